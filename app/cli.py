@@ -1,0 +1,213 @@
+"""The `rodsight` command: arguments in, a stage called, an exit status out. No logic lives here.
+
+Exit status: 0 done, 1 failed, 2 bad input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from app import __version__
+from app.errors import InputError
+
+ExperimentPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT")]
+Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the results; default runs/<name>")]
+Settings = Annotated[
+    tuple[str, ...],
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(name="set", metavar="KEY=VALUE", help="lay a setting over experiment.toml, e.g. solver.kappa=0.1"),
+]
+Frames = Annotated[str | None, tyro.conf.arg(metavar="A:B", help="only the frames A … B − 1")]
+Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]
+Sweeps = Annotated[
+    Literal["all", "log", "none"] | None, tyro.conf.arg(help="whose forces the recording holds; default log")
+]
+
+
+def run(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    view: Literal["none", "native", "web"] = "none",
+    sweeps: Sweeps = None,
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Photographs to contact forces and a recording: the main job.
+
+    Example: rodsight run sample_data/shear --view web
+    """
+    from app import commands
+
+    return commands.run_all(_request(experiment, out, frames, settings, sweeps, quiet), view)
+
+
+def check(experiment: ExperimentPath, /, settings: Settings = (), quiet: Quiet = False) -> int:
+    """Validate an experiment without computing.
+
+    Example: rodsight check sample_data/shear
+    """
+    from app import commands
+
+    return commands.check(_request(experiment, None, None, settings, None, quiet))
+
+
+def track(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Follow the grains through the photographs, no more.
+
+    Example: rodsight track sample_data/shear
+    """
+    from app import commands
+
+    return commands.track(_request(experiment, out, frames, settings, None, quiet))
+
+
+def solve(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    sweeps: Sweeps = None,
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Find contacts and forces, tracking first where that has not been done.
+
+    Example: rodsight solve sample_data/shear --set contacts.threshold_sigmas=5
+    """
+    from app import commands
+
+    return commands.solve(_request(experiment, out, frames, settings, sweeps, quiet))
+
+
+def record(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    sweeps: Sweeps = None,
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Write the recording, solving first where that has not been done.
+
+    Example: rodsight record sample_data/shear --sweeps all
+    """
+    from app import commands
+
+    return commands.record(_request(experiment, out, frames, settings, sweeps, quiet))
+
+
+def view(
+    recording: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING_OR_DIR")],
+    /,
+    web: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="in a browser")] = False,
+) -> int:
+    """Open a recording with its blueprint.
+
+    Example: rodsight view runs/shear --web
+    """
+    from app import commands
+
+    return commands.view(recording, web=web)
+
+
+def score(
+    results: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS")],
+    /,
+    truth: Annotated[
+        Path | None, tyro.conf.arg(metavar="FILE", help="table frame,i,j,fn,ft; default: the experiment's")
+    ] = None,
+    as_json: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="print JSON")] = False,
+) -> int:
+    """Compare inferred contacts and forces with true ones.
+
+    Example: rodsight score runs/shear --json
+    """
+    from app import commands
+
+    return commands.score(results, truth, as_json=as_json)
+
+
+def synth(
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT", help="folder to make")],
+    /,
+    preset: Literal["small", "paper"] = "small",
+    seed: int = 0,
+    photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
+    noise: Annotated[float, tyro.conf.arg(help="of a tracked position [m], with --no-photographs")] = 0.0,
+    depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
+    jpeg_quality: Annotated[int | None, tyro.conf.arg(help="write JPEG of this quality instead of PNG")] = None,
+    grains: Annotated[int | None, tyro.conf.arg(help="number of rods")] = None,
+    frame_count: Annotated[int | None, tyro.conf.arg(name="frames", help="number of photographs")] = None,
+    step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs")] = None,
+    pixel_size: Annotated[float | None, tyro.conf.arg(help="[m]")] = None,
+    reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="turn back half way")] = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make a synthetic experiment with its truth: explicit DEM, walls, speckle photographs.
+
+    Example: rodsight synth my_test --preset small --seed 3
+    """
+    from app import commands
+
+    return commands.synth(
+        out, quiet=quiet, preset=preset, seed=seed, photographs=photographs, noise=noise, depth=depth,
+        jpeg_quality=jpeg_quality, grains=grains, frames=frame_count, step_degrees=step_degrees,
+        pixel_size=pixel_size, reversal=reversal,
+    )  # fmt: skip
+
+
+COMMANDS: tuple[Callable[..., int], ...] = (run, check, track, solve, record, view, score, synth)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Parse the arguments, run one command, exit."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments == ["--version"]:
+        print(f"rodsight {__version__}")
+        sys.exit(0)
+    app = tyro.extras.SubcommandApp()
+    for command in COMMANDS:
+        app.command(command)
+    try:
+        status = app.cli(prog="rodsight", description=__doc__, args=arguments)
+    except InputError as error:
+        print(f"rodsight: {error}", file=sys.stderr)
+        status = 2
+    except KeyboardInterrupt:
+        print("rodsight: interrupted; the same command goes on from here", file=sys.stderr)
+        status = 130
+    except BrokenPipeError:
+        status = 1
+    sys.exit(status)
+
+
+def _request(
+    experiment: Path,
+    out: Path | None,
+    frames: str | None,
+    settings: tuple[str, ...],
+    sweeps: str | None,
+    quiet: bool,
+):  # type: ignore[no-untyped-def]
+    from app.commands import Request
+
+    if sweeps is not None:
+        settings = (*settings, f"recording.sweeps={json.dumps(sweeps)}")
+    return Request(experiment, out, frames, settings, quiet, Console(stderr=False, quiet=quiet))

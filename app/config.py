@@ -1,0 +1,212 @@
+"""The experiment file: one frozen section per stage, every key with a default that works or a reason to be given."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from app.errors import InputError
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+
+class Photographs(Section):
+    """Where the photographs are and what a pixel is."""
+
+    files: str  # pattern, relative to the experiment
+    pixel_size: Positive  # [m]
+    interval: Positive | None = None  # [s] between photographs
+    times: str | None = None  # table frame,time
+    grains: str | None = None  # table id,x,y,radius in pixels on the first photograph
+    radii: tuple[Positive, ...] = ()  # [m] known radius classes
+
+    @model_validator(mode="after")
+    def _one_clock(self) -> Photographs:
+        if (self.interval is None) == (self.times is None):
+            raise ValueError("give either interval or times")
+        return self
+
+
+class GivenTracks(Section):
+    """Tables of grains already tracked by any tool."""
+
+    positions: str  # table frame,id,x,y,theta
+    grains: str  # table id,radius
+    times: str  # table frame,time
+    precision: Positive = 1.0e-5  # [m] standard deviation of a position component
+
+
+class Plate(Section):
+    """What is known of one wall beside its position."""
+
+    pressure: Positive | None = None  # [Pa]; absent: the measured velocity is imposed
+
+
+class WallsSection(Section):
+    file: str  # table frame,wall,x1,y1,x2,y2
+    plates: dict[str, Plate] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gather_plates(cls, data: Any) -> Any:
+        """[walls.NAME] tables stand beside `file` in the experiment file."""
+        if not isinstance(data, dict) or "plates" in data:
+            return data
+        return {
+            **{key: value for key, value in data.items() if not isinstance(value, dict)},
+            "plates": {key: value for key, value in data.items() if isinstance(value, dict)},
+        }
+
+
+class MaterialSection(Section):
+    density: Positive = 2700.0  # [kg/m³]
+    length: Positive = 0.06  # [m] of the rods
+    friction: NotNegative = 0.25
+    wall_friction: NotNegative | None = None  # absent: as friction
+    formal_weight: Annotated[float, Field(ge=0, le=0.5)] = 0.0  # η
+    gravity: tuple[Finite, Finite] = (0.0, 0.0)  # [m/s²]
+
+
+class TrackingSection(Section):
+    """Tuning of the tracker."""
+
+    workers: Annotated[int, Field(ge=1)] = 2
+
+
+class ContactsSection(Section):
+    """Tuning of contact detection."""
+
+    threshold_sigmas: Positive = 6.0  # gap threshold in standard deviations of a position
+    threshold: Finite | None = None  # [m], instead of threshold_sigmas
+
+
+class SolverSection(Section):
+    """Tuning of the force solver."""
+
+    estimator: Literal["nlgs"] = "nlgs"
+    preset: Literal["rodsight", "paper"] = "rodsight"  # paper: inertia alone, one step per interval, reset to zero
+    kappa: Positive = 0.05  # kinematic number
+    substeps: Annotated[int, Field(ge=1)] = 5
+    spin_up: Annotated[int, Field(ge=1)] = 10
+    sweeps: Annotated[int, Field(ge=1)] = 1000  # per sub-step
+    relaxation: Annotated[float, Field(gt=0, lt=2)] = 1.0
+    force_change: Positive | None = None  # the paper's ε_f as a stopping level
+    reset: Literal["never", "rearrangement"] = "never"  # go back to zero forces
+
+
+class RecordingSection(Section):
+    """Tuning of the recording."""
+
+    sweeps: Literal["all", "log", "none"] = "log"  # sweeps whose forces are kept
+
+
+class ExperimentFile(Section):
+    name: Annotated[str, Field(pattern=r"^[\w][\w .+-]*$")]
+    photographs: Photographs | None = None
+    tracks: GivenTracks | None = None
+    walls: WallsSection | None = None
+    material: MaterialSection = MaterialSection()
+    tracking: TrackingSection = TrackingSection()
+    contacts: ContactsSection = ContactsSection()
+    solver: SolverSection = SolverSection()
+    recording: RecordingSection = RecordingSection()
+    truth: str | None = None  # table frame,i,j,fn,ft
+    truth_tracks: str | None = None  # table frame,id,x,y,theta: names grains that were detected as the truth does
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ExperimentFile:
+        if (self.photographs is None) == (self.tracks is None):
+            raise ValueError("give either [photographs] or [tracks]")
+        return self
+
+
+def load_config(file: Path, settings: list[str] | tuple[str, ...] = ()) -> ExperimentFile:
+    """Read an experiment file and lay KEY=VALUE settings over it; raises InputError naming file, key and value."""
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(file, "", "there is no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(file, "", f"cannot be read ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(file, "", f"is not TOML: {error}") from None
+    for setting in settings:
+        _lay_over(data, setting)
+    try:
+        return ExperimentFile.model_validate(data)
+    except ValidationError as error:
+        raise _explain(file, error) from None
+
+
+def _lay_over(data: dict[str, Any], setting: str) -> None:
+    key, equals, text = setting.partition("=")
+    if not equals or not key.strip():
+        raise InputError("--set", setting, "is not KEY=VALUE, such as solver.kappa=0.05")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text
+    *path, last = key.strip().split(".")
+    for part in path:
+        data = data.setdefault(part, {})
+        if not isinstance(data, dict):
+            raise InputError("--set", setting, f"{part} is not a section")
+    data[last] = value
+
+
+def _explain(file: Path, error: ValidationError) -> InputError:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"] if part not in ("plates",))
+    if first["type"] == "extra_forbidden":
+        return InputError(file, f"key {key}", f"is not known (value {first['input']!r})")
+    if first["type"] == "missing":
+        return InputError(file, f"key {key}", "is missing")
+    if first["type"] == "value_error":
+        return InputError(file, f"key {key}" if key else "", str(first["ctx"]["error"]))
+    return InputError(file, f"key {key}", f"value {first['input']!r}: {first['msg']}")
+
+
+def as_toml(config: ExperimentFile) -> str:
+    """The resolved configuration, defaults included, as TOML that reads back to the same."""
+    lines: list[str] = []
+    data = config.model_dump(exclude_none=True)
+    if "walls" in data:
+        plates = data["walls"].pop("plates")
+        data["walls"].update(plates)
+    _write_section(lines, (), data)
+    return "\n".join(lines).strip() + "\n"
+
+
+def _write_section(lines: list[str], path: tuple[str, ...], data: dict[str, Any]) -> None:
+    if path:
+        lines.append(f"\n[{'.'.join(_toml_key(part) for part in path)}]")
+    for key, value in data.items():
+        if not isinstance(value, dict):
+            lines.append(f"{_toml_key(key)} = {_toml_value(value)}")
+    for key, value in data.items():
+        if isinstance(value, dict):
+            _write_section(lines, (*path, key), value)
+
+
+def _toml_key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else _toml_value(key)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    escaped = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'

@@ -1,0 +1,315 @@
+"""The stages in order: photographs → tracks → contacts and forces → statistics → recording.
+
+The only file that knows the order. Every stage leaves its result in the run's folder under the fingerprint of what
+it was made from; a stage whose result is already there is not done again, and an unfinished one goes on at the
+frame where it stopped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from app import __version__
+from app.checkpoint import Checkpoint
+from app.config import ExperimentFile, as_toml
+from app.errors import InputError
+from app.experiment import (
+    Experiment,
+    check_inside,
+    checksums,
+    make_packing,
+    read_grain_guess,
+    read_times,
+    read_tracks,
+    read_walls,
+)
+from app.progress import Progress, silent
+from app.results import Results, TruthContacts
+from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
+from app.tracking.follow import detect, follow_photographs
+from app.tracks import Tracks, WallTracks
+from app.truth import read_truth, true_names
+from app.units import Scale
+from solver.chain import ChainSettings, Packing
+from solver.frame_forces import FrameForces
+from solver.frame_statistics import FrameStatistics, frame_statistics
+from solver.motion import Snapshot
+from solver.sequence import SequenceSettings, SequenceState, solve_sequence
+
+TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
+UNFINISHED = ".unfinished"  # folder of checkpoints
+
+
+@dataclass(slots=True)
+class Timings:
+    """Seconds that each stage took; 0 where its result was already there."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def add(self, stage: str, since: float) -> None:
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - since
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One experiment and the folder its results go to."""
+
+    experiment: Experiment
+    folder: Path
+    frames: tuple[int, int | None] = (0, None)
+    progress: Progress = silent
+    timings: Timings = field(default_factory=Timings)
+
+    def file(self, name: str) -> Path:
+        return self.folder / name
+
+
+def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
+    """Read and check all input without computing. Returns given tracks, and the walls."""
+    experiment = run.experiment
+    if experiment.config.tracks is not None:
+        tracks = read_tracks(experiment)
+        walls = read_walls(experiment, tracks.frame_count)
+        if walls is not None:
+            check_inside(experiment, tracks, walls)
+        ids, count = tracks.id, tracks.frame_count
+    else:
+        photographs = experiment.photographs()
+        photographs.check()
+        tracks, count = None, len(photographs)
+        read_times(experiment, count)
+        guess = read_grain_guess(experiment)
+        walls = read_walls(experiment, count)
+        ids = guess.id if guess is not None else None
+    _frame_range(run, count)
+    if experiment.config.truth is not None and ids is not None:
+        file = experiment.folder / experiment.config.truth
+        read_truth(file, ids, walls.name if walls else (), first_frame=0, frame_count=count)
+    return tracks, walls
+
+
+def track(run: Run) -> tuple[Tracks, WallTracks | None]:
+    """The tracks of the experiment's grains: from tables, or from its photographs."""
+    experiment = run.experiment
+    if experiment.config.tracks is not None:
+        tracks, walls = check(run)
+        assert tracks is not None
+        start, stop = _frame_range(run, tracks.frame_count)
+        return tracks.frames(start, stop), walls.frames(start, stop) if walls is not None else None
+    origin = _origin(run, ("photographs", "tracking", "walls"))
+    stored = read_origin(run.file(TRACKS))
+    if stored is not None and stored.fingerprint == origin.fingerprint:
+        return load_tracks(run.file(TRACKS))
+    check(run)
+    since = time.perf_counter()
+    tracks = _track_photographs(run, origin)
+    start, stop = _frame_range(run, len(experiment.photographs()))
+    walls = read_walls(experiment, len(experiment.photographs()))
+    if walls is not None:
+        check_inside(experiment, tracks, walls.frames(0, stop))
+        walls = walls.frames(start, stop)
+    tracks = tracks.frames(start, stop)
+    save_tracks(run.file(TRACKS), experiment.name, tracks, walls, origin)
+    Checkpoint(run.folder / UNFINISHED / "tracking", origin.fingerprint).clear()
+    run.timings.add("tracking", since)
+    return tracks, walls
+
+
+def _track_photographs(run: Run, origin: Provenance) -> Tracks:
+    experiment = run.experiment
+    section = experiment.config.photographs
+    assert section is not None
+    photographs = experiment.photographs()
+    _, stop = _frame_range(run, len(photographs))
+    scale = Scale(section.pixel_size, photographs.shape[0])
+    guess = read_grain_guess(experiment)
+    run.progress("detection", 0, 1)
+    detection = detect(
+        photographs[0],
+        np.array(section.radii) / section.pixel_size,
+        None if guess is None else (guess.x, guess.y, guess.radius),
+    )
+    run.progress("detection", 1, 1)
+    if len(detection.x) == 0:
+        raise InputError(photographs.files[0], "", "no grains were found; give them with photographs.grains")
+    ids = np.arange(len(detection.x)) if guess is None else guess.id
+    return follow_photographs(
+        photographs,
+        detection,
+        ids,
+        read_times(experiment, len(photographs))[:stop],
+        scale,
+        workers=experiment.config.tracking.workers,
+        checkpoint=Checkpoint(run.folder / UNFINISHED / "tracking", origin.fingerprint),
+        progress=run.progress,
+    )
+
+
+def solve(run: Run) -> Results:
+    """Contacts, forces and statistics of every frame, stored in results.h5."""
+    experiment = run.experiment
+    if experiment.config.walls is None:
+        raise InputError(experiment.file, "key walls", "is missing: without walls grains can be tracked but not solved")
+    origin = _origin(run, ("photographs", "tracking", "tracks", "walls", "material", "contacts", "solver", "recording"))
+    stored = read_origin(run.file(RESULTS))
+    if stored is not None and stored.fingerprint == origin.fingerprint:
+        return load_results(run.file(RESULTS))
+    tracks, walls = track(run)
+    assert walls is not None
+    since = time.perf_counter()
+    packing = make_packing(experiment, tracks.radius, walls.pressure)
+    checkpoint = Checkpoint(run.folder / UNFINISHED / "solving", origin.fingerprint)
+    frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint)
+    results = Results(
+        name=experiment.name,
+        tracks=tracks,
+        walls=walls,
+        grains=packing.grains,
+        friction=packing.material.friction,
+        frames=frames,
+        statistics=statistics,
+        configuration=as_toml(experiment.config),
+    )
+    save_results(run.file(RESULTS), results, origin)
+    checkpoint.clear()
+    run.timings.add("solving", since)
+    return results
+
+
+def _solve_frames(
+    run: Run, packing: Packing, tracks: Tracks, walls: WallTracks, checkpoint: Checkpoint
+) -> tuple[list[FrameForces], list[FrameStatistics]]:
+    snapshots = make_snapshots(tracks, walls)
+    frames: list[FrameForces] = []
+    statistics: list[FrameStatistics] = []
+    state: SequenceState | None = None
+    for k in range(min(checkpoint.finished(), len(snapshots))):
+        forces, kept, state = checkpoint.load(k, FrameForces, FrameStatistics, SequenceState)
+        frames.append(forces)
+        statistics.append(kept)
+    settings = sequence_settings(run.experiment.config)
+    done = len(frames)
+    run.progress("solving", done, len(snapshots))
+    for forces, state in solve_sequence(packing, snapshots, settings, state=state, first=done):
+        snapshot = snapshots[forces.frame]
+        summary = frame_statistics(
+            forces.contacts, forces.fn, forces.ft, forces.state,
+            snapshot.position, snapshot.present, packing.walls(snapshot.endpoints), packing.length,
+        )  # fmt: skip
+        checkpoint.save(forces.frame, forces, summary, state)
+        frames.append(forces)
+        statistics.append(summary)
+        run.progress("solving", len(frames), len(snapshots))
+    return frames, statistics
+
+
+def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
+    """What the solver reads of tracks and walls."""
+    present, sigma = tracks.present, tracks.position_sigma
+    return [
+        Snapshot(
+            float(tracks.time[k]), tracks.position[k], tracks.rotation[k], present[k], walls.endpoints[k],
+            float(sigma[k]),
+        )
+        for k in range(tracks.frame_count)
+    ]  # fmt: skip
+
+
+def sequence_settings(config: ExperimentFile) -> SequenceSettings:
+    """The solver's settings from the experiment file."""
+    solver, contacts = config.solver, config.contacts
+    paper = solver.preset == "paper"
+    chain = ChainSettings(
+        kappa=None if paper else solver.kappa,
+        substeps=1 if paper else solver.substeps,
+        spin_up=1 if paper else solver.spin_up,
+        sweeps=solver.sweeps * (solver.substeps if paper else 1),
+        relaxation=solver.relaxation,
+        force_change=solver.force_change,
+        keep=config.recording.sweeps,
+    )
+    return SequenceSettings(
+        chain=chain,
+        threshold_sigmas=contacts.threshold_sigmas,
+        threshold=contacts.threshold,
+        reset_to_zero=paper or solver.reset == "rearrangement",
+    )
+
+
+def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
+    """Write the recording of finished results, the truth beside them where there is one."""
+    from app.recording.recorder import record as write_recording
+
+    since = time.perf_counter()
+    section = run.experiment.config.photographs
+    photograph = scale = None
+    if section is not None:
+        photographs = run.experiment.photographs()
+        scale = Scale(section.pixel_size, photographs.shape[0])
+        first = run.frames[0]
+
+        def photograph(frame: int) -> np.ndarray:
+            return np.clip(np.rint(photographs[first + frame]), 0, 255).astype(np.uint8)
+
+    file = run.file(RECORDING)
+    write_recording(
+        results,
+        file,
+        photograph=photograph,
+        scale=scale,
+        sweeps=run.experiment.config.recording.sweeps,
+        truth=truth,
+        progress=lambda done, total: run.progress("recording", done, total),
+    )
+    run.timings.add("recording", since)
+    return file
+
+
+def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthContacts | None:
+    """The truth on the rows and frames of the results; None if the experiment names none.
+
+    file replaces the experiment's own. Grains that were detected have numbers of their own, so that
+    `truth_tracks` must tell which is which.
+    """
+    config, folder = run.experiment.config, run.experiment.folder
+    if file is None and config.truth is None:
+        return None
+    first = run.frames[0]
+    ids = results.tracks.id
+    if config.truth_tracks is not None:
+        ids = true_names(folder / config.truth_tracks, results.tracks, first)
+    elif config.photographs is not None and config.photographs.grains is None:
+        raise InputError(
+            run.experiment.file,
+            "key truth",
+            "names grains by ids, but these grains were detected: give truth_tracks or photographs.grains",
+        )
+    return read_truth(
+        file if file is not None else folder / str(config.truth),
+        ids,
+        results.walls.name,
+        first_frame=first,
+        frame_count=len(results.frames),
+    )
+
+
+def _frame_range(run: Run, count: int) -> tuple[int, int]:
+    start, stop = run.frames
+    stop = count if stop is None else stop
+    if not 0 <= start < stop <= count:
+        raise InputError("--frames", f"{start}:{stop}", f"is not a range of the frames 0:{count}")
+    return start, stop
+
+
+def _origin(run: Run, sections: tuple[str, ...]) -> Provenance:
+    config = run.experiment.config.model_dump(mode="json", include=set(sections))
+    sums = checksums(run.experiment)
+    told = json.dumps([__version__, config, sums, run.frames], sort_keys=True)
+    digest = hashlib.sha256(told.encode()).hexdigest()
+    return Provenance(digest, str(run.experiment.file.resolve()), run.frames, sums)

@@ -1,0 +1,253 @@
+"""The written schema of a recording: every timeline, every entity, every component, in one place.
+
+Two timelines. `frame` counts photographs from 0. `sweep` counts Gauss-Seidel sweeps over the whole run:
+frame k occupies the values first_sweep[k] … first_sweep[k+1] − 1, one value per sweep (one value where a
+frame was not swept at all). Rows that belong to a frame carry both timelines; on `frame` the last row of
+a frame wins, so `frame` shows the reported forces while `sweep` shows the solve on its way to them.
+
+The first row of a frame carries the geometry, the later ones only widths and colours; the row of its last
+sweep always shows the reported field. Values to be clicked (`fn`, `ft`, …) are those of the reported field.
+
+Lengths in the 2D views are pixels of the photograph as recorded (y down; a photograph above 4 megapixels
+is recorded at half size), or nominal pixels of 1/30 mean radius without photographs. The 3D view is in metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+APPLICATION_ID = "rodsight"
+
+FRAME = "frame"
+SWEEP = "sweep"
+
+PHOTOGRAPH = "/photograph"
+WALLS = "/walls"
+GRAINS = "/grains"
+GRAIN_SPINS = "/grains/spin"
+GRAINS_LOST = "/grains/lost"
+FORCES = "/contacts/force"
+SLIDING = "/contacts/sliding"
+GAPS = "/contacts/gap"
+GAINED = "/contacts/gained"
+PARTED = "/contacts/parted"
+FORCE_LEGEND = "/legend/force"
+FORCE_LEGEND_TICKS = "/legend/force/ticks"
+GAP_LEGEND = "/legend/gap"
+GAP_LEGEND_TICKS = "/legend/gap/ticks"
+
+SWEEP_FORCE_CHANGE = "/solve/force_change"
+SWEEP_NATURAL_MAP = "/solve/natural_map"
+SWEEP_UNBALANCE = "/solve/unbalance"
+TOLERANCE = "/solve/tolerance"
+
+STATUS_LANE = "/frames/status"
+TRACKING_LANE = "/frames/tracking"
+TRUST = "/frames/trust"
+SIMILARITY = "/frames/similarity"
+CORRECTION = "/frames/correction"
+OLD_UNBALANCE = "/frames/old_unbalance"
+FRAMES_SINCE_RESET = "/frames/frames_since_reset"
+SWEEP_COUNT = "/frames/sweeps"
+FINAL_NATURAL_MAP = "/frames/natural_map"
+FINAL_UNBALANCE = "/frames/unbalance"
+GAINED_COUNT = "/frames/contacts_gained"
+PARTED_COUNT = "/frames/contacts_parted"
+FLAGS = "/flags"
+
+FRICTION_ANGLE = "/statistics/friction_angle"
+WALL_RATIO_ANGLE = "/statistics/wall_ratio_angle"
+PRINCIPAL_DIRECTION = "/statistics/principal_direction"
+PRESSURE = "/statistics/pressure"
+COORDINATION_NUMBER = "/statistics/coordination_number"
+COORDINATION_NUMBER_WITHOUT_RATTLERS = "/statistics/coordination_number_without_rattlers"
+RATTLER_COUNT = "/statistics/rattler_count"
+CONTACT_COUNT = "/statistics/contact_count"
+SLIDING_FRACTION = "/statistics/sliding_fraction"
+MEAN_FN = "/statistics/mean_fn"
+MAX_FN = "/statistics/max_fn"
+FABRIC_ANISOTROPY = "/statistics/fabric_anisotropy"
+FORCE_DENSITY = "/statistics/force_density/frame"
+FORCE_DENSITY_POOLED = "/statistics/force_density/pooled"
+FORCE_DENSITY_AXES = "/statistics/force_density/axes"
+FORCE_DENSITY_TICKS = "/statistics/force_density/axes/ticks"
+STRESS_CROSS = "/statistics/stress/cross"
+STRESS_VALUES = "/statistics/stress/values"
+STRESS_CURVE = "/statistics/stress/curve"
+STRESS_AXES = "/statistics/stress/axes"
+ROSE = "/statistics/rose/contacts"
+ROSE_OF_FORCES = "/statistics/rose/forces"
+ROSE_AXES = "/statistics/rose/axes"
+ROSE_TICKS = "/statistics/rose/axes/ticks"
+
+RODS = "/rods/bodies"
+ROD_CHAINS = "/rods/chains"
+
+TRUTH_FORCES = "/truth/force"
+TRUTH_SCATTER = "/truth/scatter/contacts"
+TRUTH_AXES = "/truth/scatter/axes"
+TRUTH_TICKS = "/truth/scatter/axes/ticks"
+TRUTH_R_FN = "/truth/r_fn"
+TRUTH_R_FT = "/truth/r_ft"
+TRUTH_ERROR = "/truth/relative_l2"
+
+SUMMARY = "/summary"
+
+
+class When(Enum):
+    """On which rows an entity has data."""
+
+    START = "first sweep of every frame, on both timelines"
+    START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on both timelines"
+    START_AND_END = "cleared at the first sweep of every frame, set at its last, on both timelines"
+    END = "last sweep of every frame, on both timelines"
+    SWEEPS = "every sweep, on `sweep` only"
+    FOUND = "when there is something to say, on both timelines"
+    STATIC = "once, without a time"
+
+    @property
+    def timelines(self) -> frozenset[str]:
+        if self is When.STATIC:
+            return frozenset()
+        return frozenset({SWEEP}) if self is When.SWEEPS else frozenset({FRAME, SWEEP})
+
+
+class Condition(Enum):
+    """Which recordings have an entity."""
+
+    ALWAYS = "always"
+    PHOTOGRAPHS = "with photographs"
+    SWEPT = "where frames were swept"
+    TOLERANCE = "where a stopping level was given"
+    TRUTH = "with a truth"
+    FLAGS = "where something was flagged"
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """One entity of the recording."""
+
+    path: str
+    meaning: str
+    components: frozenset[str]
+    when: When
+    condition: Condition = Condition.ALWAYS
+
+
+def _of(archetype: str, *names: str) -> frozenset[str]:
+    return frozenset(f"{archetype}:{name}" for name in names)
+
+
+_STRIPS = _of("LineStrips2D", "strips", "radii", "colors", "draw_order")
+_POINTS = _of("Points2D", "positions", "radii", "colors", "draw_order")
+_TICKS = _of("Points2D", "positions", "radii", "colors", "labels", "show_labels")
+_SCALAR = _of("Scalars", "scalars")
+_LINE = _of("SeriesLines", "colors", "names", "widths")
+_LANE = _of("StateChange", "state") | _of("StateConfiguration", "values", "labels", "colors")
+_FORCE_VALUES = frozenset({"i", "j", "grain_a", "body_b", "fn", "ft"})
+_CONTACT_VALUES = _FORCE_VALUES | {"gap_um", "fn_sd", "mobilisation", "state", "age", "probability"}
+_GRAIN_VALUES = frozenset({"id", "x_mm", "y_mm", "theta_deg", "sigma_um", "zncc", "status", "unbalance"})
+
+
+def _scalar(path: str, meaning: str, when: When = When.END, condition: Condition = Condition.ALWAYS) -> Entity:
+    return Entity(path, meaning, _SCALAR | _LINE, when, condition)
+
+
+SCHEMA: tuple[Entity, ...] = (
+    Entity(
+        PHOTOGRAPH, "the photograph, JPEG, shown dimmed",
+        _of("EncodedImage", "blob", "media_type", "opacity", "draw_order"), When.START, Condition.PHOTOGRAPHS,
+    ),
+    Entity(WALLS, "walls, one strip each; loaded plates brighter", _STRIPS | {"name", "pressure_kPa"}, When.START),
+    Entity(
+        GRAINS, "outline of every grain, instance = row; lost ones where they were last seen",
+        _of("Ellipses2D", "centers", "half_sizes", "line_radii", "colors", "draw_order") | _GRAIN_VALUES, When.START,
+    ),
+    Entity(GRAIN_SPINS, "mark at the rim that was at the top in frame 0", _STRIPS, When.START),
+    Entity(GRAINS_LOST, "cross over every grain without a pose", _STRIPS, When.START),
+    Entity(
+        FORCES, "contacts, centre to centre (wall: centre to contact point); width and colour grow with f_n",
+        _STRIPS | _CONTACT_VALUES, When.START_AND_SWEEPS,
+    ),
+    Entity(SLIDING, "contacts at the Coulomb limit", _POINTS, When.START_AND_END),
+    Entity(GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
+    Entity(GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
+    Entity(PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),
+    Entity(FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
+    Entity(FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
+    Entity(GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
+    Entity(GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
+    _scalar(SWEEP_FORCE_CHANGE, "log10 of the greatest |Δf|/|f|", When.SWEEPS, Condition.SWEPT),
+    _scalar(SWEEP_NATURAL_MAP, "log10 of the natural-map residual", When.SWEEPS, Condition.SWEPT),
+    _scalar(SWEEP_UNBALANCE, "log10 of the worst grain unbalance over the mean f_n", When.SWEEPS, Condition.SWEPT),
+    _scalar(TOLERANCE, "log10 of the stopping level", When.START, Condition.TOLERANCE),
+    Entity(STATUS_LANE, "status of the frame", _LANE, When.START),
+    Entity(TRACKING_LANE, "whether every grain has a pose", _LANE, When.START),
+    _scalar(TRUST, "estimated correlation with the true forces, given these inputs"),
+    _scalar(SIMILARITY, "correlation of f_n with the frame before, common contacts"),
+    _scalar(CORRECTION, "ε, how much the forces must correct the measured motion"),
+    _scalar(OLD_UNBALANCE, "ū, unbalance of the former forces on this network"),
+    _scalar(FRAMES_SINCE_RESET, "frames since the last reset"),
+    _scalar(SWEEP_COUNT, "sweeps of the frame"),
+    _scalar(FINAL_NATURAL_MAP, "log10 of the natural-map residual reached"),
+    _scalar(FINAL_UNBALANCE, "log10 of the worst grain unbalance of the reported field"),
+    _scalar(GAINED_COUNT, "contacts gained since the frame before"),
+    _scalar(PARTED_COUNT, "contacts lost since the frame before"),
+    Entity(
+        FLAGS, "what a user must know about a frame", _of("TextLog", "text", "level"), When.FOUND, Condition.FLAGS,
+    ),
+    _scalar(FRICTION_ANGLE, "asin((σ₁−σ₂)/(σ₁+σ₂)) [°]"),
+    _scalar(WALL_RATIO_ANGLE, "atan(T/N) on the loaded plate [°]"),
+    _scalar(PRINCIPAL_DIRECTION, "direction of σ₁ [°], counter-clockwise from x"),
+    _scalar(PRESSURE, "half the trace of the stress [kPa]"),
+    _scalar(COORDINATION_NUMBER, "contacts with force per grain"),
+    _scalar(COORDINATION_NUMBER_WITHOUT_RATTLERS, "the same, rattlers left out"),
+    _scalar(RATTLER_COUNT, "grains without load"),
+    _scalar(CONTACT_COUNT, "contacts with force"),
+    _scalar(SLIDING_FRACTION, "share of them at the Coulomb limit"),
+    _scalar(MEAN_FN, "mean f_n [N]"),
+    _scalar(MAX_FN, "greatest f_n [N]"),
+    _scalar(FABRIC_ANISOTROPY, "2 (F₁ − F₂) of the fabric tensor"),
+    Entity(FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
+    Entity(FORCE_DENSITY_POOLED, "the same, all frames so far", _STRIPS, When.END),
+    Entity(FORCE_DENSITY_AXES, "axes", _STRIPS, When.STATIC),
+    Entity(FORCE_DENSITY_TICKS, "their values", _TICKS, When.STATIC),
+    Entity(STRESS_CROSS, "principal stresses, length over the pressure", _STRIPS, When.END),
+    Entity(STRESS_VALUES, "their values [kPa]", _TICKS, When.END),
+    Entity(STRESS_CURVE, "normal stress over the pressure in every direction", _STRIPS, When.END),
+    Entity(STRESS_AXES, "circle of the pressure, axes", _STRIPS, When.STATIC),
+    Entity(ROSE, "directions of contacts with force, relative number", _STRIPS, When.END),
+    Entity(ROSE_OF_FORCES, "the same, weighted by f_n", _STRIPS, When.END),
+    Entity(ROSE_AXES, "circle of an isotropic packing, axes", _STRIPS, When.STATIC),
+    Entity(ROSE_TICKS, "names of the curves", _TICKS, When.STATIC),
+    Entity(
+        RODS, "rods as cylinders [m]",
+        _of("Cylinders3D", "lengths", "radii", "colors", "fill_mode") | _of("InstancePoses3D", "translations"),
+        When.END,
+    ),
+    Entity(
+        ROD_CHAINS, "forces above the mean as capsules before the rods [m]",
+        _of("Capsules3D", "lengths", "radii", "colors", "fill_mode")
+        | _of("InstancePoses3D", "translations", "quaternions"),
+        When.END,
+    ),
+    Entity(TRUTH_FORCES, "true contact forces, same widths and colours", _STRIPS | _FORCE_VALUES, When.START,
+           Condition.TRUTH),
+    Entity(TRUTH_SCATTER, "inferred over true f_n", _POINTS, When.END, Condition.TRUTH),
+    Entity(TRUTH_AXES, "axes and the line of equality", _STRIPS, When.STATIC, Condition.TRUTH),
+    Entity(TRUTH_TICKS, "their values [N]", _TICKS, When.STATIC, Condition.TRUTH),
+    _scalar(TRUTH_R_FN, "correlation of f_n with the truth", When.END, Condition.TRUTH),
+    _scalar(TRUTH_R_FT, "correlation of f_t with the truth", When.END, Condition.TRUTH),
+    _scalar(TRUTH_ERROR, "relative L2 error of f_n", When.END, Condition.TRUTH),
+    Entity(SUMMARY, "settings, trust, legend", _of("TextDocument", "text", "media_type"), When.STATIC),
+)  # fmt: skip
+
+
+def describe_schema() -> str:
+    """The schema as a Markdown table."""
+    rows = [
+        f"| `{e.path}` | {e.meaning} | {', '.join(sorted(e.components))} | {e.when.value} | {e.condition.value} |"
+        for e in SCHEMA
+    ]
+    return "\n".join(["| entity | meaning | components | when | where |", "|---|---|---|---|---|", *rows])

@@ -1,0 +1,75 @@
+"""Writes the legends that stand below the packing: forces by width and colour, gaps by colour."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from app.recording import entities
+from app.recording.canvas import Canvas
+from app.recording.changes import gap_colours, gap_range
+from app.recording.plots import log_texts
+from app.recording.scene import Scene
+from solver.grains import Array
+
+PIECES = 48
+
+
+def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
+    """Log both legends, static."""
+    _log_force_legend(stream, scene)
+    _log_gap_legend(stream, scene)
+
+
+def _log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
+    """A wedge from no force to the top of the range, with the mean marked."""
+    style, top = scene.style, scene.style.range.top
+    fn = np.linspace(0.0, top, PIECES + 1)[1:]
+    stream.log(
+        entities.FORCE_LEGEND,
+        rr.LineStrips2D(_pieces(scene.canvas), radii=style.radii(fn), colors=style.colours(fn), draw_order=50.0),
+        static=True,
+    )
+    mean = style.range.mean
+    values = [(0.0, "0"), (mean, f"mean {mean:.3g} N"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
+    values.append((top, f"≥ {top:.3g} N"))
+    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, [(value / top, text) for value, text in values])
+
+
+def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
+    reach = gap_range(scene)
+    gap = np.linspace(-reach, reach, PIECES)
+    stream.log(
+        entities.GAP_LEGEND,
+        rr.LineStrips2D(
+            _pieces(scene.canvas),
+            radii=np.float32(0.22 * scene.canvas.grain_radius),
+            colors=gap_colours(gap, reach),
+            draw_order=50.0,
+        ),
+        static=True,
+    )
+    micrometres = 1e6 * reach
+    texts = [(0.0, f"overlap {micrometres:g} µm"), (0.5, "touching"), (1.0, f"open {micrometres:g} µm")]
+    _log_ticks(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts)
+
+
+def _span(canvas: Canvas) -> tuple[float, float, float]:
+    """Left and right end and height of a legend's line [px]."""
+    middle, half = 0.5 * (canvas.left + canvas.right), 0.36 * canvas.width
+    return middle - half, middle + half, canvas.bottom + 0.18 * canvas.legend_height
+
+
+def _pieces(canvas: Canvas) -> NDArray[np.float32]:
+    """A horizontal line in PIECES (PIECES, 2, 2) [px]."""
+    left, right, y = _span(canvas)
+    x = np.linspace(left, right, PIECES + 1)
+    ends: Array = np.stack([x[:-1], x[1:]], axis=1)
+    return np.stack([ends, np.full_like(ends, y)], axis=2).astype(np.float32)
+
+
+def _log_ticks(stream: rr.RecordingStream, canvas: Canvas, path: str, texts: list[tuple[float, str]]) -> None:
+    left, right, y = _span(canvas)
+    below = y + 0.12 * canvas.legend_height
+    log_texts(stream, path, [(np.array([left + share * (right - left), below]), text) for share, text in texts])

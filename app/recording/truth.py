@@ -1,0 +1,130 @@
+"""Writes the true forces beside the inferred ones, and how well they agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+
+from app.recording import entities
+from app.recording.changes import correlate
+from app.recording.colours import SERIES, packed_one
+from app.recording.network import body_values
+from app.recording.plots import Axes
+from app.recording.scene import Clock, Scene
+from app.results import TruthContacts
+from solver.contacts import measure_contacts
+from solver.frame_forces import FrameForces
+from solver.grains import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Inferred against true forces of one frame, over all true or detected contacts; absent is 0."""
+
+    r_fn: float
+    r_ft: float
+    relative_l2: float  # of f_n
+
+
+class TruthWriter:
+    """Logs the truth of every frame."""
+
+    def __init__(self, scene: Scene, truth: TruthContacts) -> None:
+        self._scene = scene
+        self._truth = truth
+        top = 1.15 * scene.style.range.top
+        self._axes = Axes((0.0, top), (0.0, top), width=400.0, height=400.0)
+
+    def log_axes(self, stream: rr.RecordingStream) -> None:
+        """Log axes of the scatter plot and the styles of the curves."""
+        top = self._axes.x_range[1]
+        step = _round_step(top / 2.5)
+        ticks = [(step * k, f"{step * k:g}") for k in range(int(top / step) + 1)]
+        self._axes.log(
+            stream,
+            entities.TRUTH_AXES,
+            entities.TRUTH_TICKS,
+            x_ticks=ticks,
+            y_ticks=ticks,
+            notes=[(0.82 * top, 0.1 * top, "across: true f_n [N]"), (0.22 * top, 0.97 * top, "up: inferred f_n [N]")],
+            guides=[self._axes.points(np.array([0.0, top]), np.array([0.0, top]))],
+        )
+        for path, name, colour in (
+            (entities.TRUTH_R_FN, "r(f_n)", SERIES[0]),
+            (entities.TRUTH_R_FT, "r(f_t)", SERIES[1]),
+            (entities.TRUTH_ERROR, "relative L2 of f_n", SERIES[3]),
+        ):
+            stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+
+    def log(self, clock: Clock, forces: FrameForces) -> Agreement:
+        """Log one frame's truth and its agreement with the inferred forces."""
+        scene, truth = self._scene, self._truth
+        rows = np.flatnonzero(truth.frame == clock.frame)
+        rows = rows[self._drawable(clock.frame, rows)]
+        walls = scene.walls_at(clock.frame)
+        contacts = measure_contacts(
+            scene.grains, scene.tracks.position[clock.frame], walls, truth.i[rows], truth.j[rows]
+        )
+        width = scene.grains.count + scene.walls.count
+        rows = rows[np.argsort(truth.i[rows] * width + truth.j[rows], kind="stable")]  # the order of contacts
+        fn, ft = truth.fn[rows], truth.ft[rows]
+        clock.start()
+        clock.stream.log(
+            entities.TRUTH_FORCES,
+            rr.LineStrips2D(
+                scene.branches(clock.frame, contacts),
+                radii=scene.style.radii(fn),
+                colors=scene.style.colours(fn),
+                draw_order=20.0,
+            ),
+            rr.AnyValues(**body_values(scene, contacts), fn=fn, ft=ft),
+        )
+        clock.end()
+        true_fn, inferred_fn = align(contacts.key, fn, forces.contacts.key, forces.fn)
+        true_ft, inferred_ft = align(contacts.key, ft, forces.contacts.key, forces.ft)
+        reach = self._axes.x_range[1]
+        clock.stream.log(
+            entities.TRUTH_SCATTER,
+            rr.Points2D(
+                self._axes.points(np.minimum(true_fn, reach), np.minimum(inferred_fn, reach)),
+                radii=np.float32(2.5),
+                colors=packed_one((*SERIES[0][:3], 200)),
+                draw_order=20.0,
+            ),
+        )
+        agreement = Agreement(
+            correlate(true_fn, inferred_fn), correlate(true_ft, inferred_ft), relative_error(true_fn, inferred_fn)
+        )
+        clock.stream.log(entities.TRUTH_R_FN, rr.Scalars(agreement.r_fn))
+        clock.stream.log(entities.TRUTH_R_FT, rr.Scalars(agreement.r_ft))
+        clock.stream.log(entities.TRUTH_ERROR, rr.Scalars(agreement.relative_l2))
+        return agreement
+
+    def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:
+        """Which true contacts have both bodies in the frame."""
+        n, present = self._scene.grains.count, self._scene.tracks.present[frame]
+        i, j = self._truth.i[rows], self._truth.j[rows]
+        return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])
+
+
+def align(true_key: np.ndarray, true: Array, key: np.ndarray, inferred: Array) -> tuple[Array, Array]:
+    """Both forces on the union of their contacts, 0 where one side has none (u,), (u,)."""
+    union = np.union1d(true_key, key)
+    both = np.zeros((2, len(union)))
+    both[0, np.searchsorted(union, true_key)] = true
+    both[1, np.searchsorted(union, key)] = np.nan_to_num(inferred)
+    return both[0], both[1]
+
+
+def relative_error(true: Array, inferred: Array) -> float:
+    """L2 norm of the difference over that of the truth; NaN where the truth is zero."""
+    norm = np.linalg.norm(true)
+    return float(np.linalg.norm(inferred - true) / norm) if norm > 0.0 else float("nan")
+
+
+def _round_step(size: float) -> float:
+    """The next of 1, 2, 5 × 10^k below a size."""
+    decade = 10.0 ** np.floor(np.log10(size))
+    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= size))

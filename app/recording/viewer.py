@@ -1,0 +1,64 @@
+"""Opens a recording in the viewer of the installed wheel, or says how to."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from enum import StrEnum
+from pathlib import Path
+
+import rerun_cli
+
+
+class ViewerKind(StrEnum):
+    NATIVE = "native"
+    WEB = "web"
+    NONE = "none"
+
+
+def viewer_binary() -> Path:
+    """The viewer that belongs to the installed SDK: the binary itself.
+
+    The `rerun` console script only wraps it, and ending the wrapper leaves the viewer running.
+    """
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    return Path(rerun_cli.__file__).parent / name
+
+
+def view_command(path: Path | str, *, web: bool = False) -> list[str]:
+    """The command that shows a recording; with `web`, to a browser on this machine only."""
+    options = ["--web-viewer", "--bind", "127.0.0.1"] if web else []
+    return [str(viewer_binary()), *options, str(path)]
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    if sys.platform in ("darwin", "win32"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE) -> str | None:
+    """Show a recording and return at once; the viewer lives on.
+
+    Returns None where a viewer was started, else one line that says how to look at the recording.
+    Raises FileNotFoundError where there is no recording.
+    """
+    kind = ViewerKind(kind)
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"there is no recording {path}")
+    shown = shlex.quote(str(path))
+    if kind is ViewerKind.NONE:
+        return f"To look at it: rodsight view {shown}"
+    if kind is ViewerKind.NATIVE and not has_display():
+        return f"No display here. In a browser: rodsight view --web {shown}; elsewhere: rerun {shown}"
+    subprocess.Popen(
+        view_command(path, web=kind is ViewerKind.WEB),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # survives this process, and an interrupt meant for it
+    )
+    return None

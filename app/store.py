@@ -1,0 +1,279 @@
+"""results.h5: what a run found out, in one file that any HDF5 reader opens.
+
+The layout is public: README lists it. Datasets of contacts are concatenated over frames; the rows of frame k are
+offset[k] : offset[k + 1].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from app import __version__
+from app.atomic import replacing
+from app.errors import InputError
+from app.results import Results
+from app.tracks import Tracks, TrackStatus, WallTracks
+from solver.contacts import Contacts
+from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus, SweepHistory
+from solver.frame_statistics import FrameStatistics
+from solver.grains import Grains
+
+SCHEMA_VERSION = 1
+SCHEMA = "schema_version"
+
+# Scalars of a frame: dataset under frames/ and attribute of FrameForces.
+FRAME_SCALARS = (
+    "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust", "frames_since_reset",
+)  # fmt: skip
+CONTACT_COLUMNS = ("un", "ut", "state", "age", "source", "probability")
+FORCE_COLUMNS = ("fn", "ft", "nlgs_fn", "nlgs_ft", "fn_sd", "ft_sd")
+HISTORY_COLUMNS = ("force_change", "natural_map", "unbalance")
+UNITS = {
+    "grains/radius": "m", "grains/mass": "kg", "frames/time": "s", "tracks/position": "m", "tracks/rotation": "rad",
+    "tracks/sigma": "m", "walls/endpoints": "m", "walls/pressure": "Pa", "contacts/gap": "m", "contacts/point": "m",
+    "contacts/un": "m/s", "contacts/ut": "m/s", "forces/fn": "N", "forces/ft": "N", "forces/nlgs_fn": "N",
+    "forces/nlgs_ft": "N", "forces/fn_sd": "N", "forces/ft_sd": "N", "sweeps/fn": "N", "sweeps/ft": "N",
+    "statistics/stress": "Pa", "statistics/pressure": "Pa", "statistics/area": "m2",
+    "statistics/friction_angle": "rad", "statistics/wall_ratio_angle": "rad",
+    "statistics/principal_direction": "rad", "statistics/mean_fn": "N", "statistics/max_fn": "N",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where results come from; stored as attributes."""
+
+    fingerprint: str  # of the input and the settings that matter for what is stored
+    experiment: str  # path of the experiment file
+    frames: tuple[int, int | None]  # the experiment's frames that are in it: first, and end or None
+    checksums: dict[str, str]  # SHA-256 by input file
+
+
+def save_tracks(file: Path, name: str, tracks: Tracks, walls: WallTracks | None, origin: Provenance) -> None:
+    """Write tracks alone, as the tracking stage leaves them."""
+    with replacing(file) as part, h5py.File(part, "w") as store:
+        _write_origin(store, name, origin)
+        _write_tracks(store, tracks, walls)
+        store.create_dataset("grains/radius", data=tracks.radius)
+        _add_units(store)
+
+
+def load_tracks(file: Path) -> tuple[Tracks, WallTracks | None]:
+    with _open(file) as store:
+        return _read_tracks(store)
+
+
+def save_results(file: Path, results: Results, origin: Provenance) -> None:
+    """Write everything; float64 where it was computed so, recorded sweeps in float32."""
+    with replacing(file) as part, h5py.File(part, "w") as store:
+        _write_origin(store, results.name, origin)
+        store.attrs["configuration"] = results.configuration
+        store.attrs["friction"] = results.friction
+        _write_tracks(store, results.tracks, results.walls)
+        store.create_dataset("grains/radius", data=results.grains.radius)
+        store.create_dataset("grains/mass", data=results.grains.mass)
+        _write_frames(store, results)
+        _write_contacts(store, results.frames)
+        _write_sweeps(store, results.frames)
+        for each in fields(FrameStatistics):
+            values = np.array([getattr(s, each.name) for s in results.statistics])
+            store.create_dataset(f"statistics/{each.name}", data=values)
+        _add_units(store)
+
+
+def load_results(file: Path) -> Results:
+    """Read what save_results wrote; raises InputError if the file is something else."""
+    with _open(file) as store:
+        if "forces" not in store:
+            raise InputError(file, "", "holds no forces: solve the experiment first")
+        tracks, walls = _read_tracks(store)
+        assert walls is not None
+        grains = Grains(store["grains/radius"][()], store["grains/mass"][()])
+        statistics = {each.name: store[f"statistics/{each.name}"][()] for each in fields(FrameStatistics)}
+        return Results(
+            name=str(store.attrs["name"]),
+            tracks=tracks,
+            walls=walls,
+            grains=grains,
+            friction=float(store.attrs["friction"]),
+            frames=_read_frames(store, grains.count, walls.count),
+            statistics=[
+                FrameStatistics(**{key: _plain(values[k]) for key, values in statistics.items()})
+                for k in range(tracks.frame_count)
+            ],
+            configuration=str(store.attrs["configuration"]),
+        )
+
+
+def read_origin(file: Path) -> Provenance | None:
+    """Where a stored file comes from; None if there is no such file, or it is not one of ours."""
+    try:
+        with h5py.File(file, "r") as store:
+            sums = store["origin/checksums"].attrs
+            first, stop = store.attrs["frames"]
+            return Provenance(
+                str(store.attrs["fingerprint"]),
+                str(store.attrs["experiment"]),
+                (int(first), int(stop) if stop >= 0 else None),
+                {str(key): str(value) for key, value in sums.items()},
+            )
+    except (OSError, KeyError):
+        return None
+
+
+def _open(file: Path) -> h5py.File:
+    try:
+        store = h5py.File(file, "r")
+    except FileNotFoundError:
+        raise InputError(file, "", "there is no such file") from None
+    except OSError:
+        raise InputError(file, "", "is not an HDF5 file that can be read") from None
+    if store.attrs.get(SCHEMA) != SCHEMA_VERSION:
+        found = store.attrs.get(SCHEMA)
+        store.close()
+        raise InputError(file, f"{SCHEMA} {found}", f"is not the schema that this version reads ({SCHEMA_VERSION})")
+    return store
+
+
+def _write_origin(store: h5py.File, name: str, origin: Provenance) -> None:
+    store.attrs[SCHEMA] = SCHEMA_VERSION
+    store.attrs["rodsight_version"] = __version__
+    store.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
+    store.attrs["name"] = name
+    store.attrs["fingerprint"] = origin.fingerprint
+    store.attrs["experiment"] = origin.experiment
+    first, stop = origin.frames
+    store.attrs["frames"] = (first, -1 if stop is None else stop)
+    sums = store.create_group("origin/checksums").attrs
+    for file, digest in origin.checksums.items():
+        sums[file] = digest
+
+
+def _write_tracks(store: h5py.File, tracks: Tracks, walls: WallTracks | None) -> None:
+    store.create_dataset("grains/id", data=tracks.id)
+    store.create_dataset("frames/time", data=tracks.time)
+    for key in ("position", "rotation", "sigma", "zncc"):
+        _compressed(store, f"tracks/{key}", getattr(tracks, key))
+    _enumerated(store, "tracks/status", tracks.status, TrackStatus)
+    if tracks.centre_sigma is not None:
+        store.create_dataset("tracks/centre_sigma", data=tracks.centre_sigma)
+    if walls is not None:
+        store.create_dataset("walls/name", data=np.array(walls.name, dtype=object), dtype=h5py.string_dtype())
+        store.create_dataset("walls/endpoints", data=walls.endpoints)
+        store.create_dataset("walls/pressure", data=walls.pressure)
+
+
+def _read_tracks(store: h5py.File) -> tuple[Tracks, WallTracks | None]:
+    tracks = Tracks(
+        id=store["grains/id"][()],
+        radius=store["grains/radius"][()],
+        time=store["frames/time"][()],
+        **{key: store[f"tracks/{key}"][()] for key in ("position", "rotation", "sigma", "zncc", "status")},
+        centre_sigma=store["tracks/centre_sigma"][()] if "tracks/centre_sigma" in store else None,
+    )
+    if "walls" not in store:
+        return tracks, None
+    names = tuple(name.decode() for name in store["walls/name"][()])
+    return tracks, WallTracks(names, store["walls/endpoints"][()], store["walls/pressure"][()])
+
+
+def _write_frames(store: h5py.File, results: Results) -> None:
+    frames = results.frames
+    _enumerated(store, "frames/status", np.array([f.status for f in frames], np.uint8), FrameStatus)
+    reasons = np.array([f.reason for f in frames], dtype=object)
+    store.create_dataset("frames/reason", data=reasons, dtype=h5py.string_dtype())
+    for key in FRAME_SCALARS:
+        store.create_dataset(f"frames/{key}", data=np.array([getattr(f, key) for f in frames]))
+
+
+def _write_contacts(store: h5py.File, frames: Any) -> None:
+    counts = [f.contacts.count for f in frames]
+    store.create_dataset("contacts/offset", data=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64))
+    for key in ("i", "j", "gap", "normal", "point"):
+        _compressed(store, f"contacts/{key}", np.concatenate([getattr(f.contacts, key) for f in frames]))
+    for key in CONTACT_COLUMNS:
+        values = np.concatenate([getattr(f, key) for f in frames])
+        kind = {"state": ContactState, "source": ContactSource}.get(key)
+        if kind is None:
+            _compressed(store, f"contacts/{key}", values)
+        else:
+            _enumerated(store, f"contacts/{key}", values, kind)
+    for key in FORCE_COLUMNS:
+        _compressed(store, f"forces/{key}", np.concatenate([getattr(f, key) for f in frames]))
+
+
+def _write_sweeps(store: h5py.File, frames: Any) -> None:
+    histories = [f.history for f in frames]
+    store.create_dataset("sweeps/offset", data=np.concatenate([[0], np.cumsum([h.count for h in histories])]))
+    for key in HISTORY_COLUMNS:
+        _compressed(store, f"sweeps/{key}", np.concatenate([getattr(h, key) for h in histories]))
+    # Sweeps whose forces were kept: their numbers, and rows of forces laid end to end over all frames.
+    kept = np.concatenate([[0], np.cumsum([len(h.recorded) for h in histories])])
+    store.create_dataset("sweeps/recorded_offset", data=kept)
+    _compressed(store, "sweeps/recorded", np.concatenate([h.recorded for h in histories]))
+    for key in ("fn", "ft"):
+        _compressed(store, f"sweeps/{key}", np.concatenate([getattr(h, key).ravel() for h in histories]))
+
+
+def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[FrameForces]:
+    columns = {key: store[f"contacts/{key}"][()] for key in ("i", "j", "gap", "normal", "point", *CONTACT_COLUMNS)}
+    columns |= {key: store[f"forces/{key}"][()] for key in FORCE_COLUMNS}
+    scalars = {key: store[f"frames/{key}"][()] for key in FRAME_SCALARS}
+    status, reason = store["frames/status"][()], store["frames/reason"][()]
+    history = {key: store[f"sweeps/{key}"][()] for key in (*HISTORY_COLUMNS, "recorded", "fn", "ft")}
+    offset, sweep_offset = store["contacts/offset"][()], store["sweeps/offset"][()]
+    kept_offset = store["sweeps/recorded_offset"][()]
+    frames, at = [], 0
+    for k in range(len(status)):
+        rows, sweeps = slice(offset[k], offset[k + 1]), slice(sweep_offset[k], sweep_offset[k + 1])
+        recorded = history["recorded"][kept_offset[k] : kept_offset[k + 1]]
+        count = int(offset[k + 1] - offset[k])
+        block = slice(at, at + len(recorded) * count)
+        at = block.stop
+        geometry = [columns[key][rows] for key in ("i", "j", "gap", "normal", "point")]
+        frames.append(
+            FrameForces(
+                frame=k,
+                contacts=Contacts(*geometry, grain_count, wall_count),
+                **{key: columns[key][rows] for key in (*CONTACT_COLUMNS, *FORCE_COLUMNS)},
+                status=FrameStatus(status[k]),
+                reason=reason[k].decode(),
+                **{key: _plain(values[k]) for key, values in scalars.items()},
+                history=SweepHistory(
+                    **{key: history[key][sweeps] for key in HISTORY_COLUMNS},
+                    recorded=recorded,
+                    fn=history["fn"][block].reshape(len(recorded), count),
+                    ft=history["ft"][block].reshape(len(recorded), count),
+                ),
+            )
+        )
+    return frames
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if np.ndim(value) == 0 else value
+
+
+def _compressed(store: h5py.File, path: str, values: np.ndarray) -> None:
+    if values.size:
+        store.create_dataset(path, data=values, compression="gzip", compression_opts=4, shuffle=True)
+    else:
+        store.create_dataset(path, data=values)
+
+
+def _enumerated(store: h5py.File, path: str, values: np.ndarray, kind: type[IntEnum]) -> None:
+    names = {member.name.lower(): member.value for member in kind}
+    store.create_dataset(path, data=values.astype(np.uint8), dtype=h5py.enum_dtype(names, basetype=np.uint8))
+
+
+def _add_units(store: h5py.File) -> None:
+    for path, unit in UNITS.items():
+        if path in store:
+            store[path].attrs["unit"] = unit

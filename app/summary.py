@@ -1,0 +1,161 @@
+"""What a person reads at the end of a run: the same facts as JSON and as a table on the terminal."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from app.atomic import write_atomically
+from app.results import Results
+from app.tracks import TrackStatus
+from app.truth import accuracy
+from solver.agreement import Agreement
+from solver.frame_forces import FrameStatus
+
+STATUS_STYLE = {
+    FrameStatus.SETTLED: "green",
+    FrameStatus.SETTLING: "yellow",
+    FrameStatus.REARRANGING: "magenta",
+    FrameStatus.SUSPECT: "red",
+    FrameStatus.RESET: "cyan",
+    FrameStatus.FAILED: "bold red",
+}
+MOST_ROWS = 40  # frames shown in the terminal's table; more are thinned evenly
+
+
+def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: dict[str, float]) -> dict[str, Any]:
+    """Gather the summary; JSON values only."""
+    frames, tracks = results.frames, results.tracks
+    status = Counter(frame.status.name.lower() for frame in frames)
+    settled = [frame.frame for frame in frames if frame.status is FrameStatus.SETTLED]
+    lost = (tracks.status == TrackStatus.LOST) | (tracks.status == TrackStatus.OUT_OF_FRAME)
+    trust = np.array([frame.trust for frame in frames])
+    worst = max(frames, key=lambda frame: frame.unbalance)
+    summary: dict[str, Any] = {
+        "name": results.name,
+        "frame_count": len(frames),
+        "grain_count": results.grains.count,
+        "wall_count": results.walls.count,
+        "contact_count": [frame.contacts.count for frame in frames],
+        "status": [frame.status.name.lower() for frame in frames],
+        "status_count": dict(status),
+        "settled_after": settled[0] if settled else None,
+        "resets": [frame.frame for frame in frames if frame.status is FrameStatus.RESET],
+        "rearrangements": [frame.frame for frame in frames if frame.status is FrameStatus.REARRANGING],
+        "suspects": [frame.frame for frame in frames if frame.status is FrameStatus.SUSPECT],
+        "lost_grains": int(lost.any(axis=0).sum()),
+        "lost_poses": int(lost.sum()),
+        "suspect_poses": int((tracks.status == TrackStatus.SUSPECT).sum()),
+        "position_sigma": _plain(tracks.position_sigma.tolist()),
+        "worst_unbalance": worst.unbalance,
+        "worst_unbalance_frame": worst.frame,
+        "natural_map": _plain([frame.natural_map for frame in frames]),
+        "correction": _plain([frame.correction for frame in frames]),
+        "trust": _plain(trust.tolist()),
+        "friction_angle_degrees": _plain([float(np.rad2deg(s.friction_angle)) for s in results.statistics]),
+        "coordination_number": _plain([s.coordination_number for s in results.statistics]),
+        "mean_fn": _plain([s.mean_fn for s in results.statistics]),
+        "timings": {stage: round(value, 3) for stage, value in seconds.items()},
+    }
+    if agreement is not None:
+        summary["accuracy"] = accuracy(agreement)
+    return summary
+
+
+def save_summary(file: Path, summary: dict[str, Any]) -> None:
+    write_atomically(file, (json.dumps(summary, indent=1, ensure_ascii=False) + "\n").encode())
+
+
+def print_summary(console: Console, summary: dict[str, Any]) -> None:
+    """Print the frames as a table, and below it how far they may be trusted."""
+    console.print(_frame_table(summary))
+    for line in trust_lines(summary):
+        console.print(line, highlight=False)
+
+
+def trust_lines(summary: dict[str, Any]) -> list[str]:
+    """The verdict in a few sentences."""
+    count = summary["status_count"]
+    settled, total = count.get("settled", 0), summary["frame_count"]
+    after = summary["settled_after"]
+    lines = [
+        f"[bold]{summary['grain_count']} grains, {total} frames.[/] "
+        + (f"Settled from frame {after}; {settled} of {total} frames are settled." if settled else "No frame settled.")
+    ]
+    events = [
+        f"{label} at frame{'s' if len(summary[key]) > 1 else ''} {_listed(summary[key])}"
+        for key, label in (("resets", "reset"), ("rearrangements", "rearrangement"), ("suspects", "suspect"))
+        if summary[key]
+    ]
+    if events:
+        lines.append("Events: " + "; ".join(events) + ".")
+    lines.append(
+        f"Worst grain unbalance {summary['worst_unbalance']:.3f} of the mean force (frame "
+        f"{summary['worst_unbalance_frame']}); lost poses {summary['lost_poses']} of {summary['lost_grains']} grains, "
+        f"suspect poses {summary['suspect_poses']}."
+    )
+    trusted = [t for t, s in zip(summary["trust"], summary["status"], strict=True) if s == "settled" and t is not None]
+    if trusted:
+        lines.append(
+            f"Trust (expected correlation with the true forces, given these inputs): {min(trusted):.2f} to "
+            f"{max(trusted):.2f} over settled frames."
+        )
+    if "accuracy" in summary:
+        late = [value for value in summary["accuracy"]["r_fn"][5:] if value is not None]
+        late_t = [value for value in summary["accuracy"]["r_ft"][5:] if value is not None]
+        if late and late_t:
+            lines.append(
+                f"[bold]Against the truth, from frame 5 on: r(f_n) {np.mean(late):.3f} (least {min(late):.3f}), "
+                f"r(f_t) {np.mean(late_t):.3f}.[/]"
+            )
+    return lines
+
+
+def _frame_table(summary: dict[str, Any]) -> Table:
+    table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("frame", justify="right")
+    table.add_column("status")
+    for heading in ("contacts", "z", "φ [°]", "mean f_n [N]", "residual", "ε", "trust"):
+        table.add_column(heading, justify="right")
+    truth = summary.get("accuracy")
+    if truth:
+        table.add_column("r(f_n)", justify="right")
+        table.add_column("r(f_t)", justify="right")
+    total = summary["frame_count"]
+    shown = np.unique(np.linspace(0, total - 1, min(total, MOST_ROWS)).round().astype(int))
+    for k in shown:
+        status = summary["status"][k]
+        cells = [
+            str(k),
+            f"[{STATUS_STYLE[FrameStatus[status.upper()]]}]{status}[/]",
+            str(summary["contact_count"][k]),
+            _cell(summary["coordination_number"][k], ".2f"),
+            _cell(summary["friction_angle_degrees"][k], ".1f"),
+            _cell(summary["mean_fn"][k], ".3g"),
+            _cell(summary["natural_map"][k], ".0e"),
+            _cell(summary["correction"][k], ".3f"),
+            _cell(summary["trust"][k], ".2f"),
+        ]
+        if truth:
+            cells += [_cell(truth["r_fn"][k], ".3f"), _cell(truth["r_ft"][k], ".3f")]
+        table.add_row(*cells)
+    return table
+
+
+def _cell(value: float | None, form: str) -> str:
+    return "–" if value is None else format(value, form)
+
+
+def _listed(frames: list[int]) -> str:
+    return ", ".join(str(k) for k in frames[:8]) + (f" and {len(frames) - 8} more" if len(frames) > 8 else "")
+
+
+def _plain(values: list[float]) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,276 @@
+"""A synthetic experiment: a simulated shear test, written as the folder a real one would give, with its truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from app.errors import InputError
+from app.synthetic import tables
+from app.synthetic.packing import prepare_packing
+from app.synthetic.rearrangement import choose_window, measure_old_unbalance
+from app.synthetic.speckle import SpeckleSettings, render_photograph
+from app.units import Scale
+from solver.dem import DemSettings, DemTruth, shear_photographs
+from solver.grains import Array
+
+Progress = Callable[[str, int, int], None]
+
+SHEAR_RATE = 4.8e-3  # [°/s], of the real test: it dates the photographs
+STEEPEST = 30.0  # [°]
+LEAST_GRAINS = 12
+MARGIN = 0.006  # [m], of backing seen around the frame
+SIDE_SURPLUS = 0.004  # [m], that the sides stand out above the plate at its highest
+FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
+# Speckle and noise offer no repeats to find: Huffman coding alone packs them best and fastest (measured).
+PNG_OPTIONS = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """Size and course of an experiment."""
+
+    grains: int
+    frames: int  # photographs written
+    step_degrees: float  # of shear between photographs
+    pixel_size: float  # [m]
+    search_degrees: float = 0.0  # simulated range from which the photographs around the greatest event are taken
+
+
+PRESETS = {
+    "small": Preset(grains=250, frames=24, step_degrees=0.25, pixel_size=2.5e-4, search_degrees=15.0),
+    "paper": Preset(grains=1172, frames=61, step_degrees=0.25, pixel_size=2.0e-4),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Synthesis:
+    """What was written, and what is known about it."""
+
+    folder: Path
+    truth: DemTruth  # in the experiment's world coordinates
+    old_unbalance: Array  # (f,) ū between true forces of consecutive photographs, NaN at frame 0
+    rearrangement: int  # the photograph of greatest ū
+    photograph_shape: tuple[int, int] | None  # rows, columns [px]
+
+
+def synthesize(
+    out: Path,
+    *,
+    preset: str = "small",
+    seed: int = 0,
+    photographs: bool = True,
+    noise: float = 0.0,
+    depth: int = 8,
+    jpeg_quality: int | None = None,
+    grains: int | None = None,
+    frames: int | None = None,
+    step_degrees: float | None = None,
+    pixel_size: float | None = None,
+    reversal: bool = False,
+    speckle: SpeckleSettings | None = None,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Simulate a simple shear test and write it as an experiment folder; the same arguments give the same bytes.
+
+    With photographs, PNG unless a jpeg_quality (1 … 100) is given, the grains are left to be detected.
+    Without, tracks are written, with Gaussian noise of standard deviation `noise` [m] on positions and
+    noise / radius [rad] on rotations. grains, frames, step_degrees and pixel_size [m] replace the
+    preset's. reversal: the shear turns back half way. speckle: how rods are painted and photographed,
+    its pixel size and depth replaced. progress is told (stage, done, total).
+    Raises InputError for a folder that exists and is not empty and for arguments out of range, and
+    solver.dem.UnbalancedError when the simulation does not come to rest: nothing is written then.
+    """
+    out = Path(out)
+    _check_choices(preset, seed, photographs, noise, depth, jpeg_quality)
+    given = {"grains": grains, "frames": frames, "step_degrees": step_degrees, "pixel_size": pixel_size}
+    plan = _plan(PRESETS[preset], {name: value for name, value in given.items() if value is not None}, reversal)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(out, "", "exists already and is not an empty folder")
+    speckle = replace(speckle or SpeckleSettings(), pixel_size=plan.pixel_size, depth=depth)
+
+    truth = _simulate(plan, seed, reversal, progress or _silent)
+    truth = _place_in_picture(truth, MARGIN + speckle.bar_thickness)
+    old_unbalance = measure_old_unbalance(truth)
+    event = int(np.nanargmax(old_unbalance)) if truth.frame_count > 1 else 0
+
+    out.mkdir(parents=True, exist_ok=True)
+    tables.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
+    tables.write_truth_contacts(out / "truth_contacts.csv", truth)
+    tables.write_tracks(out / "truth_tracks.csv", truth.position, truth.rotation)
+    if photographs:
+        source, shape = _write_photographs(
+            out, truth, speckle, seed, plan.step_degrees, jpeg_quality, progress or _silent
+        )
+    else:
+        source, shape = _write_tracks(out, truth, noise, seed, plan.step_degrees), None
+    # Last, so that a folder that was left unfinished is not an experiment.
+    tables.write_experiment(
+        out / "experiment.toml",
+        name=out.resolve().name,
+        remark=_remark(preset, seed, truth, old_unbalance, event),
+        source=source,
+        truth=truth,
+    )
+    return Synthesis(out, truth, old_unbalance, event, shape)
+
+
+def plan_course(plan: Preset, reversal: bool) -> Array:
+    """Shear angles (f,) [rad] of the photographs to simulate."""
+    count = max(plan.frames, round(plan.search_degrees / plan.step_degrees) + 1)
+    step = np.arange(count)
+    if reversal:
+        turn = (count - 1) // 2
+        step = turn - abs(step - turn)
+    return np.deg2rad(plan.step_degrees) * step
+
+
+def _simulate(plan: Preset, seed: int, reversal: bool, progress: Progress) -> DemTruth:
+    settings = DemSettings()
+    angles = plan_course(plan, reversal)
+    progress("simulate", 0, len(angles))
+    cell = prepare_packing(plan.grains, np.random.default_rng(seed), settings)
+    frames = []
+    for frame in shear_photographs(cell, angles):
+        frames.append(frame)
+        progress("simulate", len(frames), len(angles))
+    truth = DemTruth.of_frames(cell.grains.radius, frames, settings)
+    if truth.frame_count == plan.frames:
+        return truth
+    first, _ = choose_window(measure_old_unbalance(truth), plan.frames)
+    return truth.frames(first, first + plan.frames)
+
+
+def _place_in_picture(truth: DemTruth, margin: float) -> DemTruth:
+    """Shift the world until everything is right of and above the picture's corner; cut the sides to one length."""
+    endpoints = truth.endpoints.copy()
+    right, top, left = (truth.wall_names.index(name) for name in ("right", "top", "left"))
+    reach = np.linalg.norm(endpoints[:, top, 0] - endpoints[:, right, 0], axis=1).max() + SIDE_SURPLUS
+    side = endpoints[:, right, 1] - endpoints[:, right, 0]
+    side *= reach / np.linalg.norm(side, axis=1)[:, None]
+    endpoints[:, right, 1] = endpoints[:, right, 0] + side
+    endpoints[:, left, 0] = endpoints[:, left, 1] + side
+    shift = margin - endpoints.min(axis=(0, 1, 2))
+    return replace(
+        truth,
+        endpoints=endpoints + shift,
+        position=truth.position + shift,
+        rotation=truth.rotation - truth.rotation[0],
+    )
+
+
+def _write_photographs(
+    out: Path,
+    truth: DemTruth,
+    speckle: SpeckleSettings,
+    seed: int,
+    step_degrees: float,
+    jpeg_quality: int | None,
+    progress: Progress,
+) -> tuple[str, tuple[int, int]]:
+    """Write photos/ and the true grains of the first photograph; return the [photographs] table and the shape."""
+    pixel = speckle.pixel_size
+    extent = truth.endpoints.max(axis=(0, 1, 2)) + MARGIN + speckle.bar_thickness
+    width, height = (math.ceil(float(length) / pixel) + 1 for length in extent)
+    (out / "photos").mkdir()
+    suffix, options = "png", PNG_OPTIONS
+    if jpeg_quality is not None:
+        suffix, options = "jpg", [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality]
+    progress("photograph", 0, truth.frame_count)
+    for k in range(truth.frame_count):
+        image = render_photograph(
+            speckle,
+            width=width,
+            height=height,
+            radius=truth.radius,
+            position=truth.position[k],
+            rotation=truth.rotation[k],
+            bars=truth.endpoints[k],
+            pattern_seed=seed,
+            noise_seed=int(np.random.SeedSequence([seed, k]).generate_state(1)[0]),
+        )
+        name = out / "photos" / f"{k:04d}.{suffix}"
+        if not cv2.imwrite(str(name), image, options):
+            raise OSError(f"{name}: the photograph could not be written")
+        progress("photograph", k + 1, truth.frame_count)
+    scale = Scale(pixel, height)
+    tables.write_grains_in_pixels(out / "grains.csv", scale.to_pixels(truth.position[0]), truth.radius / pixel)
+    classes = ", ".join(f"{radius:g}" for radius in np.unique(truth.radius))
+    source = f"""[photographs]
+files = "photos/*.{suffix}"
+pixel_size = {pixel:g}
+interval = {step_degrees / SHEAR_RATE:.6f}
+radii = [{classes}]
+# grains = "grains.csv"  # the true grains of the first photograph: with this line nothing is detected
+"""
+    return source, (height, width)
+
+
+def _write_tracks(out: Path, truth: DemTruth, noise: float, seed: int, step_degrees: float) -> str:
+    """Write tracks with noise, their grains and times; return the [tracks] table."""
+    rng = np.random.default_rng([seed, 1])
+    position = truth.position + noise * rng.standard_normal(truth.position.shape)
+    rotation = truth.rotation + noise / truth.radius * rng.standard_normal(truth.rotation.shape)
+    tables.write_tracks(out / "tracks.csv", position, rotation)
+    tables.write_grains(out / "grains.csv", truth.radius)
+    tables.write_times(out / "times.csv", step_degrees / SHEAR_RATE * np.arange(truth.frame_count, dtype=np.float64))
+    return f"""[tracks]
+positions = "tracks.csv"
+grains = "grains.csv"
+times = "times.csv"
+precision = {max(noise, FINEST_PRECISION)}
+"""
+
+
+def _remark(preset: str, seed: int, truth: DemTruth, old_unbalance: Array, event: int) -> str:
+    first, last = np.rad2deg(truth.shear[[0, -1]])
+    text = (
+        f"Synthetic: explicit discrete-element simulation of simple shear, preset {preset}, seed {seed},\n"
+        f"{len(truth.radius)} rods, {truth.frame_count} photographs, shear {first:.2f}° to {last:.2f}°.\n"
+        f"Worst mean unbalance of a grain in the truth: {truth.unbalance.max():.1e} of the mean force."
+    )
+    if event > 0:
+        text += (
+            f"\nGreatest rearrangement: between photographs {event - 1} and {event} (ū = {old_unbalance[event]:.3f})."
+        )
+    return text
+
+
+def _check_choices(
+    preset: str, seed: int, photographs: bool, noise: float, depth: int, jpeg_quality: int | None
+) -> None:
+    if preset not in PRESETS:
+        raise InputError("synth", f"preset = {preset!r}", f"expected one of {', '.join(PRESETS)}")
+    if seed < 0:
+        raise InputError("synth", f"seed = {seed}", "expected 0 or more")
+    if depth not in (8, 16):
+        raise InputError("synth", f"depth = {depth}", "expected 8 or 16 bits")
+    if not (math.isfinite(noise) and noise >= 0.0):
+        raise InputError("synth", f"noise = {noise}", "expected metres, 0 or more")
+    if photographs and noise > 0.0:
+        raise InputError("synth", f"noise = {noise}", "noise of positions is for tracks: photographs bring their own")
+    if jpeg_quality is not None and not (1 <= jpeg_quality <= 100 and depth == 8):
+        raise InputError("synth", f"jpeg_quality = {jpeg_quality}", "expected 1 … 100, and a depth of 8 bits")
+
+
+def _plan(preset: Preset, given: dict[str, float], reversal: bool) -> Preset:
+    for name, value in given.items():
+        if not (math.isfinite(value) and value > 0):
+            raise InputError("synth", f"{name} = {value}", "expected more than 0")
+    plan = replace(preset, **given)
+    if plan.grains < LEAST_GRAINS:
+        raise InputError("synth", f"grains = {plan.grains}", f"expected at least {LEAST_GRAINS}")
+    steepest = float(np.rad2deg(plan_course(plan, reversal).max()))
+    if steepest > STEEPEST + 1e-9:
+        given_course = f"frames = {plan.frames}, step_degrees = {plan.step_degrees}"
+        raise InputError("synth", given_course, f"shears to {steepest:g}°, expected at most {STEEPEST:g}°")
+    return plan
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    pass

@@ -1,0 +1,155 @@
+"""Find the grains of the first photograph: centre and radius to a part of a pixel.
+
+Circles that might be grains are found by the slope along rings of every radius, then each is judged by
+its own outline at full resolution: edges towards the dark between the grains, wherever there is dark.
+Contacts have no edge and are passed over. What moves all edges alike (the blur's definition of an edge,
+the mean shading of the rims) is measured over all grains and taken out where the radii are known, so that
+an outline seen only on one side does not pull the centre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from app.frames import Image
+from app.tracking.outlines import Measured, Outliner
+from app.tracking.rings import Candidates, find_circles, without_overlap
+from solver.grains import Array
+
+# Rings leave the centre uncertain by this much [px], besides the difference of two classes' radii.
+RING_UNCERTAINTY = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class DetectionSettings:
+    """What is known of the grains. Lengths in pixels."""
+
+    radii: tuple[float, ...] = ()  # [px] the radius classes; empty: unknown
+    radius_range: tuple[float, float] = (8.0, 60.0)  # [px] searched when the classes are unknown
+    score_least: float = 0.15  # slope along a ring, as a share of a full edge, of a circle worth a look
+    quality_least: float = 0.3  # share of a grain's outline that must be seen as an edge in its place
+
+    def __post_init__(self) -> None:
+        if any(not radius > 3.0 for radius in self.radii):
+            raise ValueError(f"radii must exceed 3 px, not {self.radii}")
+        if not 3.0 < self.radius_range[0] < self.radius_range[1]:
+            raise ValueError(f"radius_range must ascend and exceed 3 px, not {self.radius_range}")
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """n grains of one photograph, from top to bottom."""
+
+    x: Array  # (n,) [px] column
+    y: Array  # (n,) [px] row, down
+    radius: Array  # (n,) [px]; a class, where classes are known
+    sigma: Array  # (n,) [px] standard deviation of a component of the centre
+    quality: Array  # (n,) share of the outline in view that is seen as an edge, 0 … 1
+
+    @property
+    def count(self) -> int:
+        return len(self.x)
+
+
+def detect_grains(image: Image, settings: DetectionSettings | None = None) -> Detection:
+    """Find the grains of a photograph (H, W)."""
+    settings = settings if settings is not None else DetectionSettings()
+    known = bool(settings.radii)
+    radii = np.array(sorted(set(settings.radii))) if known else _scan(settings.radius_range)
+    rough = find_circles(image, radii, score_least=settings.score_least)
+    outliner = Outliner(image, float(radii.max()))
+    table = np.empty((0, 4))
+    left = np.arange(len(rough.x))
+    while len(left):
+        # What has struck out a true circle and then proved none itself makes room for another pass.
+        chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
+        judged = _best_alternatives(outliner, rough, chosen, known)
+        good = judged[:, 3] > settings.quality_least
+        table = np.concatenate([table, judged[good]])
+        left = np.setdiff1d(left, chosen, assume_unique=True)
+        left = left[_apart(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
+    # A longer outline is the more significant at the same share.
+    table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
+    table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
+    found = refine_grains(image, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
+    order = np.lexsort((found.x, found.y))
+    return Detection(found.x[order], found.y[order], found.radius[order], found.sigma[order], found.quality[order])
+
+
+def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radius: bool = True) -> Detection:
+    """Refine rough positions x, y (n,) [px], good to two pixels, of grains of radius (n,) [px].
+
+    fixed_radius: the radii are true; else they are estimated too. Grains keep their order. A grain whose
+    outline is not seen stays where it was, with quality 0 and sigma NaN.
+    """
+    x, y, radius = (np.asarray(value, dtype=np.float64) for value in (x, y, radius))
+    if len(x) == 0:
+        return Detection(x, y, radius, np.empty(0), np.empty(0))
+    outliner = Outliner(image, float(radius.max()))
+    first = _each(len(x), lambda k: outliner.measure(x[k], y[k], radius[k], 2.0, 0.0, np.inf))
+    width = outliner.estimate_blur(first)
+    free = _each(len(x), lambda k: outliner.measure_closely(*first[k].circle, width, 0.0, np.inf))
+    if not fixed_radius:
+        return _detection(free, np.array([one.radius for one in free]))
+    excess = np.array([one.radius for one in free]) - radius
+    shift = float(np.median(excess))
+    # The rims' shading differs from grain to grain: their radii scatter about the common shift.
+    scatter = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
+    tied = _each(
+        len(x), lambda k: outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter)
+    )
+    return _detection(tied, radius)
+
+
+def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: Array, known: bool) -> Array:
+    """x, y, radius, quality (c, 4) of every chosen circle, or of the better one of another radius around it."""
+    tree = cKDTree(np.stack([rough.x, rough.y], axis=1))
+    widest = float(rough.radius.max() - rough.radius.min()) if len(rough.radius) else 0.0
+    rows = []
+    for k in chosen:
+        near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + RING_UNCERTAINTY)))
+        distance = np.hypot(rough.x[near] - rough.x[k], rough.y[near] - rough.y[k])
+        near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + RING_UNCERTAINTY]
+        # They are in the order of their score: the first of every radius is its best.
+        _, first = np.unique(rough.radius[near], return_index=True)
+        best, best_value = None, -1.0
+        for m in near[np.sort(first)] if known else [k]:
+            one = outliner.measure(rough.x[m], rough.y[m], rough.radius[m], 3.0, 0.0, 0.3 if known else np.inf)
+            value = one.quality * np.sqrt(one.radius)
+            if value > best_value:
+                best, best_value = (one.x, one.y, rough.radius[m] if known else one.radius, one.quality), value
+        if best is not None:
+            rows.append(best)
+    return np.array(rows).reshape(-1, 4)
+
+
+def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -> NDArray[np.bool_]:
+    """Which circles do not overlap what has been found, x, y, radius, … (c, 4), by more than the share allowed."""
+    if len(found) == 0 or len(x) == 0:
+        return np.ones(len(x), dtype=np.bool_)
+    count = min(8, len(found))
+    distance, index = cKDTree(found[:, :2]).query(np.stack([x, y], axis=1), k=count)
+    distance, other = distance.reshape(len(x), count), found[index.reshape(len(x), count), 2]
+    limit = radius[:, None] + other - allowed * np.minimum(radius[:, None], other)
+    return (distance >= limit).all(axis=1)
+
+
+def _each(count: int, one: Callable[[int], Measured]) -> list[Measured]:
+    return [one(k) for k in range(count)]
+
+
+def _detection(measured: list[Measured], radius: Array) -> Detection:
+    def column(name: str) -> Array:
+        return np.array([getattr(one, name) for one in measured], dtype=np.float64)
+
+    return Detection(column("x"), column("y"), radius, column("sigma"), column("quality"))
+
+
+def _scan(limits: tuple[float, float]) -> Array:
+    steps = int(np.ceil(np.log(limits[1] / limits[0]) / np.log(1.06)))
+    return np.geomspace(limits[0], limits[1], steps + 1)

@@ -1,0 +1,141 @@
+"""A grain's outline to a part of a pixel, and the circle through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from app.frames import Image
+from app.tracking.correlation_kernels import _interpolate
+from solver.grains import Array
+
+# Samples along a radius [1/px].
+DENSITY = 4
+
+# Points of the outline, one per pixel, that one dot of paint may spoil together.
+POINTS_OF_A_STRETCH = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """Edge points of one grain."""
+
+    angle: Array  # (p,) [rad] from the rough centre
+    distance: Array  # (p,) [px] of the edge from the rough centre, NaN where there is none
+    strength: Array  # (p,) [grey/px] slope of the edge
+    beyond: Array  # (p,) [grey] two pixels outside the edge
+    in_view: Array  # (p,) whether the photograph reaches there
+    rays: Image  # (p, s) [grey] the rays themselves, at distances first + k / DENSITY
+    first: float  # [px]
+
+
+@njit(cache=True, nogil=True)
+def sample_rays(coefficients, cx, cy, angles, first, step, out):
+    """Grey values along rays: out (p, s) at distances first + step · k; NaN outside the photograph."""
+    height, width = coefficients.shape
+    for p in range(len(angles)):
+        cos, sin = np.cos(angles[p]), np.sin(angles[p])
+        for k in range(out.shape[1]):
+            r = first + step * k
+            x, y = cx + r * cos, cy + r * sin
+            if not (x >= 1.0 and y >= 1.0 and x < width - 2 and y < height - 2):
+                out[p, k] = np.nan
+                continue
+            ix, iy = int(x), int(y)
+            out[p, k] = _interpolate(coefficients, ix, iy, np.float32(x - ix), np.float32(y - iy))
+
+
+def trace_outline(coefficients: Image, x: float, y: float, radius: float, window: float) -> Outline:
+    """Look along every ray for the steepest descent outwards within `window` [px] of the radius [px]."""
+    angle = np.arange(0.0, 2.0 * np.pi, 1.0 / radius)
+    margin = 3.0
+    first = radius - window - margin
+    count = int(np.ceil(2.0 * (window + margin) * DENSITY)) + 1
+    ray = np.empty((len(angle), count), np.float32)
+    sample_rays(coefficients, x, y, angle, first, 1.0 / DENSITY, ray)
+    # A second difference over half a pixel to each side: the slope, smoothed by less than the lens's blur.
+    half = DENSITY // 2
+    slope = (ray[:, :-2 * half] - ray[:, 2 * half :]) * (DENSITY / (2.0 * half))
+    where = first + (np.arange(slope.shape[1]) + half) / DENSITY
+    allowed = np.abs(where - radius) <= window
+    in_view = np.isfinite(ray).all(axis=1)
+    masked = np.where(allowed[None, :] & np.isfinite(slope), slope, -np.inf)
+    top = np.argmax(masked, axis=1)
+    rows = np.arange(len(angle))
+    top = np.clip(top, 1, slope.shape[1] - 2)
+    before, at, after = slope[rows, top - 1], slope[rows, top], slope[rows, top + 1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shift = 0.5 * (before - after) / (before - 2.0 * at + after)
+    # A maximum at the window's end is not one.
+    peaked = in_view & (at >= before) & (at >= after) & (np.abs(shift) <= 1.0) & (at > 0.0)
+    distance = np.where(peaked, where[top] + shift / DENSITY, np.nan)
+    outside = np.clip(top + half + int(2.0 * DENSITY), 0, count - 1)
+    return Outline(angle, distance, np.where(peaked, at, 0.0), ray[rows, outside], in_view, ray, first)
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle through edge points."""
+
+    x: float  # [px]
+    y: float  # [px]
+    radius: float  # [px]
+    sigma: float  # [px] standard deviation of a component of the centre
+    residual: Array  # (p,) [px] of every point, positive outside the circle
+
+
+def fit_circle(
+    x: float,
+    y: float,
+    radius: float,
+    angle: Array,
+    distance: Array,
+    weight: Array,
+    *,
+    radius_scatter: float,
+    scale_least: float,
+) -> Circle:
+    """Tukey-weighted circle through points at angle (p,) [rad], distance (p,) [px] from (x, y).
+
+    radius_scatter [px]: standard deviation of the true radius about the given one, infinite where it is
+    unknown. scale_least [px]: residuals below it are never outliers. The centre's standard deviation
+    comes from the scores summed over stretches of the outline, because one dot of paint spoils several
+    points at once.
+    """
+    px, py = distance * np.cos(angle), distance * np.sin(angle)
+    shift = np.zeros(3)  # of the centre, of the radius
+    design = np.ones((len(angle), 3))
+    prior = np.zeros(3)
+    # Start from the radius that the points themselves have, lest a common shift make outliers of them.
+    shift[2] = _weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
+    for _ in range(30):
+        ex, ey = px - shift[0], py - shift[1]
+        length = np.hypot(ex, ey)
+        residual = length - radius - shift[2]
+        design[:, 0], design[:, 1] = ex / length, ey / length
+        scale = max(_weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
+        w = weight * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
+        prior[2] = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
+        normal = (design * w[:, None]).T @ design + np.diag(prior + 1e-9)
+        inverse = np.linalg.inv(normal)
+        step = inverse @ (design.T @ (w * residual) - prior * shift)
+        shift += step
+        if np.abs(step).max() < 1e-4:
+            break
+    stretch = np.floor(angle * radius / POINTS_OF_A_STRETCH).astype(np.intp)
+    score = np.zeros((int(stretch.max()) + 1, 3))
+    np.add.at(score, stretch, design * (w * residual)[:, None])
+    score = score[np.bincount(stretch, weights=w, minlength=len(score)) > 0.0]
+    spread = inverse @ (score.T @ score) @ inverse * len(score) / max(len(score) - 3, 1)
+    # What the radius' prior leaves open counts too.
+    spread += inverse @ np.diag(prior) @ inverse * scale**2 * POINTS_OF_A_STRETCH
+    sigma = float(np.sqrt(0.5 * (spread[0, 0] + spread[1, 1])))
+    return Circle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
+
+
+def _weighted_median(value: Array, weight: Array) -> float:
+    order = np.argsort(value)
+    total = np.cumsum(weight[order])
+    return float(value[order][min(np.searchsorted(total, 0.5 * total[-1]), len(value) - 1)])

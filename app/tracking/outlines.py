@@ -1,0 +1,137 @@
+"""Measure one circle after another in a photograph: its edges, and the circle through them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.frames import Image
+from app.tracking.edges import DENSITY, Circle, Outline, fit_circle, trace_outline
+from app.tracking.rim_profile import locate_edges
+from app.tracking.rings import local_contrast
+from app.tracking.splines import spline_coefficients
+from solver.grains import Array
+
+# An edge is one where the light falls by this share of the local contrast per pixel,
+EDGE_SLOPE = 0.08
+# to a level that exceeds the darkest met around the grain by no more than this share: where grains nearly
+# touch, the gap's dark is not reached, which shifts an edge but does not make it less of one.
+DARK_EXCESS = 0.12
+DARK_EXCESS_JUDGED = 0.3
+# Points this close to the circle [px] count as its outline.
+ON_CIRCLE = 0.7
+# Fewer points do not make a circle; less of the outline in view does not make a grain.
+LEAST_POINTS = 12
+LEAST_VIEW = 0.35
+
+# What the model of the rim leaves of its shading's effect on the centre, in parts of what it takes out.
+SHADING_LEFT = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One circle."""
+
+    x: float  # [px]
+    y: float  # [px]
+    radius: float  # [px]
+    sigma: float  # [px] standard deviation of a component of the centre, NaN where it was not measured
+    quality: float  # share of the outline in view that is seen as an edge on the circle
+
+    @property
+    def circle(self) -> tuple[float, float, float]:
+        return self.x, self.y, self.radius
+
+
+class Outliner:
+    """Measures circles in one photograph."""
+
+    def __init__(self, image: Image, radius: float) -> None:
+        """radius [px]: of the largest grain, for the size of what counts as local."""
+        self._coefficients = spline_coefficients(image)
+        self._contrast = local_contrast(image, int(4 * radius))[1]
+
+    def measure(self, x: float, y: float, radius: float, window: float, shift: float, scatter: float) -> Measured:
+        """The circle through the steepest points within `window` [px] of radius + shift [px].
+
+        scatter [px]: by how much the radius may differ; infinite: it is free.
+        """
+        outline = trace_outline(self._coefficients, x, y, radius + shift, window)
+        seen, local = self._edges(outline, x, y, DARK_EXCESS_JUDGED)
+        if seen.sum() < LEAST_POINTS or outline.in_view.mean() < LEAST_VIEW:
+            return Measured(x, y, radius, np.nan, 0.0)
+        circle = fit_circle(
+            x, y, radius + shift, outline.angle[seen], outline.distance[seen],
+            np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2, radius_scatter=scatter, scale_least=0.1,
+        )  # fmt: skip
+        return _measured(circle, outline, shift)
+
+    def measure_closely(
+        self, x: float, y: float, radius: float, width: float, shift: float, scatter: float
+    ) -> Measured:
+        """The circle through edges from the fitted profile of the rim, blurred by `width` [px]."""
+        outline = trace_outline(self._coefficients, x, y, radius + shift, 2.0)
+        seen, local = self._edges(outline, x, y, DARK_EXCESS)
+        if seen.sum() < LEAST_POINTS or outline.in_view.mean() < LEAST_VIEW:
+            return Measured(x, y, radius, np.nan, 0.0)
+        steepest = fit_circle(
+            x, y, radius + shift, outline.angle[seen], outline.distance[seen],
+            np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2, radius_scatter=np.inf, scale_least=0.1,
+        )  # fmt: skip
+        edge, level, _ = _fit_profiles(outline, seen, width)
+        good = np.isfinite(edge)
+        if good.sum() < LEAST_POINTS:
+            return Measured(x, y, radius, np.nan, 0.0)
+        weight = np.minimum(level[good] / (0.6 * local), 1.0) ** 2
+        circle = fit_circle(
+            x, y, radius + shift, outline.angle[good], edge[good], weight, radius_scatter=scatter, scale_least=0.05
+        )
+        moved = np.hypot(circle.x - steepest.x, circle.y - steepest.y) / np.sqrt(2.0)
+        found = _measured(circle, outline, shift)
+        sigma = float(np.hypot(circle.sigma, SHADING_LEFT * moved))
+        return Measured(found.x, found.y, found.radius, sigma, found.quality)
+
+    def estimate_blur(self, circles: Sequence[Measured], *, most: int = 60) -> float:
+        """Width of the photograph's blur [px]: the one with which the profiles of some grains fit best."""
+        good = [one for one in circles if one.quality > 0.0]
+        good = good[:: max(len(good) // most, 1)]
+        outlines = []
+        for one in good:
+            outline = trace_outline(self._coefficients, *one.circle, 2.0)
+            outlines.append((outline, self._edges(outline, one.x, one.y, DARK_EXCESS)[0]))
+        widths = np.arange(0.4, 1.65, 0.1)
+        if not outlines:
+            return 0.7
+        total = np.array(
+            [np.nanmedian(np.concatenate([_fit_profiles(o, seen, width)[2] for o, seen in outlines])) for width in widths]
+        )
+        best = int(np.clip(np.argmin(total), 1, len(widths) - 2))
+        before, at, after = total[best - 1 : best + 2]
+        bend = before - 2.0 * at + after
+        return float(widths[best] + (0.05 * (before - after) / bend if bend > 0.0 else 0.0))
+
+    def _edges(self, outline: Outline, x: float, y: float, excess: float) -> tuple[NDArray[np.bool_], float]:
+        """Which rays meet an edge, and the local contrast [grey]."""
+        height, width = self._contrast.shape
+        local = float(self._contrast[min(max(int(y), 0), height - 1), min(max(int(x), 0), width - 1)])
+        seen = np.isfinite(outline.distance) & (outline.strength > EDGE_SLOPE * local)
+        if seen.any():
+            # The tenth-darkest part, not the single darkest ray: noise makes that one.
+            dark = float(np.percentile(outline.beyond[seen], 10.0))
+            seen &= outline.beyond < dark + excess * local
+        return seen, local
+
+
+def _fit_profiles(outline: Outline, seen: NDArray[np.bool_], width: float) -> tuple[Array, Array, Array]:
+    return locate_edges(
+        outline.rays, outline.first, 1.0 / DENSITY, np.where(seen, outline.distance, np.nan),
+        np.nan_to_num(outline.beyond), outline.angle, width,
+    )  # fmt: skip
+
+
+def _measured(circle: Circle, outline: Outline, shift: float) -> Measured:
+    on = (np.abs(circle.residual) < ON_CIRCLE).sum()
+    return Measured(circle.x, circle.y, circle.radius - shift, circle.sigma, float(on / outline.in_view.sum()))

@@ -1,0 +1,56 @@
+"""Cubic B-spline interpolation of a photograph, and its pyramid.
+
+The image is I(x, y) = Σ c[l, k] β³(x − k) β³(y − l) with pixel centres at whole coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from app.frames import Image
+
+# Unser, Aldroubi & Eden 1993: the inverse of the sampled cubic B-spline is sqrt(3) z^|k|, z = sqrt(3) − 2.
+# The first tap left out is 1e-6 of the middle one: a thousandth of a grey level.
+HALF_WIDTH = 10
+POLE = np.sqrt(3.0) - 2.0
+PREFILTER = (np.sqrt(3.0) * POLE ** np.abs(np.arange(-HALF_WIDTH, HALF_WIDTH + 1))).astype(np.float32)
+
+# Interpolating white noise halfway between two pixels with the cubic spline keeps this part of its variance.
+HALFWAY_VARIANCE = 0.7561
+
+
+def spline_coefficients(image: Image) -> Image:
+    """The coefficients c of an image (H, W), mirrored beyond its borders."""
+    return cv2.sepFilter2D(image, cv2.CV_32F, PREFILTER, PREFILTER, borderType=cv2.BORDER_REFLECT_101)
+
+
+def shrink(image: Image, factor: int) -> Image:
+    """Average squares of factor × factor pixels. Pixel X lies at factor · X + (factor − 1)/2 of the image."""
+    if factor == 1:
+        return image
+    height, width = image.shape[0] // factor, image.shape[1] // factor
+    return cv2.resize(image[: height * factor, : width * factor], (width, height), interpolation=cv2.INTER_AREA)
+
+
+@dataclass(frozen=True, slots=True)
+class Pyramid:
+    """One photograph with what the tracker needs of it, each level made when first asked for."""
+
+    image: Image
+    _levels: dict[int, Image] = field(default_factory=dict)
+    _coefficients: dict[int, Image] = field(default_factory=dict)
+
+    def level(self, factor: int) -> Image:
+        """The photograph shrunk by a factor."""
+        if factor not in self._levels:
+            self._levels[factor] = shrink(self.image, factor)
+        return self._levels[factor]
+
+    def coefficients(self, factor: int = 1) -> Image:
+        """The spline coefficients of a level."""
+        if factor not in self._coefficients:
+            self._coefficients[factor] = spline_coefficients(self.level(factor))
+        return self._coefficients[factor]

@@ -1,0 +1,238 @@
+"""Follow every grain of the first photograph through the later ones.
+
+Every photograph is compared with the same reference, the first one, so errors do not add up. A grain
+is fitted from where its own motion leads, else from where its neighbours' leads, else it is searched
+for. What still fits worse than the noise explains is refitted robustly, and what remains doubtful is
+compared with its neighbours. A pose that cannot be vouched for is never handed out as a good one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.frames import Image
+from app.tracking.correlation import Correlator, Patches, Rows
+from app.tracking.detection import Detection
+from app.tracking.neighbours import local_motion, nearby_median, overlaps
+from app.tracking.noise import image_noise
+from app.tracking.progress import Progress
+from app.tracking.rescue import leash, rescue
+from app.tracking.splines import Pyramid
+from app.tracks import TrackStatus
+from solver.grains import Array
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingSettings:
+    """How grains are followed. Lengths in pixels."""
+
+    patch_share: float = 0.85  # radius of the correlated disc / radius of the grain; the rim is shaded
+    tolerance: float = 1e-2  # [px] a step below which a fit has converged
+    step_limit: int = 25  # Gauss-Newton steps
+    search_window: float = 60.0  # [px] half width of the widest search
+    candidates: int = 8  # places that a search hands on to the fit
+    margin: float = 0.15  # by which a ZNCC must exceed the greatest accidental one
+    robust_excess: float = 4.0  # residual variance / the frame's typical one, above which a fit is repeated robustly
+    kept_least: float = 0.4  # share of a patch that a robust fit must rest on
+    overlap_allowed: float = 0.2  # overlap / smaller radius that tilt and a wrong radius can explain
+
+    def __post_init__(self) -> None:
+        if not 0.2 <= self.patch_share <= 1.0:
+            raise ValueError(f"patch_share must be in [0.2, 1], not {self.patch_share}")
+        for name in ("tolerance", "step_limit", "search_window", "candidates"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
+
+
+@dataclass(frozen=True, slots=True)
+class FramePoses:
+    """The poses of n grains in one photograph. Grains without a pose have NaN."""
+
+    x: Array  # (n,) [px] column
+    y: Array  # (n,) [px] row, down
+    rotation: Array  # (n,) [rad] from the first photograph, positive from x towards y, continuous
+    sigma: Array  # (n,) [px] standard deviation of a component of the displacement from the first photograph
+    zncc: Array  # (n,) correlation with the reference patch
+    status: NDArray[np.uint8]  # (n,) TrackStatus
+
+    @property
+    def has_pose(self) -> NDArray[np.bool_]:
+        return np.isfinite(self.x)
+
+    @property
+    def pose(self) -> Array:
+        """x, y, rotation (n, 3)."""
+        return np.stack([self.x, self.y, self.rotation], axis=1)
+
+
+class Tracker:
+    """Poses of the grains of one reference photograph in other photographs.
+
+    grains: a Detection, or x, y, radius (n,) [px]. The tracker holds no state of the sequence: `follow`
+    reads it from the history it is given, so that a run can be resumed from stored poses.
+    """
+
+    def __init__(
+        self,
+        reference_image: Image,
+        grains: Detection | tuple[Array, Array, Array],
+        settings: TrackingSettings | None = None,
+        workers: int = 2,
+    ) -> None:
+        x, y, radius = (grains.x, grains.y, grains.radius) if isinstance(grains, Detection) else grains
+        self.settings = settings if settings is not None else TrackingSettings()
+        self.radius = np.ascontiguousarray(radius, dtype=np.float64)  # (n,) [px]
+        centre = np.stack([np.asarray(x, np.float64), np.asarray(y, np.float64)], axis=1)
+        reference = Pyramid(np.ascontiguousarray(reference_image, dtype=np.float32))
+        self.patches = Patches.cut(reference, centre, self.settings.patch_share * self.radius)
+        self.noise = image_noise(reference.image)  # [grey]
+        self._correlator = Correlator(
+            self.patches, workers=workers, tolerance=self.settings.tolerance, limit=self.settings.step_limit
+        )
+
+    @property
+    def grain_count(self) -> int:
+        return len(self.radius)
+
+    @property
+    def accepted_zncc(self) -> Array:
+        """ZNCC above which a place is the right one (n,): the smaller a patch, the more it takes."""
+        return np.clip(self.patches.accidental_zncc + self.settings.margin, 0.5, 0.9)
+
+    def first(self) -> FramePoses:
+        """The poses in the reference itself.
+
+        The displacement is zero by definition; sigma is what the noise of a single photograph amounts to.
+        Grains whose patch leaves the photograph or has no texture cannot be followed and have no pose.
+        """
+        n = self.grain_count
+        patches = self.patches
+        good = patches.usable
+        height, width = patches.reference.image.shape
+        x, y, r = patches.centre[:, 0], patches.centre[:, 1], patches.reach + 3.0
+        cut = (x < r) | (y < r) | (x > width - 1 - r) | (y > height - 1 - r)
+        status = np.where(good, TrackStatus.OK, np.where(cut, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST))
+        inverse = patches.hessian_inverse
+        sigma = self.noise / patches.norm * np.sqrt(0.5 * (inverse[:, 0, 0] + inverse[:, 1, 1]))
+        return FramePoses(
+            np.where(good, x, np.nan), np.where(good, y, np.nan), np.where(good, np.zeros(n), np.nan),
+            np.where(good, sigma, np.nan), np.where(good, 1.0, np.nan), status.astype(np.uint8),
+        )  # fmt: skip
+
+    def follow(self, image: Image, history: Sequence[FramePoses]) -> FramePoses:
+        """Find the grains in the next photograph. history: earlier frames, most recent last, at least one.
+
+        The last two frames predict the motion. Frames further back are read only for grains that were lost
+        meanwhile: without them such a grain's rotation counts from the first photograph, in (−π, π].
+        """
+        if not history:
+            raise ValueError("the history must hold at least one frame, the tracker's own first()")
+        if image.shape != self.patches.reference.image.shape:
+            raise ValueError(f"the photograph is {image.shape}, the reference {self.patches.reference.image.shape}")
+        photograph = Pyramid(np.ascontiguousarray(image, dtype=np.float32))
+        last = _last_known(history, self.first())
+        progress = Progress(self.patches, self.accepted_zncc, self.settings)
+        _follow_predictions(self._correlator, photograph, progress, last, history)
+        rescue(self._correlator, photograph, progress, last, self.settings)
+        _refit_doubtful(self._correlator, photograph, progress, max(image_noise(photograph.image), self.noise))
+        self._judge(progress, last)
+        return self._poses(progress, last, photograph)
+
+    def _judge(self, progress: Progress, last: Array) -> None:
+        """Mark what contradicts its neighbours or overlaps them, unless its correlation is beyond doubt."""
+        rows = np.flatnonzero(progress.accepted)
+        if len(rows) == 0:
+            return
+        moved = progress.pose[rows, :2] - last[rows, :2]
+        predicted, scatter = local_motion(last[rows, :2], moved, last[rows, :2], itself=True)
+        # Grains do move against their neighbours, by a share of a radius between photographs.
+        deviation = np.linalg.norm(moved - predicted, axis=1)
+        odd = deviation > 6.0 * scatter + 0.25 * self.radius[rows]
+        certain = progress.zncc[rows] > np.maximum(self.accepted_zncc[rows], 0.8)
+        progress.doubt(rows[odd & ~certain])
+        pairs = rows[overlaps(progress.pose[rows, :2], self.radius[rows], self.settings.overlap_allowed)]
+        for i, j in pairs:
+            progress.doubt(np.array([i if progress.zncc[i] < progress.zncc[j] else j]))
+
+    def _poses(self, progress: Progress, last: Array, photograph: Pyramid) -> FramePoses:
+        height, width = photograph.image.shape
+        status = progress.status.copy()
+        missing = ~progress.accepted
+        expected = np.where(np.isfinite(progress.expected), progress.expected, last)
+        reach = self.patches.reach + 3.0
+        x, y = expected[:, 0], expected[:, 1]
+        leaving = (x < reach) | (y < reach) | (x > width - 1 - reach) | (y > height - 1 - reach)
+        never = self.first().status
+        status[missing] = np.where(leaving, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST)[missing]
+        status[~self.patches.usable] = never[~self.patches.usable]
+        pose = np.where(missing[:, None], np.nan, progress.pose)
+        rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
+        blank = np.where(missing, np.nan, 1.0)
+        return FramePoses(
+            pose[:, 0], pose[:, 1], rotation, progress.sigma * blank, progress.zncc * blank, status
+        )
+
+
+def _last_known(history: Sequence[FramePoses], first: FramePoses) -> Array:
+    """The most recent pose of every grain (n, 3)."""
+    last = history[-1].pose
+    for frame in reversed([first, *history[:-1]]):
+        gone = ~np.isfinite(last[:, 0])
+        if not gone.any():
+            break
+        last[gone] = frame.pose[gone]
+    return last
+
+
+def _follow_predictions(
+    correlator: Correlator, photograph: Pyramid, progress: Progress, last: Array, history: Sequence[FramePoses]
+) -> None:
+    """Fit every grain from its own motion, and from rest where that leads nowhere."""
+    seen = np.isfinite(history[-1].x)
+    guess = history[-1].pose
+    if len(history) > 1:
+        step = history[-1].pose - history[-2].pose
+        guess = np.where(np.isfinite(step), guess + step, guess)
+    rows = np.flatnonzero(seen & correlator.patches.usable)
+    progress.take(rows, correlator.fit(photograph, rows, guess[rows], leash(correlator, rows)), TrackStatus.OK)
+    rows = np.flatnonzero(seen & progress.open)
+    if len(history) > 1 and len(rows):
+        fits = correlator.fit(photograph, rows, last[rows], leash(correlator, rows))
+        progress.take(rows, fits, TrackStatus.OK)
+
+
+def _refit_doubtful(correlator: Correlator, photograph: Pyramid, progress: Progress, noise: float) -> None:
+    """Repeat robustly what fits worse than the noise explains, and try what was not found at all."""
+    settings = progress.settings
+    accepted = np.flatnonzero(progress.accepted)
+    if len(accepted) == 0:
+        return
+    typical = max(float(np.median(progress.residual[accepted])), 2.0 * noise**2)
+    poor = progress.accepted & (progress.residual > settings.robust_excess * typical)
+    hopeful = progress.open & np.isfinite(progress.expected[:, 0])
+    rows = np.flatnonzero(poor | hopeful)
+    if len(rows) == 0:
+        return
+    pose = np.where(progress.accepted[:, None], progress.pose, progress.expected)[rows]
+    clean = np.flatnonzero(progress.accepted & ~poor)
+    clean = clean if len(clean) else accepted
+    gain, offset = _light(correlator.patches, progress, clean, rows, pose)
+    fits = correlator.fit_robust(
+        photograph, rows, pose, leash(correlator, rows), np.sqrt(typical), gain, offset
+    )
+    progress.take_robust(rows, fits)
+
+
+def _light(
+    patches: Patches, progress: Progress, clean: Rows, rows: Rows, pose: Array
+) -> tuple[Array, Array]:
+    """Gain and offset that `rows` should have, seen from the clean grains about them."""
+    ratio = progress.gain[clean] / patches.norm[clean]
+    where = progress.pose[clean, :2]
+    contrast = nearby_median(where, ratio, pose[:, :2])
+    shift = nearby_median(where, progress.offset[clean] - ratio * patches.mean[clean], pose[:, :2])
+    return contrast * patches.norm[rows], contrast * patches.mean[rows] + shift

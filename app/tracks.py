@@ -1,0 +1,97 @@
+"""Tracks: where every grain is in every frame, and how well that is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.grains import Array
+
+
+class TrackStatus(IntEnum):
+    """How a pose was found. Stored with its names."""
+
+    OK = 0  # correlation converged from the predicted pose
+    RESCUED = 1  # found again by an exhaustive search
+    ROBUST = 2  # a part of the patch was disregarded (occlusion, damage)
+    SUSPECT = 3  # converged, but not to be relied on
+    LOST = 4  # no pose
+    OUT_OF_FRAME = 5  # its patch leaves the photograph: no pose
+    GIVEN = 6  # read from a table
+
+    @property
+    def has_pose(self) -> bool:
+        return self not in (TrackStatus.LOST, TrackStatus.OUT_OF_FRAME)
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """Poses of n grains in f frames. Poses of grains without one are NaN."""
+
+    id: NDArray[np.int64]  # (n,)
+    radius: Array  # (n,) [m]
+    time: Array  # (f,) [s], ascending
+    position: Array  # (f, n, 2) [m]
+    rotation: Array  # (f, n) [rad], counter-clockwise, continuous (not wrapped)
+    sigma: Array  # (f, n) [m], standard deviation of a position component
+    zncc: Array  # (f, n) correlation with the reference patch, NaN where unknown
+    status: NDArray[np.uint8]  # (f, n) TrackStatus
+    centre_sigma: Array | None = None  # (n,) [m], of the error of a centre that is fixed in its grain; None: none
+
+    def __post_init__(self) -> None:
+        f, n = len(self.time), len(self.id)
+        if self.position.shape != (f, n, 2):
+            raise ValueError(f"position must be ({f}, {n}, 2), not {self.position.shape}")
+        for name in ("rotation", "sigma", "zncc", "status"):
+            if getattr(self, name).shape != (f, n):
+                raise ValueError(f"{name} must be ({f}, {n}), not {getattr(self, name).shape}")
+        if self.radius.shape != (n,):
+            raise ValueError(f"radius must be ({n},), not {self.radius.shape}")
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.time)
+
+    @property
+    def grain_count(self) -> int:
+        return len(self.id)
+
+    @property
+    def position_sigma(self) -> Array:
+        """Standard deviation of a position component with the centre's own error, rms over present grains (f,) [m]."""
+        fixed = 0.0 if self.centre_sigma is None else float(np.mean(self.centre_sigma**2))
+        variance = np.where(self.present, self.sigma**2, 0.0).sum(axis=1)
+        return np.sqrt(variance / np.maximum(self.present.sum(axis=1), 1) + fixed)
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which grains have a pose (f, n)."""
+        return np.isfinite(self.rotation) & np.isfinite(self.position).all(axis=2)
+
+    def frames(self, start: int, stop: int) -> Tracks:
+        """The frames start … stop − 1 alone."""
+        part = slice(start, stop)
+        return Tracks(
+            self.id, self.radius, self.time[part], self.position[part], self.rotation[part],
+            self.sigma[part], self.zncc[part], self.status[part], self.centre_sigma,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class WallTracks:
+    """The walls of f frames, with the pressure that some of them carry."""
+
+    name: tuple[str, ...]  # (w,)
+    endpoints: Array  # (f, w, 2, 2) [m]; the packing lies to the left of endpoint 0 → 1
+    pressure: Array  # (w,) [Pa], NaN where the measured motion is imposed
+
+    @property
+    def count(self) -> int:
+        return len(self.name)
+
+    def frames(self, start: int, stop: int) -> WallTracks:
+        """The frames start … stop − 1 alone."""
+        return WallTracks(self.name, self.endpoints[start:stop], self.pressure)

@@ -1,0 +1,48 @@
+"""How well two force networks agree: inferred against true, one frame against another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.grains import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Of one frame, over the union of both networks' contacts, an absent contact counting as zero force."""
+
+    r_fn: float  # Pearson correlation of the normal forces
+    r_ft: float  # of the tangential forces
+    relative_l2: float  # ‖f − f_true‖ / ‖f_true‖, both components
+    scale: float  # Σ f_n / Σ f_n,true
+    contact_precision: float  # of the contacts listed, the share that truly bear force
+    contact_recall: float  # of those that truly bear force, the share that is listed
+
+
+def compare_forces(key: NDArray[np.int64], force: Array, true_key: NDArray[np.int64], true_force: Array) -> Agreement:
+    """Compare forces (c, 2) [N] on contacts named by key (c,) with true ones (t, 2) [N] on true_key (t,)."""
+    union = np.union1d(key, true_key)
+    ours, true = np.zeros((len(union), 2)), np.zeros((len(union), 2))
+    ours[np.searchsorted(union, key)] = force
+    true[np.searchsorted(union, true_key)] = true_force
+    bearing = np.unique(true_key[true_force[:, 0] > 0])
+    hit = len(np.intersect1d(np.unique(key), bearing))
+    size, total = float(np.linalg.norm(true)), float(true[:, 0].sum())
+    return Agreement(
+        r_fn=pearson(ours[:, 0], true[:, 0]),
+        r_ft=pearson(ours[:, 1], true[:, 1]),
+        relative_l2=float(np.linalg.norm(ours - true)) / size if size > 0 else float("nan"),
+        scale=float(ours[:, 0].sum()) / total if total > 0 else float("nan"),
+        contact_precision=hit / len(key) if len(key) else float("nan"),
+        contact_recall=hit / len(bearing) if len(bearing) else float("nan"),
+    )
+
+
+def pearson(a: Array, b: Array) -> float:
+    """Pearson correlation; NaN where either does not vary."""
+    if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
+        return float("nan")
+    return float(np.corrcoef(a, b)[0, 1])

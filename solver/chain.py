@@ -1,0 +1,109 @@
+"""One interval of the Gauss-Seidel chain: sub-steps in order, each on its own contact network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.boundaries import Walls
+from solver.contacts import Contacts, detect_contacts
+from solver.frame_forces import SweepHistory
+from solver.grains import Array, Grains
+from solver.motion import FrameMotion
+from solver.nlgs import NlgsSettings, Solution, solve, unbalance_of
+from solver.problem import Material, assemble, inertial_impedance, kinematic_impedance
+from solver.sweep_record import Keep, SweepRecorder
+from solver.warm_start import ForceMemory
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """What does not change from frame to frame."""
+
+    grains: Grains
+    length: float  # [m] of the rods
+    material: Material
+    pressure: Array  # (w,) [Pa] on plates, NaN where the motion is imposed
+
+    def load(self, endpoints: Array) -> Array:
+        """Load on every wall (w,) [N] of given endpoints (w, 2, 2) [m]."""
+        return self.pressure * np.linalg.norm(endpoints[:, 1] - endpoints[:, 0], axis=1) * self.length
+
+    def walls(self, endpoints: Array) -> Walls:
+        """The walls at rest at these endpoints (w, 2, 2) [m], under their loads."""
+        return Walls(endpoints, np.zeros_like(endpoints), self.load(endpoints))
+
+
+@dataclass(frozen=True, slots=True)
+class ChainSettings:
+    kappa: float | None = 0.05  # kinematic number; None: as the paper's time step gives it
+    substeps: int = 5  # per interval
+    spin_up: int = 10  # sub-steps without former forces
+    sweeps: int = 1000  # per sub-step; more of them regularise less
+    relaxation: float = 1.0  # above 1 selects another solution
+    force_change: float | None = None  # the paper's ε_f as a stopping level
+    reference_pressure: float = 1e4  # [Pa] scale of the forces where no wall carries a pressure
+    keep: Keep = "log"  # which sweeps keep their forces
+
+
+@dataclass(frozen=True, slots=True)
+class ChainStep:
+    """What one interval gave."""
+
+    contacts: Contacts  # of the frame
+    walls: Walls
+    solution: Solution  # of the last sub-step
+    sweeps: int  # of all sub-steps
+    history: SweepHistory
+    kappa: float
+    old_unbalance: float  # ū, NaN without former forces
+    memory: ForceMemory
+
+
+def force_scale(packing: Packing, settings: ChainSettings) -> float:
+    """f₀ = σ L d [N], with the mean pressure of the plates and the mean diameter."""
+    loaded = np.isfinite(packing.pressure)
+    pressure = float(packing.pressure[loaded].mean()) if loaded.any() else settings.reference_pressure
+    return pressure * packing.length * 2.0 * float(packing.grains.radius.mean())
+
+
+def advance_chain(
+    packing: Packing, motion: FrameMotion, memory: ForceMemory, settings: ChainSettings, threshold: float
+) -> ChainStep:
+    """Take the forces of the former frame through one interval.
+
+    threshold [m]: the gap below which a pair counts as a contact.
+    """
+    fresh = len(memory.key) == 0
+    steps = (settings.spin_up if fresh else settings.substeps) if motion.spans else 1
+    sweeps = settings.sweeps if motion.spans else settings.sweeps * settings.substeps
+    impedance, kappa = _impedance(packing, motion, settings, steps)
+    nlgs = NlgsSettings(sweeps, settings.force_change, None, settings.relaxation)
+    recorder = SweepRecorder(steps * sweeps, settings.keep)
+    former, done = memory, 0
+    for step in range(1, steps + 1):
+        grains, walls = motion.at(step / steps, packing.load(motion.endpoints))
+        contacts = detect_contacts(packing.grains, grains.position, grains.present, walls, threshold)
+        problem = assemble(packing.grains, grains, walls, contacts, packing.material, impedance)
+        recorder.begin(problem, contacts)
+        solution = solve(problem, nlgs, guess=memory.recall(contacts), observer=recorder.hear)
+        memory = memory.renew(contacts, np.column_stack([solution.fn, solution.ft]), grains.present)
+        done += solution.sweeps
+    old = np.nan if fresh else unbalance_of(problem, former.recall(contacts))[1]
+    return ChainStep(contacts, walls, solution, done, recorder.history(contacts), kappa, old, memory)
+
+
+def _impedance(
+    packing: Packing, motion: FrameMotion, settings: ChainSettings, steps: int
+) -> tuple[Array, float]:
+    scale, velocity = force_scale(packing, settings), motion.velocity_rms
+    weight = packing.material.formal_weight
+    if settings.kappa is None:
+        step = motion.interval / steps
+        impedance = inertial_impedance(packing.grains, interval=step, formal_weight=weight)
+        return impedance, float(packing.grains.mass.mean()) * velocity / (step * scale)
+    impedance = kinematic_impedance(
+        packing.grains, kappa=settings.kappa, force_scale=scale, velocity_scale=velocity, formal_weight=weight
+    )
+    return impedance, settings.kappa

@@ -1,0 +1,80 @@
+"""The forces of one frame, with everything one must know to judge them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.contacts import Contacts
+from solver.grains import Array
+
+
+class ContactState(IntEnum):
+    OPEN = 0  # carries no force
+    STICKING = 1  # |f_t| < μ f_n
+    SLIDING = 2  # |f_t| = μ f_n
+
+
+class ContactSource(IntEnum):
+    DETECTED = 0
+    ADDED_BY_REVIEWER = 1
+    FORBIDDEN_BY_REVIEWER = 2
+
+
+class FrameStatus(IntEnum):
+    RESET = 0  # no usable history: solved from a first guess
+    SUSPECT = 1  # the forces contradict the motion or the load
+    REARRANGING = 2  # the former forces do not fit the new network
+    SETTLING = 3  # too few frames since one of these
+    SETTLED = 4
+    FAILED = 5  # not solved
+
+
+@dataclass(frozen=True, slots=True)
+class SweepHistory:
+    """What one frame's sweeps did: residuals of every sweep, forces of some."""
+
+    force_change: Array  # (s,) greatest |Δf| / |f| of a contact, the paper's ε_f
+    natural_map: Array  # (s,) relative natural-map residual
+    unbalance: Array  # (s,) worst |ΣF| on a grain / mean f_n
+    recorded: NDArray[np.int64]  # (r,) ascending sweeps (0 … s−1) whose forces are kept
+    fn: NDArray[np.float32]  # (r, c) [N], on the contacts of the frame
+    ft: NDArray[np.float32]  # (r, c) [N]
+
+    @property
+    def count(self) -> int:
+        return len(self.force_change)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameForces:
+    """Contacts and forces of one frame. f_n > 0 is compression; forces are those that i exerts on j."""
+
+    frame: int
+    contacts: Contacts
+    fn: Array  # (c,) [N] the reported field
+    ft: Array  # (c,) [N]
+    nlgs_fn: Array  # (c,) [N] the Gauss-Seidel chain whose sweeps are recorded
+    nlgs_ft: Array  # (c,) [N]
+    un: Array  # (c,) [m/s] measured relative velocity, u_n > 0 opens
+    ut: Array  # (c,) [m/s]
+    state: NDArray[np.uint8]  # (c,) ContactState
+    age: NDArray[np.int32]  # (c,) frames since the contact was last absent
+    source: NDArray[np.uint8]  # (c,) ContactSource
+    probability: Array  # (c,) P(touch), NaN where not computed
+    fn_sd: Array  # (c,) [N] calibrated standard deviation
+    ft_sd: Array  # (c,) [N]
+    status: FrameStatus
+    reason: str  # why the frame has this status and how its solve ended: sentences for the user
+    sweeps: int
+    natural_map: float  # reached, of the Gauss-Seidel chain
+    unbalance: float  # worst |ΣF| on a grain / mean f_n, of the reported field
+    kappa: float  # kinematic number w m v_rms / (δt σ L d)
+    correction: float  # ε: how much the forces must correct the measured motion
+    old_unbalance: float  # ū: mean |ΣF| of the former forces on this network / mean f_n; NaN without former forces
+    trust: float  # T, an estimate of the correlation with the true forces, given these inputs
+    frames_since_reset: int
+    history: SweepHistory

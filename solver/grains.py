@@ -1,0 +1,60 @@
+"""Grains and their motion: what is known of the bodies before any force is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Grains:
+    """The bodies of a packing: solid rods seen end on."""
+
+    radius: Array  # (n,) [m]
+    mass: Array  # (n,) [kg]
+
+    def __post_init__(self) -> None:
+        if self.radius.shape != self.mass.shape or self.radius.ndim != 1:
+            raise ValueError("radius and mass must be one-dimensional and of equal length")
+        if not (np.all(self.radius > 0) and np.all(self.mass > 0)):
+            raise ValueError("every radius and every mass must be positive")
+
+    @classmethod
+    def of_rods(cls, radius: Array, *, density: float, length: float) -> Grains:
+        """Make rods of one material: radius (n,) [m], density [kg/m³], length [m]."""
+        radius = np.ascontiguousarray(radius, dtype=np.float64)
+        return cls(radius, density * length * np.pi * radius**2)
+
+    @property
+    def count(self) -> int:
+        return len(self.radius)
+
+    @property
+    def inertia(self) -> Array:
+        """Moment of inertia of a solid rod about its axis, ½ m R² (n,) [kg m²]."""
+        return 0.5 * self.mass * self.radius**2
+
+
+@dataclass(frozen=True, slots=True)
+class GrainMotion:
+    """Where the grains are at one instant and how they have moved to get there.
+
+    Rows of grains that are not present may hold any number: nobody reads them.
+    """
+
+    position: Array  # (n, 2) [m]
+    velocity: Array  # (n, 2) [m/s], the mean over the interval that ends here
+    spin: Array  # (n,) [rad/s], counter-clockwise
+    present: NDArray[np.bool_]  # (n,) False: lost or never seen; takes no part
+
+    def __post_init__(self) -> None:
+        n = len(self.present)
+        if self.position.shape != (n, 2) or self.velocity.shape != (n, 2) or self.spin.shape != (n,):
+            raise ValueError("position (n, 2), velocity (n, 2), spin (n,) and present (n,) must agree in n")
+        for name in ("position", "velocity", "spin"):
+            if not np.all(np.isfinite(getattr(self, name)[self.present])):
+                raise ValueError(f"the {name} of a present grain is not finite")

@@ -1,0 +1,172 @@
+"""Nonlinear Gauss-Seidel: settings, one's hand on every sweep, and the solution.
+
+`sweeps` is the method, driven by hand; `solve` runs it to an end that is a value with a sentence. Whoever listens
+sets the stride of the compiled loop and nothing else: with or without a listener the forces are the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.grains import Array
+from solver.nlgs_kernels import (
+    advance,
+    apply_forces,
+    contact_velocities,
+    grain_unbalance,
+    greatest_force_change,
+    natural_map_residual,
+)
+from solver.problem import ContactProblem
+
+
+@dataclass(frozen=True, slots=True)
+class NlgsSettings:
+    sweeps: int = 5000  # at most; in a kinematic chain, where more sweeps hurt, exactly
+    force_change: float | None = None  # stop at the paper's ε_f
+    natural_map: float | None = None  # stop at this relative residual
+    relaxation: float = 1.0  # above 1 selects another solution
+
+    def __post_init__(self) -> None:
+        if self.sweeps < 0:
+            raise ValueError("the number of sweeps cannot be negative")
+        if not 0.0 < self.relaxation < 2.0:
+            raise ValueError("the relaxation lies between 0 and 2")
+
+
+class Stop(Enum):
+    """How a solve ended, as a sentence for the user."""
+
+    NATURAL_MAP = "the natural-map residual fell below its stopping level"
+    FORCE_CHANGE = "no contact force changed by more than ε_f of itself in a sweep"
+    SWEEPS = "the stated number of sweeps was done; the residual reached is reported, convergence is not claimed"
+    EMPTY = "there are no contacts"
+
+
+class Sweep(NamedTuple):
+    """The state after a sweep. `force` is live memory: copy what you keep."""
+
+    number: int  # 1 … sweeps
+    force: Array  # (p + q, 2) [N] in visiting order
+    force_change: float  # greatest |Δf| / |f| in this sweep
+    natural_map: float  # relative residual
+    unbalance: float  # worst |ΣF| on a grain / mean f_n
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    fn: Array  # (c,) [N] in the order of the contacts
+    ft: Array  # (c,) [N]
+    stop: Stop
+    sweeps: int
+    natural_map: float
+    unbalance: float  # worst |ΣF| on a grain / mean f_n
+    mean_unbalance: float  # mean |ΣF| on a grain / mean f_n
+
+
+def sweeps(
+    problem: ContactProblem, settings: NlgsSettings, *, guess: Array | None = None, every: int = 1
+) -> Iterator[Sweep]:
+    """Advance `every` sweeps at a time from a guess, without end.
+
+    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent.
+    """
+    force, body, plate = _start(problem, guess)
+    before, velocity, total = np.empty_like(force), np.empty_like(force), np.empty_like(problem.external)
+    number = 0
+    while True:
+        if every > 1:
+            advance(problem, body, plate, force, every - 1, settings.relaxation)
+        before[:] = force
+        advance(problem, body, plate, force, 1, settings.relaxation)
+        number += every
+        contact_velocities(problem, body, plate, velocity)
+        worst, _, mean = grain_unbalance(problem, force, total)
+        yield Sweep(
+            number,
+            force,
+            greatest_force_change(before, force),
+            natural_map_residual(problem, velocity, force),
+            worst / mean if mean > 0 else 0.0,
+        )
+
+
+def solve(
+    problem: ContactProblem,
+    settings: NlgsSettings,
+    *,
+    guess: Array | None = None,
+    observer: Callable[[Sweep], None] | None = None,
+    every: int = 1,
+) -> Solution:
+    """Sweep until a stopping level or the number of sweeps is reached.
+
+    The stopping levels are looked at every `every` sweeps; the observer, too, hears every such sweep.
+    """
+    if len(problem.rows) == 0:
+        return Solution(np.empty(0), np.empty(0), Stop.EMPTY, 0, 0.0, 0.0, 0.0)
+    listening = observer is not None or settings.natural_map is not None or settings.force_change is not None
+    if not listening:
+        force, body, plate = _start(problem, guess)
+        advance(problem, body, plate, force, settings.sweeps, settings.relaxation)
+        return _finish(problem, force, Stop.SWEEPS, settings.sweeps)
+    stop, number, force = Stop.SWEEPS, 0, _start(problem, guess)[0]
+    for sweep in sweeps(problem, settings, guess=guess, every=every) if settings.sweeps > 0 else ():
+        force, number = sweep.force, sweep.number
+        if observer is not None:
+            observer(sweep)
+        if settings.natural_map is not None and sweep.natural_map <= settings.natural_map:
+            stop = Stop.NATURAL_MAP
+            break
+        if settings.force_change is not None and sweep.force_change <= settings.force_change:
+            stop = Stop.FORCE_CHANGE
+            break
+        if number >= settings.sweeps:
+            break
+    return _finish(problem, force, stop, number)
+
+
+def unbalance_of(problem: ContactProblem, force: Array) -> tuple[float, float]:
+    """Worst and mean |ΣF| on a grain over the mean f_n, for forces (c, 2) [N] in the order of the contacts."""
+    worst, mean_size, mean = grain_unbalance(
+        problem, np.ascontiguousarray(force[problem.rows]), np.empty_like(problem.external)
+    )
+    return (worst / mean, mean_size / mean) if mean > 0 else (0.0, 0.0)
+
+
+def to_contact_order(problem: ContactProblem, force: Array) -> Array:
+    """Forces in visiting order (…, c, 2) to the order of the contacts."""
+    result = np.empty_like(force)
+    result[..., problem.rows, :] = force
+    return result
+
+
+def _start(problem: ContactProblem, guess: Array | None) -> tuple[Array, Array, Array]:
+    force = np.zeros((len(problem.rows), 2)) if guess is None else np.ascontiguousarray(guess[problem.rows])
+    body, plate = np.empty_like(problem.body), np.empty_like(problem.plate)
+    apply_forces(problem, body, plate, force)
+    return force, body, plate
+
+
+def _finish(problem: ContactProblem, force: Array, stop: Stop, number: int) -> Solution:
+    body, plate = np.empty_like(problem.body), np.empty_like(problem.plate)
+    apply_forces(problem, body, plate, force)  # anew, so that rounding of many sweeps is not taken for balance
+    velocity = np.empty_like(force)
+    contact_velocities(problem, body, plate, velocity)
+    worst, mean_size, mean = grain_unbalance(problem, force, np.empty_like(problem.external))
+    ordered = to_contact_order(problem, force)
+    scale = 1.0 / mean if mean > 0 else 0.0
+    return Solution(
+        ordered[:, 0].copy(),
+        ordered[:, 1].copy(),
+        stop,
+        number,
+        natural_map_residual(problem, velocity, force),
+        worst * scale,
+        mean_size * scale,
+    )

@@ -1,0 +1,140 @@
+"""One frame's contact problem, assembled and validated once.
+
+The unknown forces act on bodies that resist with an *impedance* Z [N s/m]: the velocity that forces f
+produce is v = v_measured + ΣF / Z. The paper's scheme has Z = m / ((1−η) δt). Measured grain velocities then
+do not influence the forces at all, because that Z is some nine orders too small; the kinematic number κ
+sets Z = κ f₀ / v_rms · m / m̄ / (1−η) instead, with f₀ = σ L d, so that undoing the whole measured motion costs
+forces of κ f₀. Rotation resists with ½ Z R², as solid rods do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.boundaries import Walls
+from solver.contacts import Contacts
+from solver.grains import Array, GrainMotion, Grains
+from solver.ordering import visiting_order
+
+PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
+
+
+class ContactProblem(NamedTuple):
+    """What the kernels read: packed records in visiting order, contacts between grains first, then those with walls.
+
+    At most ten fields: numba's dispatch slows beyond.
+    """
+
+    body: Array  # (n, 4) free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
+    plate: Array  # (w, 2) free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
+    pair_body: NDArray[np.int32]  # (p, 2) grains i, j
+    pair: Array  # (p, 4) nx, ny, 1/W_nn, 1/W_tt
+    wall_body: NDArray[np.int32]  # (q, 2) grain, wall
+    wall: Array  # (q, 4) nx, ny, 1/W_nn, 1/W_tt
+    bias: Array  # (p + q, 2) [m/s] added to u_n and u_t: motion of the wall, gap still to close
+    friction: Array  # (2,) between grains, with walls
+    external: Array  # (n, 2) [N] weight of the grains
+    rows: NDArray[np.int64]  # (p + q,) record → row of Contacts
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    friction: float
+    wall_friction: float
+    formal_weight: float = 0.0  # η in [0, ½]
+    gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
+
+    def __post_init__(self) -> None:
+        if self.friction < 0 or self.wall_friction < 0:
+            raise ValueError("a coefficient of friction cannot be negative")
+        if not 0.0 <= self.formal_weight <= 0.5:
+            raise ValueError(f"the formal weight lies in [0, 0.5], not at {self.formal_weight}")
+
+
+def kinematic_impedance(
+    grains: Grains, *, kappa: float, force_scale: float, velocity_scale: float, formal_weight: float = 0.0
+) -> Array:
+    """Impedance of every grain (n,) [N s/m] for a kinematic number κ.
+
+    force_scale: f₀ = σ L d [N]; velocity_scale: v_rms [m/s].
+    """
+    if not (kappa > 0 and force_scale > 0 and velocity_scale > 0):
+        raise ValueError("κ, the force scale and the velocity scale must be positive")
+    mean = kappa * force_scale / velocity_scale / (1.0 - formal_weight)
+    return mean * grains.mass / grains.mass.mean()
+
+
+def inertial_impedance(grains: Grains, *, interval: float, formal_weight: float = 0.0) -> Array:
+    """Impedance of every grain (n,) [N s/m] as the paper's time step gives it: m / ((1−η) δt)."""
+    if not interval > 0:
+        raise ValueError("the interval must be positive")
+    return grains.mass / interval / (1.0 - formal_weight)
+
+
+def assemble(
+    grains: Grains,
+    motion: GrainMotion,
+    walls: Walls,
+    contacts: Contacts,
+    material: Material,
+    impedance: Array,
+    *,
+    closing: Array | None = None,
+) -> ContactProblem:
+    """Assemble the contact problem of one frame (or sub-step).
+
+    impedance (n,) [N s/m]; closing (c,) [m/s], the velocity at which a contact must close before it bears force
+    (a doubtful contact's extra gap over the time of the step), 0 if absent.
+    """
+    n = grains.count
+    if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
+        raise ValueError("a contact names a grain that is not present")
+    compliance = 1.0 / impedance
+    weight = grains.mass[:, None] * np.asarray(material.gravity)
+    weight[~motion.present] = 0.0
+    body = np.zeros((n, 4))
+    body[:, :2] = motion.velocity + weight * compliance[:, None]
+    body[:, 2] = motion.spin * grains.radius
+    body[:, 3] = compliance
+    body[~motion.present] = 0.0
+
+    plate = np.zeros((walls.count, 2))
+    if walls.loaded.any():
+        plate_compliance = 1.0 / (PLATE_IMPEDANCE * impedance[motion.present].mean())
+        plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
+        plate[walls.loaded, 1] = plate_compliance
+
+    rows_pair = np.flatnonzero(~contacts.with_wall)
+    rows_wall = np.flatnonzero(contacts.with_wall)
+    rows_pair = rows_pair[visiting_order(contacts.point[rows_pair], contacts.i[rows_pair], contacts.j[rows_pair])]
+    rows_wall = rows_wall[visiting_order(contacts.point[rows_wall], contacts.i[rows_wall], contacts.j[rows_wall])]
+    rows = np.concatenate([rows_pair, rows_wall])
+
+    pair_body = np.stack([contacts.i[rows_pair], contacts.j[rows_pair]], axis=1)
+    wall_body = np.stack([contacts.i[rows_wall], contacts.j[rows_wall] - n], axis=1)
+    pair_w = compliance[pair_body[:, 0]] + compliance[pair_body[:, 1]]
+    wall_w = compliance[wall_body[:, 0]]
+
+    bias = np.zeros((contacts.count, 2))
+    if closing is not None:
+        bias[:, 0] = closing[rows]
+    velocity = walls.velocity_at(wall_body[:, 1], contacts.point[rows_wall])
+    bias[len(rows_pair) :, 0] += np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall])
+    bias[len(rows_pair) :, 1] += np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall])
+
+    return ContactProblem(
+        body,
+        plate,
+        pair_body,
+        np.column_stack([contacts.normal[rows_pair], 1.0 / pair_w, 1.0 / (3.0 * pair_w)]),
+        wall_body,
+        np.column_stack([contacts.normal[rows_wall], 1.0 / (wall_w + plate[wall_body[:, 1], 1]), 1.0 / (3.0 * wall_w)]),
+        bias,
+        np.array([material.friction, material.wall_friction]),
+        weight,
+        rows,
+    )
