@@ -171,7 +171,7 @@ def _explain(file: Path, error: ValidationError) -> InputError:
     if first["type"] == "missing":
         return InputError(file, f"key {key}", "is missing")
     if first["type"] == "value_error":
-        return InputError(file, f"key {key}" if key else "", str(first["ctx"]["error"]))
+        return InputError(file, f"key {key}" if key else "", first["msg"].removeprefix("Value error, "))
     return InputError(file, f"key {key}", f"value {first['input']!r}: {first['msg']}")
 
 

@@ -93,7 +93,7 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
     """Time of every frame (f,) [s], ascending."""
     config = experiment.config
     if config.photographs is not None and config.photographs.interval is not None:
-        return np.arange(frame_count) * config.photographs.interval
+        return np.arange(frame_count, dtype=np.float64) * config.photographs.interval
     name = config.photographs.times if config.photographs is not None else config.tracks and config.tracks.times
     assert name is not None
     table = read_table(experiment.folder / name, ("frame", "time"))

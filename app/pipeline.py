@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app import __version__
 from app.checkpoint import Checkpoint
@@ -248,21 +249,19 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
 
     since = time.perf_counter()
     section = run.experiment.config.photographs
-    photograph = scale = None
-    if section is not None:
-        photographs = run.experiment.photographs()
-        scale = Scale(section.pixel_size, photographs.shape[0])
-        first = run.frames[0]
+    photographs = run.experiment.photographs() if section is not None else None
 
-        def photograph(frame: int) -> np.ndarray:
-            return np.clip(np.rint(photographs[first + frame]), 0, 255).astype(np.uint8)
+    def photograph(frame: int) -> NDArray[np.uint8] | None:
+        if photographs is None:
+            return None
+        return np.clip(np.rint(photographs[run.frames[0] + frame]), 0, 255).astype(np.uint8)
 
     file = run.file(RECORDING)
     write_recording(
         results,
         file,
-        photograph=photograph,
-        scale=scale,
+        photograph=photograph if photographs is not None else None,
+        scale=Scale(section.pixel_size, photographs.shape[0]) if section and photographs is not None else None,
         sweeps=run.experiment.config.recording.sweeps,
         truth=truth,
         progress=lambda done, total: run.progress("recording", done, total),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -32,6 +32,7 @@ SCHEMA = "schema_version"
 FRAME_SCALARS = (
     "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust", "frames_since_reset",
 )  # fmt: skip
+GEOMETRY = ("i", "j", "gap", "normal", "point")  # attributes of Contacts
 CONTACT_COLUMNS = ("un", "ut", "state", "age", "source", "probability")
 FORCE_COLUMNS = ("fn", "ft", "nlgs_fn", "nlgs_ft", "fn_sd", "ft_sd")
 HISTORY_COLUMNS = ("force_change", "natural_map", "unbalance")
@@ -95,14 +96,14 @@ def load_results(file: Path) -> Results:
             raise InputError(file, "", "holds no forces: solve the experiment first")
         tracks, walls = _read_tracks(store)
         assert walls is not None
-        grains = Grains(store["grains/radius"][()], store["grains/mass"][()])
-        statistics = {each.name: store[f"statistics/{each.name}"][()] for each in fields(FrameStatistics)}
+        grains = Grains(_read(store, "grains/radius"), _read(store, "grains/mass"))
+        statistics = {each.name: _read(store, f"statistics/{each.name}") for each in fields(FrameStatistics)}
         return Results(
             name=str(store.attrs["name"]),
             tracks=tracks,
             walls=walls,
             grains=grains,
-            friction=float(store.attrs["friction"]),
+            friction=float(cast(float, store.attrs["friction"])),
             frames=_read_frames(store, grains.count, walls.count),
             statistics=[
                 FrameStatistics(**{key: _plain(values[k]) for key, values in statistics.items()})
@@ -117,7 +118,7 @@ def read_origin(file: Path) -> Provenance | None:
     try:
         with h5py.File(file, "r") as store:
             sums = store["origin/checksums"].attrs
-            first, stop = store.attrs["frames"]
+            first, stop = cast(np.ndarray, store.attrs["frames"])
             return Provenance(
                 str(store.attrs["fingerprint"]),
                 str(store.attrs["experiment"]),
@@ -172,16 +173,16 @@ def _write_tracks(store: h5py.File, tracks: Tracks, walls: WallTracks | None) ->
 
 def _read_tracks(store: h5py.File) -> tuple[Tracks, WallTracks | None]:
     tracks = Tracks(
-        id=store["grains/id"][()],
-        radius=store["grains/radius"][()],
-        time=store["frames/time"][()],
-        **{key: store[f"tracks/{key}"][()] for key in ("position", "rotation", "sigma", "zncc", "status")},
-        centre_sigma=store["tracks/centre_sigma"][()] if "tracks/centre_sigma" in store else None,
+        id=_read(store, "grains/id"),
+        radius=_read(store, "grains/radius"),
+        time=_read(store, "frames/time"),
+        **{key: _read(store, f"tracks/{key}") for key in ("position", "rotation", "sigma", "zncc", "status")},
+        centre_sigma=_read(store, "tracks/centre_sigma") if "tracks/centre_sigma" in store else None,
     )
     if "walls" not in store:
         return tracks, None
-    names = tuple(name.decode() for name in store["walls/name"][()])
-    return tracks, WallTracks(names, store["walls/endpoints"][()], store["walls/pressure"][()])
+    names = tuple(name.decode() for name in _read(store, "walls/name"))
+    return tracks, WallTracks(names, _read(store, "walls/endpoints"), _read(store, "walls/pressure"))
 
 
 def _write_frames(store: h5py.File, results: Results) -> None:
@@ -196,7 +197,7 @@ def _write_frames(store: h5py.File, results: Results) -> None:
 def _write_contacts(store: h5py.File, frames: Any) -> None:
     counts = [f.contacts.count for f in frames]
     store.create_dataset("contacts/offset", data=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64))
-    for key in ("i", "j", "gap", "normal", "point"):
+    for key in GEOMETRY:
         _compressed(store, f"contacts/{key}", np.concatenate([getattr(f.contacts, key) for f in frames]))
     for key in CONTACT_COLUMNS:
         values = np.concatenate([getattr(f, key) for f in frames])
@@ -223,13 +224,13 @@ def _write_sweeps(store: h5py.File, frames: Any) -> None:
 
 
 def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[FrameForces]:
-    columns = {key: store[f"contacts/{key}"][()] for key in ("i", "j", "gap", "normal", "point", *CONTACT_COLUMNS)}
-    columns |= {key: store[f"forces/{key}"][()] for key in FORCE_COLUMNS}
-    scalars = {key: store[f"frames/{key}"][()] for key in FRAME_SCALARS}
-    status, reason = store["frames/status"][()], store["frames/reason"][()]
-    history = {key: store[f"sweeps/{key}"][()] for key in (*HISTORY_COLUMNS, "recorded", "fn", "ft")}
-    offset, sweep_offset = store["contacts/offset"][()], store["sweeps/offset"][()]
-    kept_offset = store["sweeps/recorded_offset"][()]
+    columns = {key: _read(store, f"contacts/{key}") for key in (*GEOMETRY, *CONTACT_COLUMNS)}
+    columns |= {key: _read(store, f"forces/{key}") for key in FORCE_COLUMNS}
+    scalars = {key: _read(store, f"frames/{key}") for key in FRAME_SCALARS}
+    status, reason = _read(store, "frames/status"), _read(store, "frames/reason")
+    history = {key: _read(store, f"sweeps/{key}") for key in (*HISTORY_COLUMNS, "recorded", "fn", "ft")}
+    offset, sweep_offset = _read(store, "contacts/offset"), _read(store, "sweeps/offset")
+    kept_offset = _read(store, "sweeps/recorded_offset")
     frames, at = [], 0
     for k in range(len(status)):
         rows, sweeps = slice(offset[k], offset[k + 1]), slice(sweep_offset[k], sweep_offset[k + 1])
@@ -237,11 +238,11 @@ def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[Fr
         count = int(offset[k + 1] - offset[k])
         block = slice(at, at + len(recorded) * count)
         at = block.stop
-        geometry = [columns[key][rows] for key in ("i", "j", "gap", "normal", "point")]
+        geometry = {key: columns[key][rows] for key in GEOMETRY}
         frames.append(
             FrameForces(
                 frame=k,
-                contacts=Contacts(*geometry, grain_count, wall_count),
+                contacts=Contacts(**geometry, grain_count=grain_count, wall_count=wall_count),
                 **{key: columns[key][rows] for key in (*CONTACT_COLUMNS, *FORCE_COLUMNS)},
                 status=FrameStatus(status[k]),
                 reason=reason[k].decode(),
@@ -255,6 +256,12 @@ def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[Fr
             )
         )
     return frames
+
+
+def _read(store: h5py.File, path: str) -> Any:
+    dataset = store[path]
+    assert isinstance(dataset, h5py.Dataset)
+    return dataset[()]
 
 
 def _plain(value: Any) -> Any:

@@ -108,26 +108,27 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
             f"{max(trusted):.2f} over settled frames."
         )
     if "accuracy" in summary:
-        late = [value for value in summary["accuracy"]["r_fn"][5:] if value is not None]
-        late_t = [value for value in summary["accuracy"]["r_ft"][5:] if value is not None]
+        first = min(5, total - 1)
+        late = [value for value in summary["accuracy"]["r_fn"][first:] if value is not None]
+        late_t = [value for value in summary["accuracy"]["r_ft"][first:] if value is not None]
         if late and late_t:
             lines.append(
-                f"[bold]Against the truth, from frame 5 on: r(f_n) {np.mean(late):.3f} (least {min(late):.3f}), "
+                f"[bold]Against the truth, from frame {first} on: r(f_n) {np.mean(late):.3f} (least {min(late):.3f}), "
                 f"r(f_t) {np.mean(late_t):.3f}.[/]"
             )
     return lines
 
 
 def _frame_table(summary: dict[str, Any]) -> Table:
-    table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 2, 0, 0))
+    table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("frame", justify="right")
     table.add_column("status")
-    for heading in ("contacts", "z", "φ [°]", "mean f_n [N]", "residual", "ε", "trust"):
-        table.add_column(heading, justify="right")
+    for heading in ("contacts", "z", "φ [°]", "⟨f_n⟩ [N]", "residual", "ε", "trust"):
+        table.add_column(heading, justify="right", no_wrap=True)
     truth = summary.get("accuracy")
     if truth:
-        table.add_column("r(f_n)", justify="right")
-        table.add_column("r(f_t)", justify="right")
+        table.add_column("r(f_n)", justify="right", no_wrap=True)
+        table.add_column("r(f_t)", justify="right", no_wrap=True)
     total = summary["frame_count"]
     shown = np.unique(np.linspace(0, total - 1, min(total, MOST_ROWS)).round().astype(int))
     for k in shown:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.errors import InputError
 from app.results import Results, TruthContacts
@@ -74,12 +74,13 @@ def true_names(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64
     place = np.column_stack([table.numbers("x"), table.numbers("y")])[here]
     names = np.full(tracks.grain_count, -1, np.int64)
     present = np.flatnonzero(tracks.present[0])
-    distance, nearest = cKDTree(place).query(tracks.position[0, present])
+    distance, nearest = KDTree(place).query(tracks.position[0, present])
     close = distance < CLOSE * tracks.radius[present]
     names[present[close]] = ids[here[nearest[close]]]
-    taken, count = np.unique(names[names >= 0], return_counts=True)
-    if np.any(count > 1):
-        raise InputError(file, f"id {taken[count > 1][0]}", "is the nearest true grain of two detected ones")
+    taken = np.sort(names[names >= 0])
+    twice = np.flatnonzero(np.diff(taken) == 0)
+    if len(twice):
+        raise InputError(file, f"id {taken[twice[0]]}", "is the nearest true grain of two detected ones")
     return names
 
 

@@ -16,13 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.calibration_equations import GapEquations, MeasuredSequence
-from solver.calibration_solve import CalibrationPriors, GapFit, contact_width, fit_gaps, narrow_priors, prior_vector
+from solver.calibration_solve import (
+    FINEST_SURFACE,
+    CalibrationPriors,
+    GapFit,
+    contact_width,
+    fit_gaps,
+    narrow_priors,
+    prior_vector,
+)
 from solver.grains import Array
 
-LEAST_GAIN = 0.05  # corrections that narrow the gaps of touching pairs by less are not worth their own noise
+LEAST_GAIN = 0.1  # corrections that narrow the gaps of touching pairs by less are not worth their own noise
 CERTAIN = 3.0  # standard deviations beyond which a correction is called sure, or larger than its prior allows
 IMPOSSIBLE = 4.0  # standard deviations of noise: no touching pair overlaps more
-EXCESSIVE_DEMAND = 1.25  # errors that the overlaps suggest, over the prior: above this the user is told
+EXCESSIVE_DEMAND = 1.5  # errors that the overlaps suggest, over the prior: above this the user is told
 POSTERIOR_SAMPLES = 100  # draws behind each standard deviation: known to 7 %
 EXPECTED_CENTRE = 5e-3  # widest prior tried without being told, of the mean diameter: a drawn edge is no worse
 EXPECTED_WALL = 3e-3  # prior of a wall without being told, of the mean diameter
@@ -100,6 +108,8 @@ def calibrate(
     """
     if not typical_overlap >= 0.0:
         raise ValueError(f"typical_overlap must be zero or positive, not {typical_overlap}")
+    if radius_class is not None and radius_class.shape != sequence.radius.shape:
+        raise ValueError(f"radius_class must name a class for each of the {sequence.grain_count} grains")
     equations = GapEquations(sequence, radius_class)
     limits = _expected_priors(sequence) if priors is None else priors
     start, demand = narrow_priors(equations, limits, typical_overlap)
@@ -162,8 +172,17 @@ def _gap_statistics(gap: Array, noise: Array, with_wall: NDArray[np.bool_], over
 
 def _certain_parts(equations: GapEquations, fit: GapFit) -> list[str]:
     layout = equations.layout
-    parts = {"walls": layout.wall, "radius classes": layout.radius_class, "pixel size": layout.scale}
-    return [name for name, part in parts.items() if np.any(np.abs(fit.unknowns[part]) > CERTAIN * fit.sd[part])]
+    finest = FINEST_SURFACE * float(equations.sequence.radius.mean())
+    parts = {
+        "walls": (layout.wall, finest),
+        "radius classes": (layout.radius_class, finest),
+        "pixel size": (layout.scale, FINEST_SURFACE),
+    }
+    return [
+        name
+        for name, (part, least) in parts.items()
+        if np.any(np.abs(fit.unknowns[part]) > CERTAIN * np.hypot(fit.sd[part], least))
+    ]
 
 
 def _verdict(applied: bool, gain: float, certain: list[str], before: GapStatistics, after: GapStatistics) -> str:

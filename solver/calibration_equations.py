@@ -214,6 +214,8 @@ class GapEquations:
         i, j, grain = rows.i.astype(np.int64), rows.j.astype(np.int64), rows.second_grain(n).astype(np.int64)
         wall = rows.with_wall(n)
         of_grain = np.where(wall, 0.0, 1.0)
+        shift = np.zeros(rows.count)  # of a wall, which the scale leaves as it is
+        shift[wall] = unknowns[layout.wall][j[wall] - n]
         ix, iy = self._in_body_frame(rows.frame, i, geometry.normal)
         jx, jy = self._in_body_frame(rows.frame, grain, geometry.normal)
         one = np.ones(rows.count)
@@ -224,7 +226,7 @@ class GapEquations:
             (2 * grain + 1, scale * of_grain * jy),
             (layout.radius.start + i, -one),
             (np.where(wall, layout.wall.start + j - n, layout.radius.start + grain), np.where(wall, one, -one)),
-            (np.full(rows.count, layout.scale.start), geometry.distance / scale),
+            (np.full(rows.count, layout.scale.start), (geometry.distance - shift) / scale),
         ]
         if self.radius_class is not None:
             start = layout.radius_class.start

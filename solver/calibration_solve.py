@@ -21,7 +21,7 @@ FINAL_SCALE = 2.0  # final s over the noise of a gap: below, noise above the con
 ANNEALED_VARIANCE = 0.3  # a row's variance is at least this times s²: while s is large, so is the doubt in the model
 NEGLIGIBLE_WEIGHT = 1e-3  # a row that counts less is left out of its round
 OVERLAP_FRAMES = 15  # frames over which the elastic overlap of a contact is one random number, not many
-OVERLAP_DOUBT = 0.5  # the typical overlap itself is known to this share, between grains and at walls apart
+DOUBT = 0.5  # the typical overlap, between grains and at walls apart, and the bias of the weights: known to this share
 # Which pairs touch is not certain either, which the draws cannot know. Against simulated truths the errors
 # are 0.75 to 1.2 times the standard deviations once these carry this factor.
 SD_FACTOR = 1.2
@@ -171,8 +171,7 @@ class _LinearStep:
         priors: CalibrationPriors,
     ) -> None:
         geometry = equations.measure(rows, unknowns)
-        beyond = np.maximum(geometry.gap + overlap, 0.0) / s
-        weight = (1.0 + beyond**2) ** -2.0
+        weight = _one_sided_weight((geometry.gap + overlap) / s)
         kept = np.flatnonzero(weight > NEGLIGIBLE_WEIGHT)
         self._equations, self._overlap = equations, overlap
         self._rows, self._geometry = rows.select(kept), geometry.select(kept)
@@ -181,7 +180,9 @@ class _LinearStep:
         self._weight = weight[kept]
         self._precision = self._weight / np.maximum(noise[kept] ** 2, ANNEALED_VARIANCE * s[kept] ** 2)
         self._matrix = equations.derive(self._rows, self._geometry, unknowns)[:, self._free]
-        self._target = self._matrix @ unknowns[self._free] - (self._geometry.gap + overlap)
+        self._shift = _weighting_bias(s[kept], noise[kept], overlap)
+        residual = self._geometry.gap + overlap + self._shift
+        self._target = self._matrix @ unknowns[self._free] - residual
         weighted = self._matrix.multiply(self._precision[:, None]).tocsr()
         normal = self._matrix.T @ weighted + sparse.diags_array(self._prior_sd[self._free] ** -2.0)
         # Pairs of neighbours make an almost planar graph: a direct factorisation is cheap and exact.
@@ -231,11 +232,32 @@ class _LinearStep:
             noise = sigma * rng.standard_normal(sequence.position.shape)
             error = np.einsum("mk,mk->m", normal, other * noise[k, grain] - noise[k, i])
             error += self._overlap * rng.standard_normal(block.max(initial=-1) + 1)[block]
-            error += self._overlap * OVERLAP_DOUBT * rng.standard_normal(2)[wall]
+            error += DOUBT * (self._overlap * rng.standard_normal(2)[wall] + self._shift * rng.standard_normal())
             right = self._matrix.T @ (self._precision * error)
             right += rng.standard_normal(len(right)) / self._prior_sd[self._free]
             row[self._free] = self._factor.solve(right)
         return errors
+
+
+def _one_sided_weight(excess: Array) -> Array:
+    """Weight (m,) of gaps that exceed contact by `excess` (m,) times s; an overlap is never excused."""
+    return (1.0 + np.maximum(excess, 0.0) ** 2) ** -2.0
+
+
+def _weighting_bias(s: Array, noise: Array, overlap: float) -> Array:
+    """How far below contact the weighted mean of the gaps of touching pairs lies (m,) [m].
+
+    Noise that opens a gap is down-weighted, noise that closes it is not: without this shift all contacts
+    would be drawn apart. Only noise of positions counts, which is as often positive as negative.
+    """
+    sigma = np.sqrt(np.maximum(noise**2 - overlap**2, 0.0))
+    relative = sigma / s
+    noise_value = np.linspace(-6.0, 6.0, 241)
+    density = np.exp(-0.5 * noise_value**2)
+    ratio = np.linspace(0.0, 1.0 / FINAL_SCALE, 41)  # σ / s never exceeds the last value
+    weighted = _one_sided_weight(ratio[:, None] * noise_value) * density
+    mean = weighted @ noise_value / weighted.sum(axis=1)
+    return -sigma * np.interp(relative, ratio, mean)
 
 
 def _gap_noise(sequence: MeasuredSequence, rows: GapRows, overlap: float) -> Array:

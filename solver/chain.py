@@ -12,7 +12,7 @@ from solver.frame_forces import SweepHistory
 from solver.grains import Array, Grains
 from solver.motion import FrameMotion
 from solver.nlgs import NlgsSettings, Solution, solve, unbalance_of
-from solver.problem import Material, assemble, inertial_impedance, kinematic_impedance
+from solver.problem import ContactProblem, Material, assemble, inertial_impedance, kinematic_impedance
 from solver.sweep_record import Keep, SweepRecorder
 from solver.warm_start import ForceMemory
 
@@ -81,22 +81,36 @@ def advance_chain(
     impedance, kappa = _impedance(packing, motion, settings, steps)
     nlgs = NlgsSettings(sweeps, settings.force_change, None, settings.relaxation)
     recorder = SweepRecorder(steps * sweeps, settings.keep)
-    former, done = memory, 0
-    for step in range(1, steps + 1):
-        grains, walls = motion.at(step / steps, packing.load(motion.endpoints))
+    load = packing.load(motion.endpoints)
+
+    def contacts_at(fraction: float) -> tuple[ContactProblem, Contacts, Walls]:
+        grains, walls = motion.at(fraction, load)
         contacts = detect_contacts(packing.grains, grains.position, grains.present, walls, threshold)
-        problem = assemble(packing.grains, grains, walls, contacts, packing.material, impedance)
+        return assemble(packing.grains, grains, walls, contacts, packing.material, impedance), contacts, walls
+
+    former, done = memory, 0
+    for step in range(1, steps):
+        problem, contacts, _ = contacts_at(step / steps)
         recorder.begin(problem, contacts)
         solution = solve(problem, nlgs, guess=memory.recall(contacts), observer=recorder.hear)
-        memory = memory.renew(contacts, np.column_stack([solution.fn, solution.ft]), grains.present)
+        memory = memory.renew(contacts, solution.force, motion.grains.present)
         done += solution.sweeps
-    old = np.nan if fresh else unbalance_of(problem, former.recall(contacts))[1]
-    return ChainStep(contacts, walls, solution, done, recorder.history(contacts), kappa, old, memory)
+    problem, contacts, walls = contacts_at(1.0)
+    recorder.begin(problem, contacts)
+    solution = solve(problem, nlgs, guess=memory.recall(contacts), observer=recorder.hear)
+    return ChainStep(
+        contacts=contacts,
+        walls=walls,
+        solution=solution,
+        sweeps=done + solution.sweeps,
+        history=recorder.history(contacts),
+        kappa=kappa,
+        old_unbalance=np.nan if fresh else unbalance_of(problem, former.recall(contacts))[1],
+        memory=memory.renew(contacts, solution.force, motion.grains.present),
+    )
 
 
-def _impedance(
-    packing: Packing, motion: FrameMotion, settings: ChainSettings, steps: int
-) -> tuple[Array, float]:
+def _impedance(packing: Packing, motion: FrameMotion, settings: ChainSettings, steps: int) -> tuple[Array, float]:
     scale, velocity = force_scale(packing, settings), motion.velocity_rms
     weight = packing.material.formal_weight
     if settings.kappa is None:

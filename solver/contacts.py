@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from solver.boundaries import Walls
 from solver.grains import Array, Grains
@@ -107,7 +107,7 @@ def _grain_pairs(
     rows = np.flatnonzero(present)
     if len(rows) < 2:
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    tree = cKDTree(position[rows])
+    tree = KDTree(position[rows])
     pairs = rows[tree.query_pairs(2.0 * radius[rows].max() + threshold, output_type="ndarray")]
     i, j = pairs.min(axis=1), pairs.max(axis=1)
     gap = np.linalg.norm(position[j] - position[i], axis=1) - radius[i] - radius[j]

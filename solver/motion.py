@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from solver.boundaries import Walls
 from solver.grains import Array, GrainMotion
@@ -138,6 +138,6 @@ def _velocities(snapshot: Snapshot, seen: LastSeen) -> tuple[Array, Array]:
     if len(strangers) and known.any():
         rows = np.flatnonzero(known)
         count = min(NEIGHBOURS, len(rows))
-        _, near = cKDTree(snapshot.position[rows]).query(snapshot.position[strangers], k=count)
+        _, near = KDTree(snapshot.position[rows]).query(snapshot.position[strangers], k=count)
         velocity[strangers] = velocity[rows[np.reshape(near, (len(strangers), count))]].mean(axis=1)
     return velocity, spin

@@ -68,6 +68,11 @@ class Solution:
     unbalance: float  # worst |ΣF| on a grain / mean f_n
     mean_unbalance: float  # mean |ΣF| on a grain / mean f_n
 
+    @property
+    def force(self) -> Array:
+        """(f_n, f_t) in the order of the contacts (c, 2) [N]."""
+        return np.column_stack([self.fn, self.ft])
+
 
 def sweeps(
     problem: ContactProblem, settings: NlgsSettings, *, guess: Array | None = None, every: int = 1

@@ -59,7 +59,13 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
     projected, which selects another solution.
     """
     mu, wall_mu = problem.friction
-    pair, pair_body, wall, wall_body, bias = problem.pair, problem.pair_body, problem.wall, problem.wall_body, problem.bias
+    pair, pair_body, wall, wall_body, bias = (
+        problem.pair,
+        problem.pair_body,
+        problem.wall,
+        problem.wall_body,
+        problem.bias,
+    )
     first = len(pair)
     for _ in range(sweeps):
         for c in range(len(pair)):

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain
 from solver.contacts import Contacts
-from solver.kinematics import relative_motion
 from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus
 from solver.grains import Array
 from solver.judgement import Evidence, free_standard_deviation, is_suspect, judge, trust
+from solver.kinematics import relative_motion
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
 from solver.stress import love_weber_stress, packing_area
 from solver.warm_start import ForceMemory
@@ -99,6 +99,8 @@ def solve_frame(
             step, evidence = wider, wider_evidence
             remark = f"solved again with a gap threshold {WIDER} times as wide; "
     status, why = judge(evidence)
+    if not motion.spans:
+        why = "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
     if status is FrameStatus.REARRANGING and settings.reset_to_zero:
         memory = ForceMemory.empty()
         step = advance_chain(packing, motion, memory, settings.chain, threshold)
@@ -139,9 +141,7 @@ def _evidence(
 def _pressure(packing: Packing, motion: FrameMotion, step: ChainStep) -> float:
     position = motion.grains.position
     area = packing_area(step.walls, position[motion.grains.present])
-    stress = love_weber_stress(
-        step.contacts, step.solution.fn, step.solution.ft, position, area, packing.length
-    )
+    stress = love_weber_stress(step.contacts, step.solution.fn, step.solution.ft, position, area, packing.length)
     return 0.5 * float(np.trace(stress))
 
 
@@ -173,9 +173,7 @@ def _describe(
     age: NDArray[np.int32],
 ) -> FrameForces:
     contacts, fn, ft = step.contacts, step.solution.fn, step.solution.ft
-    un, ut = relative_motion(
-        contacts, packing.grains.radius, motion.grains.velocity, motion.grains.spin, step.walls
-    )
+    un, ut = relative_motion(contacts, packing.grains.radius, motion.grains.velocity, motion.grains.spin, step.walls)
     return FrameForces(
         frame=k,
         contacts=contacts,
@@ -199,7 +197,7 @@ def _describe(
         kappa=step.kappa,
         correction=evidence.correction,
         old_unbalance=evidence.old_unbalance,
-        trust=trust(evidence.correction),
+        trust=trust(evidence.correction) if motion.spans else np.nan,
         frames_since_reset=since_reset,
         history=step.history,
     )

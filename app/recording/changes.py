@@ -84,8 +84,8 @@ def gap_range(scene: Scene) -> float:
 
 def gap_colours(gap: Array, reach: float) -> NDArray[np.uint32]:
     """Colours along the gap ramp, overlap … open (c,)."""
-    level = np.round((gap / reach + 1.0) * 0.5 * (len(_RAMP) - 1))
-    return _RAMP[np.clip(np.nan_to_num(level), 0, len(_RAMP) - 1).astype(np.int64)]
+    level = np.round((np.nan_to_num(gap) / reach + 1.0) * 0.5 * (len(_RAMP) - 1))
+    return _RAMP[np.clip(level, 0, len(_RAMP) - 1).astype(np.int64)]
 
 
 def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:

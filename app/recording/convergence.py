@@ -8,6 +8,7 @@ import rerun as rr
 from app.recording import entities
 from app.recording.colours import INK, SERIES, Rgba
 from app.recording.scene import Clock
+from app.recording.values import log_scalar, send_scalars
 from solver.frame_forces import SweepHistory
 from solver.grains import Array
 
@@ -24,7 +25,7 @@ def log_residual_styles(stream: rr.RecordingStream) -> None:
 def log_tolerance(clock: Clock, tolerance: float) -> None:
     """Log the stopping level, once a frame."""
     clock.start()
-    clock.stream.log(entities.TOLERANCE, rr.Scalars(float(power_of_ten(np.array(tolerance)))))
+    log_scalar(clock, entities.TOLERANCE, float(power_of_ten(np.array(tolerance))))
 
 
 def log_tolerance_style(stream: rr.RecordingStream) -> None:
@@ -40,7 +41,7 @@ def log_residuals(clock: Clock, history: SweepHistory) -> None:
         (entities.SWEEP_UNBALANCE, history.unbalance),
         (entities.SWEEP_FORCE_CHANGE, history.force_change),
     ):
-        clock.stream.send_columns(path, [when], rr.Scalars.columns(scalars=power_of_ten(residual)))
+        send_scalars(clock.stream, path, when, power_of_ten(residual))
 
 
 def power_of_ten(residual: Array) -> Array:

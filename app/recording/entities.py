@@ -10,6 +10,8 @@ sweep always shows the reported field. Values to be clicked (`fn`, `ft`, …) ar
 
 Lengths in the 2D views are pixels of the photograph as recorded (y down; a photograph above 4 megapixels
 is recorded at half size), or nominal pixels of 1/30 mean radius without photographs. The 3D view is in metres.
+
+The recording's property `experiment` holds name, frames, grains, friction and configuration (TOML).
 """
 
 from __future__ import annotations
@@ -159,7 +161,7 @@ SCHEMA: tuple[Entity, ...] = (
         PHOTOGRAPH, "the photograph, JPEG, shown dimmed",
         _of("EncodedImage", "blob", "media_type", "opacity", "draw_order"), When.START, Condition.PHOTOGRAPHS,
     ),
-    Entity(WALLS, "walls, one strip each; loaded plates brighter", _STRIPS | {"name", "pressure_kPa"}, When.START),
+    Entity(WALLS, "walls, one strip each; loaded plates brighter", _STRIPS | {"name", "drive"}, When.START),
     Entity(
         GRAINS, "outline of every grain, instance = row; lost ones where they were last seen",
         _of("Ellipses2D", "centers", "half_sizes", "line_radii", "colors", "draw_order") | _GRAIN_VALUES, When.START,
@@ -223,14 +225,11 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(ROSE_TICKS, "names of the curves", _TICKS, When.STATIC),
     Entity(
         RODS, "rods as cylinders [m]",
-        _of("Cylinders3D", "lengths", "radii", "colors", "fill_mode") | _of("InstancePoses3D", "translations"),
-        When.END,
+        _of("Cylinders3D", "lengths", "radii", "centers", "colors", "fill_mode"), When.END,
     ),
     Entity(
         ROD_CHAINS, "forces above the mean as capsules before the rods [m]",
-        _of("Capsules3D", "lengths", "radii", "colors", "fill_mode")
-        | _of("InstancePoses3D", "translations", "quaternions"),
-        When.END,
+        _of("Capsules3D", "lengths", "radii", "translations", "quaternions", "colors", "fill_mode"), When.END,
     ),
     Entity(TRUTH_FORCES, "true contact forces, same widths and colours", _STRIPS | _FORCE_VALUES, When.START,
            Condition.TRUTH),

@@ -13,6 +13,7 @@ from app.recording import entities
 from app.recording.colours import SLIDING, packed_one
 from app.recording.force_style import ForceStyle
 from app.recording.scene import Clock, Scene
+from app.recording.values import known
 from solver.contacts import Contacts
 from solver.frame_forces import ContactState, FrameForces, SweepHistory
 from solver.grains import Array
@@ -47,10 +48,9 @@ def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepCh
         ),
         contact_values(scene, forces),
     )
-    if contacts.count:
-        _send_sweeps(clock, style, rows[1:], fn[1:], thin=choice is SweepChoice.ALL)
+    sent = _send_sweeps(clock, style, rows[1:], fn[1:], thin=choice is SweepChoice.ALL) if contacts.count else 0
     _log_sliding(clock, scene, forces)
-    return len(rows)
+    return 1 + sent
 
 
 def visible_sweeps(
@@ -90,14 +90,14 @@ def contact_values(scene: Scene, forces: FrameForces) -> rr.AnyValues:
         mobilisation = np.abs(forces.ft) / (scene.friction * forces.fn)
     return rr.AnyValues(
         **body_values(scene, forces.contacts),
-        fn=forces.fn,
-        ft=forces.ft,
+        fn=known(forces.fn),
+        ft=known(forces.ft),
         gap_um=(1e6 * forces.contacts.gap).astype(np.float32),
-        fn_sd=forces.fn_sd.astype(np.float32),
-        mobilisation=np.where(forces.fn > 0.0, mobilisation, np.nan).astype(np.float32),
+        fn_sd=known(forces.fn_sd.astype(np.float32)),
+        mobilisation=known(np.where(forces.fn > 0.0, mobilisation, np.nan).astype(np.float32)),
         state=[ContactState(s).name.lower() for s in forces.state.tolist()],
         age=forces.age.astype(np.int32),
-        probability=forces.probability.astype(np.float32),
+        probability=known(forces.probability.astype(np.float32)),
     )
 
 
@@ -113,11 +113,15 @@ def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:
 
 def _send_sweeps(
     clock: Clock, style: ForceStyle, rows: NDArray[np.int64], fn: NDArray[np.floating], *, thin: bool
-) -> None:
-    """Send widths and colours of rows (r,), fn (r, c); `thin` leaves out rows that look like the one before."""
+) -> int:
+    """Send widths and colours of rows (r,), fn (r, c); `thin` leaves out rows that look like the one before.
+
+    Returns the rows sent.
+    """
     count = fn.shape[1]
     step = max(CHUNK_BYTES // (8 * count), 1)
-    former: tuple[Array, Array] | None = None
+    former: tuple[NDArray, NDArray] | None = None
+    sent = 0
     for start in range(0, len(rows), step):
         part = slice(start, start + step)
         radii, colours = style.radii(fn[part]), style.colours(fn[part])
@@ -134,6 +138,8 @@ def _send_sweeps(
             lengths = np.full(len(kept), count)
             columns = rr.LineStrips2D.columns(radii=radii[keep].ravel(), colors=colours[keep].ravel())
             clock.stream.send_columns(entities.FORCES, clock.columns(kept), columns.partition(lengths))
+            sent += len(kept)
+    return sent
 
 
 def _log_sliding(clock: Clock, scene: Scene, forces: FrameForces) -> None:

@@ -10,6 +10,7 @@ from app.recording import entities
 from app.recording.colours import INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
 from app.recording.scene import Clock, Scene, mean_force
 from app.recording.texts import printable
+from app.recording.values import known
 from app.tracks import TrackStatus
 from solver.frame_forces import FrameForces
 from solver.grains import Array
@@ -56,8 +57,15 @@ def _log_walls(clock: Clock, scene: Scene) -> None:
             colors=np.where(loaded, packed_one(LOADED_WALL), packed_one(WALL)).astype(np.uint32),
             draw_order=5.0,
         ),
-        rr.AnyValues(name=[printable(name) for name in walls.name], pressure_kPa=walls.pressure / 1e3),
+        rr.AnyValues(
+            name=[printable(name) for name in walls.name],
+            drive=[_drive(pressure) for pressure in walls.pressure.tolist()],
+        ),
     )
+
+
+def _drive(pressure: float) -> str:
+    return f"{1e-3 * pressure:g} kPa" if np.isfinite(pressure) else "motion imposed"
 
 
 def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
@@ -78,21 +86,21 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         ),
         rr.AnyValues(
             id=tracks.id,
-            x_mm=1e3 * tracks.position[frame, :, 0],
-            y_mm=1e3 * tracks.position[frame, :, 1],
-            theta_deg=np.degrees(tracks.rotation[frame]),
-            sigma_um=(1e6 * tracks.sigma[frame]).astype(np.float32),
-            zncc=tracks.zncc[frame].astype(np.float32),
+            x_mm=known(1e3 * tracks.position[frame, :, 0]),
+            y_mm=known(1e3 * tracks.position[frame, :, 1]),
+            theta_deg=known(np.degrees(tracks.rotation[frame])),
+            sigma_um=known((1e6 * tracks.sigma[frame]).astype(np.float32)),
+            zncc=known(tracks.zncc[frame].astype(np.float32)),
             status=[TrackStatus(s).name.lower() for s in status.tolist()],
-            unbalance=grain_unbalance(forces, tracks.grain_count).astype(np.float32),
+            unbalance=known(grain_unbalance(forces, tracks.grain_count).astype(np.float32)),
         ),
     )
     turned = tracks.rotation[frame] - _first_rotation(tracks.rotation)
-    known = present & np.isfinite(turned)
+    shown = present & np.isfinite(turned)
     clock.stream.log(
         entities.GRAIN_SPINS,
         rr.LineStrips2D(
-            _spin_marks(centre[known], radius[known], turned[known]),
+            _spin_marks(centre[shown], radius[shown], turned[shown]),
             radii=np.float32(0.03 * canvas.grain_radius),
             colors=packed_one(INK),
             draw_order=11.0,

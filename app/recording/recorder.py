@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from rerun.chunk import RrdReader
 
 from app.recording import entities
 from app.recording.blueprint import Layout, Tab, make_blueprint
@@ -39,6 +40,9 @@ from solver.frame_statistics import FrameStatistics
 Photograph = NDArray[np.uint8]  # (H, W) grey
 PhotographSource = Callable[[int], Photograph | None]
 Progress = Callable[[int, int], None]  # frames done, frames in all
+
+# Messages are cut by size, never by the clock: the same run makes the same file.
+_BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
 
 SWEEPS_KEPT = 40  # per frame, with SweepChoice.LOG
 # What is tried in turn to keep a recording below a size: sweeps per frame.
@@ -69,6 +73,7 @@ class Recorder:
     def __init__(
         self, stream: rr.RecordingStream, *, sweeps: SweepChoice = SweepChoice.LOG, kept: int = SWEEPS_KEPT
     ) -> None:
+        rr.set_strict_mode(True)  # else the SDK warns and leaves out what it could not write
         self._stream = stream
         self._sweeps, self._kept = sweeps, kept
         self._scene: Scene | None = None
@@ -249,7 +254,7 @@ def _write(
     max_size: int | None,
 ) -> Recorder | None:
     """Write the whole run to `part`; None, early, where it grows beyond max_size."""
-    stream = rr.RecordingStream(entities.APPLICATION_ID)
+    stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=_BATCHES)
     layout = layout_of(results, scene, photographs=photograph is not None)
     stream.save(part, default_blueprint=make_blueprint(layout, active=active))
     try:
@@ -262,9 +267,18 @@ def _write(
             if max_size is not None and part.stat().st_size > max_size:
                 return None
         recorder.finish(notes)
-        return recorder
     finally:
         stream.disconnect()
+    _check_whole(part)
+    return recorder
+
+
+def _check_whole(part: Path) -> None:
+    """Raise OSError where the end of the file is not there: the stream writes in the background and does not tell."""
+    try:
+        RrdReader(str(part)).recordings()
+    except RuntimeError as error:
+        raise OSError(f"the recording could not be written whole (is the disk full?): {error}") from error
 
 
 def _megabytes(size: int) -> str:

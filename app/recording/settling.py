@@ -11,6 +11,7 @@ from app.recording.colours import SERIES, Rgba
 from app.recording.convergence import power_of_ten
 from app.recording.scene import Clock, Scene
 from app.recording.texts import printable
+from app.recording.values import log_scalar
 from solver.frame_forces import FrameForces, FrameStatus
 
 STATUS_COLOURS: dict[FrameStatus, Rgba] = {
@@ -86,7 +87,7 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces, changes: Chang
         (entities.GAINED_COUNT, changes.gained),
         (entities.PARTED_COUNT, changes.parted),
     ):
-        clock.stream.log(path, rr.Scalars(float(value)))
+        log_scalar(clock, path, float(value))
 
 
 def _log_flags(clock: Clock, scene: Scene, forces: FrameForces) -> None:

@@ -9,6 +9,7 @@ import rerun as rr
 from app.recording import entities
 from app.recording.colours import SERIES
 from app.recording.scene import Clock
+from app.recording.values import log_scalar
 from solver.frame_statistics import FrameStatistics
 
 
@@ -48,4 +49,4 @@ def log_statistics(clock: Clock, statistics: FrameStatistics) -> None:
         (entities.MAX_FN, statistics.max_fn),
         (entities.FABRIC_ANISOTROPY, statistics.fabric_anisotropy),
     ):
-        clock.stream.log(path, rr.Scalars(float(value)))
+        log_scalar(clock, path, float(value))

@@ -134,11 +134,11 @@ def _accuracy(facts: list[FrameFacts]) -> str:
 def _frames(facts: list[FrameFacts]) -> str:
     rows = [
         f"| {f.frame} | {f.status.name.lower()} | {f.trust:.2f} | {f.similarity:.2f} | {f.sweeps} "
-        f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} |"
+        f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} | {_cell(f.reason)} |"
         for f in facts
     ]
-    head = "| frame | status | T | similarity | sweeps | natural map | unbalance | contacts | φ [°] | lost |"
-    return "\n".join(["## Frames", "", head, "|" + "---|" * 10, *rows]) if rows else ""
+    head = "| frame | status | T | similarity | sweeps | natural map | unbalance | contacts | φ [°] | lost | why |"
+    return "\n".join(["## Frames", "", head, "|" + "---|" * 11, *rows]) if rows else ""
 
 
 def _legend(scene: Scene, clipped: int, drawn: int) -> str:
@@ -167,6 +167,11 @@ def _versions() -> str:
         except PackageNotFoundError:
             found.append(f"{package} (not installed)")
     return "Made with " + ", ".join(found) + "."
+
+
+def _cell(text: str) -> str:
+    """A sentence that does not break a Markdown table."""
+    return " ".join(text.replace("|", "/").split())
 
 
 def _spread(values: list[float], worst: np.ufunc | object) -> str:

@@ -13,6 +13,7 @@ from app.recording.colours import SERIES, packed_one
 from app.recording.network import body_values
 from app.recording.plots import Axes
 from app.recording.scene import Clock, Scene
+from app.recording.values import known, log_scalar
 from app.results import TruthContacts
 from solver.contacts import measure_contacts
 from solver.frame_forces import FrameForces
@@ -79,7 +80,7 @@ class TruthWriter:
                 colors=scene.style.colours(fn),
                 draw_order=20.0,
             ),
-            rr.AnyValues(**body_values(scene, contacts), fn=fn, ft=ft),
+            rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
         )
         clock.end()
         true_fn, inferred_fn = align(contacts.key, fn, forces.contacts.key, forces.fn)
@@ -97,9 +98,9 @@ class TruthWriter:
         agreement = Agreement(
             correlate(true_fn, inferred_fn), correlate(true_ft, inferred_ft), relative_error(true_fn, inferred_fn)
         )
-        clock.stream.log(entities.TRUTH_R_FN, rr.Scalars(agreement.r_fn))
-        clock.stream.log(entities.TRUTH_R_FT, rr.Scalars(agreement.r_ft))
-        clock.stream.log(entities.TRUTH_ERROR, rr.Scalars(agreement.relative_l2))
+        log_scalar(clock, entities.TRUTH_R_FN, agreement.r_fn)
+        log_scalar(clock, entities.TRUTH_R_FT, agreement.r_ft)
+        log_scalar(clock, entities.TRUTH_ERROR, agreement.relative_l2)
         return agreement
 
     def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:

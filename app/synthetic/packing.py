@@ -12,7 +12,13 @@ from solver.grains import Array
 RADIUS_CLASSES = (0.007, 0.008, 0.011)  # [m], rods of 14, 16 and 22 mm
 CLASS_SHARES = (0.40, 0.41, 0.19)  # by number: 1172 rods then fill 0.5 × 0.6 m
 SOLID_FRACTION = 0.845  # of a dense frictionless packing in two dimensions
+LOOSENESS = 1.1  # first height over the dense one
+JITTER = 0.3  # of a lattice cell, either way
 SOFTENING = 1e-3  # the springs' share of their stiffness while overlaps are pushed apart
+SOFT_STEPS, SOFT_DRAG = 4000, 50.0  # –, [1/s]
+LOADING_STEPS, LOADING_DRAG = 5000, 20.0  # between two looks at the balance, [1/s]
+LOADING_ROUNDS = 40
+PREPARED = 1e-3  # unbalance, of grains and plate, at which a packing counts as at rest
 
 
 def choose_radii(count: int, rng: np.random.Generator) -> Array:
@@ -31,23 +37,20 @@ def prepare_packing(count: int, rng: np.random.Generator, settings: DemSettings,
     """
     radius = choose_radii(count, rng)
     width = float(np.sqrt(np.pi * np.sum(radius**2) / SOLID_FRACTION / aspect))
-    height = 1.1 * aspect * width
+    height = LOOSENESS * aspect * width
     columns = max(1, round(np.sqrt(count * width / height)))
     rows = -(-count // columns)
     cell_size = np.array([width / columns, height / rows])
     site = np.stack(np.divmod(np.arange(count), columns)[::-1], axis=1)
-    position = (site + 0.5 + rng.uniform(-0.3, 0.3, (count, 2))) * cell_size
+    position = (site + 0.5 + rng.uniform(-JITTER, JITTER, (count, 2))) * cell_size
 
     frictionless = replace(settings, friction=0.0, wall_friction=0.0)
     soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
-    cell = ShearCell(radius, position, width=width, height=height, settings=soft, drag=50.0)
-    cell.run(np.zeros(4000))
-    cell = ShearCell(radius, cell.position, width=width, height=height, settings=frictionless, drag=20.0)
-    for _ in range(40):
-        cell.run(np.zeros(5000))
+    cell = ShearCell(radius, position, width=width, height=height, settings=soft, drag=SOFT_DRAG)
+    cell.run(np.zeros(SOFT_STEPS))
+    cell = ShearCell(radius, cell.position, width=width, height=height, settings=frictionless, drag=LOADING_DRAG)
+    for _ in range(LOADING_ROUNDS):
+        cell.run(np.zeros(LOADING_STEPS))
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
             return ShearCell(radius, cell.position, width=width, height=cell.height, settings=settings)
     raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
-
-
-PREPARED = 1e-3  # unbalance, of grains and plate, at which a packing counts as at rest

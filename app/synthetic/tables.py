@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -65,10 +66,13 @@ def write_times(path: Path, time: Array) -> None:
 def write_experiment(path: Path, *, name: str, remark: str, source: str, truth: DemTruth) -> None:
     """Write experiment.toml; source is its [photographs] or [tracks] table."""
     settings = truth.settings
+    name = re.sub(r"[^\w .+-]", "-", name)
+    name = name if re.match(r"\w", name) else f"synthetic {name}"
     remarks = "".join(f"# {line}\n" for line in remark.splitlines())
     path.write_text(
         f"""{remarks}name = "{name}"
 truth = "truth_contacts.csv"
+truth_tracks = "truth_tracks.csv"
 
 {source}
 [walls]

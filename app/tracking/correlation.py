@@ -22,7 +22,7 @@ Rows = NDArray[np.intp]
 CHUNK = 32
 
 # The greatest of the thousands of accidental correlations that a search meets, in their standard deviations.
-ACCIDENTAL_DEVIATIONS = 4.0
+ACCIDENTAL_DEVIATIONS = 4.5
 
 # Radius [px] below which a patch is not shrunk any further for the search.
 COARSE_REACH = 8.0
@@ -151,7 +151,7 @@ class Correlator:
             row = rows[k]
             kernels.fit_robust(
                 coefficients, patches.data[patches.start[row] : patches.start[row + 1]], patches.reach[row],
-                leash[k], noise, gain[k], offset[k], 3 * self._limit, pose[k], fit[k], covariance[k],
+                leash[k], noise, gain[k], offset[k], 2 * self._limit, pose[k], fit[k], covariance[k],
             )  # fmt: skip
 
         self._each(len(rows), one)

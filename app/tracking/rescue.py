@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.tracking.correlation import Correlator, Rows
-from app.tracking.progress import Progress
+from app.tracking.findings import Findings
 from app.tracking.splines import Pyramid
 from app.tracks import TrackStatus
 from solver.grains import Array
@@ -22,9 +22,14 @@ NEAR_SWEEP = np.deg2rad(30.0)
 NEWS = 0.25
 
 
+# A plain fit that reaches this share of the greatest accidental ZNCC may be the right place, partly hidden.
+PROMISING = 0.7
+
+
 def rescue(
-    correlator: Correlator, photograph: Pyramid, progress: Progress, last: Array, settings: TrackingSettings
-) -> None:
+    correlator: Correlator, photograph: Pyramid, findings: Findings, last: Array, settings: TrackingSettings,
+    noise: float,
+) -> None:  # fmt: skip
     """Look for every open grain; whatever is found tells its neighbours where to look, until nothing is.
 
     A displacement far beyond the widest window is reached in this way too, as long as it begins within it
@@ -33,30 +38,37 @@ def rescue(
     reach = correlator.patches.reach
     near, wide = 0.5 * reach, np.maximum(settings.search_window, 1.5 * reach)
     searched = np.full((2, len(reach), 2), np.inf)  # where the near and the wide search have been
-    while progress.open.any():
-        before = progress.accepted.sum()
-        follow_neighbours(correlator, photograph, progress, last)
+    while findings.open.any():
+        before = findings.accepted.sum()
+        follow_neighbours(correlator, photograph, findings, last)
         for which, (window, sweep) in enumerate(((near, NEAR_SWEEP), (wide, np.pi))):
-            progress.expect_from_neighbours(last)
-            middle = np.where(np.isfinite(progress.expected), progress.expected, last)
+            findings.expect_from_neighbours(last)
+            middle = np.where(np.isfinite(findings.expected), findings.expected, last)
             with np.errstate(invalid="ignore"):
                 news = ~(np.linalg.norm(middle[:, :2] - searched[which], axis=1) < NEWS * window)
-            rows = np.flatnonzero(progress.open & news)
+            rows = np.flatnonzero(findings.open & news)
             searched[which, rows] = middle[rows, :2]
-            _search(correlator, photograph, progress, rows, middle[rows], window[rows], sweep, settings.candidates)
-        if progress.accepted.sum() == before:
+            if len(rows):
+                if which == 1:  # before the costly search: it may be where it should be, under a stain
+                    refit_hidden(correlator, photograph, findings, rows, middle[rows], noise)
+                    rows = rows[findings.open[rows]]
+                places = correlator.search(
+                    photograph, rows, middle[rows], window[rows], float(sweep), settings.candidates
+                )
+                _try_places(correlator, photograph, findings, rows, places, noise)
+        if findings.accepted.sum() == before:
             return
 
 
-def follow_neighbours(correlator: Correlator, photograph: Pyramid, progress: Progress, last: Array) -> None:
+def follow_neighbours(correlator: Correlator, photograph: Pyramid, findings: Findings, last: Array) -> None:
     """Fit what is open from its neighbours' motion, as long as that finds grains."""
     while True:
-        rows = progress.expect_from_neighbours(last)
-        before = progress.accepted.sum()
+        rows = findings.expect_from_neighbours(last)
+        before = findings.accepted.sum()
         if len(rows):
-            fits = correlator.fit(photograph, rows, progress.expected[rows], leash(correlator, rows))
-            progress.take(rows, fits, TrackStatus.OK)
-        if progress.accepted.sum() == before:
+            fits = correlator.fit(photograph, rows, findings.expected[rows], leash(correlator, rows))
+            findings.take(rows, fits, TrackStatus.OK)
+        if findings.accepted.sum() == before:
             return
 
 
@@ -65,20 +77,30 @@ def leash(correlator: Correlator, rows: Rows | NDArray[np.bool_]) -> Array:
     return np.maximum(4.0, 0.35 * correlator.patches.reach[rows])
 
 
-def _search(
-    correlator: Correlator, photograph: Pyramid, progress: Progress, rows: Rows, middle: Array, window: Array,
-    sweep: float, count: int,
-) -> None:  # fmt: skip
-    """Fit the candidates in the order of their coarse correlation until one is accepted."""
+def refit_hidden(
+    correlator: Correlator, photograph: Pyramid, findings: Findings, rows: Rows, pose: Array, noise: float
+) -> None:
+    """Fit with Tukey's weights from `pose` (m, 3): what covers a part of a grain then does not count."""
     if len(rows) == 0:
         return
-    places = correlator.search(photograph, rows, middle, window, float(sweep), count)
+    gain, offset = findings.light_at(correlator.patches, rows, pose)
+    fits = correlator.fit_robust(photograph, rows, pose, leash(correlator, rows), noise, gain, offset)
+    findings.take_robust(correlator.patches, rows, fits, noise)
+
+
+def _try_places(
+    correlator: Correlator, photograph: Pyramid, findings: Findings, rows: Rows, places: Array, noise: float
+) -> None:
+    """Fit the candidates (m, c, 4) in the order of their coarse correlation until one is accepted."""
     left = np.arange(len(rows))
-    for candidate in range(count):
+    for candidate in range(places.shape[1]):
         left = left[places[left, candidate, 3] > 0.0]
         if len(left) == 0:
             return
-        chosen = rows[left]
-        fits = correlator.fit(photograph, chosen, places[left, candidate, :3], leash(correlator, chosen))
-        progress.take(chosen, fits, TrackStatus.RESCUED)
-        left = left[progress.open[chosen]]
+        chosen, start = rows[left], places[left, candidate, :3]
+        fits = correlator.fit(photograph, chosen, start, leash(correlator, chosen))
+        findings.take(chosen, fits, TrackStatus.RESCUED)
+        hidden = findings.open[chosen] & (fits.zncc > PROMISING * correlator.patches.accidental_zncc[chosen])
+        pose = np.where(fits.converged[:, None], fits.pose, start)
+        refit_hidden(correlator, photograph, findings, chosen[hidden], pose[hidden], noise)
+        left = left[findings.open[chosen]]

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.frames import Image
-from app.tracking.correlation import Correlator, Patches, Rows
+from app.tracking.correlation import Correlator, Patches
 from app.tracking.detection import Detection
-from app.tracking.neighbours import local_motion, nearby_median, overlaps
+from app.tracking.neighbours import local_motion, overlaps
 from app.tracking.noise import image_noise
-from app.tracking.progress import Progress
-from app.tracking.rescue import leash, rescue
+from app.tracking.findings import Findings
+from app.tracking.rescue import leash, refit_hidden, rescue
 from app.tracking.splines import Pyramid
 from app.tracks import TrackStatus
 from solver.grains import Array
@@ -135,45 +135,50 @@ class Tracker:
             raise ValueError(f"the photograph is {image.shape}, the reference {self.patches.reference.image.shape}")
         photograph = Pyramid(np.ascontiguousarray(image, dtype=np.float32))
         last = _last_known(history, self.first())
-        progress = Progress(self.patches, self.accepted_zncc, self.settings)
-        _follow_predictions(self._correlator, photograph, progress, last, history)
-        rescue(self._correlator, photograph, progress, last, self.settings)
-        _refit_doubtful(self._correlator, photograph, progress, max(image_noise(photograph.image), self.noise))
-        self._judge(progress, last)
-        return self._poses(progress, last, photograph)
+        findings = Findings(self.patches, self.accepted_zncc, self.settings)
+        _follow_predictions(self._correlator, photograph, findings, last, history)
+        noise = max(image_noise(photograph.image), self.noise)
+        typical = findings.judge_residuals(self.patches, noise)
+        rescue(self._correlator, photograph, findings, last, self.settings, typical)
+        typical = findings.judge_residuals(self.patches, noise)
+        poor = np.flatnonzero(findings.poor & (findings.status != TrackStatus.ROBUST))
+        refit_hidden(self._correlator, photograph, findings, poor, findings.pose[poor], typical)
+        findings.doubt(np.flatnonzero(findings.poor & (findings.status != TrackStatus.ROBUST)))
+        self._judge(findings, last)
+        return self._poses(findings, last, photograph)
 
-    def _judge(self, progress: Progress, last: Array) -> None:
+    def _judge(self, findings: Findings, last: Array) -> None:
         """Mark what contradicts its neighbours or overlaps them, unless its correlation is beyond doubt."""
-        rows = np.flatnonzero(progress.accepted)
+        rows = np.flatnonzero(findings.accepted)
         if len(rows) == 0:
             return
-        moved = progress.pose[rows, :2] - last[rows, :2]
+        moved = findings.pose[rows, :2] - last[rows, :2]
         predicted, scatter = local_motion(last[rows, :2], moved, last[rows, :2], itself=True)
         # Grains do move against their neighbours, by a share of a radius between photographs.
         deviation = np.linalg.norm(moved - predicted, axis=1)
         odd = deviation > 6.0 * scatter + 0.25 * self.radius[rows]
-        certain = progress.zncc[rows] > np.maximum(self.accepted_zncc[rows], 0.8)
-        progress.doubt(rows[odd & ~certain])
-        pairs = rows[overlaps(progress.pose[rows, :2], self.radius[rows], self.settings.overlap_allowed)]
+        certain = findings.zncc[rows] > np.maximum(self.accepted_zncc[rows], 0.8)
+        findings.doubt(rows[odd & ~certain])
+        pairs = rows[overlaps(findings.pose[rows, :2], self.radius[rows], self.settings.overlap_allowed)]
         for i, j in pairs:
-            progress.doubt(np.array([i if progress.zncc[i] < progress.zncc[j] else j]))
+            findings.doubt(np.array([i if findings.zncc[i] < findings.zncc[j] else j]))
 
-    def _poses(self, progress: Progress, last: Array, photograph: Pyramid) -> FramePoses:
+    def _poses(self, findings: Findings, last: Array, photograph: Pyramid) -> FramePoses:
         height, width = photograph.image.shape
-        status = progress.status.copy()
-        missing = ~progress.accepted
-        expected = np.where(np.isfinite(progress.expected), progress.expected, last)
+        status = findings.status.copy()
+        missing = ~findings.accepted
+        expected = np.where(np.isfinite(findings.expected), findings.expected, last)
         reach = self.patches.reach + 3.0
         x, y = expected[:, 0], expected[:, 1]
         leaving = (x < reach) | (y < reach) | (x > width - 1 - reach) | (y > height - 1 - reach)
         never = self.first().status
         status[missing] = np.where(leaving, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST)[missing]
         status[~self.patches.usable] = never[~self.patches.usable]
-        pose = np.where(missing[:, None], np.nan, progress.pose)
+        pose = np.where(missing[:, None], np.nan, findings.pose)
         rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
         blank = np.where(missing, np.nan, 1.0)
         return FramePoses(
-            pose[:, 0], pose[:, 1], rotation, progress.sigma * blank, progress.zncc * blank, status
+            pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank, status
         )
 
 
@@ -189,7 +194,7 @@ def _last_known(history: Sequence[FramePoses], first: FramePoses) -> Array:
 
 
 def _follow_predictions(
-    correlator: Correlator, photograph: Pyramid, progress: Progress, last: Array, history: Sequence[FramePoses]
+    correlator: Correlator, photograph: Pyramid, findings: Findings, last: Array, history: Sequence[FramePoses]
 ) -> None:
     """Fit every grain from its own motion, and from rest where that leads nowhere."""
     seen = np.isfinite(history[-1].x)
@@ -198,41 +203,8 @@ def _follow_predictions(
         step = history[-1].pose - history[-2].pose
         guess = np.where(np.isfinite(step), guess + step, guess)
     rows = np.flatnonzero(seen & correlator.patches.usable)
-    progress.take(rows, correlator.fit(photograph, rows, guess[rows], leash(correlator, rows)), TrackStatus.OK)
-    rows = np.flatnonzero(seen & progress.open)
+    findings.take(rows, correlator.fit(photograph, rows, guess[rows], leash(correlator, rows)), TrackStatus.OK)
+    rows = np.flatnonzero(seen & findings.open)
     if len(history) > 1 and len(rows):
         fits = correlator.fit(photograph, rows, last[rows], leash(correlator, rows))
-        progress.take(rows, fits, TrackStatus.OK)
-
-
-def _refit_doubtful(correlator: Correlator, photograph: Pyramid, progress: Progress, noise: float) -> None:
-    """Repeat robustly what fits worse than the noise explains, and try what was not found at all."""
-    settings = progress.settings
-    accepted = np.flatnonzero(progress.accepted)
-    if len(accepted) == 0:
-        return
-    typical = max(float(np.median(progress.residual[accepted])), 2.0 * noise**2)
-    poor = progress.accepted & (progress.residual > settings.robust_excess * typical)
-    hopeful = progress.open & np.isfinite(progress.expected[:, 0])
-    rows = np.flatnonzero(poor | hopeful)
-    if len(rows) == 0:
-        return
-    pose = np.where(progress.accepted[:, None], progress.pose, progress.expected)[rows]
-    clean = np.flatnonzero(progress.accepted & ~poor)
-    clean = clean if len(clean) else accepted
-    gain, offset = _light(correlator.patches, progress, clean, rows, pose)
-    fits = correlator.fit_robust(
-        photograph, rows, pose, leash(correlator, rows), np.sqrt(typical), gain, offset
-    )
-    progress.take_robust(rows, fits)
-
-
-def _light(
-    patches: Patches, progress: Progress, clean: Rows, rows: Rows, pose: Array
-) -> tuple[Array, Array]:
-    """Gain and offset that `rows` should have, seen from the clean grains about them."""
-    ratio = progress.gain[clean] / patches.norm[clean]
-    where = progress.pose[clean, :2]
-    contrast = nearby_median(where, ratio, pose[:, :2])
-    shift = nearby_median(where, progress.offset[clean] - ratio * patches.mean[clean], pose[:, :2])
-    return contrast * patches.norm[rows], contrast * patches.mean[rows] + shift
+        findings.take(rows, fits, TrackStatus.OK)

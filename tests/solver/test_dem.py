@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 
@@ -13,6 +14,8 @@ from solver.contacts import Contacts, detect_contacts, measure_contacts
 from solver.dem import DemSettings, DemTruth, ShearCell, UnbalancedError, shear_photographs
 from solver.grains import Grains
 
+# A packing takes some ten thousand steps to prepare: minutes without compilation.
+compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 HELD = DemSettings(pressure=float("nan"), normal_stiffness=1e6)  # plate held; soft, so that collisions take few steps
 LEAPFROG = 2e-3  # relative: the first and the last step of a collision of some hundred are cut short
 ROUNDING = 1e-11  # relative, of sums over some hundred steps
@@ -109,6 +112,7 @@ def test_a_rod_that_slides_to_the_right_drags_the_bottom_to_the_right() -> None:
     assert frame.ft[0] == pytest.approx(settings.wall_friction * frame.fn[0], rel=ROUNDING)
 
 
+@compiled
 def test_the_same_start_gives_the_same_bits() -> None:
     first, second = (shear_little(seed=5, degrees=(0.0, 0.2)) for _ in range(2))
     for name in ("position", "rotation", "fn", "ft", "i", "j"):
@@ -145,6 +149,7 @@ def _grains_position_walls(truth: DemTruth, k: int) -> tuple[Grains, np.ndarray,
     return grains, truth.position[k], walls
 
 
+@compiled
 @pytest.mark.parametrize("k", range(4))
 def test_every_grain_is_in_balance_in_forces_and_moments(truth: DemTruth, k: int) -> None:
     contacts, fn, ft = contacts_of(truth, k)
@@ -169,6 +174,7 @@ def test_every_grain_is_in_balance_in_forces_and_moments(truth: DemTruth, k: int
     assert resultant[n + 2, 1] == pytest.approx(load, rel=BALANCE)  # the plate carries the load
 
 
+@compiled
 def test_friction_is_mobilised_and_never_beyond_coulomb(truth: DemTruth) -> None:
     assert np.all(truth.fn > 0.0)
     mobilised = np.abs(truth.ft) / (truth.settings.friction * truth.fn)
@@ -177,6 +183,7 @@ def test_friction_is_mobilised_and_never_beyond_coulomb(truth: DemTruth) -> None
     np.testing.assert_array_equal(truth.ft[: truth.offset[1]] == 0.0, False)
 
 
+@compiled
 @pytest.mark.parametrize("k", range(4))
 def test_forces_belong_to_all_overlaps_and_to_nothing_else(truth: DemTruth, k: int) -> None:
     """A neighbour that the lists had lost would overlap without force."""
@@ -191,6 +198,7 @@ def test_forces_belong_to_all_overlaps_and_to_nothing_else(truth: DemTruth, k: i
     np.testing.assert_allclose(fn, -truth.settings.normal_stiffness * contacts.gap, atol=faint)
 
 
+@compiled
 def test_the_frame_is_a_linkage_with_the_packing_inside(truth: DemTruth) -> None:
     side = truth.endpoints[:, :, 1] - truth.endpoints[:, :, 0]
     length = np.linalg.norm(side, axis=2)
@@ -207,12 +215,14 @@ def test_the_frame_is_a_linkage_with_the_packing_inside(truth: DemTruth) -> None
         assert np.all(inside > 0.99 * truth.radius[:, None])
 
 
+@compiled
 def test_shear_is_resisted(truth: DemTruth) -> None:
     contacts, _, ft = contacts_of(truth, 2)
     n = len(truth.radius)
     assert ft[contacts.j == n].sum() > 0.0  # sheared to the right, the packing drags the bottom to the right
 
 
+@compiled
 def test_a_packing_in_motion_is_refused_as_truth() -> None:
     cell = prepare_packing(40, np.random.default_rng(1), DemSettings())
     at_rest = cell.photograph(cell.rest())

@@ -116,13 +116,14 @@ def _frame(
     decay = np.exp(-np.arange(sweeps) / (0.08 * sweeps + 1.0))
     history = SweepHistory(decay + 1e-6, 0.3 * decay + 1e-7, 5.0 * decay + 1e-4, recorded.astype(np.int64),
                            history_fn, (0.1 * history_fn).astype(np.float32))  # fmt: skip
+    reached = (float(history.natural_map[-1]), float(history.unbalance[-1])) if sweeps else (np.nan, np.nan)
     status = STATUSES[min(frame, len(STATUSES) - 1)]
     nan = np.full(contacts.count, np.nan)
     return FrameForces(
         frame, contacts, fn, ft, fn.copy(), ft.copy(), 1e-9 * nan, 1e-9 * nan, state,
         np.full(contacts.count, frame, np.int32), np.zeros(contacts.count, np.uint8), nan, 0.1 * fn + 4.0,
-        0.1 * np.abs(ft) + 1.0, status, f"{status.name.lower()}: invented", sweeps, float(history.natural_map[-1]),
-        float(history.unbalance[-1]), 0.02, 0.06 + 0.1 * np.exp(-frame), 0.03 if frame else np.nan,
+        0.1 * np.abs(ft) + 1.0, status, f"{status.name.lower()}: invented", sweeps, reached[0],
+        reached[1], 0.02, 0.06 + 0.1 * np.exp(-frame), 0.03 if frame else np.nan,
         0.95 - 0.3 * float(np.exp(-frame)), frame, history,
     )  # fmt: skip
 

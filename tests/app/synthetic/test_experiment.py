@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numba
 import numpy as np
 import pytest
 
@@ -16,6 +17,9 @@ from app.synthetic.experiment import Synthesis, synthesize
 from app.synthetic.packing import RADIUS_CLASSES, choose_radii
 from app.synthetic.rearrangement import choose_window
 from app.units import Scale
+
+# A packing takes some ten thousand steps to prepare: minutes without compilation.
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
 
 TINY: dict[str, Any] = {"preset": "paper", "grains": 20, "frames": 3, "pixel_size": 5e-4}
 BALANCE = 5e-3  # worst grain over mean force: the simulation's own, and tables rounded to nanometres
@@ -65,6 +69,7 @@ def test_an_experiment_with_photographs_is_described(photographed: Synthesis) ->
     ]  # fmt: skip
     described = tomllib.loads((photographed.folder / "experiment.toml").read_text())
     assert described["name"] == "tiny"
+    assert (described["truth"], described["truth_tracks"]) == ("truth_contacts.csv", "truth_tracks.csv")
     assert described["photographs"] == {
         "files": "photos/*.png",
         "pixel_size": 5e-4,
@@ -185,6 +190,11 @@ def test_every_depth_and_format_can_be_read(tmp_path: Path) -> None:
     small = synthesize(tmp_path / "small", jpeg_quality=90, **tiny).folder
     assert tomllib.loads((small / "experiment.toml").read_text())["photographs"]["files"] == "photos/*.jpg"
     assert cv2.imread(str(small / "photos" / "0000.jpg"), cv2.IMREAD_UNCHANGED) is not None
+
+
+def test_a_folder_name_that_no_experiment_may_have_is_mended(tmp_path: Path) -> None:
+    folder = synthesize(tmp_path / '"x":y', photographs=False, **TINY | {"frames": 1}).folder
+    assert tomllib.loads((folder / "experiment.toml").read_text())["name"] == "synthetic -x--y"
 
 
 def test_a_reversal_turns_back_half_way(tmp_path: Path) -> None:

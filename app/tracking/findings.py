@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.tracking.correlation import Fits, Patches, Rows
-from app.tracking.neighbours import local_motion
+from app.tracking.neighbours import local_motion, nearby_median
 from app.tracks import TrackStatus
 from solver.grains import Array
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from app.tracking.tracker import TrackingSettings
 
 
-class Progress:
+class Findings:
     """The best fit of every grain so far; a better one replaces it."""
 
     def __init__(self, patches: Patches, accepted_zncc: Array, settings: TrackingSettings) -> None:
@@ -31,6 +31,7 @@ class Progress:
         self.residual = np.full(n, np.nan)  # [grey²]
         self.gain = np.full(n, np.nan)  # [grey]
         self.offset = np.full(n, np.nan)  # [grey]
+        self.poor = np.zeros(n, dtype=np.bool_)  # fits worse than noise explains
         self.status = np.full(n, TrackStatus.LOST, dtype=np.uint8)
 
     @property
@@ -49,17 +50,51 @@ class Progress:
         self._keep(rows, fits, good)
         self.status[rows[good]] = status
 
-    def take_robust(self, rows: Rows, fits: Fits) -> None:
+    def take_robust(self, patches: Patches, rows: Rows, fits: Fits, noise: float) -> None:
         """Keep robust fits that rest on enough of the patch and explain it as well as a clean one would.
 
-        A fit that disregards pixels picks those that agree, so it must convince with what is left.
+        A fit that disregards pixels picks those that agree, so it must convince with what is left. noise
+        [grey]: deviation of a clean residual.
         """
-        share = np.maximum(fits.kept, 1e-3)
-        needed = np.clip(self.accepted_zncc[rows] / np.sqrt(share), 0.8, 0.97)
+        contrast = patches.norm[rows] / np.sqrt(np.maximum(patches.pixel_count[rows], 1))
+        floor = np.clip(1.0 - 5.0 * (noise / contrast) ** 2, 0.8, 0.95)
+        needed = np.maximum(floor, np.minimum(self.accepted_zncc[rows] / np.sqrt(np.maximum(fits.kept, 1e-3)), 0.97))
         good = fits.converged & (fits.kept > self.settings.kept_least) & (fits.zncc > needed)
         good &= fits.zncc > self.zncc[rows]
         self._keep(rows, fits, good)
+        self.poor[rows[good]] = False
         self.status[rows[good]] = TrackStatus.ROBUST
+
+    def light_at(self, patches: Patches, rows: Rows, pose: Array) -> tuple[Array, Array]:
+        """Gain and offset [grey] that `rows` should have at `pose` (m, 3), seen from the clean grains about them.
+
+        Without any the light is taken to be that of the reference.
+        """
+        clean = np.flatnonzero(self.accepted & ~self.poor)
+        if len(clean) == 0:
+            return patches.norm[rows].copy(), patches.mean[rows].copy()
+        ratio = self.gain[clean] / patches.norm[clean]
+        where = self.pose[clean, :2]
+        contrast = nearby_median(where, ratio, pose[:, :2])
+        shift = nearby_median(where, self.offset[clean] - ratio * patches.mean[clean], pose[:, :2])
+        return contrast * patches.norm[rows], contrast * patches.mean[rows] + shift
+
+    def judge_residuals(self, patches: Patches, noise: float) -> float:
+        """Mark the grains that fit worse than noise explains; returns a clean residual's deviation [grey].
+
+        What is typical of the frame counts as explained (the light changes, paint shines), but no more than
+        15 % of the contrast: where something covers most grains, it must not become the rule.
+        """
+        floor = 2.0 * noise**2
+        accepted = np.flatnonzero(self.accepted)
+        self.poor[:] = False
+        if len(accepted) == 0:
+            return float(np.sqrt(floor))
+        contrast = patches.norm / np.sqrt(np.maximum(patches.pixel_count, 1))
+        common = float(np.median(self.residual[accepted]))
+        explained = np.maximum(np.minimum(common, (0.15 * contrast[accepted]) ** 2), floor)
+        self.poor[accepted] = self.residual[accepted] > self.settings.robust_excess * explained
+        return float(np.sqrt(np.median(explained)))
 
     def doubt(self, rows: Rows) -> None:
         self.status[rows] = TrackStatus.SUSPECT

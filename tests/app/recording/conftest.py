@@ -1,0 +1,45 @@
+"""Recordings made once for many tests. The SDK warns instead of raising unless it is told to be strict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+from fake_results import RADIUS, make_results, make_truth
+
+from app.recording import RecordingReport, record
+from app.results import Results, TruthContacts
+from app.units import Scale
+
+PIXEL = RADIUS / 12.0  # [m], small photographs
+SHAPE = (240, 300)
+LOST = (20, 2)  # grain and the frame it is lost from
+
+
+@pytest.fixture(autouse=True, scope="session")
+def strict():
+    rr.set_strict_mode(True)
+
+
+@pytest.fixture(scope="session")
+def results() -> Results:
+    return make_results(frame_count=4, lost=LOST)
+
+
+@pytest.fixture(scope="session")
+def truth(results) -> TruthContacts:
+    return make_truth(results, np.random.default_rng(3))
+
+
+def photograph(frame: int) -> np.ndarray:
+    return np.random.default_rng(frame).integers(40, 220, SHAPE, dtype=np.uint8)
+
+
+@pytest.fixture(scope="session")
+def recording(results, truth, tmp_path_factory) -> RecordingReport:
+    """Everything that a recording can hold."""
+    path: Path = tmp_path_factory.mktemp("recording") / "run.rrd"
+    scale = Scale(PIXEL, SHAPE[0])
+    return record(results, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)

@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fake_results import make_results
+
+from app.recording.changes import correlate, correlate_common, gap_colours
+from app.recording.convergence import SMALLEST, power_of_ten
+from app.recording.force_density import CENTRES, EDGES, density_points
+from app.recording.packing import grain_unbalance, last_seen
+from app.recording.rods import turns_from_axis
+from app.recording.stress_and_fabric import BINS, direction_shares, rose_outline
+from app.recording.texts import printable
+from app.recording.truth import align, relative_error
+from solver.contacts import Contacts
+
+ROUNDING = 1e-12
+FLOAT32 = 1e-6
+
+
+def test_a_grain_pressed_from_both_sides_is_balanced():
+    forces = make_results(1).frames[0]
+    contacts = Contacts(
+        np.array([0, 1], np.int32), np.array([1, 2], np.int32), np.zeros(2), np.array([[1.0, 0.0], [1.0, 0.0]]),
+        np.zeros((2, 2)), 3, 0,
+    )  # fmt: skip
+    from dataclasses import replace
+
+    forces = replace(forces, contacts=contacts, fn=np.array([7.0, 7.0]), ft=np.array([1.0, 1.0]))
+    unbalance = grain_unbalance(forces, 3)
+    assert unbalance[1] == pytest.approx(0.0, abs=ROUNDING)
+    assert np.allclose(unbalance[[0, 2]], np.hypot(7.0, 1.0) / 7.0, rtol=ROUNDING)
+
+
+def test_a_lost_grain_is_shown_where_it_was_last_seen_or_will_be():
+    position = np.arange(12.0).reshape(3, 2, 2)
+    position[1:, 0] = np.nan
+    position[:2, 1] = np.nan
+    shown = last_seen(position, 1)
+    assert shown.tolist() == [[0.0, 1.0], [10.0, 11.0]]
+
+
+def test_similarity_uses_the_contacts_that_both_frames_have():
+    results = make_results(2)
+    former, latter = results.frames
+    assert correlate_common(former, former) == pytest.approx(1.0)
+    common = set(former.contacts.key.tolist()) & set(latter.contacts.key.tolist())
+    a = [former.fn[former.contacts.key.tolist().index(k)] for k in sorted(common)]
+    b = [latter.fn[latter.contacts.key.tolist().index(k)] for k in sorted(common)]
+    assert correlate_common(former, latter) == pytest.approx(np.corrcoef(a, b)[0, 1], rel=ROUNDING)
+
+
+def test_correlation_is_undefined_without_variation():
+    assert np.isnan(correlate(np.ones(5), np.arange(5.0)))
+    assert np.isnan(correlate(np.array([1.0, np.nan, 2.0]), np.arange(3.0)))
+
+
+def test_the_gap_ramp_ends_differ_and_nan_is_drawn_as_touching():
+    colours = gap_colours(np.array([-1.0, 0.0, 1.0, np.nan]), 1e-5)
+    assert len(set(colours[:3].tolist())) == 3
+    assert colours[3] == colours[1]
+
+
+def test_residuals_become_powers_of_ten_with_a_floor():
+    assert power_of_ten(np.array([1e-3, 0.0])).tolist() == [-3.0, np.log10(SMALLEST)]
+    assert np.isnan(power_of_ten(np.array([np.inf, np.nan]))).all()
+
+
+def test_densities_are_drawn_at_their_value():
+    counts = np.zeros(len(CENTRES))
+    counts[[2, 5]] = 30.0, 10.0
+    points = density_points(counts, 40)
+    assert len(points) == 2
+    width = EDGES[1] - EDGES[0]
+    drop = points[1, 1] - points[0, 1]  # y down: 30 to 10 of 40 is log10 3 on an axis of 4.5 decades over 380
+    assert drop == pytest.approx(np.log10(3.0) / 4.5 * 380.0, rel=1e-5)  # float32
+    assert 40 * width > 0
+
+
+def test_a_rose_of_isotropic_directions_is_the_unit_circle():
+    angle = (np.arange(4 * BINS) + 0.5) * 2.0 * np.pi / (4 * BINS)
+    normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    shares = direction_shares(normal, np.ones(len(angle)))
+    assert np.allclose(shares, 1.0, atol=ROUNDING)
+    assert np.allclose(np.linalg.norm(rose_outline(shares), axis=1), 100.0, rtol=FLOAT32)
+
+
+def test_a_rose_points_the_way_of_its_contacts_and_the_opposite():
+    shares = direction_shares(np.array([[0.0, 1.0]]), np.array([2.0]))
+    assert np.flatnonzero(shares).tolist() == [BINS // 4, 3 * BINS // 4]
+    outline = rose_outline(shares)
+    assert outline[:, 1].min() < -1000.0  # up, y down
+
+
+def test_capsules_turn_onto_their_branches():
+    branch = np.random.default_rng(0).normal(size=(50, 2))
+    x, y, z, w = turns_from_axis(branch).astype(np.float64).T
+    turned = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)  # of (0, 0, 1)
+    way = branch / np.linalg.norm(branch, axis=1)[:, None]
+    assert np.allclose(turned, np.column_stack([way, np.zeros(50)]), atol=FLOAT32)
+
+
+def test_absent_contacts_count_as_zero_against_the_truth():
+    true, inferred = align(np.array([2, 5]), np.array([1.0, 2.0]), np.array([5, 9]), np.array([4.0, 3.0]))
+    assert true.tolist() == [1.0, 2.0, 0.0]
+    assert inferred.tolist() == [0.0, 4.0, 3.0]
+    assert relative_error(true, inferred) == pytest.approx(np.sqrt((1 + 4 + 9) / 5))
+
+
+def test_texts_keep_what_the_font_has_and_replace_the_rest():
+    assert printable("φ = 18.3°, σ₁ ≥ 2 µm, Größe\n") == "φ = 18.3°, σ₁ ≥ 2 µm, Größe\n"
+    assert printable("⟨f⟩ 砂 \U0001f600\x07") == "<f> ? ??"

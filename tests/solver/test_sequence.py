@@ -1,0 +1,148 @@
+import numpy as np
+import pytest
+
+from solver.chain import ChainSettings, Packing
+from solver.frame_forces import FrameStatus
+from solver.grains import Grains
+from solver.motion import LastSeen, Snapshot, motion_to
+from solver.problem import Material
+from solver.sequence import SequenceSettings, SequenceState, solve_sequence
+from solver.sweep_record import recorded_sweeps
+from solver.warm_start import ForceMemory
+from tests.packings import LENGTH, squeezed_heap
+
+SETTINGS = SequenceSettings(chain=ChainSettings(sweeps=40), threshold=2e-4)
+
+
+def sheared_frames(count, lost=()):
+    """A heap that is sheared a little from frame to frame; `lost`: (frame, grain) without a pose."""
+    grains, state, walls = squeezed_heap(np.random.default_rng(3))
+    packing = Packing(grains, LENGTH, Material(0.25, 0.25), np.array([np.nan, np.nan, 5e4, np.nan]))
+    snapshots = []
+    for k in range(count):
+        shear = np.array([[1.0, 2e-3 * k], [0.0, 1.0]])
+        position = state.position @ shear.T
+        rotation = np.full(grains.count, -1e-3 * k)
+        present = np.ones(grains.count, bool)
+        for frame, grain in lost:
+            if frame == k:
+                present[grain] = False
+                position[grain] = np.nan
+                rotation[grain] = np.nan
+        snapshots.append(Snapshot(30.0 * k, position, rotation, present, walls.endpoints @ shear.T, 1e-5))
+    return packing, snapshots
+
+
+def run(packing, snapshots, settings=SETTINGS, **kwargs):
+    return list(solve_sequence(packing, snapshots, settings, **kwargs))
+
+
+def test_a_sequence_goes_on_from_a_kept_state_bit_for_bit():
+    packing, snapshots = sheared_frames(5)
+    whole = run(packing, snapshots)
+    resumed = run(packing, snapshots, state=whole[2][1], first=3)
+    for (frame, _), (again, _) in zip(whole[3:], resumed, strict=True):
+        assert np.array_equal(frame.fn, again.fn)
+        assert np.array_equal(frame.ft, again.ft)
+        assert np.array_equal(frame.age, again.age)
+
+
+def test_frames_before_a_motion_exists_and_after_are_resets_then_carry_on():
+    frames = [frame for frame, _ in run(*sheared_frames(4))]
+    assert [frame.status for frame in frames[:2]] == [FrameStatus.RESET, FrameStatus.RESET]
+    assert frames[1].frames_since_reset == 0
+    assert frames[3].frames_since_reset == 2
+    assert np.isnan(frames[0].trust)
+
+
+def test_a_lost_grain_takes_no_part_and_comes_back():
+    packing, snapshots = sheared_frames(5, lost=[(2, 14)])
+    frames = [frame for frame, _ in run(packing, snapshots)]
+
+    def touching(frame):
+        return np.any((frame.contacts.i == 14) | (frame.contacts.j == 14))
+
+    assert touching(frames[1])
+    assert not touching(frames[2])
+    assert touching(frames[3])
+
+
+def test_forces_of_a_lost_grains_contacts_are_remembered():
+    packing, snapshots = sheared_frames(4, lost=[(2, 14)])
+    states = [state for _, state in run(packing, snapshots)]
+    bodies = packing.grains.count + 4
+
+    def of(state):
+        key = state.memory.key
+        return set(key[(key // bodies == 14) | (key % bodies == 14)].tolist())
+
+    assert of(states[1]) == of(states[2])
+
+
+def test_motion_since_a_grain_was_last_seen_bridges_its_absence():
+    packing, snapshots = sheared_frames(3, lost=[(1, 14)])
+    seen = LastSeen.never(packing.grains.count).renewed(snapshots[0]).renewed(snapshots[1])
+    motion = motion_to(snapshots[2], seen, snapshots[1].time, snapshots[1].endpoints)
+    expected = (snapshots[2].position[14] - snapshots[0].position[14]) / 60.0
+    assert motion.grains.velocity[14] == pytest.approx(expected)
+
+
+def test_an_unseen_grain_moves_like_its_neighbours():
+    packing, snapshots = sheared_frames(2, lost=[(0, 14)])
+    seen = LastSeen.never(packing.grains.count).renewed(snapshots[0])
+    motion = motion_to(snapshots[1], seen, snapshots[0].time, snapshots[0].endpoints)
+    around = motion.grains.velocity[[13, 15, 8, 20]]
+    assert around[:, 0].min() <= motion.grains.velocity[14, 0] <= around[:, 0].max()
+
+
+def test_time_must_go_forward():
+    packing, snapshots = sheared_frames(2)
+    late = [snapshots[0], Snapshot(0.0, *[getattr(snapshots[1], n) for n in Snapshot.__slots__[1:]])]
+    with pytest.raises(ValueError, match="not after"):
+        run(packing, late)
+
+
+def test_a_single_frame_can_be_solved():
+    packing, snapshots = sheared_frames(1)
+    frames = run(packing, snapshots)
+    assert len(frames) == 1
+    assert frames[0][0].status is FrameStatus.RESET
+
+
+def test_every_sweep_is_heard_and_the_last_recorded_is_the_frames_own():
+    packing, snapshots = sheared_frames(3)
+    frame, _ = run(packing, snapshots)[2]
+    history = frame.history
+    assert history.count == frame.sweeps == 5 * 40
+    assert history.recorded[-1] == history.count - 1
+    assert history.fn[-1] == pytest.approx(frame.nlgs_fn.astype(np.float32))
+
+
+def test_recorded_sweeps_are_log_spaced_and_end_with_the_last():
+    kept = recorded_sweeps(5000, "log")
+    assert kept[:8].tolist() == list(range(8))
+    assert kept[-1] == 4999
+    assert len(kept) <= 41
+    assert recorded_sweeps(5000, "none").tolist() == [4999]
+    assert len(recorded_sweeps(50, "all")) == 50
+
+
+def test_memory_recalls_forces_by_the_pair_and_zero_for_strangers():
+    packing, snapshots = sheared_frames(2)
+    frame, _ = run(packing, snapshots)[1]
+    memory = ForceMemory(frame.contacts.key[::2], np.column_stack([frame.fn, frame.ft])[::2])
+    force = memory.recall(frame.contacts)
+    assert np.array_equal(force[::2, 0], frame.fn[::2])
+    assert not force[1::2].any()
+
+
+def test_forces_scale_with_the_pressure_through_a_whole_sequence():
+    packing, snapshots = sheared_frames(3)
+    double = Packing(packing.grains, packing.length, packing.material, 2 * packing.pressure)
+    once, twice = run(packing, snapshots)[2][0], run(double, snapshots)[2][0]
+    assert twice.fn == pytest.approx(2 * once.fn, rel=1e-9, abs=1e-9 * once.fn.max())
+
+
+def test_states_start_empty():
+    packing = Packing(Grains.of_rods(np.array([0.01]), density=1.0, length=1.0), 1.0, Material(0, 0), np.full(4, np.nan))
+    assert len(SequenceState.first(packing).memory.key) == 0
