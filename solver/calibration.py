@@ -16,23 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.calibration_equations import GapEquations, MeasuredSequence
-from solver.calibration_solve import (
-    FINEST_SURFACE,
-    CalibrationPriors,
-    GapFit,
-    contact_width,
-    fit_gaps,
-    narrow_priors,
-    prior_vector,
-)
+from solver.calibration_priors import FINEST_SURFACE, CalibrationPriors, Candidates, narrow_priors, prior_vector
+from solver.calibration_solve import ROUNDS, GapFit, fit_gaps
+from solver.calibration_weights import contact_width
 from solver.grains import Array
 
 LEAST_GAIN = 0.1  # corrections that narrow the gaps of touching pairs by less are not worth their own noise
 CERTAIN = 3.0  # standard deviations beyond which a correction is called sure, or larger than its prior allows
 IMPOSSIBLE = 4.0  # standard deviations of noise: no touching pair overlaps more
+EXCESSIVE_NOISE = 1.3  # true over stated noise: above this the user is told
+TOLERATED_IMPOSSIBLE = 0.02  # share of the overlaps: above this the user is told
 EXCESSIVE_DEMAND = 1.5  # errors that the overlaps suggest, over the prior: above this the user is told
 POSTERIOR_SAMPLES = 100  # draws behind each standard deviation: known to 7 %
-EXPECTED_CENTRE = 5e-3  # widest prior tried without being told, of the mean diameter: a drawn edge is no worse
+EXPECTED_CENTRE = 1e-2  # widest prior without being told, of the mean diameter; the overlaps then narrow it
 EXPECTED_WALL = 3e-3  # prior of a wall without being told, of the mean diameter
 RADIUS_SHARE = 0.5  # prior of a radius over that of a centre without being told; the data then reduce either
 
@@ -60,6 +56,7 @@ class Calibration:
     pixel_size_sd: float
     gap_sd: float  # [m] what the errors that are left do to the gap of a touching pair, noise apart
     priors: CalibrationPriors  # those used: never wider than given, narrower where the gaps say so
+    noise_factor: float  # noise of positions that the corrected gaps show over that stated, at least 1
     before: GapStatistics
     after: GapStatistics  # with the corrections, whether they are applied or not
     rounds: int
@@ -67,11 +64,11 @@ class Calibration:
     verdict: str  # why, in a sentence for the user
 
     def position_sd(self, sigma: float) -> float:
-        """Standard deviation [m] of a position for contact detection: noise `sigma` [m] and what is left here.
+        """Standard deviation [m] of a position for contact detection: stated noise `sigma` [m] and what is left.
 
         The gap of a touching pair has √2 times this standard deviation.
         """
-        return float(np.hypot(sigma, self.gap_sd / np.sqrt(2.0)))
+        return float(np.hypot(self.noise_factor * sigma, self.gap_sd / np.sqrt(2.0)))
 
     def correct(self, sequence: MeasuredSequence) -> MeasuredSequence:
         """Apply the corrections: centres, radii and walls of the sequence they were found in."""
@@ -114,7 +111,7 @@ def calibrate(
     limits = _expected_priors(sequence) if priors is None else priors
     start, demand = narrow_priors(equations, limits, typical_overlap)
     fit = fit_gaps(equations, start, typical_overlap, POSTERIOR_SAMPLES, rng)
-    return _judge(equations, limits, demand, fit, typical_overlap)
+    return _judge(equations, limits, demand, fit)
 
 
 def _expected_priors(sequence: MeasuredSequence) -> CalibrationPriors:
@@ -123,17 +120,15 @@ def _expected_priors(sequence: MeasuredSequence) -> CalibrationPriors:
     return CalibrationPriors(centre, RADIUS_SHARE * centre, wall=EXPECTED_WALL * diameter)
 
 
-def _judge(
-    equations: GapEquations, limits: CalibrationPriors, demand: float, fit: GapFit, overlap: float
-) -> Calibration:
+def _judge(equations: GapEquations, limits: CalibrationPriors, demand: float, fit: GapFit) -> Calibration:
     layout, sequence = equations.layout, equations.sequence
-    with_wall = fit.rows.with_wall(sequence.grain_count)
-    before = _gap_statistics(fit.gap_before, fit.noise, with_wall, overlap)
-    after = _gap_statistics(fit.gap_after, fit.noise, with_wall, overlap)
+    before = _gap_statistics(fit.gap_before, fit.candidates)
+    after = _gap_statistics(fit.gap_after, fit.candidates)
     gain = 1.0 - after.width / before.width if before.width > 0.0 else 0.0
     certain = _certain_parts(equations, fit)
     applied = gain >= LEAST_GAIN or bool(certain)
     verdict = _verdict(applied, gain, certain, before, after)
+    verdict += _track_warning(fit, after)
     if applied:
         verdict += _prior_warning(equations, limits, demand, fit)
     unknowns = fit.unknowns if applied else np.zeros(layout.count)
@@ -152,20 +147,22 @@ def _judge(
         pixel_size_sd=float(sd[layout.scale][0]),
         gap_sd=fit.gap_sd,
         priors=fit.priors,
+        noise_factor=fit.candidates.noise_factor,
         before=before,
         after=after,
-        rounds=fit.rounds,
+        rounds=ROUNDS,
         applied=applied,
         verdict=verdict,
     )
 
 
-def _gap_statistics(gap: Array, noise: Array, with_wall: NDArray[np.bool_], overlap: float) -> GapStatistics:
+def _gap_statistics(gap: Array, candidates: Candidates) -> GapStatistics:
+    between, overlap = candidates.between_grains, candidates.overlap
     overlapping = gap + overlap < 0.0
-    deep = gap + overlap < -IMPOSSIBLE * noise
+    deep = gap + overlap < -IMPOSSIBLE * candidates.noise
     return GapStatistics(
-        contact_width(gap[~with_wall], overlap),
-        contact_width(gap[with_wall], overlap),
+        contact_width(gap[between], overlap),
+        contact_width(gap[~between], overlap),
         float(np.mean(deep[overlapping])) if np.any(overlapping) else 0.0,
     )
 
@@ -192,6 +189,16 @@ def _verdict(applied: bool, gain: float, certain: list[str], before: GapStatisti
     reasons = [widths] if gain >= LEAST_GAIN else []
     reasons += [f"surely wrong before: {', '.join(certain)}"] if certain else []
     return "applied: " + "; ".join(reasons)
+
+
+def _track_warning(fit: GapFit, after: GapStatistics) -> str:
+    """Say what the tracks promise and do not keep."""
+    text = ""
+    if fit.candidates.noise_factor > EXCESSIVE_NOISE:
+        text += f"; positions scatter {fit.candidates.noise_factor:.1f} times as much as stated"
+    if after.impossible > TOLERATED_IMPOSSIBLE:
+        text += f"; {100 * after.impossible:.0f} % of the overlaps stay impossible: some tracks are wrong"
+    return text
 
 
 def _prior_warning(equations: GapEquations, limits: CalibrationPriors, demand: float, fit: GapFit) -> str:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.boundaries import Walls
-from solver.contacts import Contacts, detect_contacts
+from solver.contacts import Contacts
 from solver.frame_forces import SweepHistory
 from solver.grains import Array, Grains
 from solver.motion import FrameMotion
+from solver.network import Network
 from solver.nlgs import NlgsSettings, Solution, solve, unbalance_of
 from solver.problem import ContactProblem, Material, assemble, inertial_impedance, kinematic_impedance
 from solver.sweep_record import Keep, SweepRecorder
@@ -69,12 +70,9 @@ def force_scale(packing: Packing, settings: ChainSettings) -> float:
 
 
 def advance_chain(
-    packing: Packing, motion: FrameMotion, memory: ForceMemory, settings: ChainSettings, threshold: float
+    packing: Packing, motion: FrameMotion, memory: ForceMemory, settings: ChainSettings, network: Network
 ) -> ChainStep:
-    """Take the forces of the former frame through one interval.
-
-    threshold [m]: the gap below which a pair counts as a contact.
-    """
+    """Take the forces of the former frame through one interval, on the contacts of a network."""
     fresh = len(memory.key) == 0
     steps = (settings.spin_up if fresh else settings.substeps) if motion.spans else 1
     sweeps = settings.sweeps if motion.spans else settings.sweeps * settings.substeps
@@ -84,9 +82,12 @@ def advance_chain(
     load = packing.load(motion.endpoints)
 
     def contacts_at(fraction: float) -> tuple[ContactProblem, Contacts, Walls]:
-        grains, walls = motion.at(fraction, load)
-        contacts = detect_contacts(packing.grains, grains.position, grains.present, walls, threshold)
-        return assemble(packing.grains, grains, walls, contacts, packing.material, impedance), contacts, walls
+        state, walls = motion.at(fraction, load)
+        contacts, reluctance = network.at(fraction, packing.grains, state, walls)
+        # Reluctance counts in displacements of a step, so the time of a step cancels.
+        closing = None if reluctance is None else motion.velocity_rms * reluctance
+        problem = assemble(packing.grains, state, walls, contacts, packing.material, impedance, closing=closing)
+        return problem, contacts, walls
 
     former, done = memory, 0
     for step in range(1, steps):

@@ -66,27 +66,34 @@ def window_of(frame: int, frame_count: int) -> range:
 
 
 def probable_contacts(
-    grains: Grains, window: Sequence[Snapshot], row: int, settings: ContactProbabilitySettings | None = None
+    grains: Grains,
+    window: Sequence[Snapshot],
+    row: int,
+    settings: ContactProbabilitySettings | None = None,
+    *,
+    frame: Snapshot | None = None,
 ) -> tuple[Contacts, Array]:
     """Find the pairs that probably touch in one frame of a window, with their P(touch) (c,).
 
-    window: consecutive snapshots; row: the frame asked about, counted in the window. Pairs with a missing grain in
-    that frame and pairs below `settings.least` are left out.
+    window: consecutive snapshots, as measured; row: the frame asked about, counted in the window. Pairs below
+    `settings.least` and pairs of a missing grain are left out. `frame`: the same snapshot with stand-ins for
+    missing grains (`bridge_lost`); their pairs are then judged by the other photographs and measured here.
     """
     settings = settings or ContactProbabilitySettings()
+    frame = window[row] if frame is None else frame
     position = np.stack([snapshot.position for snapshot in window])
     present = np.stack([snapshot.present for snapshot in window])
     sigma = np.repeat([[snapshot.sigma] for snapshot in window], grains.count, axis=1).astype(np.float64)
-    unloaded = np.full(len(window[row].endpoints), np.nan)
-    walls = [Walls(s.endpoints, np.zeros_like(s.endpoints), unloaded) for s in window]
+    walls = [_unloaded(snapshot.endpoints) for snapshot in window]
     seen = np.where(present[:, :, None], position, np.nan)
     candidates = find_candidates(grains, position, present, sigma, walls, settings)
     scale = np.array(
         [displacement_scale(seen[f], seen[f + 1], 0.5 * (sigma[f] + sigma[f + 1])) for f in range(len(window) - 1)]
     )
     touch = touch_probability(candidates.gap, candidates.sigma, scale, settings)[row]
-    keep = (touch > settings.least) & np.isfinite(candidates.gap[row])
-    found = measure_contacts(grains, position[row], walls[row], candidates.i[keep], candidates.j[keep])
+    there = np.concatenate([frame.present, np.ones(walls[row].count, dtype=bool)])
+    keep = (touch > settings.least) & there[candidates.i] & there[candidates.j]
+    found = measure_contacts(grains, frame.position, walls[row], candidates.i[keep], candidates.j[keep])
     return found, touch[keep]
 
 
@@ -154,6 +161,10 @@ def touch_probability(
         np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), touch,
     )  # fmt: skip
     return touch
+
+
+def _unloaded(endpoints: Array) -> Walls:
+    return Walls(endpoints, np.zeros_like(endpoints), np.full(len(endpoints), np.nan))
 
 
 def _reach(sigma: Array, settings: ContactProbabilitySettings) -> float:

@@ -2,8 +2,9 @@
 
 Where bodies slide, friction works at its limit against the sliding. With a coefficient that is too low, force sets in
 equilibrium need friction that does not oppose the measured sliding; with one that is too high they cannot bring
-friction to its limit. The relative power gap of a convex member is least near the true coefficient, a few per cent
-below it.
+friction to its limit. The relative power gap of a convex member is least near the true coefficient, on simulated
+packings 0-12 % below it for coefficients of 0.15 and 0.25, 11-20 % below it for 0.4: a check on an
+assumed coefficient, no replacement of a tilt test. The spread over frames does not contain this bias.
 """
 
 from __future__ import annotations

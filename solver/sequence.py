@@ -14,6 +14,7 @@ from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameS
 from solver.grains import Array
 from solver.judgement import Evidence, free_standard_deviation, is_suspect, judge, trust
 from solver.kinematics import relative_motion
+from solver.network import NearPairs
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
 from solver.stress import love_weber_stress, packing_area
 from solver.warm_start import ForceMemory
@@ -89,11 +90,11 @@ def solve_frame(
         motion = motion_from(snapshot, following) if following is not None else no_motion(snapshot)
     threshold = settings.threshold_sigmas * snapshot.sigma if settings.threshold is None else settings.threshold
     memory = state.memory
-    step = advance_chain(packing, motion, memory, settings.chain, threshold)
+    step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
     evidence = _evidence(packing, motion, step, state, memory)
     remark = ""
     if is_suspect(evidence):
-        wider = advance_chain(packing, motion, memory, settings.chain, WIDER * threshold)
+        wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold))
         wider_evidence = _evidence(packing, motion, wider, state, memory)
         if wider_evidence.correction < evidence.correction:
             step, evidence = wider, wider_evidence
@@ -103,7 +104,7 @@ def solve_frame(
         why = "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
     if status is FrameStatus.REARRANGING and settings.reset_to_zero:
         memory = ForceMemory.empty()
-        step = advance_chain(packing, motion, memory, settings.chain, threshold)
+        step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
         evidence = replace(_evidence(packing, motion, step, state, memory), old_unbalance=evidence.old_unbalance)
         status, why = FrameStatus.RESET, "reset to zero forces, as asked for at a rearrangement: " + why
     eventful = status in (FrameStatus.RESET, FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -276,8 +277,10 @@ def _write(
 def _check_whole(part: Path) -> None:
     """Raise OSError where the end of the file is not there: the stream writes in the background and does not tell."""
     try:
-        RrdReader(str(part)).recordings()
-    except RuntimeError as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # of a missing end: store() raises for it
+            RrdReader(str(part)).store()
+    except (RuntimeError, ValueError) as error:
         raise OSError(f"the recording could not be written whole (is the disk full?): {error}") from error
 
 

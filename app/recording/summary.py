@@ -71,9 +71,9 @@ def write_summary(scene: Scene, facts: list[FrameFacts], clipped: int, drawn: in
             _counts(scene, facts),
             _trust(facts),
             _accuracy(facts),
-            _frames(facts),
-            _legend(scene, clipped, drawn),
             "\n".join(f"- {note}" for note in notes),
+            _legend(scene, clipped, drawn),
+            _frames(facts),
             _versions(),
             f"## Configuration\n\n```toml\n{scene.configuration.strip()}\n```",
         )
@@ -133,8 +133,9 @@ def _accuracy(facts: list[FrameFacts]) -> str:
 
 def _frames(facts: list[FrameFacts]) -> str:
     rows = [
-        f"| {f.frame} | {f.status.name.lower()} | {f.trust:.2f} | {f.similarity:.2f} | {f.sweeps} "
-        f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} | {_cell(f.reason)} |"
+        f"| {f.frame} | {f.status.name.lower()} | {_number(f.trust)} | {_number(f.similarity)} | {f.sweeps} "
+        f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} "
+        f"| {_cell(f.reason)} |"
         for f in facts
     ]
     head = "| frame | status | T | similarity | sweeps | natural map | unbalance | contacts | φ [°] | lost | why |"
@@ -167,6 +168,10 @@ def _versions() -> str:
         except PackageNotFoundError:
             found.append(f"{package} (not installed)")
     return "Made with " + ", ".join(found) + "."
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "–"
 
 
 def _cell(text: str) -> str:

@@ -1,6 +1,6 @@
 """Texts that the viewer can draw.
 
-Its built-in font has Latin, Greek, Cyrillic and common signs. A character that the font lacks does not
+Its two built-in fonts have Latin, Greek, Cyrillic and common signs. A character that one of them lacks does not
 show as a box: it ends the viewer. So every text that comes from outside passes through here.
 """
 
@@ -20,7 +20,7 @@ _RANGES = (
     (0x3B1, 0x3C9),
     (0x410, 0x44F),
 )
-_SIGNS = frozenset("\n–—‘’“”…•·′″→←−≈≠≤≥∞⁰⁴⁵⁶⁷⁸⁹⁻₀₁₂₃₄₅₆₇₈₉√")
+_SIGNS = frozenset("\n–—‘’“”…•·′″→←−≈≠≤≥∞⁰⁴⁵⁶⁷⁸⁹₀₁₂₃₄₅₆₇₈₉√")
 _ALIKE = {"\t": "    ", "\r": "", "⟨": "<", "⟩": ">"}
 
 

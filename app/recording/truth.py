@@ -63,14 +63,18 @@ class TruthWriter:
         """Log one frame's truth and its agreement with the inferred forces."""
         scene, truth = self._scene, self._truth
         rows = np.flatnonzero(truth.frame == clock.frame)
-        rows = rows[self._drawable(clock.frame, rows)]
-        walls = scene.walls_at(clock.frame)
+        key = truth.i[rows] * (scene.grains.count + scene.walls.count) + truth.j[rows]
+        order = np.argsort(key, kind="stable")  # that of contacts
+        rows, key = rows[order], key[order]
+        shown = rows[self._drawable(clock.frame, rows)]
         contacts = measure_contacts(
-            scene.grains, scene.tracks.position[clock.frame], walls, truth.i[rows], truth.j[rows]
+            scene.grains,
+            scene.tracks.position[clock.frame],
+            scene.walls_at(clock.frame),
+            truth.i[shown],
+            truth.j[shown],
         )
-        width = scene.grains.count + scene.walls.count
-        rows = rows[np.argsort(truth.i[rows] * width + truth.j[rows], kind="stable")]  # the order of contacts
-        fn, ft = truth.fn[rows], truth.ft[rows]
+        fn, ft = truth.fn[shown], truth.ft[shown]
         clock.start()
         clock.stream.log(
             entities.TRUTH_FORCES,
@@ -83,8 +87,8 @@ class TruthWriter:
             rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
         )
         clock.end()
-        true_fn, inferred_fn = align(contacts.key, fn, forces.contacts.key, forces.fn)
-        true_ft, inferred_ft = align(contacts.key, ft, forces.contacts.key, forces.ft)
+        true_fn, inferred_fn = align(key, truth.fn[rows], forces.contacts.key, forces.fn)
+        true_ft, inferred_ft = align(key, truth.ft[rows], forces.contacts.key, forces.ft)
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,
@@ -104,7 +108,7 @@ class TruthWriter:
         return agreement
 
     def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:
-        """Which true contacts have both bodies in the frame."""
+        """Which true contacts have both bodies in the frame; the others count as missed, but cannot be drawn."""
         n, present = self._scene.grains.count, self._scene.tracks.present[frame]
         i, j = self._truth.i[rows], self._truth.j[rows]
         return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])

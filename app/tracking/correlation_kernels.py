@@ -30,6 +30,8 @@ TWO_THIRDS = np.float32(2.0 / 3.0)
 
 # Tukey's biweight keeps 95 % of the efficiency on Gaussian noise with this width.
 TUKEY_WIDTH = 4.685
+# Steps for which the robust fit keeps the light it was given.
+HELD_STEPS = 3
 # Median of the absolute value of a standard normal variable.
 NORMAL_MEDIAN = 0.6745
 
@@ -238,8 +240,12 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
     g = np.empty(count)
     misfit = np.empty(count)
     a, b = gain, offset
+    # The given light is held for some steps: what covers the patch would drag a free one along, and then
+    # hide among residuals that are large everywhere.
+    held = HELD_STEPS
+    second = False
     fit[CODE] = UNFINISHED
-    for step in range(limit):
+    for _ in range(limit):
         if not inside(height, width, pose[0], pose[1], reach):
             fit[CODE] = LEFT_IMAGE
             fit[ZNCC] = 0.0
@@ -303,13 +309,22 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             return
         # Before the light and the scale have settled a large share of a step is an artefact.
         still = abs(a_new - a) < 0.01 * a and abs(tx) + abs(ty) + reach * abs(tr) < 0.005
-        a, b = a_new, b_new
+        if held > 0:
+            held -= 1
+            still = False
+        else:
+            a, b = a_new, b_new
         fit[GAIN], fit[OFFSET] = a, b
         _compose(pose, tx, ty, tr, reach)
         if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > leash * leash:
             fit[CODE] = WANDERED
             return
-        if still and step >= 3:
+        if still and not second and fit[ZNCC] < 0.95:
+            # Often the place is right by now and only the light is not: once more from the given one.
+            second = True
+            held = HELD_STEPS
+            a, b = gain, offset
+        elif still:
             fit[CODE] = CONVERGED
             break
     for k in range(3):

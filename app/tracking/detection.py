@@ -119,7 +119,11 @@ def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: Array, kno
         _, first = np.unique(rough.radius[near], return_index=True)
         best, best_value = None, -1.0
         for m in near[np.sort(first)] if known else [k]:
-            one = outliner.measure(rough.x[m], rough.y[m], rough.radius[m], 3.0, 0.0, 0.3 if known else np.inf)
+            scatter = 0.3 if known else np.inf
+            one = outliner.measure(rough.x[m], rough.y[m], rough.radius[m], RING_UNCERTAINTY, 0.0, scatter)
+            if one.quality > 0.0:  # now that it is centred, a narrower view keeps paint near the rim out of it
+                radius = float(rough.radius[m]) if known else one.radius
+                one = outliner.measure(one.x, one.y, radius, 0.5 * RING_UNCERTAINTY, 0.0, scatter)
             value = one.quality * np.sqrt(one.radius)
             if value > best_value:
                 best, best_value = (one.x, one.y, rough.radius[m] if known else one.radius, one.quality), value

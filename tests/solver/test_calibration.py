@@ -15,7 +15,8 @@ from solver.calibration_equations import (
     outward_normals,
     rotate_offsets,
 )
-from solver.calibration_solve import CalibrationPriors, contact_width
+from solver.calibration_priors import CalibrationPriors
+from solver.calibration_weights import contact_width
 
 RADIUS = 8e-3  # [m]
 SPACING = 2.2 * RADIUS  # between the discs of a row: they never touch each other
@@ -275,3 +276,25 @@ def test_impossible_input_is_refused(true, rng):
         replace(true, rotation=np.full_like(true.rotation, np.nan))
     with pytest.raises(ValueError, match="radius_class"):
         calibrate(true, PRIORS, rng=rng, radius_class=np.zeros(3, int))
+
+
+def test_wrong_tracks_do_not_spoil_the_rest(true, rng):
+    offset = rng.normal(0, 50e-6, (true.grain_count, 2))
+    measured = add_noise(falsify(true, offset=offset), 3e-6, rng)
+    wrong = rng.random(measured.present.shape) < 0.01
+    astray = measured.position + np.where(wrong[..., None], rng.normal(0, 500e-6, measured.position.shape), 0.0)
+    result = calibrate(replace(measured, position=astray), PRIORS, rng=rng)
+    assert rms(result.offset - offset) < 0.3 * rms(offset)
+    assert result.after.impossible > 0.0
+
+
+def test_understated_noise_is_noticed(true, rng):
+    offset = rng.normal(0, 50e-6, (true.grain_count, 2))
+    measured = add_noise(falsify(true, offset=offset), 10e-6, rng)
+    understated = replace(measured, sigma=measured.sigma / 4)
+    result = calibrate(understated, PRIORS, rng=rng)
+    assert 2.0 < result.noise_factor < 5.0
+    assert "as much as stated" in result.verdict
+    honest = calibrate(measured, PRIORS, rng=rng)
+    assert honest.noise_factor < 1.2
+    assert "as much as stated" not in honest.verdict

@@ -112,6 +112,42 @@ def test_a_rod_that_slides_to_the_right_drags_the_bottom_to_the_right() -> None:
     assert frame.ft[0] == pytest.approx(settings.wall_friction * frame.fn[0], rel=ROUNDING)
 
 
+def test_a_rod_squeezed_by_the_plate_rolls_at_half_its_speed() -> None:
+    radius, overlap, rate = 0.008, 1e-6, 0.5
+    height = 2.0 * (radius - overlap)
+    cell = ShearCell(np.array([radius]), np.array([[0.5, height / 2]]), width=1.0, height=height, settings=HELD)
+    cell.run(np.full(3000, rate))
+    vx, vy, spin = cell.velocity[0]
+    speed = height * rate / np.cos(cell.shear) ** 2
+    assert vx == pytest.approx(speed / 2, rel=STIFF)
+    assert spin == pytest.approx(-speed / (2 * radius), rel=STIFF)
+    assert abs(vy) < STIFF * vx
+
+
+def test_a_rod_between_the_turning_sides_stays_midway() -> None:
+    """The dashpots see the sides' own motion, else the rod would lag by damping · speed / stiffness = 40 µm."""
+    radius, overlap = 0.008, 5e-6
+    width = 2.0 * (radius - overlap)
+    settings = replace(HELD, friction=0.0, wall_friction=0.0)
+    cell = ShearCell(np.array([radius]), np.array([[width / 2, 0.25]]), width=width, height=0.5, settings=settings)
+    cell.run(np.full(1500, 1.0))
+    x, y = cell.position[0]
+    sideways = (x - width / 2) * np.cos(cell.shear) - y * np.sin(cell.shear)
+    assert cell.shear > 0.05
+    assert abs(sideways) < 1e-6
+
+
+def test_a_pause_stops_rods_that_touch_nothing_and_no_others() -> None:
+    settings = replace(HELD, pause_limit=250, gravity=(0.0, -9.81))
+    velocity = np.array([[0.05, 0.02, 3.0], [0.5, 0.0, 0.0]])
+    position = np.array([[0.5, 0.5], [0.2, 0.008 - 3e-7]])  # in the air; sliding on the bottom
+    cell = ShearCell(np.full(2, 0.008), position, width=1.0, height=1.0, settings=settings, velocity=velocity)
+    assert cell.rest() == settings.pause_limit
+    assert cell.touching.tolist() == [False, True]
+    np.testing.assert_array_equal(cell.velocity[0], 0.0)
+    assert cell.velocity[1, 0] > 0.4
+
+
 @compiled
 def test_the_same_start_gives_the_same_bits() -> None:
     first, second = (shear_little(seed=5, degrees=(0.0, 0.2)) for _ in range(2))

@@ -12,6 +12,7 @@ from fake_results import make_results
 from app.recording import Recorder, Scene, SweepChoice, Tab, entities, read_forces, record
 from app.recording.canvas import Canvas
 from app.recording.force_style import ForceRange, ForceStyle
+from app.recording.recorder import _check_whole
 from app.recording.viewer import viewer_binary
 from app.units import Scale
 from solver.frame_forces import FrameStatus
@@ -145,3 +146,12 @@ def test_an_unknown_tab_is_refused(results, tmp_path):
     with pytest.raises(ValueError, match="Truth"):
         record(results, tmp_path / "run.rrd", active=Tab.TRUTH)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_without_its_end_is_not_taken_for_a_recording(tmp_path):
+    stream = rr.RecordingStream(entities.APPLICATION_ID)
+    stream.save(tmp_path / "cut.rrd", write_footer=False)
+    stream.log("/summary", rr.TextDocument("nothing"), static=True)
+    stream.disconnect()
+    with pytest.raises(OSError, match="whole"):
+        _check_whole(tmp_path / "cut.rrd")

@@ -2,16 +2,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rerun as rr
 from fake_results import make_results
+from rows import latest
 
+from app.recording import Canvas, ForceRange, ForceStyle, Scene, entities
 from app.recording.changes import correlate, correlate_common, gap_colours
 from app.recording.convergence import SMALLEST, power_of_ten
 from app.recording.force_density import CENTRES, EDGES, density_points
-from app.recording.packing import grain_unbalance, last_seen
+from app.recording.packing import _spin_marks, grain_unbalance, last_seen
 from app.recording.rods import turns_from_axis
+from app.recording.scene import Clock
 from app.recording.stress_and_fabric import BINS, direction_shares, rose_outline
 from app.recording.texts import printable
-from app.recording.truth import align, relative_error
+from app.recording.truth import TruthWriter, align, relative_error
+from app.results import TruthContacts
 from solver.contacts import Contacts
 
 ROUNDING = 1e-12
@@ -110,3 +115,43 @@ def test_absent_contacts_count_as_zero_against_the_truth():
 def test_texts_keep_what_the_font_has_and_replace_the_rest():
     assert printable("φ = 18.3°, σ₁ ≥ 2 µm, Größe\n") == "φ = 18.3°, σ₁ ≥ 2 µm, Größe\n"
     assert printable("⟨f⟩ 砂 \U0001f600\x07") == "<f> ? ??"
+
+
+def test_a_quarter_turn_counter_clockwise_moves_the_mark_from_the_top_to_the_left():
+    marks = _spin_marks(np.zeros((2, 2)), np.ones(2), np.array([0.0, np.pi / 2]))
+    assert np.allclose(marks[0, :, 0], 0.0, atol=FLOAT32)
+    assert np.all(marks[0, :, 1] < -0.5)  # y down
+    assert np.allclose(marks[1, :, 1], 0.0, atol=FLOAT32)
+    assert np.all(marks[1, :, 0] < -0.5)
+
+
+def test_the_stress_cross_lies_along_the_principal_direction(recording, results):
+    for statistics, frame in zip(results.statistics, range(4), strict=True):
+        strips = np.array(latest(recording.path, entities.STRESS_CROSS, entities.FRAME, frame)["LineStrips2D:strips"])
+        greatest, least = strips[:, 1] - strips[:, 0]
+        angle = np.arctan2(-greatest[1], greatest[0])  # y down
+        assert np.sin(angle - statistics.principal_direction) == pytest.approx(0.0, abs=FLOAT32)
+        ratio = np.linalg.norm(least) / np.linalg.norm(greatest)
+        assert np.arcsin((1 - ratio) / (1 + ratio)) == pytest.approx(statistics.friction_angle, rel=1e-4)  # float32
+
+
+def test_the_truth_of_a_lost_grain_counts_as_missed(recording, results, truth):
+    frame = 2  # from here on grain 20 is lost; invent its true contact
+    lost = TruthContacts(*(np.append(column, value) for column, value in (
+        (truth.frame, frame), (truth.i, 20), (truth.j, 21), (truth.fn, 500.0), (truth.ft, 0.0))))  # fmt: skip
+    writer = TruthWriter(scene_of(results), lost)
+    stream = rr.RecordingStream(entities.APPLICATION_ID)
+    memory = stream.binary_stream()
+    agreement = writer.log(Clock(stream, frame, 0, 0), results.frames[frame])
+    assert memory.read()
+    whole = TruthWriter(scene_of(results), truth).log(Clock(stream, frame, 0, 0), results.frames[frame])
+    assert agreement.r_fn < whole.r_fn
+    assert agreement.relative_l2 > whole.relative_l2
+
+
+def scene_of(results) -> Scene:
+    canvas = Canvas.around(results.tracks, None)
+    return Scene(
+        results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
+        ForceStyle.on(canvas, ForceRange.of(results.frames)),
+    )  # fmt: skip

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs th
 TINY: dict[str, Any] = {"preset": "paper", "grains": 20, "frames": 3, "pixel_size": 5e-4}
 BALANCE = 5e-3  # worst grain over mean force: the simulation's own, and tables rounded to nanometres
 ROUNDING = 1e-9  # [m], of the tables
+TABLE_FORCE = 0.2  # [N], what that and the last motion make of a spring's force
 
 
 def read_columns(path: Path) -> dict[str, list[str]]:
@@ -113,6 +114,8 @@ def test_the_written_truth_is_in_balance(kind: str, request: pytest.FixtureReque
         if j in synthesis.truth.wall_names:
             x1, y1, x2, y2 = segment[frame, j]
             normal = np.array([y2 - y1, x1 - x2])  # to the right of the wall: out of the packing
+            gap = (np.array([x1, y1]) - position[k, a]) @ normal / np.linalg.norm(normal) - synthesis.truth.radius[a]
+            assert -gap * synthesis.truth.settings.normal_stiffness == pytest.approx(float(fn), abs=TABLE_FORCE)
         else:
             normal = position[k, int(j)] - position[k, a]
         normal = normal / np.linalg.norm(normal)
@@ -169,6 +172,45 @@ def test_photographs_show_the_rods_where_the_truth_says(photographed: Synthesis)
     ends = scale.to_pixels(truth.endpoints)
     assert ends.min() > 5
     assert np.all(ends.max(axis=(0, 1, 2)) < np.array([width, height]) - 5)
+
+
+def test_photographs_show_rods_turned_and_bars_moved_as_the_truth_says(tmp_path: Path) -> None:
+    made = synthesize(tmp_path / "turned", **TINY | {"frames": 2, "step_degrees": 6.0, "pixel_size": 2.5e-4})
+    assert made.photograph_shape is not None
+    scale = Scale(2.5e-4, made.photograph_shape[0])
+    photographs = [
+        cv2.imread(str(made.folder / "photos" / f"{k:04d}.png"), cv2.IMREAD_GRAYSCALE).astype(np.float32)
+        for k in range(2)
+    ]
+    centre = scale.to_pixels(made.truth.position)
+    turn = made.truth.rotation[1]
+    row = int(np.argmax(abs(turn)))
+    assert abs(turn[row]) > 0.05  # more than a pixel at the rim
+
+    def likeness(angle: float) -> float:
+        """Correlation of the rod on the second photograph with the first one's turned counter-clockwise by angle."""
+        reach = 0.7 * made.truth.radius[row] / 2.5e-4
+        x, y = np.meshgrid(np.arange(-reach, reach), np.arange(-reach, reach))  # y down
+        inside = np.hypot(x, y) < reach
+        back_x, back_y = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
+        first, second = (
+            cv2.remap(
+                photographs[k],
+                (centre[k, row, 0] + u).astype(np.float32),
+                (centre[k, row, 1] + v).astype(np.float32),
+                cv2.INTER_LINEAR,
+            )[inside]
+            for k, u, v in ((0, back_x, back_y), (1, x, y))
+        )
+        return float(np.corrcoef(first, second)[0, 1])
+
+    assert likeness(turn[row]) > 0.95
+    assert likeness(-turn[row]) < 0.9
+    for start, end in made.truth.endpoints[1]:
+        outward = np.array([end[1] - start[1], start[0] - end[0]]) / np.linalg.norm(end - start)
+        along = start + np.linspace(0.05, 0.95, 200)[:, None] * (end - start)
+        columns, rows = scale.to_pixels(along + 2e-3 * outward).round().astype(int).T
+        assert np.quantile(photographs[1][rows, columns], 0.1) > 35.0  # metal and marks: the backing has 12
 
 
 def test_the_true_grains_of_the_first_photograph_are_in_pixels(photographed: Synthesis) -> None:

@@ -1,0 +1,145 @@
+"""Jammed disordered packings under a static load, at any size: what the benchmarks solve.
+
+Rods of three radii start on a jittered lattice in a box a little too small for them and are pushed apart as soft,
+frictionless discs until they are at rest (FIRE: Bitzek et al. 2006). What overlaps then is a rigid network in which
+forces in equilibrium exist; a plate on top and one on the right carry the same pressure, all else is at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.spatial import KDTree
+
+from solver.boundaries import Walls
+from solver.contacts import Contacts, detect_contacts
+from solver.grains import Array, GrainMotion, Grains
+from solver.problem import ContactProblem, Material, assemble
+
+RADII, SHARES = (0.007, 0.008, 0.011), (0.40, 0.41, 0.19)  # [m], by number
+SOLID_FRACTION = 0.86  # above the .842 at which frictionless discs jam
+LENGTH, DENSITY = 0.06, 2700.0  # [m], [kg/m³]
+PRESSURE = 50e3  # [Pa]
+FRICTION = 0.25
+IMPEDANCE = 1e3  # [1/s] times the mass; a static load's forces do not depend on it
+SKIN = 0.3  # of the mean radius
+AT_REST = 1e-3  # greatest unbalance over the mean overlap force
+ROUNDS, STEPS = 400, 200
+
+
+@dataclass(frozen=True, slots=True)
+class StaticPacking:
+    """A packing at rest, and the contacts that bear it."""
+
+    grains: Grains
+    motion: GrainMotion
+    walls: Walls
+    contacts: Contacts
+
+    @property
+    def mean_force(self) -> float:
+        """f₀ = σ L d [N]."""
+        return PRESSURE * LENGTH * 2.0 * float(self.grains.radius.mean())
+
+
+def jammed_packing(count: int, seed: int = 0) -> StaticPacking:
+    """Make a packing of `count` rods in a square box under pressure from above and from the right."""
+    rng = np.random.default_rng(seed)
+    radius = rng.choice(RADII, count, p=SHARES)
+    side = float(np.sqrt(np.pi * np.sum(radius**2) / SOLID_FRACTION))
+    columns = int(np.ceil(np.sqrt(count)))
+    site = np.stack(np.divmod(rng.permutation(columns * columns)[:count], columns)[::-1], axis=1)
+    position = (site + 0.5 + rng.uniform(-0.3, 0.3, (count, 2))) * (side / columns)
+    _push_apart(position, radius, side)
+
+    corner = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]])
+    endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    load = PRESSURE * side * LENGTH
+    walls = Walls(endpoints, np.zeros((4, 2, 2)), np.array([np.nan, load, load, np.nan]))
+    grains = Grains.of_rods(radius, density=DENSITY, length=LENGTH)
+    motion = GrainMotion(position, np.zeros((count, 2)), np.zeros(count), np.ones(count, np.bool_))
+    return StaticPacking(grains, motion, walls, detect_contacts(grains, position, motion.present, walls, 0.0))
+
+
+def static_problem(packing: StaticPacking) -> ContactProblem:
+    """Assemble the packing's contact problem, everything at rest but for the loads."""
+    return assemble(
+        packing.grains,
+        packing.motion,
+        packing.walls,
+        packing.contacts,
+        Material(FRICTION, FRICTION),
+        packing.grains.mass * IMPEDANCE,
+    )
+
+
+def _push_apart(position: Array, radius: Array, side: float) -> None:
+    """Relax the discs in place, to rest."""
+    mean = float(radius.mean())
+    velocity, force = np.zeros_like(position), np.zeros_like(position)
+    state = np.array([0.1, 0.1, 0.0])  # FIRE: time step, mixing, steps downhill
+    for _ in range(ROUNDS):
+        pairs = KDTree(position).query_pairs(2.0 * radius.max() + SKIN * mean, output_type="ndarray").astype(np.int32)
+        gap = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1) - radius[pairs].sum(axis=1)
+        pairs = np.ascontiguousarray(pairs[gap < SKIN * mean])
+        if _relax(position, radius, side, pairs, velocity, force, state, STEPS, 0.4 * SKIN * mean) < AT_REST:
+            return
+    raise RuntimeError(f"the packing of {len(radius)} rods did not come to rest")
+
+
+@njit(cache=True)
+def _relax(position, radius, side, pairs, velocity, force, state, steps, reach):  # type: ignore[no-untyped-def]
+    """Take FIRE steps until a disc may have left the reach of the pair list; the unbalance over the mean force."""
+    start = position.copy()
+    unbalance = np.inf
+    for _ in range(steps):
+        mean = _spring_forces(position, radius, side, pairs, force)
+        greatest = np.sqrt((force**2).sum(axis=1).max())
+        unbalance = greatest / mean if mean > 0 else 0.0
+        if unbalance < AT_REST:
+            break
+        power = (force * velocity).sum()
+        if power > 0:
+            state[2] += 1
+            scale = np.sqrt((velocity**2).sum() / max((force**2).sum(), 1e-300))
+            velocity *= 1.0 - state[1]
+            velocity += state[1] * scale * force
+            if state[2] > 5:
+                state[0] = min(state[0] * 1.1, 0.5)
+                state[1] *= 0.99
+        else:
+            velocity[:] = 0.0
+            state[:] = np.array([state[0] * 0.5, 0.1, 0.0])
+        velocity += state[0] * force
+        position += state[0] * velocity
+        if ((position - start) ** 2).sum(axis=1).max() > reach**2:
+            break
+    return unbalance
+
+
+@njit(cache=True)
+def _spring_forces(position, radius, side, pairs, force):  # type: ignore[no-untyped-def]
+    """Unit springs between overlapping discs, and against the four walls; returns the mean overlap."""
+    force[:] = 0.0
+    total, count = 0.0, 0
+    for c in range(len(pairs)):
+        i, j = pairs[c]
+        dx, dy = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+        reach = radius[i] + radius[j]
+        square = dx * dx + dy * dy
+        if square < reach * reach and square > 0.0:
+            distance = np.sqrt(square)
+            overlap = reach - distance
+            fx, fy = overlap * dx / distance, overlap * dy / distance
+            force[i, 0] -= fx
+            force[i, 1] -= fy
+            force[j, 0] += fx
+            force[j, 1] += fy
+            total += overlap
+            count += 1
+    for i in range(len(radius)):
+        for k in range(2):
+            force[i, k] += max(radius[i] - position[i, k], 0.0) - max(position[i, k] + radius[i] - side, 0.0)
+    return total / max(count, 1)

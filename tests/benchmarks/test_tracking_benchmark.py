@@ -1,0 +1,140 @@
+"""The tracker's figures: speed per core, and exactness where it takes too long for the fast tests.
+
+    pytest tests/benchmarks/test_tracking_benchmark.py --benchmark-only -s
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.tracking.tracker import FramePoses, Tracker
+from app.tracks import TrackStatus
+from tests.app.tracking.speckled import Rods, grid_of_rods
+
+PATCH_RADIUS = 20.0  # [px]
+RADIUS = PATCH_RADIUS / 0.85  # [px]
+WRONG = 0.5  # [px]
+
+Benchmark = Callable[..., FramePoses]
+
+
+@pytest.fixture(scope="module")
+def rods() -> Rods:
+    return grid_of_rods(20, 20, radius=RADIUS, pitch=49.0, margin=90.0)
+
+
+@pytest.fixture(scope="module")
+def tracker(rods: Rods) -> Tracker:
+    return Tracker(rods.reference(), (rods.x, rods.y, rods.radius), workers=1)
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def wrong_unflagged(poses: FramePoses, x: np.ndarray, y: np.ndarray) -> int:
+    flagged = ~np.isin(poses.status, [TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST])
+    return int((poses.has_pose & (np.hypot(poses.x - x, poses.y - y) > WRONG) & ~flagged).sum())
+
+
+def report(text: str) -> None:
+    print(f"\n    {text}")
+
+
+@pytest.mark.benchmark(group="tracking")
+def test_bias_and_rms_against_sub_pixel_position(benchmark: Benchmark, rods: Rods, tracker: Tracker) -> None:
+    def sweep() -> None:
+        bias, spread, bound, turn = [], [], [], []
+        limit = np.sqrt(2.0) * rms(tracker.first().sigma) * rods.settings.noise / tracker.noise
+        for k, part in enumerate(np.arange(0.0, 1.0, 0.125)):
+            poses = tracker.follow(rods.moved(part, part, 0.0, noise_seed=50 + k), [tracker.first()])
+            error = np.stack([poses.x - rods.x - part, poses.y - rods.y - part])
+            bias.append(np.abs(error.mean(axis=1)).max())
+            spread.append(rms(error))
+            bound.append(spread[-1] / limit)
+            turn.append(rms(poses.rotation))
+        report(
+            f"bias {max(bias):.4f} px, rms {max(spread):.4f} px = {max(bound):.2f} x Cramér-Rao, "
+            f"rotation {max(turn):.5f} rad (r = 20, noise 2.5, {rods.count} rods, 8 positions: worst)"
+        )
+
+    benchmark.pedantic(sweep, rounds=1)
+
+
+@pytest.mark.benchmark(group="tracking")
+def test_speed_of_predicted_grains(benchmark: Benchmark, rods: Rods, tracker: Tracker) -> None:
+    image = rods.moved(0.8, -0.6, 0.02)
+    history = [tracker.first()]
+    poses = benchmark(tracker.follow, image, history)
+    seconds = benchmark.stats.stats.median  # type: ignore[attr-defined]
+    report(f"{rods.count / seconds:.0f} grains/s predicted, photograph included (r = 20, one core)")
+    assert (poses.status == TrackStatus.OK).all()
+
+
+@pytest.mark.benchmark(group="tracking")
+@pytest.mark.parametrize(("shift", "degrees"), [(8.0, 20.0), (40.0, 60.0)])
+def test_speed_of_rescue(benchmark: Benchmark, rods: Rods, tracker: Tracker, shift: float, degrees: float) -> None:
+    turn = np.deg2rad(degrees) * np.where(np.arange(rods.count) % 2, 1.0, -1.0)
+    image = rods.moved(shift, 0.0, turn)
+    poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=3, warmup_rounds=1)
+    seconds = benchmark.stats.stats.median  # type: ignore[attr-defined]
+    lost = int((~poses.has_pose).sum())
+    report(
+        f"jump of {shift:.0f} px with {degrees:.0f}°: {rods.count / seconds:.0f} grains/s, {lost} of {rods.count} lost, "
+        f"rms {rms(poses.x - rods.x - shift):.4f} px, {wrong_unflagged(poses, rods.x + shift, rods.y)} wrong unflagged"
+    )
+    assert lost == 0
+
+
+@pytest.mark.benchmark(group="tracking")
+def test_twenty_megapixels(benchmark: Benchmark) -> None:
+    rods = grid_of_rods(34, 34, radius=58.0, pitch=127.0, margin=140.0, noise=2.0)
+    tracker = Tracker(rods.reference(), (rods.x, rods.y, rods.radius), workers=1)
+    image = rods.moved(1.8, -0.6, 0.01)
+    poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=3, warmup_rounds=1)
+    seconds = benchmark.stats.stats.median  # type: ignore[attr-defined]
+    report(
+        f"{rods.count} rods of radius 58 px in {rods.width * rods.height / 1e6:.1f} Mpx: {seconds:.2f} s on one core, "
+        f"rms {rms(poses.x - rods.x - 1.8):.4f} px"
+    )
+    assert poses.has_pose.all()
+
+
+@pytest.mark.benchmark(group="tracking")
+def test_long_way_with_an_avalanche(benchmark: Benchmark) -> None:
+    rods = grid_of_rods(34, 34, radius=RADIUS, pitch=49.0, margin=60.0)
+    wide = Rods(rods.width + 520, rods.height, rods.x, rods.y, rods.radius, rods.settings)
+    generator = np.random.default_rng(1)
+    tracker = Tracker(wide.reference(), (wide.x, wide.y, wide.radius), workers=2)
+    middle = np.argsort(np.hypot(rods.x - 800.0, rods.y - 800.0))[:40]
+    way = np.linspace(0.0, 501.0, 31)[1:]
+
+    def run() -> None:
+        history = [tracker.first()]
+        x, y, turn = rods.x.copy(), rods.y.copy(), np.zeros(rods.count)
+        lost, wrong, worst = 0, 0, 0.0
+        for k, reached in enumerate(way):
+            moved = reached - (way[k - 1] if k else 0.0)
+            # Shear: the upper rows go farther; every rod rolls a little.
+            x = x + moved * (0.4 + 0.6 * rods.y / rods.y.max())
+            turn = turn + generator.normal(0.0, 0.05, rods.count)
+            if k == 15:
+                y[middle] += 26.0 / np.sqrt(2.0)
+                x[middle] += 26.0 / np.sqrt(2.0)
+                turn[middle] += generator.uniform(-0.9, 0.9, 40)
+            poses = tracker.follow(wide.moved(x - rods.x, y - rods.y, turn, noise_seed=100 + k), history[-3:])
+            history.append(poses)
+            lost += int((~poses.has_pose).sum())
+            wrong += wrong_unflagged(poses, x, y)
+            worst = max(worst, rms(np.hypot(poses.x - x, poses.y - y)) / np.sqrt(2.0))
+        report(
+            f"{rods.count} rods, 30 photographs, 501 px, avalanche of 40 (26 px, ±0.9 rad): {lost} lost, "
+            f"{wrong} wrong unflagged, rms at most {worst:.4f} px"
+        )
+        assert lost == 0
+        assert wrong == 0
+
+    benchmark.pedantic(run, rounds=1)

@@ -1,0 +1,84 @@
+"""Self-calibration against discrete-element truth: what is put wrong on purpose must be found, and no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.synthetic.packing import prepare_packing
+from solver.calibration import calibrate
+from solver.calibration_equations import MeasuredSequence, outward_normals, rotate_offsets
+from solver.calibration_priors import CalibrationPriors
+from solver.dem import shear_photographs
+from solver.dem_truth import DemSettings, DemTruth
+
+GRAINS, FRAMES, STEP = 250, 24, np.deg2rad(0.25)
+SEEDS = (11, 12)
+# Twenty-four photographs, 6° of shear: measured 10–13 µm at 3 µm of noise, 14–17 µm at 10 µm, over six seeds.
+CENTRE_LEFT = {3e-6: 17e-6, 10e-6: 21e-6}
+HONEST = (0.5, 1.3)  # true errors over standard deviations, measured 0.6 to 1.1
+WALL_LEFT = 15e-6  # measured 2–10 µm: the elastic overlap at a wall, and centres that lean on it
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module", params=SEEDS)
+def truth(request) -> DemTruth:
+    settings = DemSettings()
+    cell = prepare_packing(GRAINS, np.random.default_rng(request.param), settings)
+    return DemTruth.of_frames(cell.grains.radius, list(shear_photographs(cell, STEP * np.arange(FRAMES))), settings)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(3)
+
+
+def typical_overlap(truth: DemTruth) -> float:
+    return float(truth.fn.mean() / truth.settings.normal_stiffness)
+
+
+def measure(truth: DemTruth, noise: float, rng: np.random.Generator) -> MeasuredSequence:
+    shape = truth.rotation.shape
+    position = truth.position + rng.normal(0.0, noise, truth.position.shape)
+    return MeasuredSequence(
+        truth.radius, position, truth.rotation, np.ones(shape, bool), truth.endpoints, np.full(shape, noise)
+    )
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@pytest.mark.parametrize("noise", [3e-6, 10e-6])
+@pytest.mark.parametrize("told", [True, False])
+def test_centres_radii_and_walls_are_found(truth, rng, noise, told):
+    exact = measure(truth, noise, rng)
+    n = exact.grain_count
+    offset, radius = rng.normal(0, 50e-6, (n, 2)), rng.normal(0, 10e-6, n)
+    wall = np.array([50e-6, -30e-6, 40e-6, -60e-6])
+    wrong = replace(
+        exact,
+        radius=exact.radius - radius,
+        position=exact.position - rotate_offsets(exact, offset),
+        endpoints=exact.endpoints - (wall[:, None] * outward_normals(exact.endpoints))[:, :, None, :],
+    )
+    priors = CalibrationPriors(50e-6, 10e-6, wall=50e-6) if told else None
+    result = calibrate(wrong, priors, rng=rng, typical_overlap=typical_overlap(truth))
+    assert result.applied
+    assert rms(result.offset - offset) < CENTRE_LEFT[noise]
+    assert rms(result.radius - radius) < rms(radius)
+    assert rms(result.wall - wall) < WALL_LEFT
+    assert HONEST[0] < rms((result.offset - offset) / result.offset_sd) < HONEST[1]
+    assert result.after.width < 1.2 * np.hypot(np.sqrt(2) * noise, typical_overlap(truth))
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-6, 10e-6])
+def test_exact_centres_are_left_alone(truth, rng, noise):
+    exact = measure(truth, noise, rng)
+    result = calibrate(exact, rng=rng, typical_overlap=typical_overlap(truth))
+    corrected = result.correct(exact)
+    assert rms(corrected.position - exact.position) < 0.5e-6
+    assert rms(corrected.radius - exact.radius) < 0.5e-6
