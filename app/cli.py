@@ -152,7 +152,8 @@ def synth(
     photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
     noise: Annotated[float, tyro.conf.arg(help="of a tracked position [m], with --no-photographs")] = 0.0,
     depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
-    jpeg_quality: Annotated[int | None, tyro.conf.arg(help="write JPEG of this quality instead of PNG")] = None,
+    jpeg_quality: Annotated[int | None, tyro.conf.arg(help="of 8-bit photographs; default: the preset's")] = None,
+    png: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write PNG, not JPEG")] = False,
     grains: Annotated[int | None, tyro.conf.arg(help="number of rods")] = None,
     frame_count: Annotated[int | None, tyro.conf.arg(name="frames", help="number of photographs")] = None,
     step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs")] = None,
@@ -168,7 +169,7 @@ def synth(
 
     return commands.synth(
         out, quiet=quiet, preset=preset, seed=seed, photographs=photographs, noise=noise, depth=depth,
-        jpeg_quality=jpeg_quality, grains=grains, frames=frame_count, step_degrees=step_degrees,
+        jpeg_quality=jpeg_quality, png=png, grains=grains, frames=frame_count, step_degrees=step_degrees,
         pixel_size=pixel_size, reversal=reversal,
     )  # fmt: skip
 

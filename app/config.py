@@ -92,7 +92,7 @@ class ContactsSection(Section):
 class SolverSection(Section):
     """Tuning of the force solver."""
 
-    estimator: Literal["nlgs"] = "nlgs"
+    estimator: Literal["ensemble", "nlgs"] = "ensemble"
     preset: Literal["rodsight", "paper"] = "rodsight"  # paper: inertia alone, one step per interval, reset to zero
     kappa: Positive = 0.05  # kinematic number
     substeps: Annotated[int, Field(ge=1)] = 5

@@ -115,7 +115,7 @@ def read_photograph(file: Path) -> Image:
         grey = cv2.transform(pixels[:, :, :3].astype(np.float32), LUMA[None, :])
     if scale != 1.0:
         grey *= scale
-    return np.ascontiguousarray(grey)
+    return np.ascontiguousarray(grey, dtype=np.float32)
 
 
 def _decode(content: bytes) -> NDArray | None:

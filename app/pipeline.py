@@ -189,19 +189,20 @@ def _solve_frames(
     snapshots = make_snapshots(tracks, walls)
     frames: list[FrameForces] = []
     statistics: list[FrameStatistics] = []
-    state: SequenceState | None = None
+    kept_state: SequenceState | None = None
     for k in range(min(checkpoint.finished(), len(snapshots))):
-        forces, kept, state = checkpoint.load(k, FrameForces, FrameStatistics, SequenceState)
+        forces, kept, kept_state = checkpoint.load(k, FrameForces, FrameStatistics, SequenceState)
         frames.append(forces)
         statistics.append(kept)
     settings = sequence_settings(run.experiment.config)
     done = len(frames)
     run.progress("solving", done, len(snapshots))
-    for forces, state in solve_sequence(packing, snapshots, settings, state=state, first=done):
+    for forces, state in solve_sequence(packing, snapshots, settings, state=kept_state, first=done):
         snapshot = snapshots[forces.frame]
         summary = frame_statistics(
             forces.contacts, forces.fn, forces.ft, forces.state,
             snapshot.position, snapshot.present, packing.walls(snapshot.endpoints), packing.length,
+            grains=packing.grains, material=packing.material,
         )  # fmt: skip
         checkpoint.save(forces.frame, forces, summary, state)
         frames.append(forces)
@@ -236,6 +237,7 @@ def sequence_settings(config: ExperimentFile) -> SequenceSettings:
         keep=config.recording.sweeps,
     )
     return SequenceSettings(
+        estimator="nlgs" if paper else solver.estimator,
         chain=chain,
         threshold_sigmas=contacts.threshold_sigmas,
         threshold=contacts.threshold,

@@ -44,6 +44,8 @@ UNITS = {
     "statistics/stress": "Pa", "statistics/pressure": "Pa", "statistics/area": "m2",
     "statistics/friction_angle": "rad", "statistics/wall_ratio_angle": "rad",
     "statistics/principal_direction": "rad", "statistics/mean_fn": "N", "statistics/max_fn": "N",
+    "statistics/sigma_1": "Pa", "statistics/sigma_2": "Pa", "statistics/wall_force": "N",
+    "statistics/anisotropy_direction": "rad", "statistics/friction_angle_of_anisotropies": "rad",
 }  # fmt: skip
 
 

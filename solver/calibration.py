@@ -3,9 +3,9 @@
 Rigid grains neither overlap nor, where they carry force, stand apart. A centre that is wrong by a
 constant, body-fixed amount breaks this in a way that turns with the grain and changes with its
 neighbours, so many photographs reveal it. The gap equations are solved by robust, one-sided,
-iteratively re-weighted least squares: an overlap is never excused, a positive gap g counts as
-(1 + (g/s)²)⁻², and s shrinks from the scale of the errors to that of the noise. Gaussian priors hold
-whatever the sequence does not determine.
+iteratively re-weighted least squares: a positive gap g counts as (1 + (g/s)²)⁻², an overlap in full
+unless only a wrong track can explain it, and s shrinks from the scale of the errors to that of the
+noise. Gaussian priors hold whatever the sequence does not determine.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ CERTAIN = 3.0  # standard deviations beyond which a correction is called sure, o
 IMPOSSIBLE = 4.0  # standard deviations of noise: no touching pair overlaps more
 EXCESSIVE_NOISE = 1.3  # true over stated noise: above this the user is told
 TOLERATED_IMPOSSIBLE = 0.02  # share of the overlaps: above this the user is told
-EXCESSIVE_DEMAND = 1.5  # errors that the overlaps suggest, over the prior: above this the user is told
+EXCESSIVE_DEMAND = 2.0  # errors that the overlaps suggest, over the prior: above this the user is told
 POSTERIOR_SAMPLES = 100  # draws behind each standard deviation: known to 7 %
 EXPECTED_CENTRE = 1e-2  # widest prior without being told, of the mean diameter; the overlaps then narrow it
 EXPECTED_WALL = 3e-3  # prior of a wall without being told, of the mean diameter

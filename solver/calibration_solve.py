@@ -21,7 +21,7 @@ NEGLIGIBLE_WEIGHT = 1e-3  # a row that counts less is left out of its round
 OVERLAP_FRAMES = 15  # frames over which the elastic overlap of a contact is one random number, not many
 DOUBT = 0.5  # the typical overlap, between grains and at walls apart, and the bias of the weights: known to this share
 # Which pairs touch is not certain either, which the draws cannot know. Against simulated truths the errors
-# are 0.6 to 1.2 times the standard deviations once these carry this factor.
+# are 0.57 to 1.16 times the standard deviations once these carry this factor.
 SD_FACTOR = 1.2
 PRIOR_SAMPLES = 8  # posterior draws that estimate a mean variance
 

@@ -10,6 +10,9 @@ reads the forces from the motion of one interval, without any mass or stiffness:
 All forces inside are in units of `force_unit`, torques over the mean radius.
 """
 
+# clarabel is compiled and ships no types.
+# pyright: reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from solver.boundaries import Walls
 from solver.contacts import Contacts
@@ -45,7 +45,8 @@ def displacement_scale(before: Array, after: Array, sigma: Array) -> float:
     count = min(NEIGHBOURS, len(seen) - 1)
     if count < 1:
         raise ValueError("fewer than two grains are seen in both frames: no displacement scale")
-    distance, near = cKDTree(before[seen]).query(before[seen], k=count + 1)
+    found = KDTree(before[seen]).query(before[seen], k=count + 1)
+    distance, near = np.asarray(found[0]), np.asarray(found[1])
     moved = after[seen] - before[seen]
     rest = moved - moved[near[:, 1:]].mean(axis=1)
     variance = sigma[seen] ** 2

@@ -11,12 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.boundaries import Walls
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain, force_scale
 from solver.contact_probability import ContactProbabilitySettings, probable_contacts, window_of
-from solver.contacts import Contacts, measure_contacts
 from solver.convex import ConvexSettings, assemble_balance, polish
 from solver.convex_members import advance_member
 from solver.displacement import find_reversals, member_intervals

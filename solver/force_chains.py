@@ -7,9 +7,9 @@ After Peters, Muthuswamy, Wibowo & Tordesillas 2005, Phys. Rev. E 72, 041307. Th
 2. A grain is highly stressed if σ₁ exceeds the mean of σ₁ over all grains present (those without force included).
 3. Two highly stressed grains that touch with force are linked if the line between their centres lies within 45° of d
    at both of them.
-4. A chain goes through a grain from a link on one side of it, along d, to a link on the other side. Chain grains are
-   those of at least three that are linked like this; links at which no chain passes belong to none. Where a grain
-   has several links on one side the chain branches and its branches count as one chain.
+4. A chain goes through a grain from a link on one side of it, along d, to a link on the other side, so that it has at
+   least three grains. A link at neither end of which a chain goes through belongs to none. Where chains share a grain
+   they branch, and count as one.
 """
 
 from __future__ import annotations
@@ -46,9 +46,7 @@ class ForceChains:
         return np.bincount(self.chain[self.chain >= 0], minlength=self.count)
 
 
-def grain_stresses(
-    contacts: Contacts, fn: Array, ft: Array, position: Array, grains: Grains, length: float
-) -> Array:
+def grain_stresses(contacts: Contacts, fn: Array, ft: Array, position: Array, grains: Grains, length: float) -> Array:
     """Symmetric stress of every grain from its contact forces (n, 2, 2) [Pa], compression positive.
 
     fn, ft (c,) [N] that i exerts on j; position (n, 2) [m]; length of the rods [m].
@@ -98,29 +96,21 @@ def find_force_chains(
     passed = links.min(axis=1) > 0
     kept = passed[i] | passed[j]
     return ForceChains(
-        chain=_label(n, i[kept], j[kept], passed),
+        chain=_number_chains(n, i[kept], j[kept]),
         link=row[kept],
         major=major,
         direction=_angle(axis),
     )
 
 
-def _label(
-    n: int, i: NDArray[np.int64], j: NDArray[np.int64], passed: NDArray[np.bool_]
-) -> NDArray[np.int32]:
-    """Number the chains in the order of their first grain.
-
-    A grain that no chain passes through is an end: of every chain that reaches it, so that it joins none of them. It
-    gets the number of the first.
-    """
-    inner = passed[i] & passed[j]
-    graph = coo_array((np.ones(inner.sum()), (i[inner], j[inner])), shape=(n, n))
+def _number_chains(n: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Number the connected parts of links i, j (l,) in the order of their first grains (n,); −1 without a link."""
+    graph = coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
     _, part = connected_components(graph, directed=False)
-    label = np.where(passed, part, n).astype(np.int64)
-    np.minimum.at(label, np.where(passed[i], j, i)[~inner], label[np.where(passed[i], i, j)[~inner]])
+    member = np.zeros(n, bool)
+    member[i] = member[j] = True
     chain = np.full(n, -1, np.int32)
-    member = label < n
-    values, first, number = np.unique(label[member], return_index=True, return_inverse=True)
+    values, first, number = np.unique(part[member], return_index=True, return_inverse=True)
     rank = np.empty(len(values), np.int32)
     rank[np.argsort(first)] = np.arange(len(values), dtype=np.int32)
     chain[member] = rank[number]

@@ -10,6 +10,8 @@ from solver.grains import Array
 
 FORCE_EDGES = np.linspace(0.0, 8.0, 33)  # of the bins of P(f), in units of the mean force
 FORCE_BINS = len(FORCE_EDGES) - 1
+MOBILISATION_EDGES = np.linspace(0.0, 1.0, 21)  # of the bins of the mobilisation
+MOBILISATION_BINS = len(MOBILISATION_EDGES) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,7 @@ def tail_exponent(force: Array) -> Estimate:
     if len(excess) == 0 or excess.mean() < 1e-9:
         return Estimate(float("nan"), float("nan"))
     value = 1.0 / float(excess.mean())
-    return Estimate(value, value / np.sqrt(len(excess)))
+    return Estimate(value, value / float(np.sqrt(len(excess))))
 
 
 def plateau_ratio(force: Array) -> Estimate:
@@ -78,6 +80,17 @@ def mobilisation(fn: Array, ft: Array, friction: Array) -> Array:
     limit = friction * fn
     held = limit > 0
     return np.where(held, np.abs(ft) / np.where(held, limit, 1.0), 1.0)
+
+
+def mobilisation_density(mobilised: Array) -> Array:
+    """Density of the mobilisation (c,) in the bins of MOBILISATION_EDGES (MOBILISATION_BINS,); zero without contacts.
+
+    Values above 1, which rounding or another friction leaves, count in the last bin.
+    """
+    if len(mobilised) == 0:
+        return np.zeros(MOBILISATION_BINS)
+    counts, _ = np.histogram(np.minimum(mobilised, 1.0), MOBILISATION_EDGES)
+    return counts / (len(mobilised) * np.diff(MOBILISATION_EDGES))
 
 
 def strong_network(fn: Array, force: Array, branch: Array) -> StrongNetwork:

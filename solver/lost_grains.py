@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from solver.grains import Array
 from solver.motion import Snapshot
@@ -52,6 +52,6 @@ def _carried(then: Snapshot, here: Snapshot, place: Array) -> Array:
     both = np.flatnonzero(then.present & here.present)
     if not len(both):
         return np.zeros(2)
-    _, near = cKDTree(then.position[both]).query(place, k=min(NEIGHBOURS, len(both)))
+    _, near = KDTree(then.position[both]).query(place, k=min(NEIGHBOURS, len(both)))
     rows = both[np.atleast_1d(near)]
     return (here.position[rows] - then.position[rows]).mean(axis=0)

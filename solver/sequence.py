@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.admissibility import worst_unbalance
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain
 from solver.contacts import Contacts
+from solver.ensemble import EnsembleSettings, EnsembleState, solve_ensemble
 from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus
 from solver.grains import Array
 from solver.judgement import Evidence, free_standard_deviation, is_suspect, judge, trust
 from solver.kinematics import relative_motion
-from solver.network import NearPairs
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
+from solver.network import NearPairs
 from solver.stress import love_weber_stress, packing_area
 from solver.warm_start import ForceMemory
 
@@ -25,17 +28,19 @@ SLIDING_TOLERANCE = 1e-6  # of μ f_n
 
 @dataclass(frozen=True, slots=True)
 class SequenceSettings:
-    chain: ChainSettings = field(default_factory=ChainSettings)
-    threshold_sigmas: float = 6.0  # gap threshold in standard deviations of a position
+    estimator: Literal["ensemble", "nlgs"] = "ensemble"
+    chain: ChainSettings = field(default_factory=ChainSettings)  # nlgs: the estimator; ensemble: its first member
+    ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
+    threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position
     threshold: float | None = None  # [m], instead of threshold_sigmas
-    reset_to_zero: bool = False  # the paper's reset at a rearrangement
+    reset_to_zero: bool = False  # nlgs: the paper's reset at a rearrangement
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceState:
     """What one frame hands to the next: with it a sequence goes on where it stopped, bit for bit."""
 
-    memory: ForceMemory
+    members: EnsembleState
     age_key: NDArray[np.int64]  # (m,) contacts of the last frame, ascending
     age: NDArray[np.int32]  # (m,) frames
     seen: LastSeen
@@ -49,9 +54,21 @@ class SequenceState:
     def first(cls, packing: Packing) -> SequenceState:
         walls = len(packing.pressure)
         return cls(
-            ForceMemory.empty(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
+            EnsembleState.first(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
             np.nan, np.full((walls, 2, 2), np.nan), np.nan, 0, 0,
         )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Estimate:
+    """One attempt at a frame: the chain, and the field to be reported on its contacts."""
+
+    step: ChainStep
+    fn: Array  # (c,) [N]
+    ft: Array  # (c,) [N]
+    probability: Array  # (c,), NaN where not computed
+    members: EnsembleState
+    remark: str = ""
 
 
 def solve_sequence(
@@ -65,72 +82,89 @@ def solve_sequence(
     """Solve the frames first, first + 1, … one after the other; yields each frame with the state after it.
 
     The motion that leads to a frame is that since the frame before. Nothing leads to frame 0: it takes the motion
-    that follows it, and the frame after it starts afresh.
+    that follows it, and the chains of the frame after it start afresh.
     """
     state = SequenceState.first(packing) if state is None else state
     for k in range(first, len(snapshots)):
-        following = snapshots[k + 1] if k == 0 and len(snapshots) > 1 else None
-        frame, state = solve_frame(packing, k, snapshots[k], state, settings, following=following)
+        frame, state = solve_frame(packing, snapshots, k, state, settings)
         yield frame, state
 
 
 def solve_frame(
-    packing: Packing,
-    k: int,
-    snapshot: Snapshot,
-    state: SequenceState,
-    settings: SequenceSettings,
-    *,
-    following: Snapshot | None = None,
+    packing: Packing, snapshots: Sequence[Snapshot], k: int, state: SequenceState, settings: SequenceSettings
 ) -> tuple[FrameForces, SequenceState]:
     """Solve frame k from the state that the frame before it left behind."""
+    snapshot = snapshots[k]
     if np.isfinite(state.time):
         motion = motion_to(snapshot, state.seen, state.time, state.endpoints)
     else:
-        motion = motion_from(snapshot, following) if following is not None else no_motion(snapshot)
-    threshold = settings.threshold_sigmas * snapshot.sigma if settings.threshold is None else settings.threshold
-    memory = state.memory
-    step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
-    evidence = _evidence(packing, motion, step, state, memory)
-    remark = ""
-    if is_suspect(evidence):
-        wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold))
-        wider_evidence = _evidence(packing, motion, wider, state, memory)
-        if wider_evidence.correction < evidence.correction:
-            step, evidence = wider, wider_evidence
-            remark = f"solved again with a gap threshold {WIDER} times as wide; "
+        motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
+    if settings.estimator == "ensemble" and len(snapshots) > 1:
+        estimate, evidence = _estimate_by_ensemble(packing, snapshots, k, motion, state, settings)
+    else:
+        estimate, evidence = _estimate_by_chain(packing, snapshot, motion, state, settings)
     status, why = judge(evidence)
     if not motion.spans:
         why = "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
     if status is FrameStatus.REARRANGING and settings.reset_to_zero:
-        memory = ForceMemory.empty()
-        step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
-        evidence = replace(_evidence(packing, motion, step, state, memory), old_unbalance=evidence.old_unbalance)
+        fresh = replace(state, members=EnsembleState.first())
+        estimate, renewed = _estimate_by_chain(packing, snapshot, motion, fresh, settings)
+        evidence = replace(renewed, old_unbalance=evidence.old_unbalance)
         status, why = FrameStatus.RESET, "reset to zero forces, as asked for at a rearrangement: " + why
     eventful = status in (FrameStatus.RESET, FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED)
     since_reset = 0 if status is FrameStatus.RESET else state.frames_since_reset + 1
-    age = _age(step.contacts, state)
-    frame = _describe(packing, k, motion, step, evidence, status, f"{remark}{why}", since_reset, age)
+    age = _age(estimate.step.contacts, state)
+    reason = "; ".join(part for part in (estimate.remark, why, estimate.step.solution.stop.value) if part)
+    frame = _describe(packing, k, motion, estimate, evidence, status, reason, since_reset, age)
     return frame, SequenceState(
-        memory=step.memory if motion.spans else ForceMemory.empty(),
-        age_key=step.contacts.key,
+        members=estimate.members,
+        age_key=estimate.step.contacts.key,
         age=age,
         seen=state.seen.renewed(snapshot),
         time=snapshot.time,
         endpoints=snapshot.endpoints,
-        pressure=_pressure(packing, motion, step) if motion.spans else np.nan,
+        pressure=_pressure(packing, motion, estimate.step) if motion.spans else np.nan,
         frames_since_reset=since_reset,
         frames_since_event=0 if eventful else state.frames_since_event + 1,
     )
 
 
-def _evidence(
-    packing: Packing, motion: FrameMotion, step: ChainStep, state: SequenceState, memory: ForceMemory
-) -> Evidence:
+def _estimate_by_chain(
+    packing: Packing, snapshot: Snapshot, motion: FrameMotion, state: SequenceState, settings: SequenceSettings
+) -> tuple[_Estimate, Evidence]:
+    threshold = settings.threshold_sigmas * snapshot.sigma if settings.threshold is None else settings.threshold
+    memory, remark = state.members.soft, ""
+    step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
+    evidence = _evidence(packing, motion, step, state)
+    if is_suspect(evidence):
+        wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold))
+        wider_evidence = _evidence(packing, motion, wider, state)
+        if wider_evidence.correction < evidence.correction:
+            step, evidence = wider, wider_evidence
+            remark = f"solved again with a gap threshold {WIDER} times as wide"
+    unknown = np.full(step.contacts.count, np.nan)
+    members = replace(state.members, soft=step.memory if motion.spans else ForceMemory.empty())
+    return _Estimate(step, step.solution.fn, step.solution.ft, unknown, members, remark), evidence
+
+
+def _estimate_by_ensemble(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    k: int,
+    motion: FrameMotion,
+    state: SequenceState,
+    settings: SequenceSettings,
+) -> tuple[_Estimate, Evidence]:
+    found = solve_ensemble(packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble)
+    evidence = _evidence(packing, motion, found.step, state)
+    return _Estimate(found.step, found.fn, found.ft, found.probability, found.state, found.remark), evidence
+
+
+def _evidence(packing: Packing, motion: FrameMotion, step: ChainStep, state: SequenceState) -> Evidence:
     pressure = _pressure(packing, motion, step)
     jump = abs(pressure - state.pressure) / state.pressure if state.pressure > 0 else np.nan
     return Evidence(
-        reset=len(memory.key) == 0,
+        reset=len(state.members.soft.key) == 0,
         correction=step.solution.mean_unbalance / step.kappa,
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
@@ -166,35 +200,36 @@ def _describe(
     packing: Packing,
     k: int,
     motion: FrameMotion,
-    step: ChainStep,
+    estimate: _Estimate,
     evidence: Evidence,
     status: FrameStatus,
-    why: str,
+    reason: str,
     since_reset: int,
     age: NDArray[np.int32],
 ) -> FrameForces:
-    contacts, fn, ft = step.contacts, step.solution.fn, step.solution.ft
+    step, fn, ft = estimate.step, estimate.fn, estimate.ft
+    contacts = step.contacts
     un, ut = relative_motion(contacts, packing.grains.radius, motion.grains.velocity, motion.grains.spin, step.walls)
     return FrameForces(
         frame=k,
         contacts=contacts,
         fn=fn,
         ft=ft,
-        nlgs_fn=fn,
-        nlgs_ft=ft,
+        nlgs_fn=step.solution.fn,
+        nlgs_ft=step.solution.ft,
         un=un,
         ut=ut,
         state=contact_state(packing, contacts, fn, ft),
         age=age,
         source=np.full(contacts.count, ContactSource.DETECTED, np.uint8),
-        probability=np.full(contacts.count, np.nan),
+        probability=estimate.probability,
         fn_sd=free_standard_deviation(fn),
         ft_sd=packing.material.friction * free_standard_deviation(fn),
         status=status,
-        reason=f"{why}; {step.solution.stop.value}",
+        reason=reason,
         sweeps=step.sweeps,
         natural_map=step.solution.natural_map,
-        unbalance=step.solution.unbalance,
+        unbalance=worst_unbalance(packing, contacts, fn, ft, motion.grains.present),
         kappa=step.kappa,
         correction=evidence.correction,
         old_unbalance=evidence.old_unbalance,

@@ -40,10 +40,11 @@ class Preset:
     step_degrees: float  # of shear between photographs
     pixel_size: float  # [m]
     search_degrees: float = 0.0  # simulated range from which the photographs around the greatest event are taken
+    jpeg_quality: int | None = None  # of 8-bit photographs; None: PNG
 
 
 PRESETS = {
-    "small": Preset(grains=250, frames=24, step_degrees=0.25, pixel_size=2.5e-4, search_degrees=15.0),
+    "small": Preset(grains=250, frames=24, step_degrees=0.25, pixel_size=2.5e-4, search_degrees=15.0, jpeg_quality=92),
     "paper": Preset(grains=1172, frames=61, step_degrees=0.25, pixel_size=2.0e-4),
 }
 
@@ -68,6 +69,7 @@ def synthesize(
     noise: float = 0.0,
     depth: int = 8,
     jpeg_quality: int | None = None,
+    png: bool = False,
     grains: int | None = None,
     frames: int | None = None,
     step_degrees: float | None = None,
@@ -78,7 +80,8 @@ def synthesize(
 ) -> Synthesis:
     """Simulate a simple shear test and write it as an experiment folder; the same arguments give the same bytes.
 
-    With photographs, PNG unless a jpeg_quality (1 … 100) is given, the grains are left to be detected.
+    With photographs, the grains are left to be detected. Photographs are JPEG where the preset or jpeg_quality
+    (1 … 100) says so, PNG with `png` and at 16 bits.
     Without, tracks are written, with Gaussian noise of standard deviation `noise` [m] on positions and
     noise / radius [rad] on rotations. grains, frames, step_degrees and pixel_size [m] replace the
     preset's. reversal: the shear turns back half way. speckle: how rods are painted and photographed,
@@ -93,6 +96,9 @@ def synthesize(
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(out, "", "exists already and is not an empty folder")
     speckle = replace(speckle or SpeckleSettings(), pixel_size=plan.pixel_size, depth=depth)
+    if jpeg_quality is None and depth == 8:
+        jpeg_quality = plan.jpeg_quality
+    jpeg_quality = None if png else jpeg_quality
 
     truth = _simulate(plan, seed, reversal, progress or _silent)
     truth = _place_in_picture(truth, MARGIN + speckle.bar_thickness)

@@ -72,9 +72,9 @@ class Patches:
         n = len(centre)
         height, width = photograph.image.shape
         usable = np.array(
-            [kernels.inside(height, width, *centre[k], reach[k]) for k in range(n)], dtype=np.bool_
+            [kernels.inside(height, width, centre[k, 0], centre[k, 1], reach[k]) for k in range(n)], dtype=np.bool_
         ).reshape(n)
-        count = [kernels.count_pixels(*centre[k], reach[k]) if usable[k] else 0 for k in range(n)]
+        count = [kernels.count_pixels(centre[k, 0], centre[k, 1], reach[k]) if usable[k] else 0 for k in range(n)]
         start = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
         data = np.empty((start[-1], 6), np.float32)
         inverse = np.full((n, 3, 3), np.nan)

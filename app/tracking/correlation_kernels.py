@@ -37,7 +37,7 @@ NORMAL_MEDIAN = 0.6745
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _interpolate(coefficients, ix, iy, tx, ty):
+def interpolate(coefficients, ix, iy, tx, ty):
     """Value at (ix + tx, iy + ty), 0 ≤ t < 1."""
     sx = ONE - tx
     ax = sx * sx * sx * SIXTH
@@ -66,7 +66,7 @@ def sample(coefficients, x, y, out):
             out[p] = np.nan
             continue
         ix, iy = int(x[p]), int(y[p])
-        out[p] = _interpolate(coefficients, ix, iy, np.float32(x[p] - ix), np.float32(y[p] - iy))
+        out[p] = interpolate(coefficients, ix, iy, np.float32(x[p] - ix), np.float32(y[p] - iy))
 
 
 @njit(cache=True, nogil=True)
@@ -179,7 +179,7 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, tolerance, limi
             x = ox + cos * dx - sin * dy
             y = oy + sin * dx + cos * dy
             ix, iy = int(x), int(y)
-            g = _interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
+            g = interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
             s0 += g
             s1 += np.float64(g) * g
             sf += np.float64(g) * data[p, 2]
@@ -239,6 +239,7 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
     margin = int(reach) + 2
     g = np.empty(count)
     misfit = np.empty(count)
+    inverse = np.zeros((5, 5))
     a, b = gain, offset
     # The given light is held for some steps: what covers the patch would drag a free one along, and then
     # hide among residuals that are large everywhere.
@@ -257,7 +258,7 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             x = ox + cos * data[p, 0] - sin * data[p, 1]
             y = oy + sin * data[p, 0] + cos * data[p, 1]
             ix, iy = int(x), int(y)
-            g[p] = _interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
+            g[p] = interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
             misfit[p] = abs(g[p] - a * data[p, 2] - b)
         scale = max(np.median(misfit) / NORMAL_MEDIAN, noise)
         normal = np.zeros((5, 5))

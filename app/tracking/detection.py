@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.frames import Image
 from app.tracking.outlines import Measured, Outliner
@@ -78,6 +78,7 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
     found = refine_grains(image, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
+    order = order[np.isfinite(found.sigma[order])]  # what cannot be measured closely is not a grain
     return Detection(found.x[order], found.y[order], found.radius[order], found.sigma[order], found.quality[order])
 
 
@@ -100,15 +101,13 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
     shift = float(np.median(excess))
     # The rims' shading differs from grain to grain: their radii scatter about the common shift.
     scatter = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
-    tied = _each(
-        len(x), lambda k: outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter)
-    )
+    tied = _each(len(x), lambda k: outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter))
     return _detection(tied, radius)
 
 
-def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: Array, known: bool) -> Array:
+def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], known: bool) -> Array:
     """x, y, radius, quality (c, 4) of every chosen circle, or of the better one of another radius around it."""
-    tree = cKDTree(np.stack([rough.x, rough.y], axis=1))
+    tree = KDTree(np.stack([rough.x, rough.y], axis=1))
     widest = float(rough.radius.max() - rough.radius.min()) if len(rough.radius) else 0.0
     rows = []
     for k in chosen:
@@ -120,13 +119,18 @@ def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: Array, kno
         best, best_value = None, -1.0
         for m in near[np.sort(first)] if known else [k]:
             scatter = 0.3 if known else np.inf
-            one = outliner.measure(rough.x[m], rough.y[m], rough.radius[m], RING_UNCERTAINTY, 0.0, scatter)
-            if one.quality > 0.0:  # now that it is centred, a narrower view keeps paint near the rim out of it
-                radius = float(rough.radius[m]) if known else one.radius
-                one = outliner.measure(one.x, one.y, radius, 0.5 * RING_UNCERTAINTY, 0.0, scatter)
-            value = one.quality * np.sqrt(one.radius)
+            one = outliner.measure(
+                float(rough.x[m]), float(rough.y[m]), float(rough.radius[m]), RING_UNCERTAINTY, 0.0, scatter
+            )
+            quality = one.quality
+            if known and quality > 0.0:
+                # Now that it is centred, a narrower view keeps paint near the rim out of it. Alone it is
+                # too easily satisfied.
+                one = outliner.measure(one.x, one.y, float(rough.radius[m]), 0.5 * RING_UNCERTAINTY, 0.0, scatter)
+                quality = min(one.quality, 2.0 * quality)
+            value = quality * np.sqrt(one.radius)
             if value > best_value:
-                best, best_value = (one.x, one.y, rough.radius[m] if known else one.radius, one.quality), value
+                best, best_value = (one.x, one.y, rough.radius[m] if known else one.radius, quality), value
         if best is not None:
             rows.append(best)
     return np.array(rows).reshape(-1, 4)
@@ -137,7 +141,7 @@ def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -
     if len(found) == 0 or len(x) == 0:
         return np.ones(len(x), dtype=np.bool_)
     count = min(8, len(found))
-    distance, index = cKDTree(found[:, :2]).query(np.stack([x, y], axis=1), k=count)
+    distance, index = KDTree(found[:, :2]).query(np.stack([x, y], axis=1), k=count)
     distance, other = distance.reshape(len(x), count), found[index.reshape(len(x), count), 2]
     limit = radius[:, None] + other - allowed * np.minimum(radius[:, None], other)
     return (distance >= limit).all(axis=1)

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from app.frames import Image
-from app.tracking.correlation_kernels import _interpolate
+from app.tracking.correlation_kernels import interpolate
 from solver.grains import Array
 
 # Samples along a radius [1/px].
@@ -24,9 +25,9 @@ class Outline:
 
     angle: Array  # (p,) [rad] from the rough centre
     distance: Array  # (p,) [px] of the edge from the rough centre, NaN where there is none
-    strength: Array  # (p,) [grey/px] slope of the edge
-    beyond: Array  # (p,) [grey] two pixels outside the edge
-    in_view: Array  # (p,) whether the photograph reaches there
+    strength: Image  # (p,) [grey/px] slope of the edge
+    beyond: Image  # (p,) [grey] two pixels outside the edge
+    in_view: NDArray[np.bool_]  # (p,) whether the photograph reaches there
     rays: Image  # (p, s) [grey] the rays themselves, at distances first + k / DENSITY
     first: float  # [px]
 
@@ -44,7 +45,7 @@ def sample_rays(coefficients, cx, cy, angles, first, step, out):
                 out[p, k] = np.nan
                 continue
             ix, iy = int(x), int(y)
-            out[p, k] = _interpolate(coefficients, ix, iy, np.float32(x - ix), np.float32(y - iy))
+            out[p, k] = interpolate(coefficients, ix, iy, np.float32(x - ix), np.float32(y - iy))
 
 
 def trace_outline(coefficients: Image, x: float, y: float, radius: float, window: float) -> Outline:
@@ -57,10 +58,10 @@ def trace_outline(coefficients: Image, x: float, y: float, radius: float, window
     sample_rays(coefficients, x, y, angle, first, 1.0 / DENSITY, ray)
     # A second difference over half a pixel to each side: the slope, smoothed by less than the lens's blur.
     half = DENSITY // 2
-    slope = (ray[:, :-2 * half] - ray[:, 2 * half :]) * (DENSITY / (2.0 * half))
+    slope = (ray[:, : -2 * half] - ray[:, 2 * half :]) * (DENSITY / (2.0 * half))
     where = first + (np.arange(slope.shape[1]) + half) / DENSITY
     allowed = np.abs(where - radius) <= window
-    in_view = np.isfinite(ray).all(axis=1)
+    in_view: NDArray[np.bool_] = np.asarray(np.isfinite(ray).all(axis=1), dtype=np.bool_)
     masked = np.where(allowed[None, :] & np.isfinite(slope), slope, -np.inf)
     top = np.argmax(masked, axis=1)
     rows = np.arange(len(angle))
@@ -110,6 +111,7 @@ def fit_circle(
     prior = np.zeros(3)
     # Start from the radius that the points themselves have, lest a common shift make outliers of them.
     shift[2] = _weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
+    residual, w, inverse, scale = np.zeros_like(weight), weight, np.eye(3), scale_least
     for _ in range(30):
         ex, ey = px - shift[0], py - shift[1]
         length = np.hypot(ex, ey)

@@ -17,9 +17,7 @@ from solver.grains import Array
 HISTORY = 8  # frames that the tracker looks back upon
 
 
-def detect(
-    first: NDArray[np.float32], radii: Array, guess: tuple[Array, Array, Array] | None
-) -> Detection:
+def detect(first: NDArray[np.float32], radii: Array, guess: tuple[Array, Array, Array] | None) -> Detection:
     """Find the grains on the first photograph, or refine those that were given (x, y, radius (n,) [px]).
 
     radii: known radius classes [px], may be empty.
@@ -43,7 +41,9 @@ def follow_photographs(
     """Follow the detected grains through all photographs; finished ones are taken from the checkpoint."""
     tracker = Tracker(photographs[0], detection, workers=workers)
     frame_count = len(time)
-    poses: list[FramePoses] = [checkpoint.load(k, FramePoses)[0] for k in range(min(checkpoint.finished(), frame_count))]
+    poses: list[FramePoses] = [
+        checkpoint.load(k, FramePoses)[0] for k in range(min(checkpoint.finished(), frame_count))
+    ]
     for k in range(len(poses), frame_count):
         progress("tracking", k, frame_count)
         pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:])

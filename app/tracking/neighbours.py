@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from solver.grains import Array
 
@@ -27,7 +27,7 @@ def local_motion(known: Array, displacement: Array, query: Array, *, itself: boo
     available = min(wanted, len(known))
     if m == 0 or available <= int(itself):
         return np.full((m, 2), np.nan), np.full(m, np.nan)
-    distance, index = cKDTree(known).query(query, k=available)
+    distance, index = KDTree(known).query(query, k=available)
     distance, index = distance.reshape(m, available), index.reshape(m, available)
     if itself:
         distance, index = distance[:, 1:], index[:, 1:]
@@ -42,7 +42,9 @@ def local_motion(known: Array, displacement: Array, query: Array, *, itself: boo
     # A quarter of a pixel keeps a perfectly uniform motion from excluding everybody.
     agree = deviation < 4.0 * scatter[:, None] + 0.25
     weight = np.exp(-2.0 * (distance / reach) ** 2) * agree
-    design = np.concatenate([np.ones((*index.shape, 1)), (known[index] - query[:, None, :]) / reach[:, :, None]], axis=2)
+    design = np.concatenate(
+        [np.ones((*index.shape, 1)), (known[index] - query[:, None, :]) / reach[:, :, None]], axis=2
+    )
     residual = moved - middle[:, None, :]
     normal = np.einsum("mk,mki,mkj->mij", weight, design, design)
     # Neighbours on one line leave a direction open: its gradient is drawn to zero.
@@ -60,7 +62,7 @@ def nearby_median(known: Array, value: Array, query: Array, count: int = NEIGHBO
     if len(known) == 0:
         return np.full(len(query), np.nan)
     count = min(count, len(known))
-    _, index = cKDTree(known).query(query, k=count)
+    _, index = KDTree(known).query(query, k=count)
     return np.median(value[index.reshape(len(query), count)], axis=1)
 
 
@@ -68,7 +70,7 @@ def overlaps(position: Array, radius: Array, allowed: float) -> NDArray[np.intp]
     """Pairs (p, 2) of grains that overlap by more than the share `allowed` of the smaller radius."""
     if len(position) < 2:
         return np.empty((0, 2), np.intp)
-    pairs = cKDTree(position).query_pairs(2.0 * float(radius.max()), output_type="ndarray")
+    pairs = KDTree(position).query_pairs(2.0 * float(radius.max()), output_type="ndarray")
     i, j = pairs[:, 0], pairs[:, 1]
     distance = np.linalg.norm(position[i] - position[j], axis=1)
     smaller = np.minimum(radius[i], radius[j])

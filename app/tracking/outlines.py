@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.frames import Image
 from app.tracking.edges import DENSITY, Circle, Outline, fit_circle, trace_outline
+from app.tracking.noise import image_noise
 from app.tracking.rim_profile import locate_edges
 from app.tracking.rings import local_contrast
 from app.tracking.splines import spline_coefficients
@@ -21,6 +22,8 @@ EDGE_SLOPE = 0.08
 # touch, the gap's dark is not reached, which shifts an edge but does not make it less of one.
 DARK_EXCESS = 0.12
 DARK_EXCESS_JUDGED = 0.3
+# Contrast below this many standard deviations of the noise [1] is none.
+NOISE_CONTRAST = 12.0
 # Points this close to the circle [px] count as its outline.
 ON_CIRCLE = 0.7
 # Fewer points do not make a circle; less of the outline in view does not make a grain.
@@ -52,7 +55,8 @@ class Outliner:
     def __init__(self, image: Image, radius: float) -> None:
         """radius [px]: of the largest grain, for the size of what counts as local."""
         self._coefficients = spline_coefficients(image)
-        self._contrast = local_contrast(image, int(4 * radius))[1]
+        # An edge must stand out from the noise too, or a photograph of nothing is full of edges.
+        self._contrast = np.maximum(local_contrast(image, int(4 * radius))[1], NOISE_CONTRAST * image_noise(image))
 
     def measure(self, x: float, y: float, radius: float, window: float, shift: float, scatter: float) -> Measured:
         """The circle through the steepest points within `window` [px] of radius + shift [px].
@@ -106,7 +110,10 @@ class Outliner:
         if not outlines:
             return 0.7
         total = np.array(
-            [np.nanmedian(np.concatenate([_fit_profiles(o, seen, width)[2] for o, seen in outlines])) for width in widths]
+            [
+                np.nanmedian(np.concatenate([_fit_profiles(o, seen, width)[2] for o, seen in outlines]))
+                for width in widths
+            ]
         )
         best = int(np.clip(np.argmin(total), 1, len(widths) - 2))
         before, at, after = total[best - 1 : best + 2]
@@ -128,7 +135,7 @@ class Outliner:
 def _fit_profiles(outline: Outline, seen: NDArray[np.bool_], width: float) -> tuple[Array, Array, Array]:
     return locate_edges(
         outline.rays, outline.first, 1.0 / DENSITY, np.where(seen, outline.distance, np.nan),
-        np.nan_to_num(outline.beyond), outline.angle, width,
+        np.nan_to_num(outline.beyond).astype(np.float64), outline.angle, width,
     )  # fmt: skip
 
 

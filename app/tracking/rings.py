@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.frames import Image
 from app.tracking.splines import shrink
@@ -56,7 +56,7 @@ def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.
     if len(x) == 0:
         return np.empty(0, np.intp)
     point = np.stack([x, y], axis=1)
-    tree = cKDTree(point)
+    tree = KDTree(point)
     alive = np.ones(len(x), dtype=np.bool_)
     largest = float(radius.max())
     for k in range(len(x)):
@@ -78,15 +78,17 @@ def local_contrast(image: Image, tile: int) -> tuple[Image, Image]:
     bright = np.empty((rows, columns), np.float32)
     for j in range(rows):
         for i in range(columns):
-            part = image[j * height // rows : (j + 1) * height // rows, i * width // columns : (i + 1) * width // columns]
+            part = image[
+                j * height // rows : (j + 1) * height // rows, i * width // columns : (i + 1) * width // columns
+            ]
             dark[j, i], bright[j, i] = np.percentile(part, [3.0, 95.0])
     contrast = bright - dark
     # Where there is only backing, its faint texture must not be blown up into edges.
     contrast = np.maximum(contrast, max(0.5 * float(np.percentile(contrast, 90.0)), 1.0)).astype(np.float32)
     size = (width, height)
     return (
-        cv2.resize(dark, size, interpolation=cv2.INTER_LINEAR),
-        cv2.resize(contrast, size, interpolation=cv2.INTER_LINEAR),
+        np.asarray(cv2.resize(dark, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32),
+        np.asarray(cv2.resize(contrast, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32),
     )
 
 
@@ -98,7 +100,7 @@ def _slopes(image: Image, tile: int) -> tuple[Image, Image]:
     steepness = np.hypot(slope_x, slope_y)
     full = max(float(np.percentile(steepness, 90.0)), 1e-6)
     cut = 1.0 / np.maximum(steepness, full)
-    return slope_x * cut, slope_y * cut
+    return np.asarray(slope_x * cut, dtype=np.float32), np.asarray(slope_y * cut, dtype=np.float32)
 
 
 def _ring_response(slope_x: Image, slope_y: Image, radius: float) -> Image:
@@ -108,7 +110,6 @@ def _ring_response(slope_x: Image, slope_y: Image, radius: float) -> Image:
     weight = np.exp(-((distance - radius) ** 2) / (2.0 * 0.8**2))
     weight /= weight.sum() * np.maximum(distance, 1.0)
     border = cv2.BORDER_REPLICATE
-    return -(
-        cv2.filter2D(slope_x, cv2.CV_32F, weight * x, borderType=border)
-        + cv2.filter2D(slope_y, cv2.CV_32F, weight * y, borderType=border)
-    )
+    response = cv2.filter2D(slope_x, cv2.CV_32F, weight * x, borderType=border)
+    response += cv2.filter2D(slope_y, cv2.CV_32F, weight * y, borderType=border)
+    return np.asarray(-response, dtype=np.float32)

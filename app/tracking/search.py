@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.tracking.correlation_kernels import _interpolate
+from app.tracking.correlation_kernels import interpolate
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -113,7 +113,7 @@ def _turn_template(reference, origin_x, origin_y, turn, offset_x, offset_y, temp
         x = min(max(x, 1.0), width - 2.001)
         y = min(max(y, 1.0), height - 2.001)
         ix, iy = int(x), int(y)
-        template[q] = _interpolate(reference, ix, iy, np.float32(x - ix), np.float32(y - iy))
+        template[q] = interpolate(reference, ix, iy, np.float32(x - ix), np.float32(y - iy))
         mean += template[q]
     mean /= len(template)
     power = 0.0

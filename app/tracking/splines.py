@@ -24,7 +24,8 @@ HALFWAY_VARIANCE = 0.7561
 
 def spline_coefficients(image: Image) -> Image:
     """The coefficients c of an image (H, W), mirrored beyond its borders."""
-    return cv2.sepFilter2D(image, cv2.CV_32F, PREFILTER, PREFILTER, borderType=cv2.BORDER_REFLECT_101)
+    filtered = cv2.sepFilter2D(image, cv2.CV_32F, PREFILTER, PREFILTER, borderType=cv2.BORDER_REFLECT_101)
+    return np.asarray(filtered, dtype=np.float32)
 
 
 def shrink(image: Image, factor: int) -> Image:
@@ -32,7 +33,8 @@ def shrink(image: Image, factor: int) -> Image:
     if factor == 1:
         return image
     height, width = image.shape[0] // factor, image.shape[1] // factor
-    return cv2.resize(image[: height * factor, : width * factor], (width, height), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(image[: height * factor, : width * factor], (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True)

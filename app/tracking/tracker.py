@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from app.frames import Image
 from app.tracking.correlation import Correlator, Patches
 from app.tracking.detection import Detection
+from app.tracking.findings import Findings
 from app.tracking.neighbours import local_motion, overlaps
 from app.tracking.noise import image_noise
-from app.tracking.findings import Findings
 from app.tracking.rescue import leash, refit_hidden, rescue
 from app.tracking.splines import Pyramid
 from app.tracks import TrackStatus
@@ -177,9 +177,7 @@ class Tracker:
         pose = np.where(missing[:, None], np.nan, findings.pose)
         rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
         blank = np.where(missing, np.nan, 1.0)
-        return FramePoses(
-            pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank, status
-        )
+        return FramePoses(pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank, status)
 
 
 def _last_known(history: Sequence[FramePoses], first: FramePoses) -> Array:

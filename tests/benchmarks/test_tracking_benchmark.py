@@ -1,10 +1,11 @@
 """The tracker's figures: speed per core, and exactness where it takes too long for the fast tests.
 
-    pytest tests/benchmarks/test_tracking_benchmark.py --benchmark-only -s
+pytest tests/benchmarks/test_tracking_benchmark.py --benchmark-only -s
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -40,6 +41,16 @@ def wrong_unflagged(poses: FramePoses, x: np.ndarray, y: np.ndarray) -> int:
     return int((poses.has_pose & (np.hypot(poses.x - x, poses.y - y) > WRONG) & ~flagged).sum())
 
 
+def cpu_seconds(tracker: Tracker, image: np.ndarray, rounds: int = 3) -> float:
+    """Processor time of one photograph, which other work on the machine does not lengthen as it does the clock's."""
+    spent = []
+    for _ in range(rounds):
+        since = time.process_time()
+        tracker.follow(image, [tracker.first()])
+        spent.append(time.process_time() - since)
+    return float(np.median(spent))
+
+
 def report(text: str) -> None:
     print(f"\n    {text}")
 
@@ -57,8 +68,8 @@ def test_bias_and_rms_against_sub_pixel_position(benchmark: Benchmark, rods: Rod
             bound.append(spread[-1] / limit)
             turn.append(rms(poses.rotation))
         report(
-            f"bias {max(bias):.4f} px, rms {max(spread):.4f} px = {max(bound):.2f} x Cramér-Rao, "
-            f"rotation {max(turn):.5f} rad (r = 20, noise 2.5, {rods.count} rods, 8 positions: worst)"
+            f"bias {max(bias):.4f} px, rms {max(spread):.4f} px, {max(bound):.2f} (mean {np.mean(bound):.2f}) x "
+            f"Cramér-Rao, rotation {max(turn):.5f} rad (r = 20, noise 2.5, {rods.count} rods, worst of 8 positions)"
         )
 
     benchmark.pedantic(sweep, rounds=1)
@@ -69,7 +80,7 @@ def test_speed_of_predicted_grains(benchmark: Benchmark, rods: Rods, tracker: Tr
     image = rods.moved(0.8, -0.6, 0.02)
     history = [tracker.first()]
     poses = benchmark(tracker.follow, image, history)
-    seconds = benchmark.stats.stats.median  # type: ignore[attr-defined]
+    seconds = cpu_seconds(tracker, image)
     report(f"{rods.count / seconds:.0f} grains/s predicted, photograph included (r = 20, one core)")
     assert (poses.status == TrackStatus.OK).all()
 
@@ -80,10 +91,11 @@ def test_speed_of_rescue(benchmark: Benchmark, rods: Rods, tracker: Tracker, shi
     turn = np.deg2rad(degrees) * np.where(np.arange(rods.count) % 2, 1.0, -1.0)
     image = rods.moved(shift, 0.0, turn)
     poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=3, warmup_rounds=1)
-    seconds = benchmark.stats.stats.median  # type: ignore[attr-defined]
+    seconds = cpu_seconds(tracker, image)
     lost = int((~poses.has_pose).sum())
     report(
-        f"jump of {shift:.0f} px with {degrees:.0f}°: {rods.count / seconds:.0f} grains/s, {lost} of {rods.count} lost, "
+        f"jump of {shift:.0f} px with {degrees:.0f}°: {rods.count / seconds:.0f} grains/s, "
+        f"{lost} of {rods.count} lost, "
         f"rms {rms(poses.x - rods.x - shift):.4f} px, {wrong_unflagged(poses, rods.x + shift, rods.y)} wrong unflagged"
     )
     assert lost == 0
@@ -95,7 +107,7 @@ def test_twenty_megapixels(benchmark: Benchmark) -> None:
     tracker = Tracker(rods.reference(), (rods.x, rods.y, rods.radius), workers=1)
     image = rods.moved(1.8, -0.6, 0.01)
     poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=3, warmup_rounds=1)
-    seconds = benchmark.stats.stats.median  # type: ignore[attr-defined]
+    seconds = cpu_seconds(tracker, image)
     report(
         f"{rods.count} rods of radius 58 px in {rods.width * rods.height / 1e6:.1f} Mpx: {seconds:.2f} s on one core, "
         f"rms {rms(poses.x - rods.x - 1.8):.4f} px"

@@ -11,7 +11,8 @@ from solver.sweep_record import recorded_sweeps
 from solver.warm_start import ForceMemory
 from tests.packings import LENGTH, squeezed_heap
 
-SETTINGS = SequenceSettings(chain=ChainSettings(sweeps=40), threshold=2e-4)
+SETTINGS = SequenceSettings(estimator="nlgs", chain=ChainSettings(sweeps=40), threshold=2e-4)
+ENSEMBLE = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40))
 
 
 def sheared_frames(count, lost=()):
@@ -37,10 +38,11 @@ def run(packing, snapshots, settings=SETTINGS, **kwargs):
     return list(solve_sequence(packing, snapshots, settings, **kwargs))
 
 
-def test_a_sequence_goes_on_from_a_kept_state_bit_for_bit():
+@pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
+def test_a_sequence_goes_on_from_a_kept_state_bit_for_bit(settings):
     packing, snapshots = sheared_frames(5)
-    whole = run(packing, snapshots)
-    resumed = run(packing, snapshots, state=whole[2][1], first=3)
+    whole = run(packing, snapshots, settings)
+    resumed = run(packing, snapshots, settings, state=whole[2][1], first=3)
     for (frame, _), (again, _) in zip(whole[3:], resumed, strict=True):
         assert np.array_equal(frame.fn, again.fn)
         assert np.array_equal(frame.ft, again.ft)
@@ -73,7 +75,7 @@ def test_forces_of_a_lost_grains_contacts_are_remembered():
     bodies = packing.grains.count + 4
 
     def of(state):
-        key = state.memory.key
+        key = state.members.soft.key
         return set(key[(key // bodies == 14) | (key % bodies == 14)].tolist())
 
     assert of(states[1]) == of(states[2])
@@ -145,4 +147,20 @@ def test_forces_scale_with_the_pressure_through_a_whole_sequence():
 
 def test_states_start_empty():
     packing = Packing(Grains.of_rods(np.array([0.01]), density=1.0, length=1.0), 1.0, Material(0, 0), np.full(4, np.nan))
-    assert len(SequenceState.first(packing).memory.key) == 0
+    assert len(SequenceState.first(packing).members.soft.key) == 0
+
+
+def test_the_ensemble_reports_a_balanced_field_inside_the_coulomb_cone():
+    packing, snapshots = sheared_frames(4, lost=[(2, 14)])
+    for frame, _ in run(packing, snapshots, ENSEMBLE):
+        assert np.all(frame.fn >= 0)
+        assert np.all(np.abs(frame.ft) <= 0.25 * frame.fn * (1 + 1e-12))
+        assert np.all(frame.probability > 0)
+        assert len(frame.nlgs_fn) == len(frame.fn)
+        assert not np.any((frame.contacts.i == 14) & (frame.frame == 2))
+
+
+def test_a_single_frame_falls_back_to_the_chain():
+    packing, snapshots = sheared_frames(1)
+    frame, _ = run(packing, snapshots, ENSEMBLE)[0]
+    assert np.array_equal(frame.fn, frame.nlgs_fn)

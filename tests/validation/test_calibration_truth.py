@@ -16,10 +16,10 @@ from solver.dem_truth import DemSettings, DemTruth
 
 GRAINS, FRAMES, STEP = 250, 24, np.deg2rad(0.25)
 SEEDS = (11, 12)
-# Twenty-four photographs, 6° of shear: measured 10–13 µm at 3 µm of noise, 14–17 µm at 10 µm, over six seeds.
-CENTRE_LEFT = {3e-6: 17e-6, 10e-6: 21e-6}
-HONEST = (0.5, 1.3)  # true errors over standard deviations, measured 0.6 to 1.1
-WALL_LEFT = 15e-6  # measured 2–10 µm: the elastic overlap at a wall, and centres that lean on it
+# [m] after 24 photographs, 6° of shear. Six other packings gave 10.4 … 12.5 µm and 15.2 … 19.3 µm.
+CENTRE_LEFT = {3e-6: 16e-6, 10e-6: 24e-6}
+HONEST = (0.5, 1.3)  # true errors over standard deviations; the six packings gave 0.69 … 1.16
+WALL_LEFT = 20e-6  # [m]; the six packings gave 3 … 13 µm: a dozen rods at a wall, each with its own centre error
 
 pytestmark = pytest.mark.slow
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from app.results import Results, TruthContacts
@@ -137,10 +139,16 @@ def _statistics(forces: FrameForces, grain_count: int) -> FrameStatistics:
     axis = np.linalg.eigh(stress)[1][:, 1]
     fabric = np.einsum("ca,cb->ab", contacts.normal[loaded], contacts.normal[loaded]) / loaded.sum()
     values = np.linalg.eigvalsh(fabric)
-    return FrameStatistics(
-        0.01, stress, 50e3, float(np.arcsin((high - low) / (high + low))), 0.2,
-        float(np.arctan2(axis[1], axis[0])), 2.0 * float(loaded.sum()) / grain_count,
-        2.1 * float(loaded.sum()) / grain_count, 3, int(loaded.sum()),
-        float((forces.state == ContactState.SLIDING).sum() / loaded.sum()), float(forces.fn[loaded].mean()),
-        float(forces.fn.max()), fabric, 2.0 * float(values[1] - values[0]),
-    )  # fmt: skip
+    sliding = float((forces.state == ContactState.SLIDING).sum() / loaded.sum())
+    known = {
+        "area": 0.01, "stress": stress, "pressure": 50e3, "wall_ratio_angle": 0.2,
+        "friction_angle": float(np.arcsin((high - low) / (high + low))),
+        "principal_direction": float(np.arctan2(axis[1], axis[0])),
+        "coordination_number": 2.0 * float(loaded.sum()) / grain_count,
+        "coordination_number_without_rattlers": 2.1 * float(loaded.sum()) / grain_count,
+        "rattler_count": 3, "contact_count": int(loaded.sum()), "sliding_fraction": sliding,
+        "mean_fn": float(forces.fn[loaded].mean()), "max_fn": float(forces.fn.max()), "fabric": fabric,
+        "fabric_anisotropy": 2.0 * float(values[1] - values[0]),
+    }  # fmt: skip
+    unread = {field.name: np.nan for field in fields(FrameStatistics)}  # quantities that a recording does not show
+    return FrameStatistics(**(unread | known))

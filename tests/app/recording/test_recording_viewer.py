@@ -70,15 +70,15 @@ def test_the_viewer_draws_the_forces_and_every_printable_character(results, tmp_
         record(named, tmp_path / f"{tab.name}.rrd", active=tab).path for tab in (Tab.EXPERIMENT, Tab.SUMMARY)
     )
     # The summary shows the characters in proportional and in monospaced type.
-    network, text = map(pixels, take_pictures([(forces, "Force network"), (summary, "Summary")]))
+    network, text = pixels(take_picture(forces, "Force network")), pixels(take_picture(summary, "Summary"))
     warm = (network[..., 0].astype(int) - network[..., 2] > 80).mean()
     assert 0.01 < warm < 0.5  # share of the picture that strong forces and the legend cover
     assert len(np.unique(network.reshape(-1, network.shape[-1]), axis=0)) > 100
     assert np.ptp(text[..., 0]) > 100
 
 
-def take_pictures(wanted: list[tuple[Path, str]]) -> list[bytes]:
-    """Views of recordings as PNG, from a viewer without a window; skips where nothing can draw."""
+def take_picture(path: Path, view: str) -> bytes:
+    """A view as PNG, from a viewer of its own without a window; skips where nothing can draw."""
     if sys.platform.startswith("linux") and not glob.glob("/usr/share/vulkan/icd.d/*.json"):
         pytest.skip("no Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1")
     from rerun.experimental import ViewerClient
@@ -89,23 +89,18 @@ def take_pictures(wanted: list[tuple[Path, str]]) -> list[bytes]:
     with ViewerClient.spawn(
         headless=True, port=port, hide_welcome_screen=True, executable_path=str(viewer.viewer_binary())
     ) as client:
-        return [take_picture(client, path, view) for path, view in wanted]
-
-
-def take_picture(client, path: Path, view: str) -> bytes:
-    """One view once it has stopped changing: the viewer loads in the background."""
-    client.open(str(path))
-    end, last = time.monotonic() + SECONDS, b""
-    while time.monotonic() < end:
-        client.take_screenshot(max_size=64)  # a view has an id once it was drawn
-        state = client.get_state()
-        found = [shown.view_id for shown in state.views if shown.name == view]
-        if found and not state.loading:
-            picture = picture_of(client, found[0])
-            if picture and picture == last:
-                return picture
-            last = picture
-        time.sleep(0.2)
+        client.open(str(path))
+        end, last = time.monotonic() + SECONDS, b""
+        while time.monotonic() < end:
+            client.take_screenshot(max_size=64)  # a view has an id once it was drawn
+            state = client.get_state()
+            found = [shown.view_id for shown in state.views if shown.name == view]
+            if found and not state.loading:
+                picture = picture_of(client, found[0])
+                if picture and picture == last:  # it has stopped changing: the viewer loads in the background
+                    return picture
+                last = picture
+            time.sleep(0.2)
     pytest.fail(f"the viewer did not show {view} in {SECONDS:.0f} s")
 
 

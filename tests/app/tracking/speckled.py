@@ -29,9 +29,7 @@ class Rods:
     def count(self) -> int:
         return len(self.x)
 
-    def photograph(
-        self, x: Array, y: Array, rotation: Array, *, noise_seed: int, pattern_seed: int = 3
-    ) -> np.ndarray:
+    def photograph(self, x: Array, y: Array, rotation: Array, *, noise_seed: int, pattern_seed: int = 3) -> np.ndarray:
         scale = Scale(self.settings.pixel_size, self.height)
         return render_photograph(
             self.settings,
@@ -48,7 +46,9 @@ class Rods:
     def reference(self) -> np.ndarray:
         return self.photograph(self.x, self.y, np.zeros(self.count), noise_seed=1).astype(np.float32)
 
-    def moved(self, dx: Array | float, dy: Array | float, rotation: Array | float, *, noise_seed: int = 2) -> np.ndarray:
+    def moved(
+        self, dx: Array | float, dy: Array | float, rotation: Array | float, *, noise_seed: int = 2
+    ) -> np.ndarray:
         turn = np.broadcast_to(np.asarray(rotation, dtype=np.float64), self.x.shape)
         return self.photograph(self.x + dx, self.y + dy, turn, noise_seed=noise_seed).astype(np.float32)
 

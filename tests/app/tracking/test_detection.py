@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.synthetic.speckle import SpeckleSettings
 from app.tracking.detection import Detection, DetectionSettings, detect_grains, refine_grains
@@ -58,15 +58,15 @@ def _resting_places(
                 places += [(ax + along * ux + s * across * uy, ay + along * uy - s * across * ux) for s in (-1, 1)]
     kept = []
     for x, y in places:
-        if left + r - 1e-6 <= x <= right - r + 1e-6 and y <= floor - r + 1e-6:
-            if all(np.hypot(x - cx, y - cy) > r + cr - 1e-6 for cx, cy, cr in circles):
-                kept.append((float(x), float(y)))
+        within = left + r - 1e-6 <= x <= right - r + 1e-6 and y <= floor - r + 1e-6
+        if within and all(np.hypot(x - cx, y - cy) > r + cr - 1e-6 for cx, cy, cr in circles):
+            kept.append((float(x), float(y)))
     return kept
 
 
 def match(found: Detection, rods: Rods) -> tuple[np.ndarray, np.ndarray]:
     """Index of the detection nearest to each rod, and whether it is that rod."""
-    distance, index = cKDTree(np.stack([found.x, found.y], axis=1)).query(np.stack([rods.x, rods.y], axis=1))
+    distance, index = KDTree(np.stack([found.x, found.y], axis=1)).query(np.stack([rods.x, rods.y], axis=1))
     return index, distance < FOUND
 
 
