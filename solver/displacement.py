@@ -39,7 +39,7 @@ def displacement_scale(before: Array, after: Array, sigma: Array) -> float:
     before, after (n, 2) [m], NaN where a grain is missing; sigma (n,) [m], standard deviation of a position component
     in either frame. It is the rms of what remains of every grain's displacement when the mean displacement of
     its nearest neighbours is taken off, freed of the noise; never less than the noise or
-    a millionth of the neighbours' distance. Within 20 % of the rms sliding at the contacts in sheared packings.
+    a millionth of the neighbours' distance. In sheared packings it is 0.6 to 1.0 of the rms sliding at the contacts.
     """
     seen = np.flatnonzero(np.isfinite(before).all(axis=1) & np.isfinite(after).all(axis=1))
     count = min(NEIGHBOURS, len(seen) - 1)

@@ -29,8 +29,9 @@ class Harmonic:
 class Anisotropies:
     """The anisotropies that make up the strength of a packing (Rothenburg & Bathurst 1989, Géotechnique 39, 601).
 
-    Over directions θ: density of contacts (1 + a_c cos 2(θ − θ_c)) / 2π; mean branch length ℓ₀ (1 + a_l cos 2(θ − θ_l));
-    mean normal force f₀ (1 + a_n cos 2(θ − θ_n)); mean tangential force −f₀ a_t sin 2(θ − θ_t).
+    Over directions θ: density of contacts (1 + a_c cos 2(θ − θ_c)) / 2π, mean branch length
+    ℓ₀ (1 + a_l cos 2(θ − θ_l)), mean normal force f₀ (1 + a_n cos 2(θ − θ_n)) and mean tangential force
+    −f₀ a_t sin 2(θ − θ_t).
     """
 
     contact: Harmonic  # a_c; its mean is 1
