@@ -42,7 +42,8 @@ class Checkpoint:
     def save(self, frame: int, *values: Any) -> None:
         """Keep dataclasses of arrays and numbers."""
         stream = io.BytesIO()
-        np.savez(stream, **{f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)})
+        named = {f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)}
+        np.savez(stream, allow_pickle=False, **named)
         write_atomically(self._file(frame), stream.getvalue())
 
     def load(self, frame: int, *kinds: type) -> list[Any]:
@@ -79,7 +80,7 @@ def restore(kind: type[T], arrays: Any, prefix: str) -> T:
         elif name not in arrays:
             values[each.name] = None
         elif hint in (int, float, bool, str) or (isinstance(hint, type) and issubclass(hint, IntEnum)):
-            values[each.name] = hint(arrays[name][()])
+            values[each.name] = hint(np.asarray(arrays[name])[()])
         else:
             values[each.name] = arrays[name]
     return kind(**values)

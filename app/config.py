@@ -82,11 +82,18 @@ class TrackingSection(Section):
     workers: Annotated[int, Field(ge=1)] = 2
 
 
+class CalibrationSection(Section):
+    """Self-calibration of centres, radii and walls from persistent contacts."""
+
+    enabled: bool = True
+
+
 class ContactsSection(Section):
     """Tuning of contact detection."""
 
     threshold_sigmas: Positive = 6.0  # gap threshold in standard deviations of a position
     threshold: Finite | None = None  # [m], instead of threshold_sigmas
+    overlap: NotNegative | None = None  # [m] typical elastic overlap and roughness; absent: 3e-4 mean diameters
 
 
 class SolverSection(Section):
@@ -116,6 +123,7 @@ class ExperimentFile(Section):
     walls: WallsSection | None = None
     material: MaterialSection = MaterialSection()
     tracking: TrackingSection = TrackingSection()
+    calibration: CalibrationSection = CalibrationSection()
     contacts: ContactsSection = ContactsSection()
     solver: SolverSection = SolverSection()
     recording: RecordingSection = RecordingSection()

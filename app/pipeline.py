@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import __version__
+from app.calibration import calibrate_tracks
 from app.checkpoint import Checkpoint
 from app.config import ExperimentFile, as_toml
 from app.errors import InputError
@@ -38,12 +39,16 @@ from app.tracks import Tracks, WallTracks
 from app.truth import read_truth, true_names
 from app.units import Scale
 from solver.chain import ChainSettings, Packing
+from solver.contact_probability import ContactProbabilitySettings
+from solver.ensemble import EnsembleSettings
 from solver.frame_forces import FrameForces
 from solver.frame_statistics import FrameStatistics, frame_statistics
+from solver.grains import Array
 from solver.motion import Snapshot
 from solver.sequence import SequenceSettings, SequenceState, solve_sequence
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
+SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 UNFINISHED = ".unfinished"  # folder of checkpoints
 
 
@@ -157,16 +162,23 @@ def solve(run: Run) -> Results:
     experiment = run.experiment
     if experiment.config.walls is None:
         raise InputError(experiment.file, "key walls", "is missing: without walls grains can be tracked but not solved")
-    origin = _origin(run, ("photographs", "tracking", "tracks", "walls", "material", "contacts", "solver", "recording"))
+    origin = _origin(
+        run,
+        ("photographs", "tracking", "tracks", "walls", "calibration", "material", "contacts", "solver", "recording"),
+    )
     stored = read_origin(run.file(RESULTS))
     if stored is not None and stored.fingerprint == origin.fingerprint:
         return load_results(run.file(RESULTS))
     tracks, walls = track(run)
     assert walls is not None
     since = time.perf_counter()
+    calibration = None
+    overlap = typical_overlap(experiment.config, tracks.radius)
+    if experiment.config.calibration.enabled:
+        tracks, walls, calibration = calibrate_tracks(tracks, walls, overlap)
     packing = make_packing(experiment, tracks.radius, walls.pressure)
     checkpoint = Checkpoint(run.folder / UNFINISHED / "solving", origin.fingerprint)
-    frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint)
+    frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint, overlap)
     results = Results(
         name=experiment.name,
         tracks=tracks,
@@ -176,6 +188,7 @@ def solve(run: Run) -> Results:
         frames=frames,
         statistics=statistics,
         configuration=as_toml(experiment.config),
+        calibration=calibration,
     )
     save_results(run.file(RESULTS), results, origin)
     checkpoint.clear()
@@ -184,7 +197,7 @@ def solve(run: Run) -> Results:
 
 
 def _solve_frames(
-    run: Run, packing: Packing, tracks: Tracks, walls: WallTracks, checkpoint: Checkpoint
+    run: Run, packing: Packing, tracks: Tracks, walls: WallTracks, checkpoint: Checkpoint, overlap: float
 ) -> tuple[list[FrameForces], list[FrameStatistics]]:
     snapshots = make_snapshots(tracks, walls)
     frames: list[FrameForces] = []
@@ -194,7 +207,7 @@ def _solve_frames(
         forces, kept, kept_state = checkpoint.load(k, FrameForces, FrameStatistics, SequenceState)
         frames.append(forces)
         statistics.append(kept)
-    settings = sequence_settings(run.experiment.config)
+    settings = sequence_settings(run.experiment.config, overlap)
     done = len(frames)
     run.progress("solving", done, len(snapshots))
     for forces, state in solve_sequence(packing, snapshots, settings, state=kept_state, first=done):
@@ -223,8 +236,17 @@ def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
     ]  # fmt: skip
 
 
-def sequence_settings(config: ExperimentFile) -> SequenceSettings:
-    """The solver's settings from the experiment file."""
+def typical_overlap(config: ExperimentFile, radius: Array) -> float:
+    """How far touching surfaces overlap or stand apart by elasticity and roughness [m]; radius (n,) [m].
+
+    A missed contact costs far more than a false one, so it is rather too large than too small.
+    """
+    given = config.contacts.overlap
+    return SURFACE * 2.0 * float(radius.mean()) if given is None else given
+
+
+def sequence_settings(config: ExperimentFile, overlap: float) -> SequenceSettings:
+    """The solver's settings from the experiment file; overlap [m] of touching surfaces."""
     solver, contacts = config.solver, config.contacts
     paper = solver.preset == "paper"
     chain = ChainSettings(
@@ -239,6 +261,8 @@ def sequence_settings(config: ExperimentFile) -> SequenceSettings:
     return SequenceSettings(
         estimator="nlgs" if paper else solver.estimator,
         chain=chain,
+        ensemble=EnsembleSettings(probability=ContactProbabilitySettings(overlap=overlap)),
+        overlap=overlap,
         threshold_sigmas=contacts.threshold_sigmas,
         threshold=contacts.threshold,
         reset_to_zero=paper or solver.reset == "rearrangement",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.tracks import Tracks, WallTracks
+from solver.calibration import Calibration
 from solver.frame_forces import FrameForces
 from solver.frame_statistics import FrameStatistics
 from solver.grains import Array, Grains
@@ -37,3 +38,4 @@ class Results:
     frames: Sequence[FrameForces]  # one per frame
     statistics: Sequence[FrameStatistics]  # one per frame
     configuration: str  # the resolved configuration, TOML
+    calibration: Calibration | None = None  # None: not tried

@@ -17,36 +17,25 @@ import numpy as np
 
 from app import __version__
 from app.atomic import replacing
+from app.checkpoint import flatten, restore
 from app.errors import InputError
+from app.layout import (
+    CONTACT_COLUMNS,
+    FORCE_COLUMNS,
+    FRAME_SCALARS,
+    GEOMETRY,
+    HISTORY_COLUMNS,
+    SCHEMA,
+    SCHEMA_VERSION,
+    UNITS,
+)
 from app.results import Results
 from app.tracks import Tracks, TrackStatus, WallTracks
+from solver.calibration import Calibration
 from solver.contacts import Contacts
 from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus, SweepHistory
 from solver.frame_statistics import FrameStatistics
 from solver.grains import Grains
-
-SCHEMA_VERSION = 1
-SCHEMA = "schema_version"
-
-# Scalars of a frame: dataset under frames/ and attribute of FrameForces.
-FRAME_SCALARS = (
-    "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust", "frames_since_reset",
-)  # fmt: skip
-GEOMETRY = ("i", "j", "gap", "normal", "point")  # attributes of Contacts
-CONTACT_COLUMNS = ("un", "ut", "state", "age", "source", "probability")
-FORCE_COLUMNS = ("fn", "ft", "nlgs_fn", "nlgs_ft", "fn_sd", "ft_sd")
-HISTORY_COLUMNS = ("force_change", "natural_map", "unbalance")
-UNITS = {
-    "grains/radius": "m", "grains/mass": "kg", "frames/time": "s", "tracks/position": "m", "tracks/rotation": "rad",
-    "tracks/sigma": "m", "walls/endpoints": "m", "walls/pressure": "Pa", "contacts/gap": "m", "contacts/point": "m",
-    "contacts/un": "m/s", "contacts/ut": "m/s", "forces/fn": "N", "forces/ft": "N", "forces/nlgs_fn": "N",
-    "forces/nlgs_ft": "N", "forces/fn_sd": "N", "forces/ft_sd": "N", "sweeps/fn": "N", "sweeps/ft": "N",
-    "statistics/stress": "Pa", "statistics/pressure": "Pa", "statistics/area": "m2",
-    "statistics/friction_angle": "rad", "statistics/wall_ratio_angle": "rad",
-    "statistics/principal_direction": "rad", "statistics/mean_fn": "N", "statistics/max_fn": "N",
-    "statistics/sigma_1": "Pa", "statistics/sigma_2": "Pa", "statistics/wall_force": "N",
-    "statistics/anisotropy_direction": "rad", "statistics/friction_angle_of_anisotropies": "rad",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +77,7 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         for each in fields(FrameStatistics):
             values = np.array([getattr(s, each.name) for s in results.statistics])
             store.create_dataset(f"statistics/{each.name}", data=values)
+        _write_calibration(store, results.calibration)
         _add_units(store)
 
 
@@ -112,6 +102,7 @@ def load_results(file: Path) -> Results:
                 for k in range(tracks.frame_count)
             ],
             configuration=str(store.attrs["configuration"]),
+            calibration=_read_calibration(store),
         )
 
 
@@ -223,6 +214,27 @@ def _write_sweeps(store: h5py.File, frames: Any) -> None:
     _compressed(store, "sweeps/recorded", np.concatenate([h.recorded for h in histories]))
     for key in ("fn", "ft"):
         _compressed(store, f"sweeps/{key}", np.concatenate([getattr(h, key).ravel() for h in histories]))
+
+
+def _write_calibration(store: h5py.File, calibration: Calibration | None) -> None:
+    if calibration is None:
+        return
+    for name, value in flatten(calibration):
+        data = str(value) if value.dtype.kind == "U" else value
+        store.create_dataset(f"calibration/{name.replace('.', '/')}", data=data)
+
+
+def _read_calibration(store: h5py.File) -> Calibration | None:
+    if "calibration" not in store:
+        return None
+    values: dict[str, Any] = {}
+
+    def gather(path: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            values[path.replace("/", ".")] = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
+
+    store["calibration"].visititems(gather)  # type: ignore[union-attr]
+    return restore(Calibration, values, "")
 
 
 def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[FrameForces]:

@@ -74,7 +74,8 @@ def true_names(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64
     place = np.column_stack([table.numbers("x"), table.numbers("y")])[here]
     names = np.full(tracks.grain_count, -1, np.int64)
     present = np.flatnonzero(tracks.present[0])
-    distance, nearest = KDTree(place).query(tracks.position[0, present])
+    found = KDTree(place).query(tracks.position[0, present])
+    distance, nearest = np.asarray(found[0]), np.asarray(found[1])
     close = distance < CLOSE * tracks.radius[present]
     names[present[close]] = ids[here[nearest[close]]]
     taken = np.sort(names[names >= 0])

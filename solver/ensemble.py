@@ -70,17 +70,15 @@ def solve_ensemble(
     chain: ChainSettings,
     settings: EnsembleSettings,
     *,
-    lag: int = 0,
+    snapshot: Snapshot,
 ) -> EnsembleForces:
     """Solve frame k of a sequence with all members.
 
-    snapshots: those that may be looked at, frame k is snapshots[k − lag].
+    motion leads to frame k; snapshot is that of frame k, with stand-ins for lost grains.
     """
-    row = k - lag
-    snapshot = snapshots[row]
-    window = window_of(row, len(snapshots))
+    window = window_of(k, len(snapshots))
     contacts, probability = probable_contacts(
-        packing.grains, [snapshots[f] for f in window], row - window.start, settings.probability
+        packing.grains, [snapshots[f] for f in window], k - window.start, settings.probability, frame=snapshot
     )
     pairs = PairProbability(contacts.key, probability)
     network = ProbablePairs(state.pairs if motion.spans else pairs, pairs)
@@ -99,8 +97,9 @@ def solve_ensemble(
         force_unit=force_scale(packing, chain), gravity=packing.material.gravity, wall_normal_total=wall_total,
     )  # fmt: skip
     fields = [soft.solution.force, stiff.solution.force]
-    memories, remarks = [], []
-    intervals = _intervals(snapshots, row)
+    memories: list[ForceMemory] = []
+    remarks: list[str] = []
+    intervals = _intervals(snapshots, k)
     for (first, last), memory in zip(intervals, (state.last, state.around, state.wide), strict=True):
         forces, renewed = advance_member(
             balance, contacts, packing.grains, walls, snapshot, (snapshots[first], snapshots[last]),
@@ -122,12 +121,12 @@ def solve_ensemble(
         EnsembleState(
             soft.memory if motion.spans else ForceMemory.empty(),
             stiff.memory if motion.spans else ForceMemory.empty(),
-            *memories, pairs,
+            memories[0], memories[1], memories[2], pairs,
         ),
         "; ".join(remarks),
     )  # fmt: skip
 
 
-def _intervals(snapshots: Sequence[Snapshot], row: int) -> tuple[tuple[int, int], ...]:
+def _intervals(snapshots: Sequence[Snapshot], k: int) -> tuple[tuple[int, int], ...]:
     position = np.stack([np.where(s.present[:, None], s.position, np.nan) for s in snapshots])
-    return member_intervals(row, find_reversals(np.stack([s.endpoints for s in snapshots]), position))
+    return member_intervals(k, find_reversals(np.stack([s.endpoints for s in snapshots]), position))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from solver.admissibility import worst_unbalance
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain
+from solver.contact_probability import window_of
 from solver.contacts import Contacts
 from solver.ensemble import EnsembleSettings, EnsembleState, solve_ensemble
 from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus
 from solver.grains import Array
 from solver.judgement import Evidence, free_standard_deviation, is_suspect, judge, trust
 from solver.kinematics import relative_motion
+from solver.lost_grains import bridge_lost
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
 from solver.network import NearPairs
 from solver.stress import love_weber_stress, packing_area
@@ -31,7 +33,8 @@ class SequenceSettings:
     estimator: Literal["ensemble", "nlgs"] = "ensemble"
     chain: ChainSettings = field(default_factory=ChainSettings)  # nlgs: the estimator; ensemble: its first member
     ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
-    threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position
+    overlap: float = 0.0  # [m] typical overlap or roughness of touching surfaces
+    threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
     reset_to_zero: bool = False  # nlgs: the paper's reset at a rearrangement
 
@@ -94,13 +97,14 @@ def solve_frame(
     packing: Packing, snapshots: Sequence[Snapshot], k: int, state: SequenceState, settings: SequenceSettings
 ) -> tuple[FrameForces, SequenceState]:
     """Solve frame k from the state that the frame before it left behind."""
-    snapshot = snapshots[k]
+    window = window_of(k, len(snapshots))
+    snapshot, bridged = bridge_lost([snapshots[f] for f in window], k - window.start)
     if np.isfinite(state.time):
         motion = motion_to(snapshot, state.seen, state.time, state.endpoints)
     else:
         motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
     if settings.estimator == "ensemble" and len(snapshots) > 1:
-        estimate, evidence = _estimate_by_ensemble(packing, snapshots, k, motion, state, settings)
+        estimate, evidence = _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, state, settings)
     else:
         estimate, evidence = _estimate_by_chain(packing, snapshot, motion, state, settings)
     status, why = judge(evidence)
@@ -116,6 +120,8 @@ def solve_frame(
     age = _age(estimate.step.contacts, state)
     reason = "; ".join(part for part in (estimate.remark, why, estimate.step.solution.stop.value) if part)
     frame = _describe(packing, k, motion, estimate, evidence, status, reason, since_reset, age)
+    if bridged.any():
+        frame = _without(frame, bridged)
     return frame, SequenceState(
         members=estimate.members,
         age_key=estimate.step.contacts.key,
@@ -132,7 +138,9 @@ def solve_frame(
 def _estimate_by_chain(
     packing: Packing, snapshot: Snapshot, motion: FrameMotion, state: SequenceState, settings: SequenceSettings
 ) -> tuple[_Estimate, Evidence]:
-    threshold = settings.threshold_sigmas * snapshot.sigma if settings.threshold is None else settings.threshold
+    threshold = settings.threshold
+    if threshold is None:  # the gap of a touching pair scatters by √2 σ and by the overlap
+        threshold = settings.threshold_sigmas * float(np.hypot(snapshot.sigma, settings.overlap / np.sqrt(2.0)))
     memory, remark = state.members.soft, ""
     step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
     evidence = _evidence(packing, motion, step, state)
@@ -151,11 +159,14 @@ def _estimate_by_ensemble(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     k: int,
+    snapshot: Snapshot,
     motion: FrameMotion,
     state: SequenceState,
     settings: SequenceSettings,
 ) -> tuple[_Estimate, Evidence]:
-    found = solve_ensemble(packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble)
+    found = solve_ensemble(
+        packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble, snapshot=snapshot
+    )
     evidence = _evidence(packing, motion, found.step, state)
     return _Estimate(found.step, found.fn, found.ft, found.probability, found.state, found.remark), evidence
 
@@ -185,6 +196,23 @@ def _age(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
     _, here, there = np.intersect1d(contacts.key, state.age_key, assume_unique=True, return_indices=True)
     age[here] = state.age[there] + 1
     return age
+
+
+def _without(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
+    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them."""
+    contacts, history = frame.contacts, frame.history
+    stand_in = np.concatenate([bridged, np.zeros(contacts.wall_count, np.bool_)])
+    keep = ~(stand_in[contacts.i] | stand_in[contacts.j])
+    columns = {
+        each.name: value[keep] for each in fields(frame) if isinstance(value := getattr(frame, each.name), np.ndarray)
+    }
+    return replace(
+        frame,
+        contacts=contacts.select(keep),
+        history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
+        reason=f"{bridged.sum()} lost grains were bridged; {frame.reason}",
+        **columns,
+    )
 
 
 def contact_state(packing: Packing, contacts: Contacts, fn: Array, ft: Array) -> NDArray[np.uint8]:

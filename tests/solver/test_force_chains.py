@@ -109,14 +109,25 @@ def test_links_on_one_side_of_a_grain_make_no_chain_through_it():
     assert chains_of(position, force, idle=9).length.tolist() == [5]
 
 
+@pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [4, 3, 0, 1, 2]])
+def test_a_link_needs_both_of_its_grains(order):
+    # A column 0-1-2 ends on grain 2 of a row 3-2-4 that carries far more, so that its σ₁ lies along the row.
+    position = np.vstack([path([0.5, 0.3], 90, 90), [[0.5 - 2 * R, 0.3 + 4 * R], [0.5 + 2 * R, 0.3 + 4 * R]]])
+    place = np.argsort(order)  # grain k of the drawing is numbered place[k]
+    force = {(0, 1): 20.0, (1, 2): 20.0, (3, 2): 50.0, (2, 4): 50.0}
+    named = {(min(place[a], place[b]), max(place[a], place[b])): value for (a, b), value in force.items()}
+    found = chains_of(position[order], named, idle=9)
+    assert found.chain[place].tolist() == [-1, -1, 0, 0, 0]
+
+
 def test_grains_out_of_sight_count_neither_in_the_mean_nor_in_chains():
-    position = path([0.5, 0.3], 90, 90, 90)
-    grains, present = rods(*[R] * 4), np.array([True, True, True, False])
+    # σ₁ is as 10, 20 and 10: only the middle grain is above the mean of these three.
+    position = np.vstack([path([0.5, 0.3], 90, 90), np.full((4, 2), np.nan)])
+    grains, present = rods(*[R] * 7), np.arange(7) < 3
     contacts = detect_contacts(grains, position, present, WIDE, TOUCH)
-    found = find_force_chains(contacts, np.array([10.0, 9.0]), np.zeros(2), position, present, grains, LENGTH)
-    # σ₁ is as 10, 19 and 9: only the middle grain is above the mean.
+    found = find_force_chains(contacts, np.full(2, 10.0), np.zeros(2), position, present, grains, LENGTH)
     assert found.count == 0
-    assert found.major[3] == 0.0
+    assert not found.major[3:].any()
 
 
 def test_no_forces_and_no_grains_make_no_chains():

@@ -98,6 +98,9 @@ def test_mobilisation_is_the_share_of_the_friction_that_is_used():
     assert density[-1] == pytest.approx(0.5 * MOBILISATION_BINS)
     even = mobilisation_density((np.arange(MOBILISATION_BINS) + 0.5) / MOBILISATION_BINS)
     assert even == pytest.approx(np.ones(len(MOBILISATION_EDGES) - 1))
+    assert mobilisation_density(np.array([1.0 + 1e-9, 1.3])) == pytest.approx(
+        np.eye(MOBILISATION_BINS)[-1] * MOBILISATION_BINS
+    )
     assert not mobilisation_density(np.empty(0)).any()
 
 

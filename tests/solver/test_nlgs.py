@@ -81,5 +81,5 @@ def test_a_guess_is_taken_in_the_order_of_the_contacts(heap):
 
 @pytest.mark.parametrize("bad", [{"sweeps": -1}, {"relaxation": 2.0}, {"relaxation": 0.0}])
 def test_nonsense_settings_are_refused(bad):
-    with pytest.raises(ValueError, match="relaxation|sweeps"):
+    with pytest.raises(ValueError, match=r"relaxation|sweeps"):
         NlgsSettings(**bad)

@@ -79,13 +79,14 @@ def test_a_number_out_of_reach_is_not_met():
         assert np.isnan(found.reached)
 
 
-def test_contacts_detected_with_the_changed_radii_have_the_number_found():
+@pytest.mark.parametrize("wanted", [2.0, 2.5, 3.0, 3.3, 3.6])
+def test_contacts_detected_with_the_changed_radii_have_the_number_found(wanted):
     rng = np.random.default_rng(11)
     heaps = [squeezed_heap(rng) for _ in range(3)]
     grains, walls = heaps[0][0], [each[2] for each in heaps]
     position, present = np.array([each[1].position for each in heaps]), np.ones((3, grains.count), bool)
     present[1, ::7] = False
-    found = tune_radii(grains, position, present, walls, 3.0, np.linspace(-3e-4, 6e-4, 19))
+    found = tune_radii(grains, position, present, walls, wanted, np.linspace(-3e-4, 6e-4, 19))
     assert found.met
 
     def number(change):
@@ -98,7 +99,7 @@ def test_contacts_detected_with_the_changed_radii_have_the_number_found():
         return np.mean(each)
 
     assert number(found.found) == pytest.approx(found.reached, abs=EXACT)
-    assert number(found.found) >= 3.0 > number(found.found - 2 * ABOVE_STEP)
+    assert number(found.found) >= wanted > number(found.found - 2 * ABOVE_STEP)
     for change, curve in zip(found.change[::6], found.coordination_number[::6], strict=True):
         assert curve == pytest.approx(number(change), abs=EXACT)
 

@@ -146,7 +146,8 @@ def test_forces_scale_with_the_pressure_through_a_whole_sequence():
 
 
 def test_states_start_empty():
-    packing = Packing(Grains.of_rods(np.array([0.01]), density=1.0, length=1.0), 1.0, Material(0, 0), np.full(4, np.nan))
+    grains = Grains.of_rods(np.array([0.01]), density=1.0, length=1.0)
+    packing = Packing(grains, 1.0, Material(0, 0), np.full(4, np.nan))
     assert len(SequenceState.first(packing).members.soft.key) == 0
 
 

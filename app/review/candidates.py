@@ -1,0 +1,101 @@
+"""Candidates: every pair of a frame whose gap leaves room for doubt, with what the detector thought of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from app.results import Results
+from solver.boundaries import Walls
+from solver.contacts import Contacts, detect_contacts, measure_contacts
+from solver.grains import Array
+
+REACH = 4.0  # [σ of a gap] beyond the threshold
+DETECTED = 0.5  # P(touch) from which on a pair counts as detected
+UNLISTED = 3e-3  # P(touch) that a pair which the detector left out has at most
+THRESHOLD_SIGMAS = 6.0  # of a position: the threshold where the configuration names none
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """Candidates of one frame, ordered by key."""
+
+    frame: int  # of the run
+    contacts: Contacts
+    sigma: Array  # (c,) [m] standard deviation of the gap
+    probability: Array  # (c,) P(touch) by the detector, or from the gap alone where it gave none
+    detected: NDArray[np.bool_]  # (c,)
+    threshold: float  # [m]
+
+    @property
+    def count(self) -> int:
+        return self.contacts.count
+
+    @property
+    def key(self) -> NDArray[np.int64]:
+        return self.contacts.key
+
+    @property
+    def doubt(self) -> Array:
+        """0: the detector is sure, 1: it cannot tell (c,)."""
+        return 1.0 - np.abs(2.0 * self.probability - 1.0)
+
+
+def find_candidates(results: Results, frame: int, threshold: float | None = None) -> Candidates:
+    """Find every pair that is detected or whose gap is below threshold + 4 σ of the gap.
+
+    frame: of the run; threshold [m]: that of the detector, 6 σ of a position unless given.
+    """
+    tracks = results.tracks
+    position, present = tracks.position[frame], tracks.present[frame]
+    deviation = float(tracks.position_sigma[frame])
+    threshold = THRESHOLD_SIGMAS * deviation if threshold is None else threshold
+    walls = walls_at(results, frame)
+    listed = results.frames[frame].contacts
+    near = detect_contacts(
+        results.grains, position, present, walls, threshold + REACH * deviation * np.sqrt(2.0),
+        wall_threshold=threshold + REACH * deviation,
+    )  # fmt: skip
+    bodies = results.grains.count + walls.count
+    here = np.concatenate([present, np.ones(walls.count, np.bool_)])
+    key = np.union1d(near.key, listed.key)
+    i, j = key // bodies, key % bodies
+    measurable = here[i] & here[j]  # a stand-in for a lost grain cannot be judged on the photograph
+    contacts = measure_contacts(results.grains, position, walls, i[measurable], j[measurable])
+    sigma = gap_sigma(contacts, deviation)
+    probability, detected = _detection(results, frame, contacts, sigma, threshold)
+    return Candidates(frame, contacts, sigma, probability, detected, threshold)
+
+
+def walls_at(results: Results, frame: int) -> Walls:
+    """The walls of one frame, at rest."""
+    endpoints = results.walls.endpoints[frame]
+    return Walls(endpoints, np.zeros_like(endpoints), np.full(results.walls.count, np.nan))
+
+
+def gap_sigma(contacts: Contacts, deviation: float) -> Array:
+    """Standard deviation of gaps (c,) [m] from that of a position component [m]; walls are taken as exact."""
+    return np.where(contacts.with_wall, 1.0, np.sqrt(2.0)) * deviation
+
+
+def _detection(
+    results: Results, frame: int, contacts: Contacts, sigma: Array, threshold: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """P(touch) and whether the pair was detected (c,)."""
+    forces = results.frames[frame]
+    from_gap = norm.cdf((threshold - contacts.gap) / np.maximum(sigma, 1e-12))
+    place = np.searchsorted(forces.contacts.key, contacts.key)
+    place = np.minimum(place, max(forces.contacts.count - 1, 0))
+    listed = np.zeros(contacts.count, np.bool_)
+    if forces.contacts.count:
+        listed = forces.contacts.key[place] == contacts.key
+    told = np.full(contacts.count, np.nan)
+    told[listed] = forces.probability[place[listed]]
+    by_probability = bool(np.isfinite(forces.probability).any())
+    unlisted = np.minimum(from_gap, UNLISTED) if by_probability else from_gap
+    probability = np.where(np.isfinite(told), told, np.where(listed | ~np.isfinite(unlisted), from_gap, unlisted))
+    detected = listed & ~(told < DETECTED)  # a NaN, where no probability was computed, compares false
+    return probability, detected
