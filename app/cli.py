@@ -174,7 +174,27 @@ def synth(
     )  # fmt: skip
 
 
-COMMANDS: tuple[Callable[..., int], ...] = (run, check, track, solve, record, view, score, synth)
+def study(
+    subject: Annotated[
+        Literal["paper", "accuracy"], tyro.conf.Positional, tyro.conf.arg(help="the paper's claims, or r against noise")
+    ],
+    /,
+    seeds: Annotated[tuple[int, ...], tyro.conf.arg(help="of the simulated packings")] = (0, 1, 2),
+    grains: Annotated[int, tyro.conf.arg(help="rods of a packing")] = 1172,
+    estimator: Literal["ensemble", "nlgs"] = "ensemble",
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
+    quiet: Quiet = False,
+) -> int:
+    """Measure the method on simulated truth: minutes for each packing, kept for the next time.
+
+    Example: rodsight study paper --seeds 0 1 --grains 400
+    """
+    from app import commands
+
+    return commands.study(subject, seeds=seeds, grains=grains, estimator=estimator, folder=out, quiet=quiet)
+
+
+COMMANDS: tuple[Callable[..., int], ...] = (run, check, track, solve, record, view, score, synth, study)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -134,6 +134,20 @@ def synth(out: Path, *, quiet: bool, **choices: Any) -> int:
     return 0
 
 
+def study(subject: str, *, seeds: tuple[int, ...], grains: int, estimator: str, folder: Path, quiet: bool) -> int:
+    from app.study.accuracy import study_accuracy
+    from app.study.claims import study_claims
+
+    with _progress(quiet) as progress:
+        if subject == "accuracy":
+            study_accuracy(
+                seeds, grains=grains, folder=folder, estimator=estimator, console=Console(), progress=progress
+            )
+        else:
+            study_claims(seeds, grains=grains, folder=folder, console=Console(), progress=progress)
+    return 0
+
+
 @contextmanager
 def _run(request: Request) -> Iterator[pipeline.Run]:
     experiment = load_experiment(request.experiment, request.settings)

@@ -93,6 +93,7 @@ class ContactsSection(Section):
 
     threshold_sigmas: Positive = 6.0  # gap threshold in standard deviations of a position
     threshold: Finite | None = None  # [m], instead of threshold_sigmas
+    coordination: Positive | None = None  # change all radii alike until z without rattlers is this (the paper: near 4)
     overlap: NotNegative | None = None  # [m] typical elastic overlap and roughness; absent: 3e-4 mean diameters
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,7 @@ from app.experiment import (
     read_tracks,
     read_walls,
 )
+from app.opinions import friction_of, tuned_radii
 from app.progress import Progress, silent
 from app.results import Results, TruthContacts
 from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
@@ -177,6 +178,15 @@ def solve(run: Run) -> Results:
     if experiment.config.calibration.enabled:
         tracks, walls, calibration = calibrate_tracks(tracks, walls, overlap)
     packing = make_packing(experiment, tracks.radius, walls.pressure)
+    tuning = None
+    if experiment.config.contacts.coordination is not None:
+        tuning = tuned_radii(packing, tracks, walls, experiment.config.contacts.coordination)
+        if not tuning.met:
+            low, high = tuning.coordination_number.min(), tuning.coordination_number.max()
+            problem = f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 1 %"
+            raise InputError(experiment.file, f"key contacts.coordination = {tuning.wanted}", problem)
+        tracks = replace(tracks, radius=tracks.radius + tuning.found)
+        packing = make_packing(experiment, tracks.radius, walls.pressure)
     checkpoint = Checkpoint(run.folder / UNFINISHED / "solving", origin.fingerprint)
     frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint, overlap)
     results = Results(
@@ -189,6 +199,10 @@ def solve(run: Run) -> Results:
         statistics=statistics,
         configuration=as_toml(experiment.config),
         calibration=calibration,
+        friction_check=friction_of(
+            packing, make_snapshots(tracks, walls), frames, ContactProbabilitySettings(overlap=overlap)
+        ),
+        radius_tuning=tuning,
     )
     save_results(run.file(RESULTS), results, origin)
     checkpoint.clear()

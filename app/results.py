@@ -12,7 +12,9 @@ from app.tracks import Tracks, WallTracks
 from solver.calibration import Calibration
 from solver.frame_forces import FrameForces
 from solver.frame_statistics import FrameStatistics
+from solver.friction_check import FrictionCheck
 from solver.grains import Array, Grains
+from solver.radius_tuning import RadiusTuning
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,3 +41,5 @@ class Results:
     statistics: Sequence[FrameStatistics]  # one per frame
     configuration: str  # the resolved configuration, TOML
     calibration: Calibration | None = None  # None: not tried
+    friction_check: FrictionCheck | None = None
+    radius_tuning: RadiusTuning | None = None  # None: not asked for

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import h5py
 import numpy as np
@@ -35,7 +35,11 @@ from solver.calibration import Calibration
 from solver.contacts import Contacts
 from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus, SweepHistory
 from solver.frame_statistics import FrameStatistics
+from solver.friction_check import FrictionCheck
 from solver.grains import Grains
+from solver.radius_tuning import RadiusTuning
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,9 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         for each in fields(FrameStatistics):
             values = np.array([getattr(s, each.name) for s in results.statistics])
             store.create_dataset(f"statistics/{each.name}", data=values)
-        _write_calibration(store, results.calibration)
+        _write_part(store, "calibration", results.calibration)
+        _write_part(store, "friction_check", results.friction_check)
+        _write_part(store, "radius_tuning", results.radius_tuning)
         _add_units(store)
 
 
@@ -102,7 +108,9 @@ def load_results(file: Path) -> Results:
                 for k in range(tracks.frame_count)
             ],
             configuration=str(store.attrs["configuration"]),
-            calibration=_read_calibration(store),
+            calibration=_read_part(store, "calibration", Calibration),
+            friction_check=_read_part(store, "friction_check", FrictionCheck),
+            radius_tuning=_read_part(store, "radius_tuning", RadiusTuning),
         )
 
 
@@ -216,16 +224,17 @@ def _write_sweeps(store: h5py.File, frames: Any) -> None:
         _compressed(store, f"sweeps/{key}", np.concatenate([getattr(h, key).ravel() for h in histories]))
 
 
-def _write_calibration(store: h5py.File, calibration: Calibration | None) -> None:
-    if calibration is None:
+def _write_part(store: h5py.File, group: str, part: Any) -> None:
+    """One dataset per field of a dataclass, nested ones in groups of their own."""
+    if part is None:
         return
-    for name, value in flatten(calibration):
+    for name, value in flatten(part):
         data = str(value) if value.dtype.kind == "U" else value
-        store.create_dataset(f"calibration/{name.replace('.', '/')}", data=data)
+        store.create_dataset(f"{group}/{name.replace('.', '/')}", data=data)
 
 
-def _read_calibration(store: h5py.File) -> Calibration | None:
-    if "calibration" not in store:
+def _read_part(store: h5py.File, group: str, kind: type[T]) -> T | None:
+    if group not in store:
         return None
     values: dict[str, Any] = {}
 
@@ -233,8 +242,8 @@ def _read_calibration(store: h5py.File) -> Calibration | None:
         if isinstance(item, h5py.Dataset):
             values[path.replace("/", ".")] = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
 
-    store["calibration"].visititems(gather)  # type: ignore[union-attr]
-    return restore(Calibration, values, "")
+    store[group].visititems(gather)  # type: ignore[union-attr]
+    return restore(kind, values, "")
 
 
 def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[FrameForces]:

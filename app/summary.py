@@ -62,6 +62,9 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "friction_angle_degrees": _plain([float(np.rad2deg(s.friction_angle)) for s in results.statistics]),
         "coordination_number": _plain([s.coordination_number for s in results.statistics]),
         "mean_fn": _plain([s.mean_fn for s in results.statistics]),
+        "friction": _friction(results),
+        "calibration": results.calibration.verdict if results.calibration is not None else None,
+        "radius_change": results.radius_tuning.found if results.radius_tuning is not None else None,
         "timings": {stage: round(value, 3) for stage, value in seconds.items()},
     }
     if agreement is not None:
@@ -106,6 +109,19 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         lines.append(
             f"Trust (expected correlation with the true forces, given these inputs): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
+        )
+    friction = summary["friction"]
+    if friction is not None and friction["enclosed"]:
+        verdict = "agrees with" if friction["agrees"] else "[bold red]contradicts[/]"
+        lines.append(
+            f"Friction from the motion: {friction['measured']:.2f} ({friction['low']:.2f} to {friction['high']:.2f}), "
+            f"which {verdict} the given {friction['given']:g}."
+        )
+    if summary["calibration"] is not None:
+        lines.append(f"Self-calibration {summary['calibration']}.")
+    if summary["radius_change"] is not None:
+        lines.append(
+            f"All radii changed by {summary['radius_change'] * 1e6:+.1f} µm for the wanted coordination number."
         )
     if "accuracy" in summary:
         first = min(5, total - 1)
@@ -152,6 +168,21 @@ def _frame_table(summary: dict[str, Any]) -> Table:
 
 def _cell(value: float | None, form: str) -> str:
     return "–" if value is None else format(value, form)
+
+
+def _friction(results: Results) -> dict[str, Any] | None:
+    check = results.friction_check
+    if check is None:
+        return None
+    return {
+        "given": check.given,
+        "measured": _plain([check.measured])[0],
+        "low": _plain([check.low])[0],
+        "high": _plain([check.high])[0],
+        "frames": [check.first, check.last],
+        "enclosed": check.enclosed,
+        "agrees": check.agrees,
+    }
 
 
 def _listed(frames: list[int]) -> str:

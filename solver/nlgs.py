@@ -14,14 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.grains import Array
-from solver.nlgs_kernels import (
-    advance,
-    apply_forces,
-    contact_velocities,
-    grain_unbalance,
-    greatest_force_change,
-    natural_map_residual,
-)
+from solver.nlgs_kernels import advance, advance_and_measure, apply_forces, measure_forces, measure_natural_map, measure_unbalance
 from solver.problem import ContactProblem
 
 
@@ -82,23 +75,11 @@ def sweeps(
     guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent.
     """
     force, body, plate = _start(problem, guess)
-    before, velocity, total = np.empty_like(force), np.empty_like(force), np.empty_like(problem.external)
-    number = 0
+    before, number = np.empty_like(force), 0
     while True:
-        if every > 1:
-            advance(problem, body, plate, force, every - 1, settings.relaxation)
-        before[:] = force
-        advance(problem, body, plate, force, 1, settings.relaxation)
+        residuals = advance_and_measure(problem, body, plate, force, before, every, settings.relaxation)
         number += every
-        contact_velocities(problem, body, plate, velocity)
-        worst, _, mean = grain_unbalance(problem, force, total)
-        yield Sweep(
-            number,
-            force,
-            greatest_force_change(before, force),
-            natural_map_residual(problem, velocity, force),
-            worst / mean if mean > 0 else 0.0,
-        )
+        yield Sweep(number, force, *residuals)
 
 
 def solve(
@@ -138,9 +119,9 @@ def solve(
 
 def unbalance_of(problem: ContactProblem, force: Array) -> tuple[float, float]:
     """Worst and mean |ΣF| on a grain over the mean f_n, for forces (c, 2) [N] in the order of the contacts."""
-    worst, mean_size, mean = grain_unbalance(
-        problem, np.ascontiguousarray(force[problem.rows]), np.empty_like(problem.external)
-    )
+    force, body, plate = _start(problem, force)
+    _, _, mean = measure_forces(force, force)
+    worst, mean_size = measure_unbalance(problem, body)
     return (worst / mean, mean_size / mean) if mean > 0 else (0.0, 0.0)
 
 
@@ -161,9 +142,8 @@ def _start(problem: ContactProblem, guess: Array | None) -> tuple[Array, Array, 
 def _finish(problem: ContactProblem, force: Array, stop: Stop, number: int) -> Solution:
     body, plate = np.empty_like(problem.body), np.empty_like(problem.plate)
     apply_forces(problem, body, plate, force)  # anew, so that rounding of many sweeps is not taken for balance
-    velocity = np.empty_like(force)
-    contact_velocities(problem, body, plate, velocity)
-    worst, mean_size, mean = grain_unbalance(problem, force, np.empty_like(problem.external))
+    _, norm, mean = measure_forces(force, force)
+    worst, mean_size = measure_unbalance(problem, body)
     ordered = to_contact_order(problem, force)
     scale = 1.0 / mean if mean > 0 else 0.0
     return Solution(
@@ -171,7 +151,7 @@ def _finish(problem: ContactProblem, force: Array, stop: Stop, number: int) -> S
         ordered[:, 1].copy(),
         stop,
         number,
-        natural_map_residual(problem, velocity, force),
+        measure_natural_map(problem, body, plate, force, norm),
         worst * scale,
         mean_size * scale,
     )

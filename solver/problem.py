@@ -18,24 +18,26 @@ from numpy.typing import NDArray
 from solver.boundaries import Walls
 from solver.contacts import Contacts
 from solver.grains import Array, GrainMotion, Grains
-from solver.ordering import visiting_order
+from solver.ordering import GROUP, WALL_GROUP, visiting_order
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
 
 
 class ContactProblem(NamedTuple):
-    """What the kernels read: packed records in visiting order, contacts between grains first, then those with walls.
+    """What the kernels read: packed records in visiting order, p contacts between grains first, then q with walls.
 
+    Contacts between grains lie in blocks of L = GROUP, one row per quantity, so that a block is read as vectors; the
+    last block is filled up with zeros. The first `grouped` of them are in groups that share no grain.
     At most ten fields: numba's dispatch slows beyond.
     """
 
     body: Array  # (n, 4) free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Array  # (w, 2) free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
-    pair_body: NDArray[np.int32]  # (p, 2) grains i, j
-    pair: Array  # (p, 4) nx, ny, 1/W_nn, 1/W_tt
+    pair_body: NDArray[np.int32]  # (blocks, 2, L) grains i, j
+    pair: Array  # (blocks, 6, L) nx, ny, 1/W_nn, 1/Z of i, 1/Z of j, and the velocity [m/s] added to u_n: gap to close
+    grouped: int  # a multiple of L, at most p
     wall_body: NDArray[np.int32]  # (q, 2) grain, wall
-    wall: Array  # (q, 4) nx, ny, 1/W_nn, 1/W_tt
-    bias: Array  # (p + q, 2) [m/s] added to u_n and u_t: motion of the wall, gap still to close
+    wall: Array  # (q, 6) nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
     friction: Array  # (2,) between grains, with walls
     external: Array  # (n, 2) [N] weight of the grains
     rows: NDArray[np.int64]  # (p + q,) record → row of Contacts
@@ -110,31 +112,47 @@ def assemble(
 
     rows_pair = np.flatnonzero(~contacts.with_wall)
     rows_wall = np.flatnonzero(contacts.with_wall)
-    rows_pair = rows_pair[visiting_order(contacts.point[rows_pair], contacts.i[rows_pair], contacts.j[rows_pair])]
-    rows_wall = rows_wall[visiting_order(contacts.point[rows_wall], contacts.i[rows_wall], contacts.j[rows_wall])]
-    rows = np.concatenate([rows_pair, rows_wall])
+    point, i, j = contacts.point, contacts.i, contacts.j
+    order, grouped = visiting_order(point[rows_pair], i[rows_pair], j[rows_pair], GROUP)
+    rows_pair = rows_pair[order]
+    order, _ = visiting_order(point[rows_wall], i[rows_wall], j[rows_wall], WALL_GROUP)
+    rows_wall = rows_wall[order]
+    closing = np.zeros(contacts.count) if closing is None else closing
 
-    pair_body = np.stack([contacts.i[rows_pair], contacts.j[rows_pair]], axis=1)
-    wall_body = np.stack([contacts.i[rows_wall], contacts.j[rows_wall] - n], axis=1)
-    pair_w = compliance[pair_body[:, 0]] + compliance[pair_body[:, 1]]
+    pair_i, pair_j = compliance[i[rows_pair]], compliance[j[rows_pair]]
+    pair = np.column_stack(
+        [contacts.normal[rows_pair], 1.0 / (pair_i + pair_j), pair_i, pair_j, closing[rows_pair]]
+    )  # fmt: skip
+
+    wall_body = np.stack([i[rows_wall], j[rows_wall] - n], axis=1)
     wall_w = compliance[wall_body[:, 0]]
-
-    bias = np.zeros((contacts.count, 2))
-    if closing is not None:
-        bias[:, 0] = closing[rows]
-    velocity = walls.velocity_at(wall_body[:, 1], contacts.point[rows_wall])
-    bias[len(rows_pair) :, 0] += np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall])
-    bias[len(rows_pair) :, 1] += np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall])
+    velocity = walls.velocity_at(wall_body[:, 1], point[rows_wall])
+    wall = np.column_stack([
+        contacts.normal[rows_wall],
+        1.0 / (wall_w + plate[wall_body[:, 1], 1]),
+        1.0 / (3.0 * wall_w),
+        np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall]) + closing[rows_wall],
+        np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall]),
+    ])  # fmt: skip
 
     return ContactProblem(
         body,
         plate,
-        pair_body,
-        np.column_stack([contacts.normal[rows_pair], 1.0 / pair_w, 1.0 / (3.0 * pair_w)]),
+        _blocks(np.stack([i[rows_pair], j[rows_pair]], axis=1)),
+        _blocks(pair),
+        grouped,
         wall_body,
-        np.column_stack([contacts.normal[rows_wall], 1.0 / (wall_w + plate[wall_body[:, 1], 1]), 1.0 / (3.0 * wall_w)]),
-        bias,
+        wall,
         np.array([material.friction, material.wall_friction]),
         weight,
-        rows,
+        np.concatenate([rows_pair, rows_wall]),
     )
+
+
+def _blocks(record: NDArray) -> NDArray:
+    """Records (p, k) in blocks (ceil(p / GROUP), k, GROUP), the last one filled up with zeros."""
+    count, width = record.shape
+    blocks = -(-count // GROUP)
+    padded = np.zeros((blocks * GROUP, width), record.dtype)
+    padded[:count] = record
+    return np.ascontiguousarray(padded.reshape(blocks, GROUP, width).transpose(0, 2, 1))

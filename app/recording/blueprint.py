@@ -95,10 +95,17 @@ def _experiment(layout: Layout) -> rrb.Container:
 def _convergence(layout: Layout) -> rrb.Container:
     near = max(layout.sweeps_per_frame, 1)
     return rrb.Horizontal(
-        _packing_view("Network as it forms", layout, [*_PACKING, *_FORCES]),
+        _packing_view(
+            "Network as it forms; the last row of a frame is the reported field", layout, [*_PACKING, *_FORCES]
+        ),
+        _packing_view(
+            "Not converged: grains by unbalance, contacts by change",
+            layout,
+            [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"],
+        ),
         rrb.Vertical(
             _curves(
-                "log₁₀ residuals, every sweep (timeline: sweep)",
+                "log₁₀ residuals, every sweep (choose the timeline: sweep)",
                 [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE, entities.TOLERANCE],
                 near=near,
             ),
@@ -106,7 +113,7 @@ def _convergence(layout: Layout) -> rrb.Container:
             _curves("Sweeps per frame", [entities.SWEEP_COUNT]),
             row_shares=[2.2, 1.2, 1.0],
         ),
-        column_shares=[1.2, 1.0],
+        column_shares=[1.0, 1.0, 0.95],
         name=Tab.CONVERGENCE,
     )
 
@@ -144,11 +151,34 @@ def _statistics() -> rrb.Container:
                 "Coordination number",
                 [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS],
             ),
-            _curves("Friction angle [°]", [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE], corner=_HIGH),
-            _curves("Pressure [kPa]", [entities.PRESSURE]),
-            _curves("Sliding, anisotropy", [entities.SLIDING_FRACTION, entities.FABRIC_ANISOTROPY]),
+            _curves(
+                "Friction angle [°]",
+                [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE, entities.ANISOTROPY_ANGLE],
+                corner=_HIGH,
+            ),
+            _curves("Stress [kPa]", [entities.SIGMA_1, entities.PRESSURE, entities.SIGMA_2]),
+            _curves(
+                "Anisotropies",
+                [
+                    entities.CONTACT_ANISOTROPY, entities.BRANCH_ANISOTROPY, entities.NORMAL_FORCE_ANISOTROPY,
+                    entities.TANGENTIAL_FORCE_ANISOTROPY,
+                ],
+            ),
         ),
-        row_shares=[1.5, 1.0],
+        rrb.Horizontal(
+            _curves("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
+            _curves("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
+            _curves(
+                "Strong network and force chains",
+                [
+                    entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE,
+                    entities.CHAIN_GRAIN_SHARE,
+                ],
+            ),
+            _curves("Normal forces on the walls [N]", [entities.WALL_NORMAL_FORCE], legend=True),
+            _curves("… along the walls [N]", [entities.WALL_TANGENTIAL_FORCE], legend=True),
+        ),
+        row_shares=[1.5, 1.0, 1.0],
         name=Tab.STATISTICS,
     )  # fmt: skip
 
@@ -157,12 +187,17 @@ def _contacts(layout: Layout) -> rrb.Container:
     shown = [*_PACKING, entities.GAPS, entities.GAINED, entities.PARTED, f"{entities.GAP_LEGEND}/**"]
     return rrb.Horizontal(
         _packing_view("Gaps; gained green, lost red", layout, shown),
-        rrb.Vertical(
-            _curves("Contacts with force", [entities.CONTACT_COUNT]),
-            _curves("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
-            _curves("Sliding fraction", [entities.SLIDING_FRACTION]),
+        _packing_view(
+            "Probability that they touch",
+            layout,
+            [entities.WALLS, entities.GRAINS, entities.PROBABILITY, f"{entities.PROBABILITY_LEGEND}/**"],
         ),
-        column_shares=[1.75, 1.0],
+        rrb.Vertical(
+            _curves("Contacts", [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]),
+            _curves("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
+            _curves("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
+        ),
+        column_shares=[1.0, 1.0, 0.8],
         name=Tab.CONTACTS,
     )
 
@@ -254,6 +289,7 @@ def _curves(
     *,
     y_range: tuple[float, float] | None = None,
     near: int | None = None,
+    legend: bool | None = None,
     corner: rrb.Corner2D = rrb.Corner2D.RightTop,
 ) -> rrb.View:
     """A plot of curves; `near` shows only that many values on either side of the time cursor."""
@@ -266,5 +302,5 @@ def _curves(
         name=name,
         axis_x=rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(start=ends[0], end=ends[1])),
         axis_y=rrb.ScalarAxis(range=y_range) if y_range else None,
-        plot_legend=rrb.PlotLegend(corner, visible=len(contents) > 1),
+        plot_legend=rrb.PlotLegend(corner, visible=len(contents) > 1 if legend is None else legend),
     )

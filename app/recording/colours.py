@@ -43,6 +43,16 @@ SERIES: tuple[Rgba, ...] = ((255, 176, 84, 255), (110, 190, 255, 255), (176, 222
 _FORCE_WAY = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.87, 0.155, 92.0), (0.97, 0.06, 106.0))
 # Overlap blue, touching pale, open orange.
 _GAP_WAY = ((0.58, 0.150, 255.0), (0.74, 0.09, 240.0), (0.95, 0.0, 0.0), (0.76, 0.11, 60.0), (0.64, 0.17, 45.0))
+# Quiet slate, violet, magenta, rose, pale: what is far from converged glows.
+_DOUBT_WAY = ((0.36, 0.045, 260.0), (0.46, 0.10, 285.0), (0.58, 0.19, 330.0), (0.74, 0.15, 5.0), (0.95, 0.03, 60.0))
+# Doubtful magenta over pale to a quiet teal where two bodies surely touch.
+_PROBABILITY_WAY = (
+    (0.60, 0.20, 350.0),
+    (0.76, 0.11, 20.0),
+    (0.90, 0.03, 110.0),
+    (0.66, 0.07, 200.0),
+    (0.50, 0.07, 215.0),
+)
 RAMP_LEVELS = 64
 
 
@@ -85,3 +95,5 @@ def packed_one(colour: Rgba) -> np.uint32:
 
 FORCE_RAMP = make_ramp(_FORCE_WAY)
 GAP_RAMP = make_ramp(_GAP_WAY)
+DOUBT_RAMP = make_ramp(_DOUBT_WAY)
+PROBABILITY_RAMP = make_ramp(_PROBABILITY_WAY)

@@ -1,12 +1,15 @@
 """The written schema of a recording: every timeline, every entity, every component, in one place.
 
 Two timelines. `frame` counts photographs from 0. `sweep` counts Gauss-Seidel sweeps over the whole run:
-frame k occupies the values first_sweep[k] … first_sweep[k+1] − 1, one value per sweep (one value where a
-frame was not swept at all). Rows that belong to a frame carry both timelines; on `frame` the last row of
-a frame wins, so `frame` shows the reported forces while `sweep` shows the solve on its way to them.
+frame k occupies the values first_sweep[k] … first_sweep[k+1] − 1, one value per sweep and a last one for the
+reported field (that one alone where a frame was not swept at all). Rows that belong to a frame carry both
+timelines; on `frame` the last row of a frame wins, so `frame` shows the reported forces while `sweep` shows the
+solve on its way to them.
 
-The first row of a frame carries the geometry, the later ones only widths and colours; the row of its last
-sweep always shows the reported field. Values to be clicked (`fn`, `ft`, …) are those of the reported field.
+The first row of a frame carries the geometry, the later ones only widths and colours. The sweeps are those of the
+Gauss-Seidel chain, its own last one included; the row after it shows the reported field, which the estimator
+`ensemble` makes of several chains and convex members: the forces may step there. Values to be clicked (`fn`,
+`ft`, …) are those of the reported field.
 
 Lengths in the 2D views are pixels of the photograph as recorded (y down; a photograph above 4 megapixels
 is recorded at half size), or nominal pixels of 1/30 mean radius without photographs. The 3D view is in metres.
@@ -34,15 +37,22 @@ SLIDING = "/contacts/sliding"
 GAPS = "/contacts/gap"
 GAINED = "/contacts/gained"
 PARTED = "/contacts/parted"
+PROBABILITY = "/contacts/probability"
 FORCE_LEGEND = "/legend/force"
 FORCE_LEGEND_TICKS = "/legend/force/ticks"
 GAP_LEGEND = "/legend/gap"
 GAP_LEGEND_TICKS = "/legend/gap/ticks"
+PROBABILITY_LEGEND = "/legend/probability"
+PROBABILITY_LEGEND_TICKS = "/legend/probability/ticks"
+MAP_LEGEND = "/legend/unconverged"
+MAP_LEGEND_TICKS = "/legend/unconverged/ticks"
 
 SWEEP_FORCE_CHANGE = "/solve/force_change"
 SWEEP_NATURAL_MAP = "/solve/natural_map"
 SWEEP_UNBALANCE = "/solve/unbalance"
 TOLERANCE = "/solve/tolerance"
+UNBALANCE_MAP = "/solve/map/unbalance"
+CHANGE_MAP = "/solve/map/change"
 
 STATUS_LANE = "/frames/status"
 TRACKING_LANE = "/frames/tracking"
@@ -56,6 +66,8 @@ FINAL_NATURAL_MAP = "/frames/natural_map"
 FINAL_UNBALANCE = "/frames/unbalance"
 GAINED_COUNT = "/frames/contacts_gained"
 PARTED_COUNT = "/frames/contacts_parted"
+EXPECTED_COUNT = "/frames/contacts_expected"
+DOUBTFUL_COUNT = "/frames/contacts_doubtful"
 FLAGS = "/flags"
 
 FRICTION_ANGLE = "/statistics/friction_angle"
@@ -70,6 +82,23 @@ SLIDING_FRACTION = "/statistics/sliding_fraction"
 MEAN_FN = "/statistics/mean_fn"
 MAX_FN = "/statistics/max_fn"
 FABRIC_ANISOTROPY = "/statistics/fabric_anisotropy"
+SIGMA_1 = "/statistics/sigma_1"
+SIGMA_2 = "/statistics/sigma_2"
+ANISOTROPY_ANGLE = "/statistics/friction_angle_of_anisotropies"
+CONTACT_ANISOTROPY = "/statistics/contact_anisotropy"
+BRANCH_ANISOTROPY = "/statistics/branch_anisotropy"
+NORMAL_FORCE_ANISOTROPY = "/statistics/normal_force_anisotropy"
+TANGENTIAL_FORCE_ANISOTROPY = "/statistics/tangential_force_anisotropy"
+MOBILISATION = "/statistics/mobilisation"
+TAIL_EXPONENT = "/statistics/tail_exponent"
+PLATEAU_RATIO = "/statistics/plateau_ratio"
+STRONG_SHARE = "/statistics/strong_share"
+STRONG_PRESSURE_SHARE = "/statistics/strong_pressure_share"
+STRONG_DEVIATOR_SHARE = "/statistics/strong_deviator_share"
+CHAIN_COUNT = "/statistics/chain_count"
+CHAIN_GRAIN_SHARE = "/statistics/chain_grain_share"
+WALL_NORMAL_FORCE = "/statistics/wall_normal_force"
+WALL_TANGENTIAL_FORCE = "/statistics/wall_tangential_force"
 FORCE_DENSITY = "/statistics/force_density/frame"
 FORCE_DENSITY_POOLED = "/statistics/force_density/pooled"
 FORCE_DENSITY_AXES = "/statistics/force_density/axes"
@@ -102,8 +131,8 @@ class When(Enum):
 
     START = "first sweep of every frame, on both timelines"
     START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on both timelines"
-    START_AND_END = "cleared at the first sweep of every frame, set at its last, on both timelines"
-    END = "last sweep of every frame, on both timelines"
+    START_AND_END = "cleared at the first sweep of every frame, set at its last row, on both timelines"
+    END = "last row of every frame, on both timelines"
     SWEEPS = "every sweep, on `sweep` only"
     FOUND = "when there is something to say, on both timelines"
     STATIC = "once, without a time"
@@ -176,14 +205,32 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
     Entity(GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
     Entity(PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),
+    Entity(
+        PROBABILITY, "contacts, colour by the probability that they touch; grey where it was not computed",
+        _STRIPS | {"probability", "grain_a", "body_b"}, When.START,
+    ),
     Entity(FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
     Entity(FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
     Entity(GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
     Entity(GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
+    Entity(PROBABILITY_LEGEND, "colour of P(touch)", _STRIPS, When.STATIC),
+    Entity(PROBABILITY_LEGEND_TICKS, "its values", _TICKS, When.STATIC),
+    Entity(MAP_LEGEND, "colour of unbalance and change", _STRIPS, When.STATIC),
+    Entity(MAP_LEGEND_TICKS, "its values, over the mean f_n", _TICKS, When.STATIC),
     _scalar(SWEEP_FORCE_CHANGE, "log10 of the greatest |Δf|/|f|", When.SWEEPS, Condition.SWEPT),
     _scalar(SWEEP_NATURAL_MAP, "log10 of the natural-map residual", When.SWEEPS, Condition.SWEPT),
     _scalar(SWEEP_UNBALANCE, "log10 of the worst grain unbalance over the mean f_n", When.SWEEPS, Condition.SWEPT),
     _scalar(TOLERANCE, "log10 of the stopping level", When.START, Condition.TOLERANCE),
+    Entity(
+        UNBALANCE_MAP, "grains, colour by |ΣF| of the recorded forces over the mean f_n", _POINTS,
+        When.START_AND_SWEEPS,
+    ),
+    Entity(
+        CHANGE_MAP,
+        "contacts, colour by the change since the recorded row before over the mean f_n; in the last row of a frame "
+        "the step from the chain to the reported field",
+        _STRIPS, When.START_AND_SWEEPS,
+    ),
     Entity(STATUS_LANE, "status of the frame", _LANE, When.START),
     Entity(TRACKING_LANE, "whether every grain has a pose", _LANE, When.START),
     _scalar(TRUST, "estimated correlation with the true forces, given these inputs"),
@@ -196,6 +243,8 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(FINAL_UNBALANCE, "log10 of the worst grain unbalance of the reported field"),
     _scalar(GAINED_COUNT, "contacts gained since the frame before"),
     _scalar(PARTED_COUNT, "contacts lost since the frame before"),
+    _scalar(EXPECTED_COUNT, "expected number of contacts: the sum of P(touch)"),
+    _scalar(DOUBTFUL_COUNT, "contacts kept though P(touch) < 1/2"),
     Entity(
         FLAGS, "what a user must know about a frame", _of("TextLog", "text", "level"), When.FOUND, Condition.FLAGS,
     ),
@@ -211,6 +260,23 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(MEAN_FN, "mean f_n [N]"),
     _scalar(MAX_FN, "greatest f_n [N]"),
     _scalar(FABRIC_ANISOTROPY, "2 (F₁ − F₂) of the fabric tensor"),
+    _scalar(SIGMA_1, "greatest principal stress [kPa]"),
+    _scalar(SIGMA_2, "smallest principal stress [kPa]"),
+    _scalar(ANISOTROPY_ANGLE, "friction angle that the anisotropies add up to [°]"),
+    _scalar(CONTACT_ANISOTROPY, "a_c, of contact directions"),
+    _scalar(BRANCH_ANISOTROPY, "a_l, of branch lengths"),
+    _scalar(NORMAL_FORCE_ANISOTROPY, "a_n, of normal forces"),
+    _scalar(TANGENTIAL_FORCE_ANISOTROPY, "a_t, of tangential forces"),
+    _scalar(MOBILISATION, "mean |f_t| / (μ f_n)"),
+    _scalar(TAIL_EXPONENT, "β of the exponential tail of P(f_n) above the mean"),
+    _scalar(PLATEAU_RATIO, "P(f_n) of the weakest forces over its plateau below the mean; 1: flat"),
+    _scalar(STRONG_SHARE, "share of the contacts with more than the mean f_n"),
+    _scalar(STRONG_PRESSURE_SHARE, "share of the pressure that they carry"),
+    _scalar(STRONG_DEVIATOR_SHARE, "share of the stress deviator that they carry"),
+    _scalar(CHAIN_COUNT, "force chains"),
+    _scalar(CHAIN_GRAIN_SHARE, "share of the grains that belong to one"),
+    _scalar(WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
+    _scalar(WALL_TANGENTIAL_FORCE, "… along the wall [N]"),
     Entity(FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
     Entity(FORCE_DENSITY_POOLED, "the same, all frames so far", _STRIPS, When.END),
     Entity(FORCE_DENSITY_AXES, "axes", _STRIPS, When.STATIC),

@@ -40,7 +40,7 @@ class ForceDensity:
             notes=[
                 (6.4, 0.26, "points: this frame"), (6.4, -0.02, "line: all frames so far"),
                 (6.4, -0.3, "thin: exp(−x)"),
-                (7.0, -4.35, "f_n / mean f_n"), (0.55, 0.36, "P"),
+                (7.1, -3.62, "f_n / mean f_n"), (0.55, 0.36, "P"),
             ],
             guides=[AXES.points(x, -x * np.log10(np.e))],
         )  # fmt: skip

@@ -127,7 +127,7 @@ class HeadlessViewer:
         """A picture (PNG) of the window, or of one view of the tab in front, taken once it stands still."""
         client = self._running()
         view_id = None if view is None else self._view_id(view)
-        while view_id is None and time.monotonic() < self._clear_at:
+        while time.monotonic() < self._clear_at:
             client.take_screenshot(max_size=64)
             time.sleep(0.3)
         end, former = time.monotonic() + ANSWER_SECONDS, b""

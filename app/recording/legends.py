@@ -11,15 +11,29 @@ from app.recording.canvas import Canvas
 from app.recording.changes import gap_colours, gap_range
 from app.recording.plots import log_texts
 from app.recording.scene import Scene
+from app.recording.touching import probability_colours
+from app.recording.unconverged import DECADES, doubt_colours
 from solver.grains import Array
 
 PIECES = 48
+_POWERS = ("10⁻⁴", "0.001", "0.01", "0.1")  # texts of the decades of the maps
 
 
 def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
-    """Log both legends, static."""
+    """Log all legends, static."""
     _log_force_legend(stream, scene)
     _log_gap_legend(stream, scene)
+    power = np.linspace(DECADES[0], DECADES[1], PIECES)
+    decades = int(DECADES[1] - DECADES[0])
+    _log_ramp(
+        stream, scene.canvas, entities.MAP_LEGEND, entities.MAP_LEGEND_TICKS, doubt_colours(10.0**power),
+        [(k / decades, _POWERS[k]) for k in range(decades)] + [(1.0, "1 × mean f_n")],
+    )  # fmt: skip
+    share = np.linspace(0.0, 1.0, PIECES)
+    _log_ramp(
+        stream, scene.canvas, entities.PROBABILITY_LEGEND, entities.PROBABILITY_LEGEND_TICKS,
+        probability_colours(share), [(0.0, "P(touch) 0"), (0.5, "0.5"), (1.0, "1")],
+    )  # fmt: skip
 
 
 def _log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
@@ -53,6 +67,22 @@ def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     micrometres = 1e6 * reach
     texts = [(0.0, f"overlap {micrometres:g} µm"), (0.5, "touching"), (1.0, f"open {micrometres:g} µm")]
     _log_ticks(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts)
+
+
+def _log_ramp(
+    stream: rr.RecordingStream,
+    canvas: Canvas,
+    path: str,
+    ticks: str,
+    colours: NDArray[np.uint32],
+    texts: list[tuple[float, str]],
+) -> None:
+    """A line of colours (PIECES,) with texts at shares of its length."""
+    strips = rr.LineStrips2D(
+        _pieces(canvas), radii=np.float32(0.22 * canvas.grain_radius), colors=colours, draw_order=50.0
+    )
+    stream.log(path, strips, static=True)
+    _log_ticks(stream, canvas, ticks, texts)
 
 
 def _span(canvas: Canvas) -> tuple[float, float, float]:

@@ -35,7 +35,7 @@ def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepCh
 
     At most `kept` sweeps with SweepChoice.LOG. Returns the rows written.
     """
-    rows, fn = visible_sweeps(forces, clock.last - clock.first, choice, kept)
+    rows, fn, _ = visible_sweeps(forces, clock.last - clock.first, choice, kept)
     style, contacts = scene.style, forces.contacts
     clock.start()
     clock.stream.log(
@@ -55,22 +55,23 @@ def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepCh
 
 def visible_sweeps(
     forces: FrameForces, last: int, choice: SweepChoice, kept: int
-) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
-    """Choose the rows of a frame (r,), the first 0, the greatest `last`, and their f_n (r, c) [N].
+) -> tuple[NDArray[np.int64], NDArray[np.floating], NDArray[np.floating]]:
+    """Choose the rows of a frame (r,), the first 0, the greatest `last`, and their f_n and f_t (r, c) [N].
 
-    The row `last` holds the reported field, whatever the sweep of that number did. Where the
+    The row `last` holds the reported field; the one before it is the last sweep of the chain. Where the
     first sweep's forces were not kept, row 0 shows the network without force.
     """
-    reported = np.nan_to_num(forces.fn)
+    reported = np.nan_to_num(np.stack([forces.fn, forces.ft]))[:, None]
     if last == 0 or choice is SweepChoice.NONE:
-        return np.zeros(1, np.int64), reported[None]
+        return np.zeros(1, np.int64), reported[0], reported[1]
     history = forces.history
     chosen = chosen_sweeps(history, choice, kept)
-    chosen = chosen[history.recorded[chosen] < last]
-    rows, fn = history.recorded[chosen], history.fn[chosen]
+    rows, force = history.recorded[chosen], [history.fn[chosen], history.ft[chosen]]
     if len(rows) == 0 or rows[0] != 0:
-        rows, fn = np.concatenate([[0], rows]), np.concatenate([np.zeros((1, len(reported))), fn])
-    return np.concatenate([rows, [last]]), np.concatenate([fn, reported[None]])
+        nothing = np.zeros((1, reported.shape[2]))
+        rows, force = np.concatenate([[0], rows]), [np.concatenate([nothing, each]) for each in force]
+    fn, ft = (np.concatenate([each, end]) for each, end in zip(force, reported, strict=True))
+    return np.concatenate([rows, [last]]), fn, ft
 
 
 def chosen_sweeps(history: SweepHistory, choice: SweepChoice, kept: int) -> NDArray[np.int64]:

@@ -21,6 +21,7 @@ from app.recording.changes import log_changes
 from app.recording.convergence import log_residual_styles, log_residuals, log_tolerance, log_tolerance_style
 from app.recording.force_density import ForceDensity
 from app.recording.force_style import ForceRange, ForceStyle
+from app.recording.layout_property import send_layout
 from app.recording.legends import log_legends
 from app.recording.network import SweepChoice, log_network
 from app.recording.packing import log_packing
@@ -32,7 +33,9 @@ from app.recording.statistics import log_statistics, log_statistics_styles
 from app.recording.stress_and_fabric import log_polar_axes, log_rose, log_stress
 from app.recording.summary import FrameFacts, log_summary
 from app.recording.texts import printable
+from app.recording.touching import log_touching, log_touching_styles
 from app.recording.truth import TruthWriter
+from app.recording.unconverged import log_unconverged
 from app.results import Results, TruthContacts
 from app.units import Scale
 from solver.frame_forces import FrameForces
@@ -109,7 +112,8 @@ class Recorder:
             ),
         )
         log_settling_styles(stream)
-        log_statistics_styles(stream)
+        log_statistics_styles(stream, scene)
+        log_touching_styles(stream)
         log_polar_axes(stream)
         log_legends(stream, scene)
         self._density.log_axes(stream)
@@ -122,7 +126,7 @@ class Recorder:
     def frame(self, forces: FrameForces, statistics: FrameStatistics, photograph: Photograph | None = None) -> None:
         """Write one frame."""
         scene = self._running()
-        span = max(forces.history.count, 1)
+        span = forces.history.count + 1  # the reported field has a place of its own
         clock = Clock(self._stream, forces.frame, self._next_sweep, self._next_sweep + span - 1)
         self._next_sweep += span
         if photograph is not None:
@@ -130,9 +134,11 @@ class Recorder:
         log_packing(clock, scene, forces)
         self.network_rows += log_network(clock, scene, forces, self._sweeps, self._kept)
         self._log_solve(clock, scene, forces)
+        log_unconverged(clock, scene, forces, self._sweeps, self._kept)
+        log_touching(clock, scene, forces)
         changes = log_changes(clock, scene, forces, self._former)
         log_settling(clock, scene, forces, changes)
-        log_statistics(clock, statistics)
+        log_statistics(clock, scene, statistics)
         log_stress(clock, statistics)
         log_rose(clock, forces)
         self._density.log(clock, forces.fn)
@@ -261,6 +267,7 @@ def _write(
     try:
         recorder = Recorder(stream, sweeps=choice, kept=kept)
         recorder.start(scene)
+        send_layout(stream, layout)
         for done, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
             recorder.frame(forces, statistics, photograph(forces.frame) if photograph else None)
             if progress:

@@ -4,22 +4,39 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import rerun as rr
 
 from app.recording import entities
 from app.recording.colours import SERIES
-from app.recording.scene import Clock
-from app.recording.values import log_scalar
+from app.recording.scene import Clock, Scene
+from app.recording.texts import printable
+from app.recording.values import log_scalar, log_scalars
 from solver.frame_statistics import FrameStatistics
 
 
-def log_statistics_styles(stream: rr.RecordingStream) -> None:
+def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log names and colours of the curves."""
     for path, name, colour in (
         (entities.FRICTION_ANGLE, "friction angle φ [°]", SERIES[0]),
         (entities.WALL_RATIO_ANGLE, "wall ratio atan(T/N) [°]", SERIES[1]),
         (entities.PRINCIPAL_DIRECTION, "direction of σ₁ [°]", SERIES[2]),
         (entities.PRESSURE, "pressure [kPa]", SERIES[2]),
+        (entities.SIGMA_1, "σ₁ [kPa]", SERIES[0]),
+        (entities.SIGMA_2, "σ₂ [kPa]", SERIES[1]),
+        (entities.ANISOTROPY_ANGLE, "φ of the anisotropies [°]", SERIES[2]),
+        (entities.CONTACT_ANISOTROPY, "a_c contacts", SERIES[1]),
+        (entities.BRANCH_ANISOTROPY, "a_l branches", SERIES[2]),
+        (entities.NORMAL_FORCE_ANISOTROPY, "a_n normal forces", SERIES[0]),
+        (entities.TANGENTIAL_FORCE_ANISOTROPY, "a_t tangential forces", SERIES[3]),
+        (entities.MOBILISATION, "mobilisation |f_t| / μ f_n", SERIES[0]),
+        (entities.TAIL_EXPONENT, "tail exponent β", SERIES[0]),
+        (entities.PLATEAU_RATIO, "plateau ratio", SERIES[1]),
+        (entities.STRONG_SHARE, "strong contacts", SERIES[1]),
+        (entities.STRONG_PRESSURE_SHARE, "their share of the pressure", SERIES[0]),
+        (entities.STRONG_DEVIATOR_SHARE, "their share of the deviator", SERIES[3]),
+        (entities.CHAIN_COUNT, "force chains", SERIES[2]),
+        (entities.CHAIN_GRAIN_SHARE, "grains in chains", SERIES[2]),
         (entities.COORDINATION_NUMBER, "coordination number z", SERIES[0]),
         (entities.COORDINATION_NUMBER_WITHOUT_RATTLERS, "z without rattlers", SERIES[1]),
         (entities.RATTLER_COUNT, "rattlers", SERIES[3]),
@@ -30,9 +47,13 @@ def log_statistics_styles(stream: rr.RecordingStream) -> None:
         (entities.FABRIC_ANISOTROPY, "fabric anisotropy", SERIES[2]),
     ):
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+    walls = [printable(name) for name in scene.walls.name]
+    hues = [SERIES[row % len(SERIES)] for row in range(len(walls))]
+    for path in (entities.WALL_NORMAL_FORCE, entities.WALL_TANGENTIAL_FORCE):
+        stream.log(path, rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls)), static=True)
 
 
-def log_statistics(clock: Clock, statistics: FrameStatistics) -> None:
+def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> None:
     """Log one frame's macroscopic quantities."""
     clock.end()
     for path, value in (
@@ -48,5 +69,24 @@ def log_statistics(clock: Clock, statistics: FrameStatistics) -> None:
         (entities.MEAN_FN, statistics.mean_fn),
         (entities.MAX_FN, statistics.max_fn),
         (entities.FABRIC_ANISOTROPY, statistics.fabric_anisotropy),
+        (entities.SIGMA_1, 1e-3 * statistics.sigma_1),
+        (entities.SIGMA_2, 1e-3 * statistics.sigma_2),
+        (entities.ANISOTROPY_ANGLE, math.degrees(statistics.friction_angle_of_anisotropies)),
+        (entities.CONTACT_ANISOTROPY, statistics.contact_anisotropy),
+        (entities.BRANCH_ANISOTROPY, statistics.branch_anisotropy),
+        (entities.NORMAL_FORCE_ANISOTROPY, statistics.normal_force_anisotropy),
+        (entities.TANGENTIAL_FORCE_ANISOTROPY, statistics.tangential_force_anisotropy),
+        (entities.MOBILISATION, statistics.mobilisation),
+        (entities.TAIL_EXPONENT, statistics.tail_exponent),
+        (entities.PLATEAU_RATIO, statistics.plateau_ratio),
+        (entities.STRONG_SHARE, statistics.strong_share),
+        (entities.STRONG_PRESSURE_SHARE, statistics.strong_pressure_share),
+        (entities.STRONG_DEVIATOR_SHARE, statistics.strong_deviator_share),
+        (entities.CHAIN_COUNT, statistics.chain_count),
+        (entities.CHAIN_GRAIN_SHARE, statistics.chain_grain_share),
     ):
         log_scalar(clock, path, float(value))
+    walls = scene.walls_at(clock.frame)
+    force = np.broadcast_to(statistics.wall_force, (walls.count, 2))
+    log_scalars(clock, entities.WALL_NORMAL_FORCE, np.einsum("wk,wk->w", force, walls.outward))
+    log_scalars(clock, entities.WALL_TANGENTIAL_FORCE, np.einsum("wk,wk->w", force, walls.direction))

@@ -156,7 +156,12 @@ def _legend(scene: Scene, clipped: int, drawn: int) -> str:
         "- **Click** a contact or a grain and open the right panel for its values (fn, ft, gap_um, fn_sd, "
         "mobilisation, state, age, probability …): they are those of the reported field.\n"
         "- Timeline **frame**: one step per photograph, reported forces. Timeline **sweep**: the solve itself; "
-        "switch to it for the tab *Convergence*. The last sweep of a frame shows the reported field."
+        "switch to it for the tab *Convergence*. After the last sweep of a frame one more value shows the "
+        "reported field: the estimator *ensemble* makes it of several chains and convex members, so that the "
+        "forces may step there.\n"
+        "- **Not converged**: grains glow by the force that is missing to their balance, contacts by how much they "
+        "changed since the recorded sweep before (in a frame's last row: from the chain to the reported field), both "
+        "over the mean f_n."
     )
 
 

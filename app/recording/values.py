@@ -27,6 +27,11 @@ def log_scalar(clock: Clock, path: str, value: float) -> None:
     clock.stream.log(path, rr.Scalars([value] if np.isfinite(value) else []))
 
 
+def log_scalars(clock: Clock, path: str, values: Array) -> None:
+    """Log one point of several curves that share a path; a gap where any is not finite."""
+    clock.stream.log(path, rr.Scalars(values if np.all(np.isfinite(values)) else []))
+
+
 def send_scalars(stream: rr.RecordingStream, path: str, when: rr.TimeColumn, values: Array) -> None:
     """Send many points (k,) of a curve; gaps where values are not finite."""
     finite = np.isfinite(values)

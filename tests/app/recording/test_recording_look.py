@@ -6,8 +6,10 @@ from fake_results import RADIUS, make_results
 
 from app.recording.canvas import LARGEST_PHOTOGRAPH, NOMINAL_RADIUS, Canvas
 from app.recording.colours import (
+    _DOUBT_WAY,
     _FORCE_WAY,
     _GAP_WAY,
+    _PROBABILITY_WAY,
     FORCE_RAMP,
     RAMP_LEVELS,
     even_way,
@@ -24,7 +26,7 @@ GAMUT = 0.01  # of linear sRGB: what clipping may change without being seen
 EVEN = 1e-6  # relative: rounding
 
 
-@pytest.mark.parametrize("way", [_FORCE_WAY, _GAP_WAY])
+@pytest.mark.parametrize("way", [_FORCE_WAY, _GAP_WAY, _DOUBT_WAY, _PROBABILITY_WAY])
 def test_a_ramp_is_perceptually_even_and_can_be_shown(way):
     lab = even_way(lab_from_lch(way), RAMP_LEVELS)
     steps = np.linalg.norm(np.diff(lab, axis=0), axis=1)
@@ -107,9 +109,10 @@ def test_chosen_sweeps_keep_the_first_ones_and_the_limit():
 @pytest.mark.parametrize("choice", list(SweepChoice))
 def test_the_first_row_is_the_first_sweep_and_the_last_the_reported_field(choice):
     forces = make_results(1, sweeps=200, recorded=np.array([5, 50, 199])).frames[0]
-    rows, fn = visible_sweeps(forces, 199, choice, 40)
+    rows, fn, ft = visible_sweeps(forces, 200, choice, 40)
     assert rows[0] == 0
     assert np.array_equal(fn[-1], forces.fn)
+    assert np.array_equal(ft[-1], forces.ft)
     if choice is not SweepChoice.NONE:
-        assert rows.tolist() == [0, 5, 50, 199]
+        assert rows.tolist() == [0, 5, 50, 199, 200]
         assert not fn[0].any()  # nothing was kept of the first sweep: no force is claimed

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from fake_results import make_results
 from rows import components, latest, rows
@@ -59,7 +61,7 @@ def test_both_timelines_end_a_frame_with_the_reported_field(tmp_path):
     style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(results.frames))
     end = -1
     for forces in results.frames:
-        end += forces.history.count
+        end += forces.history.count + 1  # the reported field comes after the last sweep
         for timeline, at in ((entities.FRAME, forces.frame), (entities.SWEEP, end)):
             shown = latest(path, entities.FORCES, timeline, at)
             assert shown["LineStrips2D:radii"] == style.radii(forces.fn).tolist()
@@ -70,8 +72,8 @@ def test_both_timelines_end_a_frame_with_the_reported_field(tmp_path):
 def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path):
     results = make_results(2, sweeps=30)
     path = record(results, tmp_path / "run.rrd").path
-    assert len(latest(path, entities.SLIDING, entities.SWEEP, 29)["Points2D:positions"]) > 0
-    assert len(latest(path, entities.SLIDING, entities.SWEEP, 30)["Points2D:positions"]) == 0
+    assert len(latest(path, entities.SLIDING, entities.SWEEP, 30)["Points2D:positions"]) > 0
+    assert len(latest(path, entities.SLIDING, entities.SWEEP, 31)["Points2D:positions"]) == 0
     assert len(latest(path, entities.SLIDING, entities.FRAME, 1)["Points2D:positions"]) > 0
 
 
@@ -79,7 +81,11 @@ def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
     results = make_results(3, sweeps=50, recorded=np.array([0, 10, 49]))
     path = record(results, tmp_path / "run.rrd", sweeps="none").path
     found = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
-    assert [row["sweep"] for row in found] == list(range(150))
+    assert [row["sweep"] for row in found] == [
+        *range(50),
+        *range(51, 101),
+        *range(102, 152),
+    ]  # none for the reported field
     expected_values = np.concatenate([np.log10(frame.history.natural_map) for frame in results.frames])
     assert np.array_equal([row["Scalars:scalars"][0] for row in found], expected_values)
 
@@ -93,3 +99,15 @@ def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, result
     assert len(latest(recording.path, entities.GRAINS_LOST, entities.FRAME, 2)["LineStrips2D:strips"]) == 2
     flags = [row["TextLog:text"][0] for row in rows(recording.path, entities.FLAGS)]
     assert any("lost grain 120" in flag for flag in flags)
+
+
+def test_the_chain_s_own_last_sweep_is_shown_before_the_reported_field(tmp_path):
+    results = make_results(2, sweeps=50)
+    other = [replace(frame, fn=0.5 * frame.fn) for frame in results.frames]  # reported by something else
+    path = record(replace(results, frames=other), tmp_path / "run.rrd").path
+    style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(other))
+    frame = other[0]
+    chain = latest(path, entities.FORCES, entities.SWEEP, 49)["LineStrips2D:radii"]
+    assert chain == style.radii(frame.history.fn[-1]).tolist()
+    reported = latest(path, entities.FORCES, entities.SWEEP, 50)["LineStrips2D:radii"]
+    assert reported == style.radii(frame.fn).tolist() != chain

@@ -1,0 +1,42 @@
+"""Second opinions on a solved sequence: the friction that the motion shows, the radii that the connectivity wants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.tracks import Tracks, WallTracks
+from solver.chain import ChainSettings, Packing, force_scale
+from solver.contact_probability import ContactProbabilitySettings
+from solver.frame_forces import FrameForces, FrameStatus
+from solver.friction_check import FRAMES, FrictionCheck, check_friction
+from solver.motion import Snapshot
+from solver.radius_tuning import RadiusTuning, tune_radii
+
+REACH = 0.01  # radii are changed by this share of the mean radius at most, either way
+CURVE_POINTS = 41
+
+
+def friction_of(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    frames: Sequence[FrameForces],
+    settings: ContactProbabilitySettings,
+) -> FrictionCheck | None:
+    """Check the friction on the quietest consecutive frames; None where there are too few, or no friction to check."""
+    if len(snapshots) < 4 or packing.material.friction <= 0 or packing.material.wall_friction <= 0:
+        return None
+    calm = np.array([frame.status in (FrameStatus.SETTLED, FrameStatus.SETTLING) for frame in frames])
+    count = min(FRAMES, len(snapshots) - 2)
+    starts = np.arange(1, len(snapshots) - count)
+    first = int(starts[np.argmax([calm[s : s + count].sum() for s in starts])])
+    return check_friction(packing, snapshots, first, first + count - 1, force_scale(packing, ChainSettings()), settings)
+
+
+def tuned_radii(packing: Packing, tracks: Tracks, walls: WallTracks, wanted: float) -> RadiusTuning:
+    """The common change of all radii that gives the wanted coordination number, rattlers excluded."""
+    reach = REACH * float(packing.grains.radius.mean())
+    change = np.linspace(-reach, reach, CURVE_POINTS)
+    bodies = [packing.walls(ends) for ends in walls.endpoints]
+    return tune_radii(packing.grains, tracks.position, tracks.present, bodies, wanted, change)

@@ -1,0 +1,32 @@
+"""The layout of a recording as one of its properties, so that its blueprint can be made again from the file alone."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from app.recording.blueprint import Layout
+from app.recording.canvas import Canvas
+from app.units import Scale
+
+PROPERTY = "layout"
+
+
+def send_layout(stream: rr.RecordingStream, layout: Layout) -> None:
+    """Store the layout in the recording."""
+    stream.send_property(PROPERTY, rr.AnyValues(json=json.dumps(asdict(layout))))
+
+
+def read_layout(path: Path | str) -> Layout:
+    """The layout of a recording; raises ValueError where it holds none."""
+    for chunk in RrdReader(str(path)).store().stream().filter(content=f"/__properties/{PROPERTY}").to_chunks():
+        for row in chunk.to_record_batch().to_pylist():
+            if row.get("json"):
+                stored = json.loads(row["json"][0])
+                canvas = stored.pop("canvas")
+                return Layout(Canvas(Scale(**canvas.pop("scale")), **canvas), **stored)
+    raise ValueError(f"{path} does not say how it is laid out: it is not a recording of this version")

@@ -1,0 +1,323 @@
+"""The review page's server: the standard library's, on 127.0.0.1 only.
+
+It serves a fixed list of names and the answers of one session: no path of a request ever reaches the file system.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import threading
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from app.errors import InputError
+from app.recording.web_viewer import WebViewer, read_web_viewer
+from app.review.gate import SAFE_HEADERS, Gate
+from app.review.session import BadRequest, ReviewSession, Viewpoint
+from app.review.verdicts import Flag, Origin, Verdict
+
+LARGEST_BODY = 64 * 1024  # bytes of a question
+LONGEST_NAME = 60  # characters of a reviewer
+PATIENCE = 60.0  # [s] for a client that says nothing
+
+_PAGE = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/style.css": ("style.css", "text/css; charset=utf-8"),
+    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+    "/viewer.js": ("viewer.js", "text/javascript; charset=utf-8"),
+    "/crop.js": ("crop.js", "text/javascript; charset=utf-8"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
+}
+_SCRIPT, _MODULE = "/re_viewer.js", "/re_viewer_bg.wasm"
+_RRD = "application/octet-stream"
+
+
+class ReviewServer:
+    """Serves one session; port 0 takes a free one."""
+
+    def __init__(self, session: ReviewSession, port: int = 0, reviewer: str = "") -> None:
+        self.session, self.reviewer = session, reviewer
+        server = self
+
+        class Handler(_Handler):
+            review = server
+
+        self._http = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        self._http.daemon_threads = True
+        self.gate = Gate(self._http.server_address[1])
+        page = files("app.review") / "page"
+        self.assets = {path: (page.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
+        self._viewer: WebViewer | None = None
+        self._packed: bytes | None = None
+        self._viewer_lock = threading.Lock()
+
+    @property
+    def address(self) -> str:
+        """The address to open first, with its token."""
+        return self.gate.address
+
+    def serve(self) -> None:
+        """Serve until shutdown is called."""
+        self._http.serve_forever(poll_interval=0.2)
+
+    def shutdown(self) -> None:
+        self._http.shutdown()
+
+    def close(self) -> None:
+        self._http.server_close()
+
+    def viewer(self) -> WebViewer:
+        with self._viewer_lock:
+            if self._viewer is None:
+                self._viewer = read_web_viewer()
+            return self._viewer
+
+    def packed_module(self) -> bytes:
+        """The viewer's module, compressed once: over an ssh tunnel it is 16 MB instead of 43."""
+        module = self.viewer().module
+        with self._viewer_lock:
+            if self._packed is None:
+                self._packed = gzip.compress(module, 1)
+            return self._packed
+
+    def answer(self, name: str, values: dict[str, Any]) -> Any:
+        """Answer one question of the page with JSON values."""
+        try:
+            question = _QUESTIONS[name]
+        except KeyError:
+            raise BadRequest(f"there is no question {name}") from None
+        return question(self, _Values(values))
+
+
+class _Values:
+    """The fields of a question, checked as they are taken."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        self._values = values
+
+    def get(self, key: str, kind: type, default: Any = None) -> Any:
+        value = self._values.get(key, default)
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise BadRequest(f"{key} is not {kind.__name__}")
+        if kind is float and not abs(value) < 1e9:  # refuses NaN too
+            raise BadRequest(f"{key} is out of range")
+        return value
+
+    def key(self, name: str = "key") -> int:
+        # A key may exceed what a number of the page holds exactly, so that it travels as text.
+        text = self.get(name, str)
+        if not text.isdecimal() or len(text) > 18:
+            raise BadRequest(f"{name} is not a key")
+        return int(text)
+
+    def has(self, key: str) -> bool:
+        return self._values.get(key) is not None
+
+    def member(self, key: str, kind: Callable[[str], Any]) -> Any:
+        try:
+            return kind(self.get(key, str))
+        except ValueError as error:
+            raise BadRequest(str(error)) from None
+
+    def view(self) -> Viewpoint:
+        name = " ".join(self.get("reviewer", str).split())
+        if not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
+            raise BadRequest("a reviewer has a name of 1 to 60 printable characters")
+        return Viewpoint(
+            name, self.get("frame", int), self.get("sampled", bool, False), self.get("blind", bool, False)
+        )
+
+
+def _open(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    return server.session.opening() | {"reviewer": server.reviewer}
+
+
+def _status(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    return server.session.status(values.view())
+
+
+def _next(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    after = None
+    if values.has("after_key"):
+        after = (values.get("after_frame", int), values.key("after_key"))
+    return {"pair": server.session.following(values.view(), after)}
+
+
+def _pick(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    under = None
+    if values.has("path") and values.has("instance"):
+        under = (values.get("path", str), values.get("instance", int))
+    return server.session.pick(values.view(), values.get("x", float), values.get("y", float), under)
+
+
+def _named(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    return {"pair": server.session.named(values.view(), values.get("a", str), values.get("b", str))}
+
+
+def _judge(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    """Write a verdict and give the next candidate in the same answer: one journey for one key."""
+    view = values.view()
+    verdict, origin = values.member("verdict", Verdict), values.member("origin", Origin)
+    if origin is Origin.IMPORT:
+        raise BadRequest("the page imports nothing")
+    frame, key = values.get("pair_frame", int), values.key()
+    told = server.session.judge(view, frame, key, verdict, max(values.get("seconds", float), 0.0), origin)
+    return told | {"pair": server.session.following(view, (frame, key))}
+
+
+def _undo(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    return server.session.undo(values.view())
+
+
+def _flag(server: ReviewServer, values: _Values) -> dict[str, Any]:
+    server.session.flag(values.view(), values.member("flag", Flag), values.get("on", bool))
+    return {}
+
+
+_QUESTIONS: dict[str, Callable[[ReviewServer, _Values], dict[str, Any]]] = {
+    "open": _open, "status": _status, "next": _next, "pick": _pick, "named": _named, "judge": _judge, "undo": _undo,
+    "flag": _flag,
+}  # fmt: skip
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One connection. Subclassed with the server it belongs to."""
+
+    review: ReviewServer
+    protocol_version = "HTTP/1.1"
+    server_version = "rodsight"
+    sys_version = ""
+    timeout = PATIENCE
+    disable_nagle_algorithm = True
+
+    def do_GET(self) -> None:
+        parts = urlsplit(self.path)
+        query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
+        entering = parts.path == "/" and "token" in query
+        if self._refused(changes=False, entering=entering):
+            return
+        if entering:
+            if self.review.gate.opens(query["token"]):
+                self._send(b"", "text/plain", HTTPStatus.SEE_OTHER, Location="/", Set_Cookie=self.review.gate.set_cookie)
+            else:
+                self._say(HTTPStatus.FORBIDDEN, "this token is not the one that `rodsight review` printed")
+            return
+        self._guarded(lambda: self._get(parts.path, query))
+
+    def do_POST(self) -> None:
+        if self._refused(changes=True):
+            return
+        length = self.headers.get("Content-Length") or ""
+        if not length.isdecimal() or int(length) > LARGEST_BODY:
+            self._say(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "a question must be short")
+            return
+        body = self.rfile.read(int(length))
+        self._guarded(lambda: self._post(urlsplit(self.path).path, body))
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: the terminal belongs to the person."""
+
+    def _get(self, path: str, query: dict[str, str]) -> None:
+        if path in self.review.assets:
+            self._send(*self.review.assets[path])
+        elif path == _SCRIPT:
+            self._send(self.review.viewer().script, "text/javascript; charset=utf-8")
+        elif path == _MODULE:
+            packs = "gzip" in (self.headers.get("Accept-Encoding") or "")
+            content = self.review.packed_module() if packs else self.review.viewer().module
+            more = {"Content_Encoding": "gzip"} if packs else {}
+            self._send(content, "application/wasm", Vary="Accept-Encoding", **more)
+        elif path in ("/backdrop", "/marks", "/look", "/crop"):
+            self._send_picture(path, query)
+        else:
+            self._say(HTTPStatus.NOT_FOUND, "there is nothing here")
+
+    def _send_picture(self, path: str, query: dict[str, str]) -> None:
+        session = self.review.session
+        frame = _whole(query, "frame")
+        key = _whole(query, "key") if "key" in query else None
+        if not 0 <= frame < len(session.results.frames):
+            raise BadRequest(f"there is no frame {frame}")
+        if path == "/backdrop":
+            self._send(session.picture.backdrop(frame), _RRD)
+        elif path == "/marks":
+            values = _Values({"reviewer": query.get("reviewer", ""), "frame": frame, "blind": query.get("blind") == "1"})
+            self._send(session.marks(values.view(), key), _RRD)
+        elif path == "/look":
+            aspect = _whole(query, "aspect") / 1000.0
+            point = session.point_of(frame, key) if key is not None else None
+            self._send(session.picture.look(point, aspect), _RRD)
+        else:
+            if key is None:
+                raise BadRequest("a crop is of a pair")
+            windows = session.picture.windows(session.point_of(frame, key))
+            zoom = _whole(query, "zoom")
+            if zoom >= len(windows):
+                raise BadRequest(f"there is no zoom {zoom}")
+            self._send(session.picture.crop(frame, windows[zoom]), "image/jpeg")
+
+    def _post(self, path: str, body: bytes) -> None:
+        try:
+            values = json.loads(body)
+        except ValueError:
+            raise BadRequest("this is not JSON") from None
+        if not path.startswith("/ask/") or not isinstance(values, dict):
+            raise BadRequest("there is no such question")
+        answer = self.review.answer(path.removeprefix("/ask/"), values)
+        self._send(json.dumps(answer, allow_nan=False).encode(), "application/json")
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except BadRequest as error:
+            self._say(HTTPStatus.BAD_REQUEST, str(error))
+        except (InputError, OSError) as error:
+            if isinstance(error, ConnectionError):
+                self.close_connection = True  # the page went away
+            else:
+                self._say(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
+
+    def _refused(self, *, changes: bool, entering: bool = False) -> bool:
+        for name in ("Host", "Origin"):
+            if len(self.headers.get_all(name) or []) > 1:
+                self.close_connection = True
+                self._say(HTTPStatus.BAD_REQUEST, f"{name} stands twice")
+                return True
+        headers = {name: value for name in _HEADERS if (value := self.headers.get(name)) is not None}
+        objection = self.review.gate.objection(headers, changes=changes, entering=entering)
+        if objection is not None:
+            self.close_connection = True  # the body, if any, was not read
+            self._say(HTTPStatus.FORBIDDEN, objection)
+        return objection is not None
+
+    def _say(self, status: HTTPStatus, sentence: str) -> None:
+        self._send(sentence.encode(), "text/plain; charset=utf-8", status)
+
+    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Cache-Control", "no-store")
+        for name, value in (SAFE_HEADERS | {key.replace("_", "-"): value for key, value in headers.items()}).items():
+            self.send_header(name, value)
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        self.wfile.write(content)
+
+
+_HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
+
+
+def _whole(query: dict[str, str], name: str) -> int:
+    text = query.get(name, "")
+    if not text.isdecimal() or len(text) > 18:
+        raise BadRequest(f"{name} is not a whole number")
+    return int(text)

@@ -1,0 +1,325 @@
+"""One review of one run: what the page asks, answered in plain values. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from app import __version__
+from app.recording.review_layer import (
+    CANDIDATES,
+    CONTACT,
+    DETECTED,
+    HIDDEN,
+    MARKS,
+    NO_CONTACT,
+    UNDETECTED,
+    UNSURE,
+    Marked,
+)
+from app.results import Results
+from app.review.agreement import agreements
+from app.review.candidates import Candidates, find_candidates, gap_sigma, walls_at
+from app.review.decisions import Bodies
+from app.review.estimate import NO, UNJUDGED, YES, estimate
+from app.review.picking import gap_at, nearest_candidate
+from app.review.picture import Picture
+from app.review.queue import Queue, frame_queue, sampled_queue
+from app.review.verdicts import Entry, Flag, Origin, Pair, Verdict, VerdictLog, canonical
+from solver.contacts import Contacts, measure_contacts
+
+_KINDS = {Verdict.CONTACT: CONTACT, Verdict.NO_CONTACT: NO_CONTACT, Verdict.UNSURE: UNSURE}
+_OUTCOMES = {Verdict.CONTACT: YES, Verdict.NO_CONTACT: NO, Verdict.UNSURE: UNJUDGED}
+_ESTIMATE_SEED = 7  # the same verdicts give the same interval
+
+
+class BadRequest(ValueError):
+    """The page asked for something that does not exist."""
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """Who asks, and how they work."""
+
+    reviewer: str
+    frame: int  # of the run
+    sampled: bool = False
+    blind: bool = False
+
+
+class ReviewSession:
+    """Frames here count from 0 in the run; the log's frames are those of the experiment."""
+
+    def __init__(
+        self, results: Results, picture: Picture, log: VerdictLog, *, first_frame: int = 0,
+        threshold: float | None = None,
+    ) -> None:  # fmt: skip
+        self.results, self.picture, self.log = results, picture, log
+        self.first_frame = first_frame
+        self.bodies = Bodies.of(results.tracks, results.walls)
+        self._rows = self.bodies.rows()
+        self._threshold = threshold
+        self._candidates: dict[int, Candidates] = {}
+        self._queues: dict[int | None, Queue] = {}
+        self._lock = threading.RLock()
+
+    def opening(self) -> dict[str, Any]:
+        """What the page needs once."""
+        return {
+            "name": self.results.name, "version": __version__, "first_frame": self.first_frame,
+            "frame_count": len(self.results.frames), "photographs": self.picture.photograph is not None,
+            "grain_count": self.results.grains.count,
+        }  # fmt: skip
+
+    def status(self, view: Viewpoint) -> dict[str, Any]:
+        """Progress, the estimate so far, agreement and flags."""
+        self._check(view.frame)
+        queue = self._queue(view)
+        judged = self._judged(view.reviewer)
+        here = [(int(f), int(k)) for f, k in zip(queue.frame, queue.key, strict=True)]
+        flags = [e.flag.value for e in self.log.last_words(view.reviewer) if e.flag and e.on and self._here(e, view)]
+        told: dict[str, Any] = {
+            "judged": sum(pair in judged for pair in here), "total": len(here), "flags": flags,
+            "spoken": len(judged), "torn": self.log.torn,
+        }  # fmt: skip
+        if not view.blind:
+            told["estimate"] = self._estimate(queue, here, judged, None if view.sampled else view.frame)
+            told["agreement"] = self.agreement()
+        return told
+
+    def agreement(self) -> list[dict[str, Any]]:
+        """Cohen's κ between all judges."""
+        detected: dict[Pair, bool] = {}
+        for frame in {pair[0] - self.first_frame for pair, _ in self.log.verdicts()}:
+            if 0 <= frame < len(self.results.frames):
+                found = self.candidates(frame)
+                for i, j, yes in zip(found.contacts.i, found.contacts.j, found.detected, strict=True):
+                    detected[self._pair(frame, int(i), int(j))] = bool(yes)
+        return [_finite(asdict(each)) for each in agreements(self.log, detected)]
+
+    def following(self, view: Viewpoint, after: tuple[int, int] | None = None) -> dict[str, Any] | None:
+        """The next doubtful candidate, None when all are judged."""
+        queue = self._queue(view)
+        place = queue.following(self._judged(view.reviewer), after)
+        if place is None:
+            return None
+        return self.describe(view, int(queue.frame[place]), int(queue.key[place]), Origin.QUEUE)
+
+    def describe(self, view: Viewpoint, frame: int, key: int, origin: Origin) -> dict[str, Any]:
+        """All that the page shows of one pair. In blind mode nothing that tells the detector's answer."""
+        pair = self._measure(frame, key)
+        i, j = int(pair.i[0]), int(pair.j[0])
+        canvas, tracks = self.picture.canvas, self.results.tracks
+        said = self._judged(view.reviewer).get((frame, key))
+        circles = [
+            [*canvas.points(tracks.position[frame, row]).tolist(), float(canvas.lengths(tracks.radius[row]))]
+            for row in (i, j)
+            if row < self.results.grains.count
+        ]
+        wall = None
+        if j >= self.results.grains.count:
+            wall = canvas.points(self.results.walls.endpoints[frame, j - self.results.grains.count]).tolist()
+        told: dict[str, Any] = {
+            "frame": frame, "key": str(key), "a": self.bodies.name(i), "b": self.bodies.name(j),
+            "point": canvas.points(pair.point[0]).tolist(), "circles": circles, "wall": wall,
+            "windows": [asdict(each) for each in self.picture.windows(pair.point[0])],
+            "verdict": said.verdict.value if said is not None and said.verdict is not None else None,
+            "origin": origin.value,
+        }  # fmt: skip
+        if not view.blind:
+            told |= self._measured(frame, key, pair)
+        return told
+
+    def pick(self, view: Viewpoint, x: float, y: float, under: tuple[str, int] | None = None) -> dict[str, Any]:
+        """Answer a click at a pixel of the picture: select a candidate, or add the contact that was missed there.
+
+        under: entity and instance that the viewer reports below the pointer.
+        """
+        self._check(view.frame)
+        canvas = self.picture.canvas
+        point = canvas.scale.to_world(np.array([x, y]) - 0.5)
+        candidates = self.candidates(view.frame)
+        hint = self._row_of(view, candidates, *under) if under is not None else None
+        row = nearest_candidate(candidates, point, float(self.results.grains.radius.mean()), hint)
+        if row is not None:
+            key = int(candidates.key[row])
+            return {"pair": self.describe(view, view.frame, key, Origin.CLICK), "added": False}
+        bodies = gap_at(self.results, view.frame, point)
+        if bodies is None:
+            return {"pair": None, "added": False}
+        key = self.bodies.key(*bodies)
+        if (view.frame, key) in self._judged(view.reviewer):
+            return {"pair": self.describe(view, view.frame, key, Origin.ADDED), "added": False}
+        self.judge(view, view.frame, key, Verdict.CONTACT, 0.0, Origin.ADDED)
+        return {"pair": self.describe(view, view.frame, key, Origin.ADDED), "added": True}
+
+    def named(self, view: Viewpoint, a: str, b: str) -> dict[str, Any]:
+        """Select a pair by the names of its bodies, whether or not it is a candidate."""
+        i, j = (self._rows.get(int(text) if text.lstrip("-").isdigit() else text, self._rows.get(text)) for text in (a, b))
+        present = self.results.tracks.present[self._check(view.frame)]
+        n = self.results.grains.count
+        if i is None or j is None or i == j or min(i, j) >= n:
+            raise BadRequest(f"there is no pair {a} {b}")
+        if not all(row >= n or present[row] for row in (i, j)):
+            raise BadRequest(f"a grain of the pair {a} {b} is lost in this frame")
+        key = self.bodies.key(i, j)
+        known = bool(np.isin(key, self.candidates(view.frame).key))
+        return self.describe(view, view.frame, key, Origin.CLICK if known else Origin.ADDED)
+
+    def judge(
+        self, view: Viewpoint, frame: int, key: int, verdict: Verdict, seconds: float, origin: Origin
+    ) -> dict[str, Any]:
+        """Write a verdict down."""
+        pair = self._measure(frame, key)
+        number, a, b = self._pair(frame, int(pair.i[0]), int(pair.j[0]))
+        entry = self.log.append(
+            Entry(number, view.reviewer, a, b, verdict, seconds=seconds, origin=origin, blind=view.blind)
+        )
+        return {"line": entry.line}
+
+    def flag(self, view: Viewpoint, flag: Flag, on: bool) -> None:
+        self.log.append(Entry(self._check(view.frame) + self.first_frame, view.reviewer, flag=flag, on=on))
+
+    def undo(self, view: Viewpoint) -> dict[str, Any]:
+        """Take the reviewer's last line back, and show the pair it was about."""
+        entry = self.log.undo(view.reviewer)
+        if entry is None:
+            return {"undone": None, "pair": None}
+        frame = entry.frame - self.first_frame
+        if entry.pair is None:
+            return {"undone": entry.flag.value if entry.flag else None, "pair": None, "frame": frame}
+        i, j = (self._rows.get(each) for each in entry.pair[1:])
+        if i is None or j is None or not 0 <= frame < len(self.results.frames):
+            return {"undone": str(entry.verdict), "pair": None}
+        pair = self.describe(view, frame, self.bodies.key(i, j), entry.origin)
+        return {"undone": str(entry.verdict), "pair": pair, "frame": frame}
+
+    def marks(self, view: Viewpoint, chosen: int | None) -> bytes:
+        """The frame's candidates and this reviewer's verdicts, for the viewer."""
+        found = self.candidates(self._check(view.frame))
+        said = {key: entry for (frame, key), entry in self._judged(view.reviewer).items() if frame == view.frame}
+        extra = [key for key in sorted(set(said) - set(found.key.tolist())) if self._can_be_seen(view.frame, key)]
+        contacts, more = found.contacts, self._measure_all(view.frame, extra)
+        kind = np.where(found.detected, DETECTED, UNDETECTED) if not view.blind else np.full(found.count, HIDDEN)
+        kind = np.concatenate([kind, np.zeros(len(extra), np.int64)])
+        keys = [*found.key.tolist(), *extra]
+        for row, key in enumerate(keys):
+            verdict = said[key].verdict if key in said else None
+            if verdict is not None:
+                kind[row] = _KINDS[verdict]
+        point = np.concatenate([contacts.point, more.point])
+        normal = np.concatenate([contacts.normal, more.normal])
+        pair, at = None, None
+        if chosen is not None:
+            one = self._measure(view.frame, chosen)
+            pair, at = (int(one.i[0]), int(one.j[0])), one.point[0]
+        return self.picture.marks(Marked(point, normal, kind), pair, view.frame, at)
+
+    def point_of(self, frame: int, key: int) -> np.ndarray:
+        """Contact point of a pair (2,) [m]."""
+        return self._measure(frame, key).point[0]
+
+    def candidates(self, frame: int) -> Candidates:
+        with self._lock:
+            if frame not in self._candidates:
+                self._candidates[frame] = find_candidates(self.results, frame, self._threshold)
+            return self._candidates[frame]
+
+    def _queue(self, view: Viewpoint) -> Queue:
+        which = None if view.sampled else self._check(view.frame)
+        with self._lock:
+            if which not in self._queues:
+                every = [self.candidates(k) for k in range(len(self.results.frames))] if which is None else []
+                self._queues[which] = sampled_queue(every) if which is None else frame_queue(self.candidates(which))
+            return self._queues[which]
+
+    def _judged(self, reviewer: str) -> dict[tuple[int, int], Entry]:
+        """The reviewer's last word on every pair of the run, by frame and key."""
+        found = {}
+        for (number, a, b), entry in self.log.verdicts(reviewer):
+            frame, i, j = number - self.first_frame, self._rows.get(a), self._rows.get(b)
+            if i is not None and j is not None and 0 <= frame < len(self.results.frames):
+                found[(frame, self.bodies.key(i, j))] = entry
+        return found
+
+    def _row_of(self, view: Viewpoint, candidates: Candidates, entity: str, instance: int) -> int | None:
+        """The candidate that an instance of the picture stands for."""
+        if entity not in (CANDIDATES, MARKS):
+            return None
+        said = {key for frame, key in self._judged(view.reviewer) if frame == view.frame}
+        judged = np.isin(candidates.key, sorted(said))
+        rows = np.flatnonzero(judged if entity == MARKS else ~judged)
+        return int(rows[instance]) if 0 <= instance < len(rows) else None
+
+    def _estimate(
+        self, queue: Queue, pairs: list[tuple[int, int]], judged: dict[tuple[int, int], Entry], frame: int | None
+    ) -> dict[str, Any]:
+        outcome = np.full(queue.count, UNJUDGED)
+        chosen = np.zeros(queue.count, np.bool_)
+        for place, pair in enumerate(pairs):
+            entry = judged.get(pair)
+            if entry is not None and entry.verdict is not None:
+                outcome[place] = _OUTCOMES[entry.verdict]
+                chosen[place] = entry.origin is Origin.QUEUE
+        known = set(pairs)
+        missed = sum(
+            entry.verdict is Verdict.CONTACT and pair not in known and (frame is None or pair[0] == frame)
+            for pair, entry in judged.items()
+        )
+        rng = np.random.default_rng(_ESTIMATE_SEED)
+        return asdict(estimate(queue.stratum, queue.detected, outcome, chosen, missed, rng))
+
+    def _measured(self, frame: int, key: int, pair: Contacts) -> dict[str, Any]:
+        candidates = self.candidates(frame)
+        row = np.flatnonzero(candidates.key == key)
+        deviation = float(self.results.tracks.position_sigma[frame])
+        return _finite({
+            "gap_um": 1e6 * float(pair.gap[0]),
+            "sigma_um": 1e6 * float(gap_sigma(pair, deviation)[0]),
+            "threshold_um": 1e6 * candidates.threshold,
+            "detected": bool(candidates.detected[row[0]]) if len(row) else False,
+            "probability": float(candidates.probability[row[0]]) if len(row) else None,
+        })  # fmt: skip
+
+    def _measure(self, frame: int, key: int) -> Contacts:
+        n, w = self.results.grains.count, self.results.walls.count
+        i, j = divmod(key, n + w)
+        self._check(frame)
+        if not 0 <= i < min(j, n) or not self._can_be_seen(frame, key):
+            raise BadRequest(f"there is no pair {key} in frame {frame}")
+        return self._measure_all(frame, [key])
+
+    def _can_be_seen(self, frame: int, key: int) -> bool:
+        """Whether both bodies have a pose in the frame."""
+        n = self.results.grains.count
+        here = self.results.tracks.present[frame]
+        return all(row >= n or bool(here[row]) for row in divmod(key, self.bodies.count))
+
+    def _measure_all(self, frame: int, keys: list[int]) -> Contacts:
+        key = np.array(keys, np.int64)
+        bodies = self.bodies.count
+        position = self.results.tracks.position[frame]
+        return measure_contacts(
+            self.results.grains, position, walls_at(self.results, frame), key // bodies, key % bodies
+        )
+
+    def _pair(self, frame: int, i: int, j: int) -> Pair:
+        a = self.bodies.name(i)
+        assert isinstance(a, int)
+        return canonical((frame + self.first_frame, a, self.bodies.name(j)))
+
+    def _here(self, entry: Entry, view: Viewpoint) -> bool:
+        return entry.frame == view.frame + self.first_frame
+
+    def _check(self, frame: int) -> int:
+        if not 0 <= frame < len(self.results.frames):
+            raise BadRequest(f"there is no frame {frame}")
+        return frame
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    """JSON has no NaN."""
+    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in values.items()}

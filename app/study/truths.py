@@ -1,0 +1,97 @@
+"""Simulated truths for studies: simulated once, kept in a folder, observed with noise."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.atomic import replacing
+from app.progress import Progress, silent
+from app.synthetic.packing import prepare_packing
+from solver.agreement import Agreement, compare_forces
+from solver.chain import Packing
+from solver.dem import DemSettings, DemTruth, shear_photographs
+from solver.frame_forces import FrameForces
+from solver.grains import Array, Grains
+from solver.motion import Snapshot
+from solver.problem import Material
+
+STEP = 0.25  # [°] of shear between photographs
+TURN = 15.0  # [°] at which the shear turns back
+INTERVAL = 52.0  # [s] between photographs at the real test's rate
+FINEST = 1e-6  # [m] precision claimed of exact positions
+
+
+def simulate(seed: int, *, grains: int, folder: Path, turn: float = TURN, progress: Progress = silent) -> DemTruth:
+    """One loading cycle of a packing, a photograph every 0.25° (f = 2 turn / 0.25 + 1); from the folder if there."""
+    file = folder / f"truth_{grains}_{turn:g}_{seed}.npz"
+    settings = DemSettings()
+    if file.exists():
+        with np.load(file) as kept:
+            values = {each.name: kept[each.name] for each in fields(DemTruth) if each.name in kept}
+        values["wall_names"] = tuple(str(name) for name in values["wall_names"])
+        return DemTruth(**values, settings=settings)
+    up = np.arange(round(turn / STEP) + 1)
+    angles = np.deg2rad(STEP) * np.concatenate([up, up[-2::-1]])
+    cell = prepare_packing(grains, np.random.default_rng(seed), settings)
+    frames = []
+    for frame in shear_photographs(cell, angles):
+        frames.append(frame)
+        progress(f"truth {seed}", len(frames), len(angles))
+    truth = DemTruth.of_frames(cell.grains.radius, frames, settings)
+    arrays = {each.name: getattr(truth, each.name) for each in fields(DemTruth) if each.name != "settings"}
+    with replacing(file) as part, part.open("wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
+    return truth
+
+
+def packing_of(truth: DemTruth, *, loaded: bool = True, friction: float | None = None) -> Packing:
+    """The mechanics of a truth. loaded: the top is a plate under pressure; otherwise its measured motion is imposed."""
+    settings = truth.settings
+    pressure = np.full(len(truth.wall_names), np.nan)
+    if loaded:
+        pressure[truth.wall_names.index("top")] = settings.pressure
+    mu = settings.friction if friction is None else friction
+    grains = Grains.of_rods(truth.radius, density=settings.density, length=settings.length)
+    return Packing(grains, settings.length, Material(mu, mu), pressure)
+
+
+def observe(truth: DemTruth, frames: range, noise: float, rng: np.random.Generator) -> list[Snapshot]:
+    """Photographs of a truth, tracked with Gaussian noise [m] on positions and noise / R [rad] on rotations."""
+    n = len(truth.radius)
+    return [
+        Snapshot(
+            INTERVAL * k,
+            truth.position[k] + noise * rng.standard_normal((n, 2)),
+            truth.rotation[k] + noise / truth.radius * rng.standard_normal(n),
+            np.ones(n, np.bool_),
+            truth.endpoints[k],
+            max(noise, FINEST),
+        )
+        for k in frames
+    ]
+
+
+def true_forces(truth: DemTruth, frame: int) -> tuple[NDArray[np.int64], Array]:
+    """Keys (t,) and forces (t, 2) [N] of one frame's true contacts."""
+    rows = slice(truth.offset[frame], truth.offset[frame + 1])
+    bodies = len(truth.radius) + len(truth.wall_names)
+    key = truth.i[rows].astype(np.int64) * bodies + truth.j[rows]
+    return key, np.column_stack([truth.fn[rows], truth.ft[rows]])
+
+
+def agreement_of(forces: FrameForces, truth: DemTruth, frame: int) -> Agreement:
+    """Agreement of inferred forces with the truth's photograph `frame`."""
+    return compare_forces(forces.contacts.key, np.column_stack([forces.fn, forces.ft]), *true_forces(truth, frame))
+
+
+def starts_of(truth: DemTruth, length: int) -> tuple[int, ...]:
+    """First photographs of two windows of `length`: one on the way up, one on the way back."""
+    turn = truth.position.shape[0] // 2
+    up = max(1, turn // 4)
+    if up + length > turn or turn + up + length > len(truth.position):
+        raise ValueError(f"windows of {length} photographs do not fit into {len(truth.position)}")
+    return up, turn + up
