@@ -194,7 +194,45 @@ def study(
     return commands.study(subject, seeds=seeds, grains=grains, estimator=estimator, folder=out, quiet=quiet)
 
 
-COMMANDS: tuple[Callable[..., int], ...] = (run, check, track, solve, record, view, score, synth, study)
+def share(
+    source: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING_OR_DIR")] = None,
+    /,
+    frames: Frames = None,
+    scale: Annotated[float, tyro.conf.arg(help="of photographs, 0.5: half as wide and high")] = 1.0,
+    html: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="one page with the viewer in it")] = False,
+    repair: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="mend a damaged recording instead")] = None,
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="FILE", help="what to write; default: beside the recording")
+    ] = None,
+) -> int:
+    """Make a small recording to send, or one HTML file that any browser opens.
+
+    Example: rodsight share runs/shear --frames 0:12 --scale 0.5 --html
+    """
+    from app import sharing
+
+    return sharing.share(
+        source, frames=frames, scale=scale, page=html, damaged=repair, out=out, console=Console(soft_wrap=True)
+    )
+
+
+def compare(
+    first: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="A", help="folder of a run, or results.h5")],
+    second: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="B")] = None,
+    /,
+    truth: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="compare A with its truth")] = False,
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="the recording; default compare-A-B.rrd")] = None,
+) -> int:
+    """Show two results side by side with their difference.
+
+    Example: rodsight compare runs/shear runs/shear-nlgs --out compare.rrd
+    """
+    from app import comparing
+
+    return comparing.compare(first, second, truth=truth, out=out, console=Console(soft_wrap=True))
+
+
+COMMANDS: tuple[Callable[..., int], ...] = (run, check, track, solve, record, view, score, synth, study, share, compare)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from app.errors import InputError
 
@@ -19,15 +19,83 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
 
+def _pixel_size(value: Any) -> Any:
+    """One side or both, in one line of complaint: a union's own would name its branches."""
+    sides = value if isinstance(value, list | tuple) else [value]
+    numbers = all(isinstance(side, int | float) and not isinstance(side, bool) for side in sides)
+    if len(sides) not in (1, 2) or not numbers or not all(0 < side < float("inf") for side in sides):
+        raise ValueError(f"value {value!r}: must be a positive number [m], or [along rows, along columns]")
+    return tuple(float(side) for side in sides) if isinstance(value, list | tuple) else float(value)
+
+
+class LensSection(Section):
+    """How the lens bends the picture: OpenCV's model, or Brown's with capital letters as p-tracker writes it."""
+
+    fx: Positive | None = None  # [px]
+    fy: Positive | None = None  # [px]; absent: fx
+    cx: Finite | None = None  # [px]
+    cy: Finite | None = None  # [px]
+    k1: Finite = 0.0
+    k2: Finite = 0.0
+    p1: Finite = 0.0
+    p2: Finite = 0.0
+    k3: Finite = 0.0
+    xc: Finite | None = None  # [px]
+    yc: Finite | None = None  # [px]
+    K1: Finite = 0.0  # [1/px²]
+    K2: Finite = 0.0  # [1/px⁴]
+    K3: Finite = 0.0  # [1/px⁶]
+    P1: Finite = 0.0  # [1/px]
+    P2: Finite = 0.0  # [1/px]
+    P3: Finite = 0.0  # [1/px²]
+
+    @model_validator(mode="after")
+    def _one_model(self) -> LensSection:
+        opencv = [key for key in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3") if getattr(self, key)]
+        brown = [key for key in ("xc", "yc", "K1", "K2", "K3", "P1", "P2", "P3") if getattr(self, key)]
+        if opencv and brown:
+            raise ValueError(f"{opencv[0]} belongs to OpenCV's model and {brown[0]} to Brown's: give one of them")
+        needed = ("xc", "yc") if brown else ("fx", "cx", "cy")
+        for key in needed:
+            if getattr(self, key) is None:
+                raise ValueError(f"{key} is missing: OpenCV's model needs fx, cx, cy, Brown's xc, yc, all in pixels")
+        return self
+
+
+class KnownDistance(Section):
+    """Two points of the first photograph whose distance was measured, instead of pixel_size."""
+
+    start: tuple[Finite, Finite]  # [px] column, row
+    end: tuple[Finite, Finite]  # [px]
+    metres: Positive
+
+    @model_validator(mode="after")
+    def _apart(self) -> KnownDistance:
+        if self.start == self.end:
+            raise ValueError(f"value {list(self.start)!r}: start and end are the same point")
+        return self
+
+
 class Photographs(Section):
     """Where the photographs are and what a pixel is."""
 
     files: str  # pattern, relative to the experiment
-    pixel_size: Positive  # [m]
+    pixel_size: Annotated[float | tuple[float, float] | None, BeforeValidator(_pixel_size)] = None  # [m], [m, m]
+    distance: KnownDistance | None = None  # instead of pixel_size
+    lens: LensSection | None = None  # absent: the picture is straight
     interval: Positive | None = None  # [s] between photographs
     times: str | None = None  # table frame,time
     grains: str | None = None  # table id,x,y,radius in pixels on the first photograph
     radii: tuple[Positive, ...] = ()  # [m] known radius classes
+    corrections: str | None = None  # table frame,id,x,y,theta: poses told by hand [px, px, rad], or lost
+
+    @model_validator(mode="after")
+    def _one_scale(self) -> Photographs:
+        if self.pixel_size is None and self.distance is None:
+            raise ValueError("pixel_size is missing: give it or distance = {start, end, metres}")
+        if self.pixel_size is not None and self.distance is not None:
+            raise ValueError("give either pixel_size or distance")
+        return self
 
     @model_validator(mode="after")
     def _one_clock(self) -> Photographs:
@@ -53,6 +121,8 @@ class Plate(Section):
 
 class WallsSection(Section):
     file: str  # table frame,wall,x1,y1,x2,y2
+    track: bool | None = None  # follow walls in the photographs where the table has no row; absent: where it has none
+    thickness: Positive | None = None  # [m] of the bars seen beside their inner faces; absent: measured on the picture
     plates: dict[str, Plate] = {}
 
     @model_validator(mode="before")
@@ -80,6 +150,14 @@ class TrackingSection(Section):
     """Tuning of the tracker."""
 
     workers: Annotated[int, Field(ge=1)] = 2
+    radius_range: tuple[Positive, Positive] = (8.0, 60.0)  # [px] of grains looked for when radii are not known
+    search_window: Positive = 60.0  # [px] half width of the widest search for a grain that has jumped
+
+    @model_validator(mode="after")
+    def _ascending(self) -> TrackingSection:
+        if not 3.0 < self.radius_range[0] < self.radius_range[1]:
+            raise ValueError(f"radius_range value {list(self.radius_range)!r}: must ascend and exceed 3 px")
+        return self
 
 
 class CalibrationSection(Section):

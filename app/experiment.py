@@ -55,7 +55,7 @@ class Experiment:
         config = self.config
         names = [config.truth, config.truth_tracks]
         if config.photographs:
-            names += [config.photographs.times, config.photographs.grains]
+            names += [config.photographs.times, config.photographs.grains, config.photographs.corrections]
         if config.tracks:
             names += [config.tracks.positions, config.tracks.grains, config.tracks.times]
         if config.walls:
@@ -121,7 +121,7 @@ def read_tracks(experiment: Experiment) -> Tracks:
     frame, of = table.integers("frame"), table.integers("id")
     check_unique(table, "id", frame, of)
     frame_count = check_frames(table, frame)
-    row = _rows_of(table, "id", of, ids)
+    row = rows_of(table, "id", of, ids)
     shape = (frame_count, len(ids))
     position, rotation = np.full((*shape, 2), np.nan), np.full(shape, np.nan)
     position[frame, row] = np.column_stack([table.numbers("x"), table.numbers("y")])
@@ -152,7 +152,11 @@ def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
 
 
 def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
-    """The walls in every frame; None where the experiment has none."""
+    """The walls in every frame; None where the experiment has none.
+
+    Endpoints are NaN where they are to be followed in the photographs: with `walls.track`, wherever the table has no
+    row; without it, where the table ends with frame 0.
+    """
     section = experiment.config.walls
     if section is None:
         return None
@@ -161,14 +165,19 @@ def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
     names = tuple(dict.fromkeys(name))
     row = np.array([names.index(each) for each in name])
     check_unique(table, "wall", frame, row)
-    found = check_frames(table, frame)
-    if found != frame_count:
+    track = section.track
+    found = int(frame.max()) + 1 if track and frame.min() == 0 else check_frames(table, frame)
+    if track and experiment.config.photographs is None:
+        raise InputError(experiment.file, "key walls.track = true", "walls can be followed in photographs only")
+    if track is None:
+        track = experiment.config.photographs is not None and found == 1
+    if found > frame_count or (found < frame_count and not track):
         raise InputError(table.file, "frame", f"there are walls of {found} frames, but {frame_count} frames")
     for unknown in section.plates.keys() - set(names):
         raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {section.file}")
     endpoints = np.full((frame_count, len(names), 2, 2), np.nan)
     endpoints[frame, row] = np.column_stack([table.numbers(c) for c in ("x1", "y1", "x2", "y2")]).reshape(-1, 2, 2)
-    absent = np.argwhere(np.isnan(endpoints[:, :, 0, 0]))
+    absent = np.argwhere(np.isnan(endpoints[: 1 if track else None, :, 0, 0]))
     if len(absent):
         raise InputError(table.file, f"frame {absent[0][0]}", f"has no row of wall {names[absent[0][1]]!r}")
     point = np.flatnonzero(np.all(endpoints[frame, row, 0] == endpoints[frame, row, 1], axis=1))
@@ -216,7 +225,7 @@ def _all_positive(table: Table, column: str, values: Array) -> None:
         raise table.error(int(bad[0]), column, "is not positive")
 
 
-def _rows_of(table: Table, column: str, of: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
+def rows_of(table: Table, column: str, of: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
     order = np.argsort(ids)
     place = np.minimum(np.searchsorted(ids[order], of), len(ids) - 1)
     unknown = np.flatnonzero(ids[order[place]] != of)

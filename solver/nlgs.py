@@ -13,9 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver.acceleration import PERIOD, Acceleration
 from solver.grains import Array
-from solver.nlgs_kernels import advance, advance_and_measure, apply_forces, measure_forces, measure_natural_map, measure_unbalance
-from solver.problem import ContactProblem
+from solver.nlgs_kernels import (
+    advance,
+    advance_and_measure,
+    apply_forces,
+    measure_forces,
+    measure_natural_map,
+    measure_state,
+    measure_unbalance,
+)
+from solver.problem import ContactProblem, aligned_zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +33,15 @@ class NlgsSettings:
     force_change: float | None = None  # stop at the paper's ε_f
     natural_map: float | None = None  # stop at this relative residual
     relaxation: float = 1.0  # above 1 selects another solution
+    acceleration: int = 0  # Anderson's window, 5 does well; for static loads alone; 0: plain sweeps
 
     def __post_init__(self) -> None:
         if self.sweeps < 0:
             raise ValueError("the number of sweeps cannot be negative")
         if not 0.0 < self.relaxation < 2.0:
             raise ValueError("the relaxation lies between 0 and 2")
+        if self.acceleration < 0:
+            raise ValueError("the window of the acceleration cannot be negative")
 
 
 class Stop(Enum):
@@ -72,13 +84,27 @@ def sweeps(
 ) -> Iterator[Sweep]:
     """Advance `every` sweeps at a time from a guess, without end.
 
-    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent.
+    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent. With acceleration the forces
+    take a step every PERIOD sweeps, heard or not.
     """
     force, body, plate = _start(problem, guess)
     before, number = np.empty_like(force), 0
+    if settings.acceleration == 0:
+        while True:
+            residuals = advance_and_measure(problem, body, plate, force, before, every, settings.relaxation)
+            number += every
+            yield Sweep(number, force, *residuals)
+    acceleration = Acceleration(problem, force, settings.acceleration)
     while True:
-        residuals = advance_and_measure(problem, body, plate, force, before, every, settings.relaxation)
-        number += every
+        heard = number + every
+        while number < heard:
+            if number % PERIOD == 0 and number > 0:
+                acceleration.step(body, plate, force)
+            count = min(heard, number - number % PERIOD + PERIOD) - number
+            residuals = advance_and_measure(problem, body, plate, force, before, count, settings.relaxation)
+            number += count
+            if number % PERIOD == 0 and acceleration.settle(body, plate, force):
+                residuals = (residuals[0], *measure_state(problem, body, plate, force))
         yield Sweep(number, force, *residuals)
 
 
@@ -96,8 +122,8 @@ def solve(
     """
     if len(problem.rows) == 0:
         return Solution(np.empty(0), np.empty(0), Stop.EMPTY, 0, 0.0, 0.0, 0.0)
-    listening = observer is not None or settings.natural_map is not None or settings.force_change is not None
-    if not listening:
+    stopping = settings.natural_map is not None or settings.force_change is not None
+    if observer is None and not stopping and settings.acceleration == 0:
         force, body, plate = _start(problem, guess)
         advance(problem, body, plate, force, settings.sweeps, settings.relaxation)
         return _finish(problem, force, Stop.SWEEPS, settings.sweeps)
@@ -133,8 +159,10 @@ def to_contact_order(problem: ContactProblem, force: Array) -> Array:
 
 
 def _start(problem: ContactProblem, guess: Array | None) -> tuple[Array, Array, Array]:
-    force = np.zeros((len(problem.rows), 2)) if guess is None else np.ascontiguousarray(guess[problem.rows])
-    body, plate = np.empty_like(problem.body), np.empty_like(problem.plate)
+    force, body = aligned_zeros((len(problem.rows), 2)), aligned_zeros(problem.body.shape)
+    if guess is not None:
+        force[:] = guess[problem.rows]
+    plate = np.empty_like(problem.plate)
     apply_forces(problem, body, plate, force)
     return force, body, plate
 

@@ -69,7 +69,7 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, flat_force = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = _workspace(6 * L)
+    work = workspace(6 * L)
     # Numbers are moved as integers, of which the processor stores two at a time.
     store, source = work.view(np.int64), flat.view(np.int64)
     for _ in range(sweeps):
@@ -82,7 +82,7 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
 
 
 @njit(inline="always")
-def _workspace(size):  # type: ignore[no-untyped-def]
+def workspace(size):  # type: ignore[no-untyped-def]
     """Room for `size` numbers on the bounds of a cache line: made here, so that the compiler knows it overlaps nothing."""
     room = np.empty(size + 8)
     start = (-(room.ctypes.data >> 3)) & 7
@@ -177,6 +177,14 @@ def advance_and_measure(problem, body, plate, force, before, sweeps, relaxation)
 
 
 @njit(cache=True, error_model="numpy")
+def measure_state(problem, body, plate, force):  # type: ignore[no-untyped-def]
+    """Natural-map residual, and the worst unbalance over the mean f_n."""
+    _, norm, mean = measure_forces(force, force)
+    worst, _ = measure_unbalance(problem, body)
+    return measure_natural_map(problem, body, plate, force, norm), worst / mean if mean > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def measure_forces(force, before):  # type: ignore[no-untyped-def]
     """Greatest relative change, Euclidean norm [N], and mean f_n of bearing contacts [N].
 
@@ -184,7 +192,7 @@ def measure_forces(force, before):  # type: ignore[no-untyped-def]
     counts as 1.
     """
     f, old, count = force.reshape(force.size), before.reshape(before.size), len(force)
-    work = _workspace(5 * L)  # squares, f_n, bearing, and the greatest change as a fraction: one of each per lane
+    work = workspace(5 * L)  # squares, f_n, bearing, and the greatest change as a fraction: one of each per lane
     work[: 4 * L] = 0.0
     work[4 * L :] = 1.0
     for block in range((count + L - 1) // L):
@@ -222,7 +230,7 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, f = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = _workspace(4 * L)  # relative velocities, and the sum of squares per lane
+    work = workspace(4 * L)  # relative velocities, and the sum of squares per lane
     work[:] = 0.0
     for block in range(problem.grouped // L):
         p, e = block * PAIR, block * IDS
@@ -270,7 +278,7 @@ def measure_unbalance(problem, body):  # type: ignore[no-untyped-def]
     """Worst and mean |ΣF| [N] on a grain, from what the forces have added to its velocity."""
     now, free, external = body.reshape(body.size), problem.body.reshape(body.size), problem.external.reshape(problem.external.size)
     count = len(body)
-    work = _workspace(3 * L)  # worst, sum and number of grains: one of each per lane
+    work = workspace(3 * L)  # worst, sum and number of grains: one of each per lane
     work[:] = 0.0
     for block in range((count + L - 1) // L):
         first, second = block * (4 * L), block * (2 * L)

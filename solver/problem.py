@@ -21,6 +21,7 @@ from solver.grains import Array, GrainMotion, Grains
 from solver.ordering import GROUP, WALL_GROUP, visiting_order
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
+CACHE_LINE = 64  # bytes
 
 
 class ContactProblem(NamedTuple):
@@ -149,10 +150,20 @@ def assemble(
     )
 
 
+def aligned_zeros(shape: tuple[int, ...], kind: type = np.float64) -> NDArray:
+    """Zeros on the bounds of a cache line, which no vector then straddles."""
+    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    room = np.zeros(size + CACHE_LINE, np.uint8)
+    start = -room.ctypes.data % CACHE_LINE
+    return room[start : start + size].view(kind).reshape(shape)
+
+
 def _blocks(record: NDArray) -> NDArray:
     """Records (p, k) in blocks (ceil(p / GROUP), k, GROUP), the last one filled up with zeros."""
     count, width = record.shape
     blocks = -(-count // GROUP)
     padded = np.zeros((blocks * GROUP, width), record.dtype)
     padded[:count] = record
-    return np.ascontiguousarray(padded.reshape(blocks, GROUP, width).transpose(0, 2, 1))
+    result = aligned_zeros((blocks, width, GROUP), record.dtype.type)
+    result[:] = padded.reshape(blocks, GROUP, width).transpose(0, 2, 1)
+    return result

@@ -77,13 +77,13 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT) -> rrb.Bluep
 def _experiment(layout: Layout) -> rrb.Container:
     photograph = [entities.PHOTOGRAPH] if layout.photographs else []
     return rrb.Horizontal(
-        _packing_view("Force network", layout, [*photograph, *_PACKING, *_FORCES]),
+        packing_view("Force network", layout.canvas, [*photograph, *_PACKING, *_FORCES]),
         rrb.Vertical(
             _lanes(),
-            _curves(
+            curve_view(
                 "Friction angle [°]", [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE], corner=rrb.Corner2D.LeftTop
             ),
-            _curves("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=(0.0, 1.05), corner=_LOW),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=(0.0, 1.05), corner=_LOW),
             _flags(),
             row_shares=[1.1, 2.0, 2.0, 1.5],
         ),
@@ -95,22 +95,22 @@ def _experiment(layout: Layout) -> rrb.Container:
 def _convergence(layout: Layout) -> rrb.Container:
     near = max(layout.sweeps_per_frame, 1)
     return rrb.Horizontal(
-        _packing_view(
-            "Network as it forms; the last row of a frame is the reported field", layout, [*_PACKING, *_FORCES]
+        packing_view(
+            "Network as it forms; the last row of a frame is the reported field", layout.canvas, [*_PACKING, *_FORCES]
         ),
-        _packing_view(
+        packing_view(
             "Not converged: grains by unbalance, contacts by change",
-            layout,
+            layout.canvas,
             [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"],
         ),
         rrb.Vertical(
-            _curves(
+            curve_view(
                 "log₁₀ residuals, every sweep (choose the timeline: sweep)",
                 [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE, entities.TOLERANCE],
                 near=near,
             ),
-            _curves("log₁₀ residuals reached per frame", [entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]),
-            _curves("Sweeps per frame", [entities.SWEEP_COUNT]),
+            curve_view("log₁₀ residuals reached per frame", [entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]),
+            curve_view("Sweeps per frame", [entities.SWEEP_COUNT]),
             row_shares=[2.2, 1.2, 1.0],
         ),
         column_shares=[1.0, 1.0, 0.95],
@@ -122,10 +122,10 @@ def _settling() -> rrb.Container:
     return rrb.Vertical(
         _lanes(),
         rrb.Horizontal(
-            _curves("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=(0.0, 1.05), corner=_LOW),
-            _curves("Correction ε and old unbalance ū", [entities.CORRECTION, entities.OLD_UNBALANCE]),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=(0.0, 1.05), corner=_LOW),
+            curve_view("Correction ε and old unbalance ū", [entities.CORRECTION, entities.OLD_UNBALANCE]),
         ),
-        rrb.Horizontal(_curves("Frames since reset", [entities.FRAMES_SINCE_RESET]), _flags()),
+        rrb.Horizontal(curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET]), _flags()),
         row_shares=[1.0, 2.4, 1.6],
         name=Tab.SETTLING,
     )
@@ -147,17 +147,17 @@ def _statistics() -> rrb.Container:
             column_shares=[1.5, 1.0, 1.0],
         ),
         rrb.Horizontal(
-            _curves(
+            curve_view(
                 "Coordination number",
                 [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS],
             ),
-            _curves(
+            curve_view(
                 "Friction angle [°]",
                 [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE, entities.ANISOTROPY_ANGLE],
                 corner=_HIGH,
             ),
-            _curves("Stress [kPa]", [entities.SIGMA_1, entities.PRESSURE, entities.SIGMA_2]),
-            _curves(
+            curve_view("Stress [kPa]", [entities.SIGMA_1, entities.PRESSURE, entities.SIGMA_2]),
+            curve_view(
                 "Anisotropies",
                 [
                     entities.CONTACT_ANISOTROPY, entities.BRANCH_ANISOTROPY, entities.NORMAL_FORCE_ANISOTROPY,
@@ -166,17 +166,17 @@ def _statistics() -> rrb.Container:
             ),
         ),
         rrb.Horizontal(
-            _curves("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
-            _curves("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
-            _curves(
+            curve_view("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
+            curve_view("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
+            curve_view(
                 "Strong network and force chains",
                 [
                     entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE,
                     entities.CHAIN_GRAIN_SHARE,
                 ],
             ),
-            _curves("Normal forces on the walls [N]", [entities.WALL_NORMAL_FORCE], legend=True),
-            _curves("… along the walls [N]", [entities.WALL_TANGENTIAL_FORCE], legend=True),
+            curve_view("Normal forces on the walls [N]", [entities.WALL_NORMAL_FORCE], legend=True),
+            curve_view("… along the walls [N]", [entities.WALL_TANGENTIAL_FORCE], legend=True),
         ),
         row_shares=[1.5, 1.0, 1.0],
         name=Tab.STATISTICS,
@@ -186,16 +186,16 @@ def _statistics() -> rrb.Container:
 def _contacts(layout: Layout) -> rrb.Container:
     shown = [*_PACKING, entities.GAPS, entities.GAINED, entities.PARTED, f"{entities.GAP_LEGEND}/**"]
     return rrb.Horizontal(
-        _packing_view("Gaps; gained green, lost red", layout, shown),
-        _packing_view(
+        packing_view("Gaps; gained green, lost red", layout.canvas, shown),
+        packing_view(
             "Probability that they touch",
-            layout,
+            layout.canvas,
             [entities.WALLS, entities.GRAINS, entities.PROBABILITY, f"{entities.PROBABILITY_LEGEND}/**"],
         ),
         rrb.Vertical(
-            _curves("Contacts", [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]),
-            _curves("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
-            _curves("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
+            curve_view("Contacts", [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]),
+            curve_view("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
+            curve_view("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
         ),
         column_shares=[1.0, 1.0, 0.8],
         name=Tab.CONTACTS,
@@ -233,12 +233,12 @@ def _truth(layout: Layout) -> rrb.Container:
     )
     return rrb.Vertical(
         rrb.Horizontal(
-            _packing_view("Inferred", layout, [*_PACKING, *_FORCES]),
-            _packing_view("True", layout, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]),
+            packing_view("Inferred", layout.canvas, [*_PACKING, *_FORCES]),
+            packing_view("True", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]),
         ),
         rrb.Horizontal(
             scatter,
-            _curves(
+            curve_view(
                 "Correlation, error", [entities.TRUTH_R_FN, entities.TRUTH_R_FT, entities.TRUTH_ERROR],
                 y_range=(0.0, 1.05), corner=_LOW,
             ),
@@ -248,8 +248,8 @@ def _truth(layout: Layout) -> rrb.Container:
     )  # fmt: skip
 
 
-def _packing_view(name: str, layout: Layout, contents: list[str]) -> rrb.View:
-    canvas = layout.canvas
+def packing_view(name: str, canvas: Canvas, contents: list[str]) -> rrb.View:
+    """A view of the packing, with room for a legend below it."""
     return rrb.Spatial2DView(
         origin="/",
         contents=contents,
@@ -283,7 +283,7 @@ def _flags() -> rrb.View:
     return rrb.TextLogView(origin=entities.FLAGS, name="Flags", columns=columns)
 
 
-def _curves(
+def curve_view(
     name: str,
     contents: list[str],
     *,

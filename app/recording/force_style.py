@@ -40,7 +40,12 @@ class ForceRange:
     @classmethod
     def of(cls, frames: Sequence[FrameForces]) -> ForceRange:
         """The range of a finished run; 1 N where it has no force at all."""
-        fn = np.concatenate([np.empty(0), *(frame.fn for frame in frames)])
+        return cls.of_forces([frame.fn for frame in frames])
+
+    @classmethod
+    def of_forces(cls, forces: Sequence[Array]) -> ForceRange:
+        """The range of all these forces [N]; 1 N where there is none."""
+        fn = np.concatenate([np.empty(0), *forces])
         fn = fn[np.isfinite(fn) & (fn > 0.0)]
         if len(fn) == 0:
             return cls(1.0, 4.0)

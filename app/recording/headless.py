@@ -198,8 +198,7 @@ class HeadlessViewer:
         raise NoPictureError(f"{self.recording} has no tabs")
 
     def _name(self, item: str) -> str:
-        parts = self._running().get_blueprint().blueprint[f"/{item}"]
-        return next(iter(parts.values())).get("display_name", "") if len(parts) == 1 else _display_name(parts)
+        return _display_name(self._running().get_blueprint().blueprint[_path(item)])
 
     def _view_id(self, name: str) -> str:
         found = [view for view in self._running().get_state().views if view.name == name]
@@ -207,7 +206,7 @@ class HeadlessViewer:
             raise NoPictureError(f"{self.recording} has no view {name!r}; there are {', '.join(self.views)}")
         if len(found) > 1 and self._tab is not None:
             inside = self._views_of_tab(self._tab)
-            found = [view for view in found if f"view/{view.view_id}" in inside] or found
+            found = [view for view in found if str(view.view_id) in inside] or found
         return str(found[0].view_id)
 
     def _views_of_tab(self, tab: str) -> set[str]:
@@ -216,11 +215,16 @@ class HeadlessViewer:
         views: set[str] = set()
         while todo:
             item = todo.pop()
-            if item.startswith("view/"):
-                views.add(item)
+            if _path(item).startswith("/view/"):
+                views.add(_path(item).removeprefix("/view/"))
             else:
-                todo += blueprint[f"/{item}"]["ContainerBlueprint"]["contents"]
+                todo += blueprint[_path(item)]["ContainerBlueprint"]["contents"]
         return views
+
+
+def _path(item: str) -> str:
+    """Blueprint path of a container's content, which is named with or without its leading slash."""
+    return "/" + item.lstrip("/")
 
 
 def _display_name(parts: dict) -> str:

@@ -21,22 +21,22 @@ _POWERS = ("10⁻⁴", "0.001", "0.01", "0.1")  # texts of the decades of the ma
 
 def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log all legends, static."""
-    _log_force_legend(stream, scene)
+    log_force_legend(stream, scene)
     _log_gap_legend(stream, scene)
     power = np.linspace(DECADES[0], DECADES[1], PIECES)
     decades = int(DECADES[1] - DECADES[0])
-    _log_ramp(
+    log_ramp_legend(
         stream, scene.canvas, entities.MAP_LEGEND, entities.MAP_LEGEND_TICKS, doubt_colours(10.0**power),
         [(k / decades, _POWERS[k]) for k in range(decades)] + [(1.0, "1 × mean f_n")],
     )  # fmt: skip
     share = np.linspace(0.0, 1.0, PIECES)
-    _log_ramp(
+    log_ramp_legend(
         stream, scene.canvas, entities.PROBABILITY_LEGEND, entities.PROBABILITY_LEGEND_TICKS,
         probability_colours(share), [(0.0, "P(touch) 0"), (0.5, "0.5"), (1.0, "1")],
     )  # fmt: skip
 
 
-def _log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
+def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     """A wedge from no force to the top of the range, with the mean marked."""
     style, top = scene.style, scene.style.range.top
     fn = np.linspace(0.0, top, PIECES + 1)[1:]
@@ -69,7 +69,7 @@ def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     _log_ticks(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts)
 
 
-def _log_ramp(
+def log_ramp_legend(
     stream: rr.RecordingStream,
     canvas: Canvas,
     path: str,

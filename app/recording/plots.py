@@ -93,3 +93,9 @@ def log_cross_hairs(stream: rr.RecordingStream, path: str, reach: float) -> None
     stream.log(
         path, rr.LineStrips2D(strips, radii=np.float32(0.5), colors=packed_one(FAINT), draw_order=0.0), static=True
     )
+
+
+def round_step(size: float) -> float:
+    """The next of 1, 2, 5 × 10^k below a size."""
+    decade = 10.0 ** np.floor(np.log10(size))
+    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= size))

@@ -48,6 +48,9 @@ Progress = Callable[[int, int], None]  # frames done, frames in all
 # Messages are cut by size, never by the clock: the same run makes the same file.
 _BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
 
+# Frames between two moments at which all that was logged reaches the file: what a cut file may lack at its end.
+# Fewer make more and smaller messages.
+FLUSHED_FRAMES = 8
 SWEEPS_KEPT = 40  # per frame, with SweepChoice.LOG
 # What is tried in turn to keep a recording below a size: sweeps per frame.
 THINNER = (40, 20, 10, 0)
@@ -75,11 +78,16 @@ class Recorder:
     """
 
     def __init__(
-        self, stream: rr.RecordingStream, *, sweeps: SweepChoice = SweepChoice.LOG, kept: int = SWEEPS_KEPT
+        self,
+        stream: rr.RecordingStream,
+        *,
+        sweeps: SweepChoice = SweepChoice.LOG,
+        kept: int = SWEEPS_KEPT,
+        flush_every: int = FLUSHED_FRAMES,
     ) -> None:
         rr.set_strict_mode(True)  # else the SDK warns and leaves out what it could not write
         self._stream = stream
-        self._sweeps, self._kept = sweeps, kept
+        self._sweeps, self._kept, self._flush_every = sweeps, kept, flush_every
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._former: FrameForces | None = None
@@ -151,6 +159,8 @@ class Recorder:
         self._facts.append(
             FrameFacts.of(forces, statistics, similarity=changes.similarity, lost=lost, agreement=agreement)
         )
+        if len(self._facts) % self._flush_every == 0:
+            self._stream.flush()
 
     def finish(self, notes: tuple[str, ...] = ()) -> None:
         """Write the summary."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from app.atomic import replacing
-from app.recording import entities
+from app.recording.readback import read_forces
 from app.recording.share import run_tool
 
 
@@ -19,7 +19,7 @@ class RepairReport:
     path: Path
     size: int  # [bytes]
     former_size: int  # [bytes] of the damaged file
-    frames: int  # of which at least the first row is there
+    frames: int  # whose reported forces are there
 
 
 def repair_recording(damaged: Path | str, target: Path | str) -> RepairReport:
@@ -34,16 +34,15 @@ def repair_recording(damaged: Path | str, target: Path | str) -> RepairReport:
         run_tool("optimize", "--continue-on-error", "--profile", "live", damaged, "-o", part)
         frames = _frames_of(part)
         if frames == 0:
-            raise OSError(f"{damaged}: no frame could be read; there is nothing to save")
+            raise OSError("no frame of it could be read; there is nothing to save")
         run_tool("verify", part)
     return RepairReport(target, target.stat().st_size, damaged.stat().st_size, frames)
 
 
 def _frames_of(path: Path) -> int:
-    found: set[int] = set()
-    reader = RrdReader(str(path))
-    if not reader.recordings():
+    if not RrdReader(str(path)).recordings():
         return 0
-    for chunk in reader.store().stream().filter(content=entities.FORCES).to_chunks():
-        found.update(chunk.to_record_batch().column(entities.FRAME).to_pylist())
-    return len(found)
+    try:
+        return len(read_forces(path))
+    except ValueError:  # no frame's forces came through
+        return 0

@@ -6,6 +6,7 @@ shows at once, and the viewer keeps one photograph, never all.
 
 from __future__ import annotations
 
+import math
 import uuid
 from dataclasses import dataclass
 
@@ -77,11 +78,8 @@ class ReviewLayer:
     def backdrop(self, backdrop: Backdrop) -> bytes:
         """Photograph and outlines of a frame."""
         stream, canvas = self._stream(), self.canvas
-        if backdrop.photograph is not None:
-            image = rr.EncodedImage(
-                contents=encode_jpeg(backdrop.photograph), media_type="image/jpeg", draw_order=-10.0
-            )
-            stream.log(PHOTOGRAPH, image, static=True)
+        image = rr.EncodedImage(contents=encode_jpeg(self._ground(backdrop)), media_type="image/jpeg", draw_order=-10.0)
+        stream.log(PHOTOGRAPH, image, static=True)
         radius = canvas.lengths(backdrop.radius)
         stream.log(
             GRAINS,
@@ -135,6 +133,13 @@ class ReviewLayer:
         stream = self._stream()
         stream.send_blueprint(blueprint, make_active=True, make_default=True)
         return _bytes(stream)
+
+    def _ground(self, backdrop: Backdrop) -> NDArray[np.uint8]:
+        """The photograph, or a plain ground: a click on it has a place, one on nothing has none."""
+        if backdrop.photograph is not None:
+            return backdrop.photograph
+        canvas = self.canvas
+        return np.full((max(1, math.ceil(canvas.bottom)), max(1, math.ceil(canvas.right))), 40, np.uint8)
 
     def _choose(self, stream: rr.RecordingStream, chosen: Chosen | None) -> None:
         size = self.canvas.grain_radius

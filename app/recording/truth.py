@@ -11,7 +11,7 @@ from app.recording import entities
 from app.recording.changes import correlate
 from app.recording.colours import SERIES, packed_one
 from app.recording.network import body_values
-from app.recording.plots import Axes
+from app.recording.plots import Axes, round_step
 from app.recording.scene import Clock, Scene
 from app.recording.values import known, log_scalar
 from app.results import TruthContacts
@@ -41,7 +41,7 @@ class TruthWriter:
     def log_axes(self, stream: rr.RecordingStream) -> None:
         """Log axes of the scatter plot and the styles of the curves."""
         top = self._axes.x_range[1]
-        step = _round_step(top / 2.5)
+        step = round_step(top / 2.5)
         ticks = [(step * k, f"{step * k:g}") for k in range(int(top / step) + 1)]
         self._axes.log(
             stream,
@@ -127,9 +127,3 @@ def relative_error(true: Array, inferred: Array) -> float:
     """L2 norm of the difference over that of the truth; NaN where the truth is zero."""
     norm = np.linalg.norm(true)
     return float(np.linalg.norm(inferred - true) / norm) if norm > 0.0 else float("nan")
-
-
-def _round_step(size: float) -> float:
-    """The next of 1, 2, 5 × 10^k below a size."""
-    decade = 10.0 ** np.floor(np.log10(size))
-    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= size))

@@ -10,8 +10,8 @@ from solver.contacts import Contacts, detect_contacts
 from solver.grains import Array
 
 NEAR = 0.45  # [mean radius] how far from a candidate's point a click may be
-WIDEST_GAP = 0.5  # [mean radius] between two bodies that a click can join
-BESIDE = 0.5  # [mean radius] how far from the middle of such a gap a click may be
+WIDEST_GAP = 0.25  # [mean radius] between two bodies that a click can join
+BESIDE = 0.35  # [mean radius] how far from the middle of such a gap a click may be
 
 
 def nearest_candidate(candidates: Candidates, point: Array, mean_radius: float, hint: int | None = None) -> int | None:

@@ -64,21 +64,27 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     rough = find_circles(image, radii, score_least=settings.score_least)
     outliner = Outliner(image, float(radii.max()))
     table = np.empty((0, 4))
-    left = np.arange(len(rough.x))
-    while len(left):
-        # What has struck out a true circle and then proved none itself makes room for another pass.
-        chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
-        judged = _best_alternatives(outliner, rough, chosen, known)
-        good = judged[:, 3] > settings.quality_least
-        table = np.concatenate([table, judged[good]])
-        left = np.setdiff1d(left, chosen, assume_unique=True)
+    unjudged = np.ones(len(rough.x), dtype=np.bool_)
+    while True:
+        left = np.flatnonzero(unjudged)
         left = left[_apart(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
-    # A longer outline is the more significant at the same share.
-    table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-    table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
+        if len(left) == 0:
+            break
+        # What has struck out a true circle and then proved none itself makes room for another pass; so does
+        # what a better circle strikes out later.
+        chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
+        unjudged[chosen] = False
+        judged = _best_alternatives(outliner, rough, chosen, known)
+        table = np.concatenate([table, judged[judged[:, 3] > settings.quality_least]])
+        # A longer outline is the more significant at the same share.
+        table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
+        table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
     found = refine_grains(image, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
-    order = order[np.isfinite(found.sigma[order])]  # what cannot be measured closely is not a grain
+    good = np.isfinite(found.sigma)  # what cannot be measured closely is not a grain
+    if not known:
+        good &= (found.radius > 0.9 * radii[0]) & (found.radius < 1.1 * radii[-1])
+    order = order[good[order]]
     return Detection(found.x[order], found.y[order], found.radius[order], found.sigma[order], found.quality[order])
 
 

@@ -24,6 +24,8 @@ DARK_EXCESS = 0.12
 DARK_EXCESS_JUDGED = 0.3
 # Contrast below this many standard deviations of the noise [1] is none.
 NOISE_CONTRAST = 12.0
+# A circle that has left the window in which its points were looked for, by this many times, is none of theirs.
+ASTRAY = 2.5
 # Points this close to the circle [px] count as its outline.
 ON_CIRCLE = 0.7
 # Fewer points do not make a circle; less of the outline in view does not make a grain.
@@ -71,6 +73,9 @@ class Outliner:
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
             np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2, radius_scatter=scatter, scale_least=0.1,
         )  # fmt: skip
+        moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
+        if not moved < ASTRAY * window:
+            return Measured(x, y, radius, np.nan, 0.0)
         return _measured(circle, outline, shift)
 
     def measure_closely(

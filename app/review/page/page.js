@@ -53,13 +53,17 @@ function named(body) {
   return typeof body === "number" ? `grain ${body}` : body;
 }
 
+function both(pair) {
+  return typeof pair.b === "number" ? `grains ${pair.a} – ${pair.b}` : `grain ${pair.a} – ${pair.b}`;
+}
+
 function showPair() {
   const pair = state.pair;
   state.since = performance.now();
-  at("bodies").textContent = pair ? `${named(pair.a)} – ${named(pair.b)}` : "";
+  at("bodies").textContent = pair ? both(pair) : "";
   at("empty").textContent = pair ? "" : state.sampled ? "The whole sample is judged." : "Every candidate of this frame is judged. Next frame: ]";
   const told = pair && pair.detected !== undefined;
-  const chance = told && pair.probability !== null ? `, P(touch) ${pair.probability.toFixed(2)}` : "";
+  const chance = told && pair.probability !== null ? `, P ${pair.probability.toFixed(2)}` : "";
   at("detector").textContent = told ? (pair.detected ? "detected" : "not detected") + chance : "";
   at("detector").className = told ? (pair.detected ? "detected-text" : "undetected-text") : "";
   at("said").textContent = pair && pair.verdict ? `● ${pair.verdict}` : "";
@@ -68,9 +72,9 @@ function showPair() {
   gap.replaceChildren();
   if (pair && Number.isFinite(pair.gap_um)) {
     const value = document.createElement("b");
-    value.textContent = `gap ${signed(pair.gap_um)} µm`;
+    value.textContent = `gap ${signed(pair.gap_um)} ± ${pair.sigma_um.toFixed(1)} µm`;
     const sigmas = pair.sigma_um > 0 ? ` = ${signed(pair.gap_um / pair.sigma_um)} σ` : "";
-    gap.append(value, `${sigmas}   (σ ${pair.sigma_um.toFixed(1)} µm, threshold ${pair.threshold_um.toFixed(0)} µm)`);
+    gap.append(value, `${sigmas}, threshold ${pair.threshold_um.toFixed(0)} µm`);
   }
   for (const [id, verdict] of Object.entries(VERDICTS)) {
     at(id).disabled = !pair;
@@ -151,7 +155,7 @@ const judge = (verdict) => queue(async () => {
   if (!pair) return;
   const seconds = Math.min((performance.now() - state.since) / 1000, LONGEST);
   const answer = await ask("judge", { verdict, seconds, origin: pair.origin, pair_frame: pair.frame, key: pair.key });
-  toast(`${named(pair.a)} – ${named(pair.b)}: ${verdict}`);
+  toast(`${both(pair)}: ${verdict}`);
   await present(answer.pair);
 });
 
@@ -181,7 +185,7 @@ const turn = (by) => queue(async () => {
 const pick = (x, y, path, instance) => queue(async () => {
   const answer = await ask("pick", { x, y, path, instance });
   if (!answer.pair) return toast("No gap here: click a candidate, or between two grains");
-  if (answer.added) toast(`Added: ${named(answer.pair.a)} – ${named(answer.pair.b)} touch.  Z takes it back`, 4000);
+  if (answer.added) toast(`Added a contact: ${both(answer.pair)}.  Z takes it back`, 4000);
   await present(answer.pair, false);
 });
 
@@ -256,6 +260,7 @@ function onKey(event) {
   if (!act) return;
   event.preventDefault();
   event.stopPropagation(); // the viewer has keys of its own
+  if (state.viewer) state.viewer.leave();
   if (!event.repeat) act();
 }
 

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -95,16 +96,14 @@ class Browser:
         png = base64.b64decode(self._on_page("Page.captureScreenshot", format="png")["data"])
         return cv2.cvtColor(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
-    def still_picture(self, seconds: float = 90.0) -> np.ndarray:
-        """A picture once two in a row are equal."""
-        end, former = time.monotonic() + seconds, self.picture()
+    def shows(self, test: Callable[[np.ndarray], bool], seconds: float = 90.0) -> bool:
+        """Whether what the page shows passes a test before the time is up."""
+        end = time.monotonic() + seconds
         while time.monotonic() < end:
-            time.sleep(1.0)
-            latter = self.picture()
-            if np.array_equal(former, latter):
-                return latter
-            former = latter
-        return former
+            if test(self.picture()):
+                return True
+            time.sleep(0.3)
+        return False
 
     def _on_page(self, method: str, **parameters: Any) -> dict[str, Any]:
         return self._call(method, session=self._session, **parameters)

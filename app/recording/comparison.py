@@ -1,0 +1,257 @@
+"""Writes two force fields side by side: both networks, their difference, and how they differ from frame to frame.
+
+Entities stand under /compare; the timeline is `frame`. Widths and colours of both networks mean the same forces. In
+the difference a line is as wide as the forces differ, warm where the first field has more and cool where the second.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from app.comparison import Comparison, FieldFrame
+from app.recording import entities
+from app.recording.blueprint import curve_view, packing_view
+from app.recording.canvas import Canvas
+from app.recording.colours import BACKGROUND, OPEN, SERIES, make_ramp, packed, packed_one
+from app.recording.force_style import ForceRange, ForceStyle
+from app.recording.legends import PIECES, log_force_legend, log_ramp_legend
+from app.recording.network import body_values
+from app.recording.packing import log_packing
+from app.recording.plots import Axes, round_step
+from app.recording.scene import Clock, Scene
+from app.recording.texts import printable
+from app.recording.values import known, log_scalar
+from app.units import Scale
+from solver.contacts import Contacts, measure_contacts
+from solver.grains import Array
+
+APPLICATION_ID = "rodsight-compare"  # its own, so that a user's layout of runs is not used for comparisons
+FIRST, SECOND = "/compare/first", "/compare/second"
+DIFFERENCE = "/compare/difference"
+DIFFERENCE_LEGEND, DIFFERENCE_TICKS = "/legend/difference", "/legend/difference/ticks"
+SCATTER, SCATTER_AXES = "/compare/scatter/contacts", "/compare/scatter/axes"
+SCATTER_TICKS = "/compare/scatter/axes/ticks"
+R_FN, R_FT, ERROR, SUM_RATIO = (f"/compare/{name}" for name in ("r_fn", "r_ft", "relative_l2", "sum_ratio"))
+ANGLES = tuple(f"/compare/{which}/{name}" for which in ("first", "second") for name in ("friction_angle", "wall_ratio"))
+SUMMARY = "/compare/summary"
+
+DIFFERENCE_SHARE = 0.4  # of the drawn range of forces: the difference that is drawn widest and brightest
+
+# Cool where the second has more, over dark grey, to warm where the first has more.
+_DIFFERENCE_WAY = (
+    (0.80, 0.10, 225.0), (0.62, 0.14, 250.0), (0.42, 0.05, 265.0), (0.40, 0.0, 0.0), (0.45, 0.06, 40.0),
+    (0.66, 0.17, 45.0), (0.86, 0.14, 85.0),
+)  # fmt: skip
+_RAMP = packed(make_ramp(_DIFFERENCE_WAY))
+
+
+def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale | None = None) -> int:
+    """Write a comparison as a recording; returns its size [bytes]."""
+    path, base = Path(path), comparison.base
+    canvas = Canvas.around(base.tracks, scale)
+    scene = Scene(
+        f"{comparison.first.name} and {comparison.second.name}", base.tracks, base.walls, base.grains, base.friction,
+        base.configuration, canvas, ForceStyle.on(canvas, _range_of(comparison)),
+    )  # fmt: skip
+    part = path.with_name(path.name + ".part")
+    rr.set_strict_mode(True)
+    stream = rr.RecordingStream(APPLICATION_ID)
+    try:
+        stream.save(part, default_blueprint=make_comparison_blueprint(comparison, canvas))
+        stream.set_log_time_enabled(False)
+        stream.send_recording_name(printable(scene.name))
+        axes = _log_styles(stream, scene, comparison)
+        for frame in range(len(base.frames)):
+            _log_frame(Clock(stream, frame, frame, frame), scene, comparison, axes)
+        stream.reset_time()
+        text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
+        stream.log(SUMMARY, text, static=True)
+        stream.disconnect()
+        os.replace(part, path)
+    finally:
+        stream.disconnect()
+        part.unlink(missing_ok=True)
+    return path.stat().st_size
+
+
+def describe(comparison: Comparison) -> str:
+    """What the comparison found, as Markdown."""
+    first, second = comparison.first.name, comparison.second.name
+    rows = [
+        f"| {k} | {a.r_fn:.3f} | {a.r_ft:.3f} | {a.relative_l2:.3f} | {a.scale:.3f} "
+        f"| {np.degrees(x.friction_angle):.1f} | {np.degrees(y.friction_angle):.1f} "
+        f"| {np.degrees(x.wall_ratio_angle):.1f} | {np.degrees(y.wall_ratio_angle):.1f} |"
+        for k, (a, x, y) in enumerate(
+            zip(comparison.agreement, comparison.first.frames, comparison.second.frames, strict=True)
+        )
+    ]
+    head = (
+        f"| frame | r(f_n) | r(f_t) | relative L2 | sum ratio | φ {first} | φ {second} | wall {first} | wall {second} |"
+    )
+    return "\n".join(
+        [
+            f"# {first} against {second}", "",
+            f"Over all contacts that either has; absent counts as 0. Relative L2 and the ratio of the sums of f_n are "
+            f"relative to {second}. Angles in degrees: φ of the stress, and the wall ratio atan(T/N).", "",
+            *[f"- {note}" for note in comparison.notes], "", head, "|" + "---|" * 9, *rows,
+        ]
+    )  # fmt: skip
+
+
+def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blueprint:
+    """Networks and difference above, scatter and curves below; a second tab with the table."""
+    packing = [entities.WALLS, f"{entities.GRAINS}/**"]
+    legend = f"{entities.FORCE_LEGEND}/**"
+    first, second = printable(comparison.first.name), printable(comparison.second.name)
+    side = rrb.Vertical(
+        rrb.Horizontal(
+            packing_view(first, canvas, [*packing, FIRST, legend]),
+            packing_view(f"{first} − {second}", canvas, [*packing, DIFFERENCE, f"{DIFFERENCE_LEGEND}/**"]),
+            packing_view(second, canvas, [*packing, SECOND, legend]),
+        ),
+        rrb.Horizontal(
+            rrb.Spatial2DView(
+                origin="/compare/scatter", contents="$origin/**", name=f"f_n: {first} over {second}",
+                background=BACKGROUND, visual_bounds=rrb.VisualBounds2D(x_range=[-60.0, 425.0], y_range=[-15.0, 455.0]),
+            ),
+            curve_view("Correlation, error", [R_FN, R_FT, ERROR, SUM_RATIO], corner=rrb.Corner2D.LeftBottom),
+            curve_view("Friction angle φ, wall ratio [°]", list(ANGLES), corner=rrb.Corner2D.LeftBottom),
+            column_shares=[0.8, 1.0, 1.0],
+        ),
+        row_shares=[1.7, 1.0],
+        name="Side by side",
+    )  # fmt: skip
+    return rrb.Blueprint(
+        rrb.Tabs(side, rrb.TextDocumentView(origin=SUMMARY, name="Figures"), name="Rodsight"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=4.0, loop_mode="all"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def difference_colours(difference: Array, top: float) -> NDArray[np.uint32]:
+    """Colours of first − second (c,) [N], from −top to top."""
+    level = np.round((np.clip(np.nan_to_num(difference) / top, -1.0, 1.0) + 1.0) * 0.5 * (len(_RAMP) - 1))
+    return np.where(difference == 0.0, packed_one(OPEN), _RAMP[level.astype(np.int64)]).astype(np.uint32)
+
+
+def _difference_style(scene: Scene) -> ForceStyle:
+    style = scene.style
+    reach = ForceRange(DIFFERENCE_SHARE * style.range.mean, DIFFERENCE_SHARE * style.range.top)
+    return ForceStyle(reach, style.grain_radius, style.quantum)
+
+
+def _range_of(comparison: Comparison) -> ForceRange:
+    frames = [*comparison.first.frames, *comparison.second.frames]
+    return ForceRange.of_forces([frame.fn for frame in frames])
+
+
+def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison) -> Axes:
+    first, second = printable(comparison.first.name), printable(comparison.second.name)
+    log_force_legend(stream, scene)
+    top = scene.style.range.top
+    share, most = np.linspace(-1.0, 1.0, PIECES), _difference_style(scene).range.top
+    log_ramp_legend(
+        stream, scene.canvas, DIFFERENCE_LEGEND, DIFFERENCE_TICKS, difference_colours(share * most, most),
+        [(0.0, f"{second} more: {most:.3g} N"), (0.5, "equal"), (1.0, f"{first} more: {most:.3g} N")],
+    )  # fmt: skip
+    names = (f"φ {first}", f"wall ratio {first}", f"φ {second}", f"wall ratio {second}")
+    curves = [
+        (R_FN, "r(f_n)", SERIES[0], 2.0), (R_FT, "r(f_t)", SERIES[1], 2.0), (ERROR, "relative L2", SERIES[3], 2.0),
+        (SUM_RATIO, "ratio of the sums of f_n", SERIES[2], 1.0),
+    ]  # fmt: skip
+    hues, widths = (SERIES[0], SERIES[1], SERIES[0], SERIES[1]), (2.5, 2.5, 1.0, 1.0)
+    curves += list(zip(ANGLES, names, hues, widths, strict=True))
+    for path, name, colour, width in curves:
+        stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=width), static=True)
+    reach = 1.15 * top
+    axes = Axes((0.0, reach), (0.0, reach), width=400.0, height=400.0)
+    step = round_step(reach / 2.5)
+    ticks = [(step * k, f"{step * k:g}") for k in range(int(reach / step) + 1)]
+    axes.log(
+        stream, SCATTER_AXES, SCATTER_TICKS, x_ticks=ticks, y_ticks=ticks,
+        notes=[(0.8 * reach, 0.1 * reach, f"across: {second} [N]"), (0.22 * reach, 0.97 * reach, f"up: {first} [N]")],
+        guides=[axes.points(np.array([0.0, reach]), np.array([0.0, reach]))],
+    )  # fmt: skip
+    return axes
+
+
+def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -> None:
+    k, stream = clock.frame, clock.stream
+    a, b = comparison.first.frames[k], comparison.second.frames[k]
+    log_packing(clock, scene, comparison.base.frames[k])
+    clock.end()
+    for path, field in ((FIRST, a), (SECOND, b)):
+        _log_network(clock, scene, path, field)
+    key, fn = _on_union(a, b, "fn")
+    _, ft = _on_union(a, b, "ft")
+    _log_difference(clock, scene, key, fn, ft)
+    reach = axes.x_range[1]
+    stream.log(
+        SCATTER,
+        rr.Points2D(
+            axes.points(np.minimum(fn[1], reach), np.minimum(fn[0], reach)),
+            radii=np.float32(2.5), colors=packed_one((*SERIES[0][:3], 200)), draw_order=20.0,
+        ),
+    )  # fmt: skip
+    agreement = comparison.agreement[k]
+    angles = (a.friction_angle, a.wall_ratio_angle, b.friction_angle, b.wall_ratio_angle)
+    for path, value in (
+        (R_FN, agreement.r_fn), (R_FT, agreement.r_ft), (ERROR, agreement.relative_l2), (SUM_RATIO, agreement.scale),
+        *((path, float(np.degrees(angle))) for path, angle in zip(ANGLES, angles, strict=True)),
+    ):  # fmt: skip
+        log_scalar(clock, path, value)
+
+
+def _log_network(clock: Clock, scene: Scene, path: str, field: FieldFrame) -> None:
+    shown = np.flatnonzero(np.isfinite(field.contacts.point).all(axis=1))
+    contacts, fn, ft = field.contacts.select(shown), field.fn[shown], field.ft[shown]
+    clock.stream.log(
+        path,
+        rr.LineStrips2D(
+            scene.branches(clock.frame, contacts), radii=scene.style.radii(fn), colors=scene.style.colours(fn),
+            draw_order=20.0,
+        ),
+        rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
+    )  # fmt: skip
+
+
+def _log_difference(clock: Clock, scene: Scene, key: NDArray[np.int64], fn: Array, ft: Array) -> None:
+    contacts = _contacts_of(scene, clock.frame, key)
+    shown = np.flatnonzero(np.isfinite(contacts.point).all(axis=1))
+    contacts, fn, ft = contacts.select(shown), fn[:, shown], ft[:, shown]
+    difference, style = fn[0] - fn[1], _difference_style(scene)
+    clock.stream.log(
+        DIFFERENCE,
+        rr.LineStrips2D(
+            scene.branches(clock.frame, contacts), radii=style.radii(np.abs(difference)),
+            colors=difference_colours(difference, style.range.top), draw_order=20.0,
+        ),
+        rr.AnyValues(
+            **body_values(scene, contacts), fn_first=known(fn[0]), fn_second=known(fn[1]), ft_first=known(ft[0]),
+            ft_second=known(ft[1]),
+        ),
+    )  # fmt: skip
+
+
+def _on_union(a: FieldFrame, b: FieldFrame, name: str) -> tuple[NDArray[np.int64], Array]:
+    """Keys of the contacts of either field (u,), and both forces on them (2, u) [N], 0 where one has no contact."""
+    key = np.union1d(a.contacts.key, b.contacts.key)
+    both = np.zeros((2, len(key)))
+    for row, field in enumerate((a, b)):
+        both[row, np.searchsorted(key, field.contacts.key)] = np.nan_to_num(getattr(field, name))
+    return key, both
+
+
+def _contacts_of(scene: Scene, frame: int, key: NDArray[np.int64]) -> Contacts:
+    bodies = scene.grains.count + scene.walls.count
+    i, j = np.divmod(key, bodies)
+    return measure_contacts(scene.grains, scene.tracks.position[frame], scene.walls_at(frame), i, j)
