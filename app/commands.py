@@ -24,6 +24,9 @@ from app.summary import print_summary, save_summary, summarize
 from app.terminal import progress_bars
 from app.truth import accuracy, correlations
 from app.truth import score as score_frames
+from app.watching import watching
+
+WIDE = 120  # columns of a table that goes to a file
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ class Request:
 
 def run_all(request: Request, view: str) -> int:
     began = time.perf_counter()
-    with _run(request) as run:
+    with _run(request) as plain, watching(plain, view, request.console) as (run, watch):
         results = pipeline.solve(run)
         truth = pipeline.load_truth(run, results)
         agreement = score_frames(results, truth) if truth is not None else None
@@ -50,7 +53,8 @@ def run_all(request: Request, view: str) -> int:
     save_summary(run.file(pipeline.SUMMARY), summary)
     print_summary(request.console, summary)
     request.console.print(f"Results in {run.folder}/ after {seconds['total']:.1f} s.", highlight=False)
-    return _show(recording, view, request.console)
+    watched = watch is not None and watch.started  # the viewer is open already
+    return _show(recording, "none" if watched else view, request.console)
 
 
 def check(request: Request) -> int:
@@ -138,13 +142,12 @@ def study(subject: str, *, seeds: tuple[int, ...], grains: int, estimator: str, 
     from app.study.accuracy import study_accuracy
     from app.study.claims import study_claims
 
+    console = Console() if sys.stdout.isatty() else Console(width=WIDE)
     with _progress(quiet) as progress:
         if subject == "accuracy":
-            study_accuracy(
-                seeds, grains=grains, folder=folder, estimator=estimator, console=Console(), progress=progress
-            )
+            study_accuracy(seeds, grains=grains, folder=folder, estimator=estimator, console=console, progress=progress)
         else:
-            study_claims(seeds, grains=grains, folder=folder, console=Console(), progress=progress)
+            study_claims(seeds, grains=grains, folder=folder, console=console, progress=progress)
     return 0
 
 

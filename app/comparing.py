@@ -73,8 +73,8 @@ def _tell(comparison: Comparison, console: Console) -> None:
     apart = float(np.sqrt(np.nanmean(np.diff(angle, axis=1) ** 2)))
     console.print(
         f"{first.name} against {second.name}, {len(r)} frames: r(f_n) mean {mean[0]:.3f}, least {least:.3f}; r(f_t) "
-        f"mean {mean[1]:.3f}; relative L2 {mean[2]:.3f}; ratio of the sums of f_n {mean[3]:.3f}; friction angles apart by "
-        f"{apart:.2f}° rms.",
+        f"mean {mean[1]:.3f}; relative L2 {mean[2]:.3f}; ratio of the sums of f_n {mean[3]:.3f}; friction angles "
+        f"apart by {apart:.2f}° rms.",
         highlight=False, soft_wrap=True,
     )  # fmt: skip
     for note in comparison.notes:

@@ -126,9 +126,9 @@ def _frames_of(results: Results, first: int, stop: int) -> Results:
 def _match_grains(a: Results, b: Results, frame_a: int, frame_b: int) -> tuple[NDArray[np.int64], str]:
     """Row in a of every grain of b (n_b,), −1 where there is none; and a sentence where ids did not serve."""
     place_a, place_b = a.tracks.position[frame_a], b.tracks.position[frame_b]
-    order = np.argsort(a.tracks.id)
-    at = np.minimum(np.searchsorted(a.tracks.id[order], b.tracks.id), len(order) - 1)
-    rows = order[at]
+    order: NDArray[np.int64] = np.argsort(a.tracks.id)
+    at: NDArray[np.int64] = np.minimum(np.searchsorted(a.tracks.id[order], b.tracks.id), len(order) - 1)
+    rows: NDArray[np.int64] = order[at]
     rows[a.tracks.id[rows] != b.tracks.id] = -1
     both = (rows >= 0) & b.tracks.present[frame_b] & a.tracks.present[frame_a][rows]
     near = np.linalg.norm(place_b[both] - place_a[rows[both]], axis=1) < CLOSE * b.tracks.radius[both]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,9 +26,7 @@ class PoseCorrections:
     theta: Array  # (m,) [rad] from the first photograph, counter-clockwise; NaN where it is not told
 
 
-def read_corrections(
-    experiment: Experiment, ids: NDArray[np.int64] | None, frame_count: int
-) -> PoseCorrections | None:
+def read_corrections(experiment: Experiment, ids: NDArray[np.int64] | None, frame_count: int) -> PoseCorrections | None:
     """Read `photographs.corrections`, a table frame,id,x,y,theta; None if the experiment has none.
 
     x and y are pixels as in the table of grains, theta is in radians as in a table of tracks; an empty theta leaves
@@ -57,10 +56,8 @@ def _numbers(table: Table, column: str, blank: NDArray[np.bool_]) -> Array:
     """A column's numbers (m,), NaN where `blank` (m,) says that there is none."""
     values = np.full(len(table), np.nan)
     for row in np.flatnonzero(~blank):
-        try:
+        with suppress(ValueError):
             values[row] = float(table.text(column)[row])
-        except ValueError:
-            pass
         if not np.isfinite(values[row]):
             raise table.error(int(row), column, f"is neither a finite number nor {LOST!r}")
     return values

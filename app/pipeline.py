@@ -12,6 +12,7 @@ import json
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from app import __version__
 from app.calibration import calibrate_tracks
 from app.checkpoint import Checkpoint
 from app.config import ExperimentFile, as_toml
+from app.corrections import read_corrections
 from app.errors import InputError
 from app.experiment import (
     Experiment,
@@ -34,11 +36,11 @@ from app.experiment import (
 from app.opinions import friction_of, tuned_radii
 from app.progress import Progress, silent
 from app.results import Results, TruthContacts
+from app.scaling import make_scale
 from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
-from app.tracking.follow import detect, follow_photographs
+from app.tracking.stage import track_photographs, write_tables
 from app.tracks import Tracks, WallTracks
 from app.truth import read_truth, true_names
-from app.units import Scale
 from solver.chain import ChainSettings, Packing
 from solver.contact_probability import ContactProbabilitySettings
 from solver.ensemble import EnsembleSettings
@@ -63,6 +65,16 @@ class Timings:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - since
 
 
+class Watch(Protocol):
+    """Somebody who is told what has been solved, while it is."""
+
+    def start(self, run: Results) -> None:
+        """Bodies, motion and settings; the frames are still to come."""
+
+    def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
+        """The next frame is there."""
+
+
 @dataclass(frozen=True, slots=True)
 class Run:
     """One experiment and the folder its results go to."""
@@ -72,6 +84,7 @@ class Run:
     frames: tuple[int, int | None] = (0, None)
     progress: Progress = silent
     timings: Timings = field(default_factory=Timings)
+    watch: Watch | None = None  # hears every frame as it is solved
 
     def file(self, name: str) -> Path:
         return self.folder / name
@@ -94,6 +107,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         guess = read_grain_guess(experiment)
         walls = read_walls(experiment, count)
         ids = guess.id if guess is not None else None
+        read_corrections(experiment, ids, count)
     _frame_range(run, count)
     if experiment.config.truth is not None and ids is not None:
         file = experiment.folder / experiment.config.truth
@@ -115,47 +129,19 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         return load_tracks(run.file(TRACKS))
     check(run)
     since = time.perf_counter()
-    tracks = _track_photographs(run, origin)
     start, stop = _frame_range(run, len(experiment.photographs()))
-    walls = read_walls(experiment, len(experiment.photographs()))
+    unfinished = run.folder / UNFINISHED
+    tracks, walls, tables = track_photographs(experiment, stop, unfinished, origin.fingerprint, run.progress)
     if walls is not None:
-        check_inside(experiment, tracks, walls.frames(0, stop))
+        check_inside(experiment, tracks, walls)
         walls = walls.frames(start, stop)
     tracks = tracks.frames(start, stop)
+    write_tables(run.folder, tables)
     save_tracks(run.file(TRACKS), experiment.name, tracks, walls, origin)
-    Checkpoint(run.folder / UNFINISHED / "tracking", origin.fingerprint).clear()
+    for stage in ("tracking", "walls"):
+        Checkpoint(unfinished / stage, origin.fingerprint).clear()
     run.timings.add("tracking", since)
     return tracks, walls
-
-
-def _track_photographs(run: Run, origin: Provenance) -> Tracks:
-    experiment = run.experiment
-    section = experiment.config.photographs
-    assert section is not None
-    photographs = experiment.photographs()
-    _, stop = _frame_range(run, len(photographs))
-    scale = Scale(section.pixel_size, photographs.shape[0])
-    guess = read_grain_guess(experiment)
-    run.progress("detection", 0, 1)
-    detection = detect(
-        photographs[0],
-        np.array(section.radii) / section.pixel_size,
-        None if guess is None else (guess.x, guess.y, guess.radius),
-    )
-    run.progress("detection", 1, 1)
-    if len(detection.x) == 0:
-        raise InputError(photographs.files[0], "", "no grains were found; give them with photographs.grains")
-    ids = np.arange(len(detection.x)) if guess is None else guess.id
-    return follow_photographs(
-        photographs,
-        detection,
-        ids,
-        read_times(experiment, len(photographs))[:stop],
-        scale,
-        workers=experiment.config.tracking.workers,
-        checkpoint=Checkpoint(run.folder / UNFINISHED / "tracking", origin.fingerprint),
-        progress=run.progress,
-    )
 
 
 def solve(run: Run) -> Results:
@@ -217,10 +203,16 @@ def _solve_frames(
     frames: list[FrameForces] = []
     statistics: list[FrameStatistics] = []
     kept_state: SequenceState | None = None
+    if run.watch is not None:
+        config, grains = run.experiment.config, packing.grains
+        friction = packing.material.friction
+        run.watch.start(Results(config.name, tracks, walls, grains, friction, (), (), as_toml(config)))
     for k in range(min(checkpoint.finished(), len(snapshots))):
         forces, kept, kept_state = checkpoint.load(k, FrameForces, FrameStatistics, SequenceState)
         frames.append(forces)
         statistics.append(kept)
+        if run.watch is not None:
+            run.watch.frame(forces, kept)
     settings = sequence_settings(run.experiment.config, overlap)
     done = len(frames)
     run.progress("solving", done, len(snapshots))
@@ -234,6 +226,8 @@ def _solve_frames(
         checkpoint.save(forces.frame, forces, summary, state)
         frames.append(forces)
         statistics.append(summary)
+        if run.watch is not None:
+            run.watch.frame(forces, summary)
         run.progress("solving", len(frames), len(snapshots))
     return frames, statistics
 
@@ -301,7 +295,7 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
         results,
         file,
         photograph=photograph if photographs is not None else None,
-        scale=Scale(section.pixel_size, photographs.shape[0]) if section and photographs is not None else None,
+        scale=make_scale(section, photographs.shape[0]) if section and photographs is not None else None,
         sweeps=run.experiment.config.recording.sweeps,
         truth=truth,
         progress=lambda done, total: run.progress("recording", done, total),

@@ -30,7 +30,7 @@ class Acceleration:
     """
 
     def __init__(self, problem: ContactProblem, force: Array, window: int) -> None:
-        """force (c, 2) [N] in visiting order, at the start of the first period; window: how many pairs are looked at."""
+        """force (c, 2) [N] in visiting order, at the start of the first period; window: pairs that are looked at."""
         self._problem = problem
         self._start = force.copy()
         self._former_image, self._former_residual = np.empty_like(force), np.empty_like(force)
@@ -92,7 +92,7 @@ class Acceleration:
         gram = self._gram[:count, :count].copy()
         gram[np.diag_indices(count)] *= 1.0 + REGULARISATION
         right = inner_products(self._residual_change[:count], self._former_residual.reshape(-1))
-        return np.linalg.lstsq(gram, right, rcond=1e-14)[0]
+        return np.asarray(np.linalg.lstsq(gram, right, rcond=1e-14)[0], np.float64)
 
 
 @njit(cache=True, error_model="numpy")

@@ -88,7 +88,7 @@ def sweeps(
     take a step every PERIOD sweeps, heard or not.
     """
     force, body, plate = _start(problem, guess)
-    before, number = np.empty_like(force), 0
+    before, number, residuals = np.empty_like(force), 0, (0.0, 0.0, 0.0)
     if settings.acceleration == 0:
         while True:
             residuals = advance_and_measure(problem, body, plate, force, before, every, settings.relaxation)
@@ -127,6 +127,8 @@ def solve(
         force, body, plate = _start(problem, guess)
         advance(problem, body, plate, force, settings.sweeps, settings.relaxation)
         return _finish(problem, force, Stop.SWEEPS, settings.sweeps)
+    if observer is None and not stopping:
+        every = max(1, settings.sweeps)
     stop, number, force = Stop.SWEEPS, 0, _start(problem, guess)[0]
     for sweep in sweeps(problem, settings, guess=guess, every=every) if settings.sweeps > 0 else ():
         force, number = sweep.force, sweep.number
@@ -145,7 +147,7 @@ def solve(
 
 def unbalance_of(problem: ContactProblem, force: Array) -> tuple[float, float]:
     """Worst and mean |ΣF| on a grain over the mean f_n, for forces (c, 2) [N] in the order of the contacts."""
-    force, body, plate = _start(problem, force)
+    force, body, _ = _start(problem, force)
     _, _, mean = measure_forces(force, force)
     worst, mean_size = measure_unbalance(problem, body)
     return (worst / mean, mean_size / mean) if mean > 0 else (0.0, 0.0)

@@ -45,7 +45,9 @@ def apply_forces(problem, body, plate, force):  # type: ignore[no-untyped-def]
     flat = body.reshape(body.size)
     for c in range(len(problem.wall)):
         i, w = U4 * U(problem.wall_body[c, 0]), problem.wall_body[c, 1]
-        _push_from_wall(flat, plate, i, w, problem.wall[c, 0], problem.wall[c, 1], force[first + c, 0], force[first + c, 1])
+        _push_from_wall(
+            flat, plate, i, w, problem.wall[c, 0], problem.wall[c, 1], force[first + c, 0], force[first + c, 1]
+        )
 
 
 @njit(inline="always")
@@ -101,8 +103,21 @@ def _relax_group(pair, ids, source, force, work, store, block, relaxation, mu): 
         store[4 * L + k] = source[j + U1]
         store[5 * L + k] = source[j + U2]
     for k in range(L):
-        nx, ny, wn, ci, cj = pair[p + k], pair[p + L + k], relaxation * pair[p + 2 * L + k], pair[p + 3 * L + k], pair[p + 4 * L + k]
-        ax, ay, aw, bx, by, bw = work[k], work[L + k], work[2 * L + k], work[3 * L + k], work[4 * L + k], work[5 * L + k]
+        nx, ny, wn, ci, cj = (
+            pair[p + k],
+            pair[p + L + k],
+            relaxation * pair[p + 2 * L + k],
+            pair[p + 3 * L + k],
+            pair[p + 4 * L + k],
+        )
+        ax, ay, aw, bx, by, bw = (
+            work[k],
+            work[L + k],
+            work[2 * L + k],
+            work[3 * L + k],
+            work[4 * L + k],
+            work[5 * L + k],
+        )
         dx, dy = bx - ax, by - ay
         un = dx * nx + dy * ny + pair[p + 5 * L + k]
         ut = dy * nx - dx * ny - aw - bw
@@ -276,7 +291,11 @@ def _miss(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def measure_unbalance(problem, body):  # type: ignore[no-untyped-def]
     """Worst and mean |ΣF| [N] on a grain, from what the forces have added to its velocity."""
-    now, free, external = body.reshape(body.size), problem.body.reshape(body.size), problem.external.reshape(problem.external.size)
+    now, free, external = (
+        body.reshape(body.size),
+        problem.body.reshape(body.size),
+        problem.external.reshape(problem.external.size),
+    )
     count = len(body)
     work = workspace(3 * L)  # worst, sum and number of grains: one of each per lane
     work[:] = 0.0

@@ -44,8 +44,11 @@ _LOW, _HIGH = rrb.Corner2D.LeftBottom, rrb.Corner2D.LeftTop
 _FORCES = [entities.FORCES, entities.SLIDING, f"{entities.FORCE_LEGEND}/**"]
 
 
-def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT) -> rrb.Blueprint:
-    """Make the blueprint with one tab in front. The Convergence tab in front starts on the timeline `sweep`."""
+def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: bool = False) -> rrb.Blueprint:
+    """Make the blueprint with one tab in front; `following` keeps the cursor at the newest frame.
+
+    The Convergence tab in front starts on the timeline `sweep`.
+    """
     tabs: dict[Tab, rrb.Container | rrb.View] = {
         Tab.EXPERIMENT: _experiment(layout),
         Tab.CONVERGENCE: _convergence(layout),
@@ -67,7 +70,8 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT) -> rrb.Bluep
             state="collapsed",
             timeline=entities.SWEEP if active is Tab.CONVERGENCE else entities.FRAME,
             fps=4.0,
-            loop_mode="all",
+            play_state="following" if following else "playing",
+            loop_mode="off" if following else "all",
         ),
         auto_views=False,
         auto_layout=False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import rerun as rr
@@ -17,8 +17,11 @@ PROPERTY = "layout"
 
 
 def send_layout(stream: rr.RecordingStream, layout: Layout) -> None:
-    """Store the layout in the recording."""
-    stream.send_property(PROPERTY, rr.AnyValues(json=json.dumps(asdict(layout))))
+    """Store the layout in the recording; of the scale only what frames a view, its lens stays behind."""
+    canvas = layout.canvas
+    straight = Scale(canvas.scale.pixel_size, canvas.scale.height)
+    stored = asdict(replace(layout, canvas=replace(canvas, scale=straight)))
+    stream.send_property(PROPERTY, rr.AnyValues(json=json.dumps(stored)))
 
 
 def read_layout(path: Path | str) -> Layout:

@@ -46,7 +46,7 @@ PhotographSource = Callable[[int], Photograph | None]
 Progress = Callable[[int, int], None]  # frames done, frames in all
 
 # Messages are cut by size, never by the clock: the same run makes the same file.
-_BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
+BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
 
 # Frames between two moments at which all that was logged reaches the file: what a cut file may lack at its end.
 # Fewer make more and smaller messages.
@@ -271,7 +271,7 @@ def _write(
     max_size: int | None,
 ) -> Recorder | None:
     """Write the whole run to `part`; None, early, where it grows beyond max_size."""
-    stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=_BATCHES)
+    stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
     layout = layout_of(results, scene, photographs=photograph is not None)
     stream.save(part, default_blueprint=make_blueprint(layout, active=active))
     try:

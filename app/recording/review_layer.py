@@ -119,8 +119,11 @@ class ReviewLayer:
 
     def look(self, left: float, top: float, width: float, height: float) -> bytes:
         """A blueprint that frames a part of the picture [px]."""
+        # A click asks for a place, and the server knows what lies there. Were the marks themselves to be picked, a slow
+        # renderer would answer some pictures late, or not at all.
+        still = {path: rrb.EntityBehavior(interactive=False) for path in (GRAINS, WALLS, CANDIDATES, MARKS, SELECTION)}
         view = rrb.Spatial2DView(
-            name="Photograph", origin="/", contents=["/**"], titlebar=False, background=[16, 17, 21],
+            name="Photograph", origin="/", contents=["/**"], titlebar=False, background=[16, 17, 21], overrides=still,
             visual_bounds=rrb.VisualBounds2D(x_range=[left, left + width], y_range=[top, top + height]),
         )  # fmt: skip
         view.id = _VIEW

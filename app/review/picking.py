@@ -14,21 +14,13 @@ WIDEST_GAP = 0.25  # [mean radius] between two bodies that a click can join
 BESIDE = 0.35  # [mean radius] how far from the middle of such a gap a click may be
 
 
-def nearest_candidate(candidates: Candidates, point: Array, mean_radius: float, hint: int | None = None) -> int | None:
-    """Row of the candidate that a click at point (2,) [m] means; None if none is near.
-
-    hint: the row that the viewer believes to be under the pointer. It decides only between candidates that are about
-    equally near, because a slow renderer may report what was there some pictures ago.
-    """
+def nearest_candidate(candidates: Candidates, point: Array, mean_radius: float) -> int | None:
+    """Row of the candidate that a click at point (2,) [m] means; None if none is near."""
     if candidates.count == 0:
         return None
     distance = np.linalg.norm(candidates.contacts.point - point, axis=1)
     row = int(np.argmin(distance))
-    if distance[row] > NEAR * mean_radius:
-        return None
-    if hint is not None and 0 <= hint < candidates.count and distance[hint] < distance[row] + 0.05 * mean_radius:
-        return hint
-    return row
+    return row if distance[row] <= NEAR * mean_radius else None
 
 
 def gap_at(results: Results, frame: int, point: Array) -> tuple[int, int] | None:

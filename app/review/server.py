@@ -151,10 +151,7 @@ def _next(server: ReviewServer, values: _Values) -> dict[str, Any]:
 
 
 def _pick(server: ReviewServer, values: _Values) -> dict[str, Any]:
-    under = None
-    if values.has("path") and values.has("instance"):
-        under = (values.get("path", str), values.get("instance", int))
-    return server.session.pick(values.view(), values.get("x", float), values.get("y", float), under)
+    return server.session.pick(values.view(), values.get("x", float), values.get("y", float))
 
 
 def _named(server: ReviewServer, values: _Values) -> dict[str, Any]:

@@ -10,11 +10,9 @@ import numpy as np
 
 from app import __version__
 from app.recording.review_layer import (
-    CANDIDATES,
     CONTACT,
     DETECTED,
     HIDDEN,
-    MARKS,
     NO_CONTACT,
     UNDETECTED,
     UNSURE,
@@ -133,17 +131,13 @@ class ReviewSession:
             told |= self._measured(frame, key, pair)
         return told
 
-    def pick(self, view: Viewpoint, x: float, y: float, under: tuple[str, int] | None = None) -> dict[str, Any]:
-        """Answer a click at a pixel of the picture: select a candidate, or add the contact that was missed there.
-
-        under: entity and instance that the viewer reports below the pointer.
-        """
+    def pick(self, view: Viewpoint, x: float, y: float) -> dict[str, Any]:
+        """Answer a click at a pixel of the picture: select a candidate, or add the contact that was missed there."""
         self._check(view.frame)
         canvas = self.picture.canvas
         point = canvas.scale.to_world(np.array([x, y]) - 0.5)
         candidates = self.candidates(view.frame)
-        hint = self._row_of(view, candidates, *under) if under is not None else None
-        row = nearest_candidate(candidates, point, float(self.results.grains.radius.mean()), hint)
+        row = nearest_candidate(candidates, point, float(self.results.grains.radius.mean()))
         if row is not None:
             key = int(candidates.key[row])
             return {"pair": self.describe(view, view.frame, key, Origin.CLICK), "added": False}
@@ -244,15 +238,6 @@ class ReviewSession:
             if i is not None and j is not None and 0 <= frame < len(self.results.frames):
                 found[(frame, self.bodies.key(i, j))] = entry
         return found
-
-    def _row_of(self, view: Viewpoint, candidates: Candidates, entity: str, instance: int) -> int | None:
-        """The candidate that an instance of the picture stands for."""
-        if entity not in (CANDIDATES, MARKS):
-            return None
-        said = {key for frame, key in self._judged(view.reviewer) if frame == view.frame}
-        judged = np.isin(candidates.key, sorted(said))
-        rows = np.flatnonzero(judged if entity == MARKS else ~judged)
-        return int(rows[instance]) if 0 <= instance < len(rows) else None
 
     def _estimate(
         self, queue: Queue, pairs: list[tuple[int, int]], judged: dict[tuple[int, int], Entry], frame: int | None

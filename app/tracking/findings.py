@@ -23,7 +23,7 @@ class Findings:
         n = len(patches.centre)
         self.settings = settings
         self.accepted_zncc = accepted_zncc  # (n,)
-        self.usable = patches.usable  # (n,)
+        self.usable = patches.usable.copy()  # (n,) false too for what a user has settled
         self.pose = np.full((n, 3), np.nan)  # x, y [px], rotation [rad]
         self.expected = np.full((n, 3), np.nan)  # where the neighbours' motion leads
         self.sigma = np.full(n, np.nan)  # [px]
@@ -86,7 +86,7 @@ class Findings:
         15 % of the contrast: where something covers most grains, it must not become the rule.
         """
         floor = 2.0 * noise**2
-        accepted = np.flatnonzero(self.accepted)
+        accepted = np.flatnonzero(self.accepted & np.isfinite(self.residual))
         self.poor[:] = False
         if len(accepted) == 0:
             return float(np.sqrt(floor))
@@ -97,7 +97,18 @@ class Findings:
         return float(np.sqrt(np.median(explained)))
 
     def doubt(self, rows: Rows) -> None:
-        self.status[rows] = TrackStatus.SUSPECT
+        self.status[rows[self.status[rows] != TrackStatus.GIVEN]] = TrackStatus.SUSPECT
+
+    def close(self, rows: Rows) -> None:
+        """Look no further for `rows`."""
+        self.usable[rows] = False
+
+    def give(self, rows: Rows, pose: Array, sigma: float) -> None:
+        """Take poses (m, 3) as they are told, good to `sigma` [px]."""
+        self.pose[rows] = pose
+        self.sigma[rows] = sigma
+        self.zncc[rows] = np.nan
+        self.status[rows] = TrackStatus.GIVEN
 
     def expect_from_neighbours(self, last: Array) -> Rows:
         """Predict the open grains from the accepted ones about them; returns the rows predicted."""

@@ -1,63 +1,139 @@
-"""From photographs to tracks in the world: detection on the first one, then one photograph after the other."""
+"""From photographs to tracks in the world: one photograph after the other, grains and walls."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.checkpoint import Checkpoint
+from app.errors import InputError
 from app.frames import Photographs
 from app.progress import Progress, silent
-from app.tracking.detection import Detection, DetectionSettings, detect_grains, refine_grains
-from app.tracking.tracker import FramePoses, Tracker
-from app.tracks import Tracks
+from app.tracking.corrections import Corrections
+from app.tracking.detection import Detection
+from app.tracking.tracker import FramePoses, Tracker, TrackingSettings
+from app.tracking.walls import WallPoses, WallTracker
+from app.tracks import Tracks, WallTracks
 from app.units import Scale
 from solver.grains import Array
 
 HISTORY = 8  # frames that the tracker looks back upon
 
+# What is assumed of the centre of a grain whose outline could not be seen [px].
+UNSEEN_SIGMA = 1.0
 
-def detect(first: NDArray[np.float32], radii: Array, guess: tuple[Array, Array, Array] | None) -> Detection:
-    """Find the grains on the first photograph, or refine those that were given (x, y, radius (n,) [px]).
 
-    radii: known radius classes [px], may be empty.
-    """
-    if guess is not None:
-        return refine_grains(first, *guess)
-    return detect_grains(first, DetectionSettings(radii=tuple(float(r) for r in radii)))
+@dataclass(frozen=True, slots=True)
+class FollowedWalls:
+    """The walls of f frames and how well they are known."""
+
+    walls: WallTracks
+    sigma: Array  # (f, w, 2) [m] of each endpoint along the normal, against frame 0; NaN where it was measured
+    zncc: Array  # (f, w) NaN where it was measured
+    patches: NDArray[np.int64]  # (f, w) how many agree
 
 
 def follow_photographs(
     photographs: Photographs,
     detection: Detection,
     ids: NDArray[np.int64],
+    radius: Array,
     time: Array,
     scale: Scale,
     *,
     workers: int,
     checkpoint: Checkpoint,
+    settings: TrackingSettings | None = None,
+    corrections: Mapping[int, Corrections] | None = None,
     progress: Progress = silent,
 ) -> Tracks:
-    """Follow the detected grains through all photographs; finished ones are taken from the checkpoint."""
-    tracker = Tracker(photographs[0], detection, workers=workers)
+    """Follow the detected grains through all photographs; finished ones are taken from the checkpoint.
+
+    radius (n,) [m]; corrections: poses told by hand, by frame.
+    """
+    told = corrections if corrections is not None else {}
+    tracker = Tracker(photographs[0], detection, settings, workers=workers)
     frame_count = len(time)
     poses: list[FramePoses] = [
         checkpoint.load(k, FramePoses)[0] for k in range(min(checkpoint.finished(), frame_count))
     ]
     for k in range(len(poses), frame_count):
         progress("tracking", k, frame_count)
-        pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:])
+        pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:], told.get(k))
         checkpoint.save(k, pose)
         poses.append(pose)
     progress("tracking", frame_count, frame_count)
+    pixels = np.stack([np.stack([p.x, p.y], axis=1) for p in poses])
+    centre = np.stack([detection.x, detection.y], axis=1)
     return Tracks(
         id=ids,
-        radius=detection.radius * scale.pixel_size,
+        radius=radius,
         time=time,
-        position=scale.to_world(np.stack([np.stack([p.x, p.y], axis=1) for p in poses])),
+        position=scale.to_world(pixels),
         rotation=scale.angle_to_world(np.stack([p.rotation for p in poses])),
-        sigma=np.stack([p.sigma for p in poses]) * scale.pixel_size,
+        sigma=np.stack([p.sigma for p in poses]) * scale.size_at(pixels),
         zncc=np.stack([p.zncc for p in poses]),
         status=np.stack([p.status for p in poses]),
-        centre_sigma=detection.sigma * scale.pixel_size,
+        centre_sigma=np.where(np.isfinite(detection.sigma), detection.sigma, UNSEEN_SIGMA) * scale.size_at(centre),
+    )
+
+
+def follow_walls(
+    photographs: Photographs,
+    walls: WallTracks,
+    scale: Scale,
+    depth: Array,
+    *,
+    source: Path,
+    workers: int,
+    checkpoint: Checkpoint,
+    progress: Progress = silent,
+) -> FollowedWalls:
+    """Follow the walls where their endpoints are NaN; depth (w,) [m]: how much of each bar is seen.
+
+    source: the walls' table. Raises InputError for a wall without texture and for one that is not found.
+    """
+    frame_count = len(walls.endpoints)
+    tracker = WallTracker(photographs[0], walls.endpoints[0], scale, depth, workers=workers)
+    asked = np.isnan(walls.endpoints).any(axis=(2, 3))
+    for w in np.flatnonzero(asked.any(axis=0) & (tracker.patch_count < tracker.settings.least_patches)):
+        raise InputError(
+            source,
+            f"frame 0, wall {walls.name[w]!r}",
+            f"shows {tracker.patch_count[w]} patches of texture within {depth[w] * 1e3:.3g} mm on the right of 1 → 2: "
+            "too few to be followed; give its position in every frame",
+        )
+    poses: list[WallPoses] = [checkpoint.load(k, WallPoses)[0] for k in range(min(checkpoint.finished(), frame_count))]
+    for k in range(len(poses), frame_count):
+        progress("walls", k, frame_count)
+        pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:])
+        pose = _measured_where_told(pose, walls.endpoints[k], ~asked[k])
+        missing: NDArray[np.bool_] = np.isnan(pose.endpoints).any(axis=(1, 2))
+        for w in np.flatnonzero(missing):
+            raise InputError(
+                source,
+                f"frame {k}, wall {walls.name[w]!r}",
+                f"is not found again in {photographs.files[k].name}: give its position in that frame",
+            )
+        checkpoint.save(k, pose)
+        poses.append(pose)
+    progress("walls", frame_count, frame_count)
+    return FollowedWalls(
+        WallTracks(walls.name, np.stack([p.endpoints for p in poses]), walls.pressure),
+        np.stack([p.sigma for p in poses]),
+        np.stack([p.zncc for p in poses]),
+        np.stack([p.patches for p in poses]),
+    )
+
+
+def _measured_where_told(pose: WallPoses, endpoints: Array, told: NDArray[np.bool_]) -> WallPoses:
+    return WallPoses(
+        np.where(told[:, None, None], endpoints, pose.endpoints),
+        np.where(told[:, None], np.nan, pose.sigma),
+        np.where(told, np.nan, pose.zncc),
+        np.where(told, 0, pose.patches),
     )

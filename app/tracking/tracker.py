@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.frames import Image
+from app.tracking.corrections import Corrections, apply_corrections
 from app.tracking.correlation import Correlator, Patches
 from app.tracking.detection import Detection
 from app.tracking.findings import Findings
@@ -123,8 +124,10 @@ class Tracker:
             np.where(good, sigma, np.nan), np.where(good, 1.0, np.nan), status.astype(np.uint8),
         )  # fmt: skip
 
-    def follow(self, image: Image, history: Sequence[FramePoses]) -> FramePoses:
+    def follow(self, image: Image, history: Sequence[FramePoses], corrections: Corrections | None = None) -> FramePoses:
         """Find the grains in the next photograph. history: earlier frames, most recent last, at least one.
+
+        corrections: what a user tells of some of them in this photograph.
 
         The last two frames predict the motion. Frames further back are read only for grains that were lost
         meanwhile: without them such a grain's rotation counts from the first photograph, in (−π, π].
@@ -136,8 +139,10 @@ class Tracker:
         photograph = Pyramid(np.ascontiguousarray(image, dtype=np.float32))
         last = _last_known(history, self.first())
         findings = Findings(self.patches, self.accepted_zncc, self.settings)
-        _follow_predictions(self._correlator, photograph, findings, last, history)
         noise = max(image_noise(photograph.image), self.noise)
+        if corrections is not None:
+            apply_corrections(self._correlator, photograph, findings, corrections, last, np.sqrt(2.0) * noise)
+        _follow_predictions(self._correlator, photograph, findings, last, history)
         typical = findings.judge_residuals(self.patches, noise)
         rescue(self._correlator, photograph, findings, last, self.settings, typical)
         typical = findings.judge_residuals(self.patches, noise)
@@ -160,8 +165,9 @@ class Tracker:
         certain = findings.zncc[rows] > np.maximum(self.accepted_zncc[rows], 0.8)
         findings.doubt(rows[odd & ~certain])
         pairs = rows[overlaps(findings.pose[rows, :2], self.radius[rows], self.settings.overlap_allowed)]
+        trust = np.where(findings.status == TrackStatus.GIVEN, np.inf, findings.zncc)
         for i, j in pairs:
-            findings.doubt(np.array([i if findings.zncc[i] < findings.zncc[j] else j]))
+            findings.doubt(np.array([i if trust[i] < trust[j] else j]))
 
     def _poses(self, findings: Findings, last: Array, photograph: Pyramid) -> FramePoses:
         height, width = photograph.image.shape
@@ -173,7 +179,8 @@ class Tracker:
         leaving = (x < reach) | (y < reach) | (x > width - 1 - reach) | (y > height - 1 - reach)
         never = self.first().status
         status[missing] = np.where(leaving, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST)[missing]
-        status[~self.patches.usable] = never[~self.patches.usable]
+        unseen = ~self.patches.usable & missing
+        status[unseen] = never[unseen]
         pose = np.where(missing[:, None], np.nan, findings.pose)
         rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
         blank = np.where(missing, np.nan, 1.0)
@@ -200,7 +207,7 @@ def _follow_predictions(
     if len(history) > 1:
         step = history[-1].pose - history[-2].pose
         guess = np.where(np.isfinite(step), guess + step, guess)
-    rows = np.flatnonzero(seen & correlator.patches.usable)
+    rows = np.flatnonzero(seen & findings.open)
     findings.take(rows, correlator.fit(photograph, rows, guess[rows], leash(correlator, rows)), TrackStatus.OK)
     rows = np.flatnonzero(seen & findings.open)
     if len(history) > 1 and len(rows):

@@ -118,8 +118,8 @@ def test_a_sweep_takes_a_fraction_of_a_plain_one(benchmark: Benchmark, table: li
     benchmark(solver_turn(problem), 1)
     ratio = found["solver"] / found["plain"]
     table.append(
-        f"sweep   {count:7d} grains {contacts:7d} contacts: solver {found['solver']:5.2f} ns, plain {found['plain']:5.2f} "
-        f"(shuffled {found['shuffled']:5.2f}): ratio {ratio:.3f} (aim {TARGET[count]}); "
+        f"sweep   {count:7d} grains {contacts:7d} contacts: solver {found['solver']:5.2f} ns, "
+        f"plain {found['plain']:5.2f} (shuffled {found['shuffled']:5.2f}): ratio {ratio:.3f} (aim {TARGET[count]}); "
         f"every sweep heard {found['heard'] / found['solver'] - 1:+.0%}"
     )
     assert ratio < TARGET[count] + NOISE

@@ -7,6 +7,7 @@ from solver.grains import GrainMotion
 from solver.nlgs import NlgsSettings, Stop, solve, sweeps
 from solver.nlgs_kernels import advance, apply_forces
 from solver.problem import Material, assemble
+from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, jammed_packing
 from tests.packings import squeezed_heap
 from tests.solver.test_natural_map import natural_map_of
 
@@ -16,12 +17,10 @@ ROUNDING = 1e-3  # of the residual: sums in another order
 
 @pytest.fixture(scope="module", params=[1, 5])
 def heap(request):
-    """A disordered heap at rest under its weight and a loaded plate."""
-    grains, state, walls = squeezed_heap(np.random.default_rng(request.param), columns=12, rows=12)
-    still = GrainMotion(state.position, np.zeros_like(state.velocity), np.zeros_like(state.spin), state.present)
-    contacts = detect_contacts(grains, still.position, still.present, walls, 2e-4)
-    material = Material(0.3, 0.2, 0.0, (0.0, -9.81))
-    return grains, still, walls, contacts, material, grains.mass * 1e3
+    """A jammed packing under load, everything at rest."""
+    packing = jammed_packing(250, seed=request.param)
+    material, impedance = Material(FRICTION, FRICTION), packing.grains.mass * IMPEDANCE
+    return packing.grains, packing.motion, packing.walls, packing.contacts, material, impedance
 
 
 def settings(window, **more):

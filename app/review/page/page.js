@@ -182,8 +182,8 @@ const turn = (by) => queue(async () => {
   await present((await ask("next")).pair);
 });
 
-const pick = (x, y, path, instance) => queue(async () => {
-  const answer = await ask("pick", { x, y, path, instance });
+const pick = (x, y) => queue(async () => {
+  const answer = await ask("pick", { x, y });
   if (!answer.pair) return toast("No gap here: click a candidate, or between two grains");
   if (answer.added) toast(`Added a contact: ${both(answer.pair)}.  Z takes it back`, 4000);
   await present(answer.pair, false);

@@ -2,28 +2,59 @@
 
 const CHANNEL = "review";
 
+const DRAG = 5; // pixels from which on a press is a drag
+
 /**
- * Keep idle pointer moves from the viewer. It would pick and outline what lies below the pointer at every move, which
- * takes a software renderer more than a second a picture. A click needs its own place only; so does a wheel.
+ * Make the pointer easy for a viewer that draws slowly. An idle pointer is kept from it: at every move it would pick
+ * and outline what lies below, for more than a second a picture in software. And a press waits for its release, so that
+ * both come in one picture: a press that lasts longer than 0.8 s, be it for slow drawing, is no click to the viewer.
  */
 function calm(canvas) {
   let passing = false;
-  const hold = (event) => {
-    if (event.target !== canvas || event.buttons || passing) return;
-    event.stopImmediatePropagation();
-  };
-  for (const kind of ["mousemove", "pointermove", "mouseover", "pointerover"]) window.addEventListener(kind, hold, { capture: true });
-  const tell = (event) => {
-    if (event.target !== canvas) return;
-    passing = true; // the viewer clicks and zooms at the place that it knows
-    canvas.dispatchEvent(new MouseEvent("mousemove", { clientX: event.clientX, clientY: event.clientY, bubbles: true }));
+  let press = null;
+  const pass = (kind, event, buttons) => {
+    passing = true;
+    const { clientX, clientY, pointerId, pointerType, shiftKey, ctrlKey, altKey, metaKey } = event;
+    const same = { clientX, clientY, pointerId, pointerType, shiftKey, ctrlKey, altKey, metaKey };
+    const make = kind.startsWith("pointer") ? PointerEvent : MouseEvent;
+    canvas.dispatchEvent(new make(kind, { ...same, button: 0, buttons, bubbles: true, cancelable: true }));
     passing = false;
   };
-  for (const kind of ["pointerdown", "wheel"]) window.addEventListener(kind, tell, { capture: true, passive: true });
+  const release = () => {
+    const event = press;
+    press = null;
+    pass("mousemove", event, 0);
+    pass("pointerdown", event, 1);
+  };
+  const on = (kind, act) => window.addEventListener(kind, act, { capture: true, passive: true });
+  const still = (event) => {
+    if (passing || event.target !== canvas) return;
+    if (press && Math.hypot(event.clientX - press.clientX, event.clientY - press.clientY) > DRAG) release();
+    if (!event.buttons || press) event.stopImmediatePropagation();
+  };
+  for (const kind of ["mousemove", "pointermove", "mouseover", "pointerover"]) on(kind, still);
+  on("pointerdown", (event) => {
+    if (passing || event.target !== canvas || event.button !== 0) return;
+    press = event;
+    event.stopImmediatePropagation();
+  });
+  on("pointerup", (event) => {
+    if (passing || !press) return;
+    press = null;
+    event.stopImmediatePropagation();
+    pass("mousemove", event, 0); // the viewer must have drawn the pointer there once before it takes a click
+    const click = () => {
+      pass("pointerdown", event, 1);
+      pass("pointerup", event, 0);
+    };
+    requestAnimationFrame(() => requestAnimationFrame(click));
+  });
+  on("pointercancel", () => (press = null));
+  on("wheel", (event) => event.target === canvas && pass("mousemove", event, 0)); // it zooms at the place it knows
   return () => canvas.dispatchEvent(new MouseEvent("mouseleave"));
 }
 
-/** Start the viewer on a canvas. onClick(x, y, path, instance) is told what was clicked, in pixels of the picture. */
+/** Start the viewer on a canvas. onClick(x, y) is told what was clicked, in pixels of the picture. */
 export async function startViewer(canvas, theme, onClick) {
   if (!globalThis.WebAssembly || !canvas.ownerDocument.createElement("canvas").getContext("webgl2")) {
     throw new Error("this browser draws no WebGL");
@@ -46,7 +77,7 @@ export async function startViewer(canvas, theme, onClick) {
       setTimeout(leave, 50);
       const item = event.items.find((each) => each.type === "entity" && each.position);
       if (item && Number.isFinite(item.position[0]) && Number.isFinite(item.position[1])) {
-        onClick(item.position[0], item.position[1], item.entity_path, item.instance_id);
+        onClick(item.position[0], item.position[1]);
       }
     },
   });
