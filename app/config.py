@@ -123,6 +123,7 @@ class WallsSection(Section):
     file: str  # table frame,wall,x1,y1,x2,y2
     track: bool | None = None  # follow walls in the photographs where the table has no row; absent: where it has none
     thickness: Positive | None = None  # [m] of the bars seen beside their inner faces; absent: measured on the picture
+    forces: str | None = None  # table frame,wall,fx,fy [N] of sensors: the packing's force on the wall, to compare
     plates: dict[str, Plate] = {}
 
     @model_validator(mode="before")

@@ -59,7 +59,7 @@ class Experiment:
         if config.tracks:
             names += [config.tracks.positions, config.tracks.grains, config.tracks.times]
         if config.walls:
-            names.append(config.walls.file)
+            names += [config.walls.file, config.walls.forces]
         files = [self.folder / name for name in names if name is not None]
         return files + (list(self.photographs().files) if config.photographs else [])
 
@@ -184,7 +184,26 @@ def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
     if len(point):
         raise table.error(int(point[0]), "wall", "has no length: its two ends are the same point")
     pressure = np.array([section.plates[n].pressure if n in section.plates else None for n in names], np.float64)
-    return WallTracks(names, endpoints, pressure)
+    return WallTracks(names, endpoints, pressure, _read_wall_forces(experiment, names, frame_count))
+
+
+def _read_wall_forces(experiment: Experiment, names: tuple[str, ...], frame_count: int) -> Array | None:
+    """What sensors recorded on the walls (f, w, 2) [N], NaN where they did not; None without a table."""
+    section = experiment.config.walls
+    if section is None or section.forces is None:
+        return None
+    table = read_table(experiment.folder / section.forces, ("frame", "wall", "fx", "fy"))
+    frame, name = table.integers("frame"), table.text("wall")
+    for row, (k, each) in enumerate(zip(frame, name, strict=True)):
+        if each not in names:
+            raise table.error(row, "wall", "is not the name of a wall")
+        if not 0 <= k < frame_count:
+            raise table.error(row, "frame", f"is not one of the {frame_count} frames")
+    wall = np.array([names.index(each) for each in name])
+    check_unique(table, "wall", frame, wall)
+    force = np.full((frame_count, len(names), 2), np.nan)
+    force[frame, wall] = np.column_stack([table.numbers("fx"), table.numbers("fy")])
+    return force
 
 
 def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> None:

@@ -59,5 +59,6 @@ UNITS = {
     "tracks/rotation": "rad",
     "tracks/sigma": "m",
     "walls/endpoints": "m",
+    "walls/force": "N",
     "walls/pressure": "Pa",
 }

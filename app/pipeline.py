@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -36,6 +37,8 @@ from app.experiment import (
 from app.opinions import friction_of, tuned_radii
 from app.progress import Progress, silent
 from app.results import Results, TruthContacts
+from app.review.decisions import Bodies, decide, fingerprint
+from app.review.verdicts import VERDICTS, Flag, VerdictLog
 from app.scaling import make_scale
 from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
 from app.tracking.stage import track_photographs, write_tables
@@ -49,6 +52,7 @@ from solver.frame_statistics import FrameStatistics, frame_statistics
 from solver.grains import Array
 from solver.motion import Snapshot
 from solver.sequence import SequenceSettings, SequenceState, solve_sequence
+from solver.verdicts import Verdicts
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
@@ -153,6 +157,8 @@ def solve(run: Run) -> Results:
         run,
         ("photographs", "tracking", "tracks", "walls", "calibration", "material", "contacts", "solver", "recording"),
     )
+    log = VerdictLog(run.file(VERDICTS))
+    origin = replace(origin, fingerprint=_with_verdicts(origin.fingerprint, log))
     stored = read_origin(run.file(RESULTS))
     if stored is not None and stored.fingerprint == origin.fingerprint:
         return load_results(run.file(RESULTS))
@@ -174,7 +180,12 @@ def solve(run: Run) -> Results:
         tracks = replace(tracks, radius=tracks.radius + tuning.found)
         packing = make_packing(experiment, tracks.radius, walls.pressure)
     checkpoint = Checkpoint(run.folder / UNFINISHED / "solving", origin.fingerprint)
-    frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint, overlap)
+    decisions = decide(
+        log, Bodies.of(tracks, walls), first_frame=run.frames[0], frame_count=tracks.frame_count
+    )  # fmt: skip
+    if decisions.flags and all(Flag.IGNORE in decisions.flags.get(k, ()) for k in range(tracks.frame_count)):
+        raise InputError(log.file, "flag ignore", "is set on every frame: nothing is left to solve")
+    frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint, overlap, decisions.for_solver())
     results = Results(
         name=experiment.name,
         tracks=tracks,
@@ -197,7 +208,13 @@ def solve(run: Run) -> Results:
 
 
 def _solve_frames(
-    run: Run, packing: Packing, tracks: Tracks, walls: WallTracks, checkpoint: Checkpoint, overlap: float
+    run: Run,
+    packing: Packing,
+    tracks: Tracks,
+    walls: WallTracks,
+    checkpoint: Checkpoint,
+    overlap: float,
+    verdicts: Mapping[int, Verdicts],
 ) -> tuple[list[FrameForces], list[FrameStatistics]]:
     snapshots = make_snapshots(tracks, walls)
     frames: list[FrameForces] = []
@@ -216,7 +233,9 @@ def _solve_frames(
     settings = sequence_settings(run.experiment.config, overlap)
     done = len(frames)
     run.progress("solving", done, len(snapshots))
-    for forces, state in solve_sequence(packing, snapshots, settings, state=kept_state, first=done):
+    for forces, state in solve_sequence(
+        packing, snapshots, settings, state=kept_state, first=done, verdicts=verdicts
+    ):
         snapshot = snapshots[forces.frame]
         summary = frame_statistics(
             forces.contacts, forces.fn, forces.ft, forces.state,
@@ -338,6 +357,12 @@ def _frame_range(run: Run, count: int) -> tuple[int, int]:
     if not 0 <= start < stop <= count:
         raise InputError("--frames", f"{start}:{stop}", f"is not a range of the frames 0:{count}")
     return start, stop
+
+
+def _with_verdicts(digest: str, log: VerdictLog) -> str:
+    """The fingerprint of results that obey a log of verdicts; without verdicts it stays what it was."""
+    told = fingerprint(log)
+    return hashlib.sha256((digest + told).encode()).hexdigest() if told else digest
 
 
 def _origin(run: Run, sections: tuple[str, ...]) -> Provenance:

@@ -170,6 +170,8 @@ def _write_tracks(store: h5py.File, tracks: Tracks, walls: WallTracks | None) ->
         store.create_dataset("walls/name", data=np.array(walls.name, dtype=object), dtype=h5py.string_dtype())
         store.create_dataset("walls/endpoints", data=walls.endpoints)
         store.create_dataset("walls/pressure", data=walls.pressure)
+        if walls.force is not None:
+            store.create_dataset("walls/force", data=walls.force)
 
 
 def _read_tracks(store: h5py.File) -> tuple[Tracks, WallTracks | None]:
@@ -183,7 +185,8 @@ def _read_tracks(store: h5py.File) -> tuple[Tracks, WallTracks | None]:
     if "walls" not in store:
         return tracks, None
     names = tuple(name.decode() for name in _read(store, "walls/name"))
-    return tracks, WallTracks(names, _read(store, "walls/endpoints"), _read(store, "walls/pressure"))
+    force = _read(store, "walls/force") if "walls/force" in store else None
+    return tracks, WallTracks(names, _read(store, "walls/endpoints"), _read(store, "walls/pressure"), force)
 
 
 def _write_frames(store: h5py.File, results: Results) -> None:

@@ -63,6 +63,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "coordination_number": _plain([s.coordination_number for s in results.statistics]),
         "mean_fn": _plain([s.mean_fn for s in results.statistics]),
         "friction": _friction(results),
+        "wall_force_error": _wall_force_error(results),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
         "radius_change": results.radius_tuning.found if results.radius_tuning is not None else None,
         "timings": {stage: round(value, 3) for stage, value in seconds.items()},
@@ -117,6 +118,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
             f"Friction from the motion: {friction['measured']:.2f} ({friction['low']:.2f} to {friction['high']:.2f}), "
             f"which {verdict} the given {friction['given']:g}."
         )
+    if summary["wall_force_error"]:
+        told = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
+        lines.append(f"Inferred against recorded wall forces, rms difference over settled frames: {told}.")
     if summary["calibration"] is not None:
         lines.append(f"Self-calibration {summary['calibration']}.")
     if summary["radius_change"] is not None:
@@ -168,6 +172,23 @@ def _frame_table(summary: dict[str, Any]) -> Table:
 
 def _cell(value: float | None, form: str) -> str:
     return "–" if value is None else format(value, form)
+
+
+def _wall_force_error(results: Results) -> dict[str, float]:
+    """rms |F inferred − F recorded| / rms |F recorded| of every wall with a sensor, over settled frames."""
+    recorded = results.walls.force
+    settled = [frame.frame for frame in results.frames if frame.status is FrameStatus.SETTLED]
+    if recorded is None or not settled:
+        return {}
+    inferred = np.stack([results.statistics[k].wall_force for k in settled])
+    difference, size = inferred - recorded[settled], recorded[settled]
+    error = {}
+    for w, name in enumerate(results.walls.name):
+        known = np.isfinite(size[:, w]).all(axis=1)
+        if known.any() and np.any(size[known, w]):
+            ratio = np.sum(difference[known, w] ** 2) / np.sum(size[known, w] ** 2)
+            error[name] = float(np.sqrt(ratio))
+    return error
 
 
 def _friction(results: Results) -> dict[str, Any] | None:

@@ -87,6 +87,7 @@ class WallTracks:
     name: tuple[str, ...]  # (w,)
     endpoints: Array  # (f, w, 2, 2) [m]; the packing lies to the left of endpoint 0 → 1
     pressure: Array  # (w,) [Pa], NaN where the measured motion is imposed
+    force: Array | None = None  # (f, w, 2) [N] recorded by sensors, of the packing on the wall; NaN: not recorded
 
     @property
     def count(self) -> int:
@@ -94,4 +95,5 @@ class WallTracks:
 
     def frames(self, start: int, stop: int) -> WallTracks:
         """The frames start … stop − 1 alone."""
-        return WallTracks(self.name, self.endpoints[start:stop], self.pressure)
+        force = None if self.force is None else self.force[start:stop]
+        return WallTracks(self.name, self.endpoints[start:stop], self.pressure, force)

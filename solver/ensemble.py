@@ -14,12 +14,14 @@ import numpy as np
 
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain, force_scale
 from solver.contact_probability import ContactProbabilitySettings, probable_contacts, window_of
+from solver.contacts import Contacts
 from solver.convex import ConvexSettings, assemble_balance, polish
 from solver.convex_members import advance_member
 from solver.displacement import find_reversals, member_intervals
 from solver.grains import Array
 from solver.motion import FrameMotion, Snapshot
 from solver.network import PairProbability, ProbablePairs
+from solver.verdicts import NO_VERDICTS, Verdicts, apply_verdicts
 from solver.warm_start import ForceMemory
 
 
@@ -59,6 +61,8 @@ class EnsembleForces:
     member_ft: Array  # (5, c) [N]
     state: EnsembleState
     remark: str  # what went otherwise than it should, or empty
+    forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
+    forbidden_probability: Array  # (m,) P(touch) of those, as detected
 
 
 def solve_ensemble(
@@ -71,15 +75,23 @@ def solve_ensemble(
     settings: EnsembleSettings,
     *,
     snapshot: Snapshot,
+    verdicts: Verdicts = NO_VERDICTS,
 ) -> EnsembleForces:
     """Solve frame k of a sequence with all members.
 
-    motion leads to frame k; snapshot is that of frame k, with stand-ins for lost grains.
+    motion leads to frame k; snapshot is that of frame k, with stand-ins for lost grains; verdicts are on frame k.
     """
     window = window_of(k, len(snapshots))
-    contacts, probability = probable_contacts(
+    detected, touch = probable_contacts(
         packing.grains, [snapshots[f] for f in window], k - window.start, settings.probability, frame=snapshot
     )
+    contacts, before = apply_verdicts(
+        detected, verdicts, packing.grains, snapshot.position, snapshot.present, packing.walls(snapshot.endpoints)
+    )
+    # A pair that people saw touch is certain, whatever its measured gaps say.
+    seen = np.isin(contacts.key, verdicts.forced)
+    probability = np.where(seen, 1.0, touch[before]) if len(touch) else np.ones(contacts.count)
+    forbidden = np.isin(detected.key, verdicts.forbidden)
     pairs = PairProbability(contacts.key, probability)
     network = ProbablePairs(state.pairs if motion.spans else pairs, pairs)
     soft = advance_chain(packing, motion, state.soft, chain, network)
@@ -123,7 +135,7 @@ def solve_ensemble(
             stiff.memory if motion.spans else ForceMemory.empty(),
             memories[0], memories[1], memories[2], pairs,
         ),
-        "; ".join(remarks),
+        "; ".join(remarks), detected.select(forbidden), touch[forbidden],
     )  # fmt: skip
 
 

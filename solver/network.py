@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from solver.boundaries import Walls
 from solver.contacts import Contacts, detect_contacts, measure_contacts
 from solver.grains import Array, GrainMotion, Grains
+from solver.verdicts import NO_VERDICTS, Verdicts, apply_verdicts
 
 SURE = 0.3  # P(touch) from which on a contact bears force at once
 LEAST = 3e-3  # P(touch) below which a pair is no contact
@@ -29,12 +30,14 @@ class Network(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class NearPairs:
-    """Every pair whose gap is below a threshold [m]."""
+    """Every pair whose gap is below a threshold [m], save where people know better."""
 
     threshold: float
+    verdicts: Verdicts = NO_VERDICTS
 
     def at(self, fraction: float, grains: Grains, state: GrainMotion, walls: Walls) -> tuple[Contacts, Array | None]:
-        return detect_contacts(grains, state.position, state.present, walls, self.threshold), None
+        near = detect_contacts(grains, state.position, state.present, walls, self.threshold)
+        return apply_verdicts(near, self.verdicts, grains, state.position, state.present, walls)[0], None
 
 
 @dataclass(frozen=True, slots=True)

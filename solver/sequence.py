@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from solver.admissibility import worst_unbalance
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain
 from solver.contact_probability import window_of
-from solver.contacts import Contacts
+from solver.contacts import Contacts, detect_contacts
 from solver.ensemble import EnsembleSettings, EnsembleState, solve_ensemble
-from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus
+from solver.frame_forces import ContactState, FrameForces, FrameStatus
 from solver.grains import Array
 from solver.judgement import Evidence, free_standard_deviation, is_suspect, judge, trust
 from solver.kinematics import relative_motion
@@ -22,6 +22,7 @@ from solver.lost_grains import bridge_lost
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
 from solver.network import NearPairs
 from solver.stress import love_weber_stress, packing_area
+from solver.verdicts import NO_VERDICTS, Verdicts, show_forbidden, sources, without_ignored
 from solver.warm_start import ForceMemory
 
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
@@ -71,6 +72,8 @@ class _Estimate:
     ft: Array  # (c,) [N]
     probability: Array  # (c,), NaN where not computed
     members: EnsembleState
+    forbidden: Contacts  # detected, but left out for people forbade them
+    forbidden_probability: Array  # (m,)
     remark: str = ""
 
 
@@ -81,22 +84,32 @@ def solve_sequence(
     *,
     state: SequenceState | None = None,
     first: int = 0,
+    verdicts: Mapping[int, Verdicts] | None = None,
 ) -> Iterator[tuple[FrameForces, SequenceState]]:
     """Solve the frames first, first + 1, … one after the other; yields each frame with the state after it.
 
     The motion that leads to a frame is that since the frame before. Nothing leads to frame 0: it takes the motion
-    that follows it, and the chains of the frame after it start afresh.
+    that follows it, and the chains of the frame after it start afresh. verdicts: what people said of frames, by frame.
     """
     state = SequenceState.first(packing) if state is None else state
+    verdicts = {} if verdicts is None else verdicts
+    snapshots = without_ignored(snapshots, verdicts)
     for k in range(first, len(snapshots)):
-        frame, state = solve_frame(packing, snapshots, k, state, settings)
+        frame, state = solve_frame(packing, snapshots, k, state, settings, verdicts.get(k, NO_VERDICTS))
         yield frame, state
 
 
 def solve_frame(
-    packing: Packing, snapshots: Sequence[Snapshot], k: int, state: SequenceState, settings: SequenceSettings
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    k: int,
+    state: SequenceState,
+    settings: SequenceSettings,
+    verdicts: Verdicts = NO_VERDICTS,
 ) -> tuple[FrameForces, SequenceState]:
     """Solve frame k from the state that the frame before it left behind."""
+    if verdicts.reset:
+        state = replace(state, members=EnsembleState.first())
     window = window_of(k, len(snapshots))
     snapshot, bridged = bridge_lost([snapshots[f] for f in window], k - window.start)
     if np.isfinite(state.time):
@@ -104,22 +117,30 @@ def solve_frame(
     else:
         motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
     if settings.estimator == "ensemble" and len(snapshots) > 1:
-        estimate, evidence = _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, state, settings)
+        estimate, evidence = _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, state, settings, verdicts)
     else:
-        estimate, evidence = _estimate_by_chain(packing, snapshot, motion, state, settings)
+        estimate, evidence = _estimate_by_chain(packing, snapshot, motion, state, settings, verdicts)
     status, why = judge(evidence)
     if not motion.spans:
         why = "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
+    if verdicts.rearrangement and status is not FrameStatus.RESET:
+        status, why = FrameStatus.REARRANGING, "a reviewer saw a rearrangement here; " + why
+    if verdicts.reset:
+        status, why = FrameStatus.RESET, "a reviewer asked for a reset here; " + why
     if status is FrameStatus.REARRANGING and settings.reset_to_zero:
         fresh = replace(state, members=EnsembleState.first())
-        estimate, renewed = _estimate_by_chain(packing, snapshot, motion, fresh, settings)
+        estimate, renewed = _estimate_by_chain(packing, snapshot, motion, fresh, settings, verdicts)
         evidence = replace(renewed, old_unbalance=evidence.old_unbalance)
         status, why = FrameStatus.RESET, "reset to zero forces, as asked for at a rearrangement: " + why
     eventful = status in (FrameStatus.RESET, FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED)
+    if verdicts.ignored:  # no event of the packing: the frames after it do not settle anew
+        status = FrameStatus.SUSPECT
+        why = "a reviewer had this photograph ignored: solved on positions between its neighbours; " + why
     since_reset = 0 if status is FrameStatus.RESET else state.frames_since_reset + 1
     age = _age(estimate.step.contacts, state)
     reason = "; ".join(part for part in (estimate.remark, why, estimate.step.solution.stop.value) if part)
     frame = _describe(packing, k, motion, estimate, evidence, status, reason, since_reset, age)
+    frame = _with_verdicts(frame, packing, motion, estimate, verdicts)
     if bridged.any():
         frame = _without(frame, bridged)
     return frame, SequenceState(
@@ -136,23 +157,32 @@ def solve_frame(
 
 
 def _estimate_by_chain(
-    packing: Packing, snapshot: Snapshot, motion: FrameMotion, state: SequenceState, settings: SequenceSettings
+    packing: Packing,
+    snapshot: Snapshot,
+    motion: FrameMotion,
+    state: SequenceState,
+    settings: SequenceSettings,
+    verdicts: Verdicts,
 ) -> tuple[_Estimate, Evidence]:
     threshold = settings.threshold
     if threshold is None:  # the gap of a touching pair scatters by √2 σ and by the overlap
         threshold = settings.threshold_sigmas * float(np.hypot(snapshot.sigma, settings.overlap / np.sqrt(2.0)))
     memory, remark = state.members.soft, ""
-    step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold))
+    step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold, verdicts))
     evidence = _evidence(packing, motion, step, state)
     if is_suspect(evidence):
-        wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold))
+        wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold, verdicts))
         wider_evidence = _evidence(packing, motion, wider, state)
         if wider_evidence.correction < evidence.correction:
             step, evidence = wider, wider_evidence
             remark = f"solved again with a gap threshold {WIDER} times as wide"
     unknown = np.full(step.contacts.count, np.nan)
+    near = detect_contacts(packing.grains, snapshot.position, snapshot.present, step.walls, threshold)
+    forbidden = near.select(np.isin(near.key, verdicts.forbidden))
     members = replace(state.members, soft=step.memory if motion.spans else ForceMemory.empty())
-    return _Estimate(step, step.solution.fn, step.solution.ft, unknown, members, remark), evidence
+    return _Estimate(
+        step, step.solution.fn, step.solution.ft, unknown, members, forbidden, np.full(forbidden.count, np.nan), remark
+    ), evidence  # fmt: skip
 
 
 def _estimate_by_ensemble(
@@ -163,12 +193,17 @@ def _estimate_by_ensemble(
     motion: FrameMotion,
     state: SequenceState,
     settings: SequenceSettings,
+    verdicts: Verdicts,
 ) -> tuple[_Estimate, Evidence]:
     found = solve_ensemble(
-        packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble, snapshot=snapshot
-    )
+        packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble,
+        snapshot=snapshot, verdicts=verdicts,
+    )  # fmt: skip
     evidence = _evidence(packing, motion, found.step, state)
-    return _Estimate(found.step, found.fn, found.ft, found.probability, found.state, found.remark), evidence
+    return _Estimate(
+        found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
+        found.remark,
+    ), evidence  # fmt: skip
 
 
 def _evidence(packing: Packing, motion: FrameMotion, step: ChainStep, state: SequenceState) -> Evidence:
@@ -196,6 +231,20 @@ def _age(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
     _, here, there = np.intersect1d(contacts.key, state.age_key, assume_unique=True, return_indices=True)
     age[here] = state.age[there] + 1
     return age
+
+
+def _with_verdicts(
+    frame: FrameForces, packing: Packing, motion: FrameMotion, estimate: _Estimate, verdicts: Verdicts
+) -> FrameForces:
+    """Mark what people added, and list what they forbade."""
+    frame = replace(frame, source=sources(frame.contacts, verdicts))
+    if estimate.forbidden.count == 0:
+        return frame
+    grains = motion.grains
+    un, ut = relative_motion(
+        estimate.forbidden, packing.grains.radius, grains.velocity, grains.spin, estimate.step.walls
+    )
+    return show_forbidden(frame, estimate.forbidden, estimate.forbidden_probability, un, ut)
 
 
 def _without(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
@@ -249,7 +298,7 @@ def _describe(
         ut=ut,
         state=contact_state(packing, contacts, fn, ft),
         age=age,
-        source=np.full(contacts.count, ContactSource.DETECTED, np.uint8),
+        source=sources(contacts, NO_VERDICTS),
         probability=estimate.probability,
         fn_sd=free_standard_deviation(fn),
         ft_sd=packing.material.friction * free_standard_deviation(fn),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from app.review.verdicts import Body, Flag, Verdict, VerdictLog
 from app.tracks import Tracks, WallTracks
+from solver.verdicts import Verdicts
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +37,19 @@ class Decisions:
         """Keys of the pairs that do not touch in a frame, ascending."""
         return _keys(self.no_contact, frame)
 
-    @property
-    def fingerprint(self) -> str:
-        """The same for the same decisions, however they came about; empty where nothing was decided."""
-        if not self.count and not self.flags:
-            return ""
-        flags = sorted((frame, sorted(each)) for frame, each in self.flags.items())
-        told = json.dumps([sorted(self.contact), sorted(self.no_contact), flags])
-        return hashlib.sha256(told.encode()).hexdigest()
+    def for_solver(self) -> dict[int, Verdicts]:
+        """What the solver must obey, by frame of the run."""
+        frames = {frame for frame, _ in self.contact | self.no_contact} | set(self.flags)
+        return {
+            frame: Verdicts(
+                self.forced(frame),
+                self.forbidden(frame),
+                rearrangement=Flag.REARRANGEMENT in self.flags.get(frame, ()),
+                reset=Flag.RESET in self.flags.get(frame, ()),
+                ignored=Flag.IGNORE in self.flags.get(frame, ()),
+            )
+            for frame in sorted(frames)
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +108,16 @@ def decide(log: VerdictLog, bodies: Bodies, *, first_frame: int, frame_count: in
         unknown,
         {frame: frozenset(each) for frame, each in flags.items()},
     )
+
+
+def fingerprint(log: VerdictLog) -> str:
+    """A digest of all last words that decide something; empty where nothing was decided."""
+    words = [
+        [entry.reviewer, *(str(each) for each in entry.subject), str(entry.verdict), entry.on]
+        for entry in log.last_words()
+        if entry.verdict is not Verdict.UNSURE and (entry.flag is None or entry.on)
+    ]
+    return hashlib.sha256(json.dumps(sorted(words)).encode()).hexdigest() if words else ""
 
 
 def _keys(pairs: frozenset[tuple[int, int]], frame: int) -> NDArray[np.int64]:

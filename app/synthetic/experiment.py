@@ -107,6 +107,7 @@ def synthesize(
 
     out.mkdir(parents=True, exist_ok=True)
     tables.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
+    tables.write_wall_forces(out / "wall_forces.csv", truth)
     tables.write_truth_contacts(out / "truth_contacts.csv", truth)
     tables.write_tracks(out / "truth_tracks.csv", truth.position, truth.rotation)
     if photographs:

@@ -44,6 +44,26 @@ def write_truth_contacts(path: Path, truth: DemTruth) -> None:
     _write(path, ("frame", "i", "j", "fn", "ft"), rows)
 
 
+def write_wall_forces(path: Path, truth: DemTruth) -> None:
+    """Write the packing's force on every wall [N], as sensors would record it."""
+    n, w = len(truth.radius), len(truth.wall_names)
+    along = truth.endpoints[:, :, 1] - truth.endpoints[:, :, 0]
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    normal = np.stack([along[..., 1], -along[..., 0]], axis=2)  # the tangent, normal turned by +90°, is `along`
+    frame = np.repeat(np.arange(truth.frame_count), np.diff(truth.offset))
+    on_wall = truth.j >= n
+    k, wall = frame[on_wall], truth.j[on_wall] - n
+    force = np.zeros((truth.frame_count, w, 2))
+    each = truth.fn[on_wall, None] * normal[k, wall] + truth.ft[on_wall, None] * along[k, wall]
+    np.add.at(force, (k, wall), each)
+    rows = (
+        (k, name, f"{fx:.4f}", f"{fy:.4f}")
+        for k, walls in enumerate(force)
+        for name, (fx, fy) in zip(truth.wall_names, walls, strict=True)
+    )
+    _write(path, ("frame", "wall", "fx", "fy"), rows)
+
+
 def write_grains(path: Path, radius: Array) -> None:
     """Write radius (n,) [m], as tracks need it."""
     _write(path, ("id", "radius"), ((grain, _metres(value)) for grain, value in enumerate(radius)))
@@ -77,6 +97,7 @@ truth_tracks = "truth_tracks.csv"
 {source}
 [walls]
 file = "walls.csv"
+forces = "wall_forces.csv"
 [walls.top]
 pressure = {settings.pressure}
 

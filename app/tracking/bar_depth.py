@@ -33,8 +33,8 @@ def visible_depth(image: Image, endpoints: Array, scale: Scale, most: float) -> 
         with np.errstate(invalid="ignore"):
             away = np.abs(level - body)
             top = np.nanmax(away) if np.isfinite(away).any() else np.nan
-            # A quarter of the body's own grey, or half of what is met beyond, whichever is more.
-            left = ~(away < max(0.5 * top, 0.15 * float(np.ptp(image))))
+            # Half of the farthest that is met, and no less than a part of the whole range: the marks are no end.
+            left = ~(away <= max(0.5 * top, 0.15 * float(np.ptp(image))))
         # A mark or a shadow is narrow; the backing lasts.
         lasting = left & np.append(left[1:], True) & np.append(left[2:], [True, True])
         first = int(np.argmax(lasting)) if lasting.any() else len(steps) - 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -123,7 +123,7 @@ def follow_walls(
         poses.append(pose)
     progress("walls", frame_count, frame_count)
     return FollowedWalls(
-        WallTracks(walls.name, np.stack([p.endpoints for p in poses]), walls.pressure),
+        replace(walls, endpoints=np.stack([p.endpoints for p in poses])),
         np.stack([p.sigma for p in poses]),
         np.stack([p.zncc for p in poses]),
         np.stack([p.patches for p in poses]),

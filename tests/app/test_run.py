@@ -211,3 +211,18 @@ def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys
     capsys.readouterr()
     summary = json.loads((out / "summary.json").read_text())
     assert summary["accuracy"]["r_fn"][-1] > 0.7
+
+
+def test_recorded_wall_forces_are_compared_with_inferred_ones(tracked, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert rodsight("solve", str(tracked), "--out", str(out)) == 0
+    told = capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    if summary["settled_after"] is not None:  # they are compared over settled frames
+        assert set(summary["wall_force_error"]) == {"bottom", "right", "top", "left"}
+        assert max(summary["wall_force_error"].values()) < 0.5
+        assert "recorded wall forces" in told
+    with h5py.File(out / "results.h5") as store:
+        recorded, inferred = store["walls/force"][()], store["statistics/wall_force"][()]
+    # The truth's own walls push back what the inferred forces push on them: same side, same order of size.
+    assert np.sum(recorded[3:] * inferred[3:]) > 0.8 * np.sum(recorded[3:] ** 2)

@@ -12,6 +12,8 @@ const DRAG = 5; // pixels from which on a press is a drag
 function calm(canvas) {
   let passing = false;
   let press = null;
+  let waiting = false; // for the answer to a click
+  const leave = () => canvas.dispatchEvent(new MouseEvent("mouseleave"));
   const pass = (kind, event, buttons) => {
     passing = true;
     const { clientX, clientY, pointerId, pointerType, shiftKey, ctrlKey, altKey, metaKey } = event;
@@ -26,6 +28,12 @@ function calm(canvas) {
     pass("mousemove", event, 0);
     pass("pointerdown", event, 1);
   };
+  // It tells of a click one picture later, and draws that only when something happens.
+  const nudge = (event, times) => setTimeout(() => {
+    if (!waiting || !times) return leave();
+    pass("mousemove", event, 0);
+    nudge(event, times - 1);
+  }, 120);
   const on = (kind, act) => window.addEventListener(kind, act, { capture: true, passive: true });
   const still = (event) => {
     if (passing || event.target !== canvas) return;
@@ -47,11 +55,19 @@ function calm(canvas) {
       pass("pointerdown", event, 1);
       pass("pointerup", event, 0);
     };
-    requestAnimationFrame(() => requestAnimationFrame(click));
+    waiting = true;
+    requestAnimationFrame(() => requestAnimationFrame(() => {
+      click();
+      nudge(event, 12);
+    }));
   });
   on("pointercancel", () => (press = null));
   on("wheel", (event) => event.target === canvas && pass("mousemove", event, 0)); // it zooms at the place it knows
-  return () => canvas.dispatchEvent(new MouseEvent("mouseleave"));
+  const answered = () => {
+    waiting = false;
+    leave();
+  };
+  return { leave, answered };
 }
 
 /** Start the viewer on a canvas. onClick(x, y) is told what was clicked, in pixels of the picture. */
@@ -61,7 +77,7 @@ export async function startViewer(canvas, theme, onClick) {
   }
   console.debug = () => {}; // the viewer tells its inner life there, which costs a slow machine seconds
   await wasm_bindgen({ module_or_path: "/re_viewer_bg.wasm" });
-  const leave = calm(canvas);
+  const { leave, answered } = calm(canvas);
   const handle = new wasm_bindgen.WebHandle({
     url: [],
     hide_welcome_screen: true,
@@ -74,7 +90,7 @@ export async function startViewer(canvas, theme, onClick) {
     on_viewer_event: (told) => {
       const event = typeof told === "string" ? JSON.parse(told) : told;
       if (event.type !== "selection_change") return;
-      setTimeout(leave, 50);
+      setTimeout(answered);
       const item = event.items.find((each) => each.type === "entity" && each.position);
       if (item && Number.isFinite(item.position[0]) && Number.isFinite(item.position[1])) {
         onClick(item.position[0], item.position[1]);
@@ -83,6 +99,5 @@ export async function startViewer(canvas, theme, onClick) {
   });
   await handle.start(canvas);
   handle.open_channel(CHANNEL, CHANNEL);
-  canvas.addEventListener("pointerup", () => setTimeout(leave, 1500)); // a click that changed no selection
   return { show: (bytes) => handle.send_rrd_to_channel(CHANNEL, bytes), leave };
 }

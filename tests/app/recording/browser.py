@@ -78,8 +78,12 @@ class Browser:
         os.close(self._write)
         shutil.rmtree(self._profile, ignore_errors=True)
 
-    def open(self, address: str) -> None:
-        self._on_page("Page.navigate", url=address)
+    def open(self, address: str, seconds: float = 30.0) -> None:
+        """Open a page, waiting for its server to answer."""
+        end = time.monotonic() + seconds
+        while "errorText" in self._on_page("Page.navigate", url=address):
+            assert time.monotonic() < end, f"{address} does not answer"
+            time.sleep(0.2)
 
     def evaluate(self, script: str) -> Any:
         return self._on_page("Runtime.evaluate", expression=script, awaitPromise=True).get("result", {}).get("value")
@@ -93,7 +97,14 @@ class Browser:
 
     def picture(self) -> np.ndarray:
         """What the page shows (h, w, 3), red green blue."""
-        png = base64.b64decode(self._on_page("Page.captureScreenshot", format="png")["data"])
+        for _ in range(50):
+            try:
+                png = base64.b64decode(self._on_page("Page.captureScreenshot", format="png")["data"])
+                break
+            except AssertionError:  # between two pages there is nothing to picture
+                time.sleep(0.2)
+        else:
+            raise AssertionError("the browser takes no picture")
         return cv2.cvtColor(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
     def shows(self, test: Callable[[np.ndarray], bool], seconds: float = 90.0) -> bool:

@@ -66,7 +66,7 @@ def test_the_same_seed_gives_the_same_bytes(photographed: Synthesis, tmp_path: P
 def test_an_experiment_with_photographs_is_described(photographed: Synthesis) -> None:
     assert sorted(contents(photographed.folder)) == [
         "experiment.toml", "grains.csv", "photos/0000.png", "photos/0001.png", "photos/0002.png",
-        "truth_contacts.csv", "truth_tracks.csv", "walls.csv",
+        "truth_contacts.csv", "truth_tracks.csv", "wall_forces.csv", "walls.csv",
     ]  # fmt: skip
     described = tomllib.loads((photographed.folder / "experiment.toml").read_text())
     assert described["name"] == "tiny"
@@ -77,7 +77,7 @@ def test_an_experiment_with_photographs_is_described(photographed: Synthesis) ->
         "interval": pytest.approx(0.25 / 4.8e-3),  # the paper's 0.25° at 4.8e-3 °/s
         "radii": list(RADIUS_CLASSES),
     }
-    assert described["walls"] == {"file": "walls.csv", "top": {"pressure": 50e3}}
+    assert described["walls"] == {"file": "walls.csv", "forces": "wall_forces.csv", "top": {"pressure": 50e3}}
     assert described["material"] == {"density": 2700.0, "length": 0.06, "friction": 0.25, "wall_friction": 0.25}
     assert "tracks" not in described
 

@@ -92,7 +92,7 @@ def test_a_bar_that_jumped_is_searched_for(tracker: WallTracker) -> None:
 def test_motion_goes_on_as_it_was(tracker: WallTracker) -> None:
     history = [tracker.first()]
     for k in range(1, 4):
-        bars = moved(1, 9.0 * k, 2.0 * k, -0.3 * k)
+        bars = moved(1, -9.0 * k, 2.0 * k, -0.3 * k)
         history.append(tracker.follow(photograph(bars, 40 + k), history))
         assert np.abs(across(history[-1].endpoints, bars)).max() < NORMAL_ALLOWED
 
@@ -132,7 +132,7 @@ def test_depth_of_the_bars_is_seen_in_the_photograph() -> None:
 
 
 def test_a_bar_like_its_backing_gets_the_greatest_depth() -> None:
-    assert (visible_depth(np.full((HEIGHT, WIDTH), 80.0, np.float32), BARS, SCALE, 0.02) == 0.02).all()
+    assert (visible_depth(np.full((HEIGHT, WIDTH), 80.0, np.float32), BARS, SCALE, 0.01) == 0.01).all()
 
 
 def test_bar_without_marks_has_no_usable_patch() -> None:

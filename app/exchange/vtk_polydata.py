@@ -1,0 +1,120 @@
+"""Results for ParaView: VTK PolyData files (.vtp, XML, ASCII), one of grains and one of contacts per frame, and a
+collection (.pvd) of each that carries the times.
+
+Format: The VTK User's Guide, "VTK File Formats", PolyData. Lengths in metres, forces in newtons, z = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from app.atomic import write_atomically
+from app.results import Results
+from solver.contacts import Contacts
+from solver.grains import Array
+
+_TYPES = {"f": "Float64", "i": "Int64", "u": "Int64"}
+
+
+def write_polydata(results: Results, folder: Path) -> list[Path]:
+    """Write grains.pvd, contacts.pvd and the files that they name; returns the two collections."""
+    folder.mkdir(parents=True, exist_ok=True)
+    names: dict[str, list[str]] = {"grains": [], "contacts": []}
+    for frame in range(len(results.frames)):
+        for kind, text in (("grains", _grains(results, frame)), ("contacts", _contacts(results, frame))):
+            name = f"{kind}_{frame:04d}.vtp"
+            write_atomically(folder / name, text.encode())
+            names[kind].append(name)
+    files = []
+    for kind, parts in names.items():
+        write_atomically(folder / f"{kind}.pvd", _collection(parts, results.tracks.time).encode())
+        files.append(folder / f"{kind}.pvd")
+    return files
+
+
+def _grains(results: Results, frame: int) -> str:
+    tracks, forces = results.tracks, results.frames[frame]
+    here = np.flatnonzero(tracks.present[frame])
+    count = np.bincount(_bodies(forces.contacts, forces.fn > 0.0), minlength=tracks.grain_count)
+    data = {
+        "id": tracks.id[here],
+        "radius": tracks.radius[here],
+        "rotation": tracks.rotation[frame, here],
+        "status": tracks.status[frame, here],
+        "loaded_contacts": count[: tracks.grain_count][here],
+    }
+    vertices = np.arange(len(here))[:, None]
+    return _polydata(tracks.position[frame, here], "Verts", vertices, point_data=data)
+
+
+def _contacts(results: Results, frame: int) -> str:
+    """Lines from centre to centre, or from centre to contact point on a wall."""
+    forces, position = results.frames[frame], results.tracks.position[frame]
+    contacts = forces.contacts
+    far = contacts.point.copy()
+    pair = ~contacts.with_wall
+    far[pair] = position[contacts.j[pair]]
+    points = np.concatenate([position[contacts.i], far])
+    lines = np.column_stack([np.arange(contacts.count), np.arange(contacts.count) + contacts.count])
+    ids = np.concatenate([results.tracks.id, -1 - np.arange(results.walls.count)])  # walls: −1, −2, …
+    data = {
+        "i": ids[contacts.i], "j": ids[contacts.j], "fn": forces.fn, "ft": forces.ft, "gap": contacts.gap,
+        "fn_sd": forces.fn_sd, "probability": forces.probability, "state": forces.state, "age": forces.age,
+    }  # fmt: skip
+    return _polydata(points, "Lines", lines, cell_data=data)
+
+
+def _bodies(contacts: Contacts, kept: np.ndarray) -> np.ndarray:
+    return np.concatenate([contacts.i[kept], contacts.j[kept]])
+
+
+def _polydata(
+    points: Array,
+    kind: str,
+    cells: np.ndarray,
+    *,
+    point_data: Mapping[str, np.ndarray] | None = None,
+    cell_data: Mapping[str, np.ndarray] | None = None,
+) -> str:
+    """One piece: points (p, 2) [m], cells (k, s) of point numbers as Verts or Lines, data by name."""
+    offsets = (np.arange(len(cells)) + 1) * cells.shape[1]
+    spatial = np.column_stack([points, np.zeros(len(points))])
+    count = {name: len(cells) if name == kind else 0 for name in ("Verts", "Lines")}
+    parts = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian">',
+        "<PolyData>",
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="{count["Verts"]}" NumberOfLines="{count["Lines"]}" '
+        'NumberOfStrips="0" NumberOfPolys="0">',
+        "<Points>", _array("points", spatial), "</Points>",
+        f"<{kind}>", _array("connectivity", cells), _array("offsets", offsets), f"</{kind}>",
+        *_data("PointData", point_data), *_data("CellData", cell_data),
+        "</Piece>", "</PolyData>", "</VTKFile>", "",
+    ]  # fmt: skip
+    return "\n".join(parts)
+
+
+def _data(tag: str, data: Mapping[str, np.ndarray] | None) -> list[str]:
+    return [] if not data else [f"<{tag}>", *(_array(name, values) for name, values in data.items()), f"</{tag}>"]
+
+
+def _array(name: str, values: np.ndarray) -> str:
+    """All digits of floats: they read back to the same number. NaN is a word that the format knows."""
+    values = np.asarray(values)
+    kind = _TYPES[values.dtype.kind]
+    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 and name == "points" else ""
+    text = " ".join(map(repr, values.astype(float if kind == "Float64" else int).ravel().tolist()))
+    return f'<DataArray type="{kind}" Name={quoteattr(name)}{width} format="ascii">{text}</DataArray>'
+
+
+def _collection(names: list[str], time: Array) -> str:
+    rows = [
+        f'<DataSet timestep="{second!r}" part="0" file={quoteattr(name)}/>'
+        for second, name in zip(time.tolist(), names, strict=True)
+    ]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n<Collection>'
+    return "\n".join([head, *rows, "</Collection>", "</VTKFile>", ""])

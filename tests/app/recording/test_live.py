@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from browser import Browser, warm_share
+from fake_results import make_results
+
+from app.cli import main
+from app.recording import read_forces
+from app.recording.live import LiveRecording
+from app.recording.repair import repair_recording
+
+DRAWN = 0.005  # least share of a page that strong forces and their legend cover
+
+
+def before(results):
+    return replace(results, frames=(), statistics=())
+
+
+def test_the_file_of_a_live_recording_is_complete(results, tmp_path):
+    live = LiveRecording(tmp_path / "live.rrd", "none")
+    live.start(before(results))
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        live.frame(forces, statistics)
+    live.finish()
+    live.close()
+    found = read_forces(live.path)
+    assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
+    assert live.notes == []
+    # Frames reach the file one by one, which must not keep it from being whole.
+    assert repair_recording(live.path, tmp_path / "again.rrd").frames == len(results.frames)
+
+
+def test_every_finished_frame_is_in_the_file_before_the_next_begins(tmp_path):
+    results = make_results(3, sweeps=20)
+    live = LiveRecording(tmp_path / "live.rrd", "none")
+    live.start(before(results))
+    try:
+        for count, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True), 1):
+            live.frame(forces, statistics)
+            copy = tmp_path / f"copy{count}.rrd"
+            copy.write_bytes(live.path.read_bytes())  # as if the machine went down here
+            assert repair_recording(copy, tmp_path / f"mended{count}.rrd").frames == count
+    finally:
+        live.close()
+
+
+def test_nobody_outside_this_machine_is_served(results, tmp_path):
+    live = LiveRecording(tmp_path / "live.rrd", "none")
+    live.start(before(results))
+    try:
+        port = int(live.address.rsplit(":", 1)[1].split("/")[0])
+        with socket.create_connection(("127.0.0.1", port), timeout=5):
+            pass
+        with pytest.raises(OSError, match=r"refused|unreachable|timed out|assign"):
+            socket.create_connection((other_address(), port), timeout=2).close()
+    finally:
+        live.close()
+
+
+def other_address() -> str:
+    """An address of this machine beside 127.0.0.1: another of the loopback network, which 0.0.0.0 would listen on."""
+    return "127.0.0.2"
+
+
+def test_a_viewer_where_there_is_no_display_is_only_told_about(results, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    live = LiveRecording(tmp_path / "live.rrd", "native")
+    live.start(before(results))
+    live.close()
+    assert "--connect" in live.hint
+
+
+def test_a_watched_run_ends_with_the_full_recording_alone(tracked, tmp_path, capsys):
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as end:
+        main(["run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=50"])
+    assert not end.value.code
+    told = capsys.readouterr().out
+    assert "ssh -L" in told
+    assert "http://127.0.0.1:" in told
+    assert sorted(file.name for file in out.glob("*.rrd")) == ["recording.rrd"]
+    assert len(read_forces(out / "recording.rrd")) == 5
+
+
+def test_an_interrupted_run_leaves_a_recording_that_opens(tracked, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", "from app.cli import main; main()", "run", str(tracked), "--out", str(out)]
+    command += ["--view", "web", "--set", "solver.sweeps=6000"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    kept, end = out / ".unfinished" / "solving", time.monotonic() + 60
+    while not (kept / "000002.npz").exists() and run.poll() is None and time.monotonic() < end:
+        time.sleep(0.005)
+    run.send_signal(signal.SIGINT)
+    told, said = run.communicate(timeout=60)
+    assert run.returncode == 130, said
+    assert "What was solved so far" in told
+    assert len(read_forces(out / "recording-live.rrd")) >= 2
+    assert not (out / "recording.rrd").exists()
+
+
+@pytest.mark.slow
+def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path):
+    live = LiveRecording(tmp_path / "live.rrd", "web")
+    live.start(before(results))
+    try:
+        with Browser() as browser:
+            browser.open(f"{live.address}&renderer=webgl")
+            assert not browser.shows(lambda picture: warm_share(picture) > DRAWN, seconds=8.0)  # nothing solved yet
+            for forces, statistics in zip(results.frames, results.statistics, strict=True):
+                live.frame(forces, statistics)
+            assert browser.shows(lambda picture: warm_share(picture) > DRAWN)
+    finally:
+        live.close()
