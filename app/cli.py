@@ -232,7 +232,74 @@ def compare(
     return comparing.compare(first, second, truth=truth, out=out, console=Console(soft_wrap=True))
 
 
-COMMANDS: tuple[Callable[..., int], ...] = (run, check, track, solve, record, view, score, synth, study, share, compare)
+def export(
+    what: Annotated[Literal["pictures", "video", "tables", "vtk", "dic"], tyro.conf.Positional],
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
+    /,
+    out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help="default: beside the results")] = None,
+    kind: Annotated[Literal["csv", "parquet"], tyro.conf.arg(help="of tables")] = "csv",
+    frames: Annotated[str | None, tyro.conf.arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
+    timeline: Annotated[Literal["frame", "sweep"], tyro.conf.arg(help="pictures, video")] = "frame",
+    step: Annotated[int, tyro.conf.arg(help="pictures, video: every so many values")] = 1,
+    tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show")] = None,
+    view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
+    size: Annotated[str, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window")] = "1600x1000",
+    rate: Annotated[float, tyro.conf.arg(help="video: pictures a second")] = 6.0,
+    pixel_size: Annotated[float | None, tyro.conf.arg(help="dic: [m]; default: the experiment's")] = None,
+    quiet: Quiet = False,
+) -> int:
+    """Write pictures, a video, tidy tables, VTK files or tracker files.
+
+    Example: rodsight export video runs/shear --view "Force network"
+    """
+    from app import exporting
+    from app.commands import progress_of
+
+    with progress_of(quiet) as progress:
+        return exporting.export(
+            what, source, out, console=Console(quiet=quiet), progress=progress, kind=kind, timeline=timeline,
+            times=frames, step=step, tab=tab, view=view, size=size, rate=rate, pixel_size=pixel_size,
+        )  # fmt: skip
+
+
+def import_(
+    form: Annotated[Literal["dic"], tyro.conf.Positional],
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of dic_out_N.txt or CONFNNNN")],
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT", help="folder to make")],
+    /,
+    pixel_size: Annotated[float, tyro.conf.arg(help="[m]")],
+    interval: Annotated[float, tyro.conf.arg(help="[s] between photographs")] = 1.0,
+    height: Annotated[int | None, tyro.conf.arg(help="of a photograph [px]; default: what holds all grains")] = None,
+    precision: Annotated[float, tyro.conf.arg(help="of a tracked position [px]")] = 0.05,
+    quiet: Quiet = False,
+) -> int:
+    """Make an experiment of another tracker's files.
+
+    Example: rodsight import dic tracked/ my_test --pixel-size 1.2e-4
+    """
+    from app import importing
+
+    return importing.import_dic(
+        source, out, pixel_size=pixel_size, interval=interval, height=height, precision=precision,
+        console=Console(quiet=quiet),
+    )  # fmt: skip
+
+
+COMMANDS: tuple[Callable[..., int], ...] = (
+    run,
+    check,
+    track,
+    solve,
+    record,
+    view,
+    score,
+    synth,
+    study,
+    share,
+    compare,
+    export,
+    import_,
+)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -243,7 +310,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(0)
     app = tyro.extras.SubcommandApp()
     for command in COMMANDS:
-        app.command(command)
+        app.command(command, name=command.__name__.rstrip("_"))
     try:
         status = app.cli(prog="rodsight", description=__doc__, args=arguments)
     except InputError as error:

@@ -130,7 +130,7 @@ def score(path: Path, truth_file: Path | None, *, as_json: bool) -> int:
 def synth(out: Path, *, quiet: bool, **choices: Any) -> int:
     from app.synthetic.experiment import synthesize
 
-    with _progress(quiet) as progress:
+    with progress_of(quiet) as progress:
         made = synthesize(out, progress=progress, **choices)
     if not quiet:
         told = f"{len(made.truth.radius)} rods, {made.truth.frame_count} frames"
@@ -143,7 +143,7 @@ def study(subject: str, *, seeds: tuple[int, ...], grains: int, estimator: str, 
     from app.study.claims import study_claims
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDE)
-    with _progress(quiet) as progress:
+    with progress_of(quiet) as progress:
         if subject == "accuracy":
             study_accuracy(seeds, grains=grains, folder=folder, estimator=estimator, console=console, progress=progress)
         else:
@@ -155,12 +155,12 @@ def study(subject: str, *, seeds: tuple[int, ...], grains: int, estimator: str, 
 def _run(request: Request) -> Iterator[pipeline.Run]:
     experiment = load_experiment(request.experiment, request.settings)
     folder = request.out if request.out is not None else Path("runs") / experiment.name
-    with _progress(request.quiet) as progress:
+    with progress_of(request.quiet) as progress:
         yield pipeline.Run(experiment, folder, _frame_range(request.frames), progress)
 
 
 @contextmanager
-def _progress(quiet: bool) -> Iterator[Progress]:
+def progress_of(quiet: bool) -> Iterator[Progress]:
     if quiet or not sys.stderr.isatty():
         yield silent
     else:

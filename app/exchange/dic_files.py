@@ -58,12 +58,11 @@ def write_sequence(tracks: Tracks, scale: Scale, folder: Path) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     kept = np.flatnonzero(tracks.present[0])
-    pixels, rotation = scale.to_pixels(tracks.position[:, kept]), tracks.rotation[:, kept]
+    pixels, rotation = scale.to_pixels(tracks.position[:, kept]), tracks.rotation[:, kept].copy()
     present = tracks.present[:, kept]
-    for frame in range(1, tracks.frame_count):  # lost: where it was
+    for frame in range(1, tracks.frame_count):
         gone = ~present[frame]
-        pixels[frame, gone], rotation = pixels[frame - 1, gone], rotation.copy() if frame == 1 else rotation
-        rotation[frame, gone] = rotation[frame - 1, gone]
+        pixels[frame, gone], rotation[frame, gone] = pixels[frame - 1, gone], rotation[frame - 1, gone]
     reference, start = np.rint(pixels[0]), rotation[0]
     radius = tracks.radius[kept] / scale.pixel_size
     files = []

@@ -245,8 +245,8 @@ class _Handler(BaseHTTPRequestHandler):
         if path == "/backdrop":
             self._send(session.picture.backdrop(frame), _RRD)
         elif path == "/marks":
-            values = _Values({"reviewer": query.get("reviewer", ""), "frame": frame, "blind": query.get("blind") == "1"})
-            self._send(session.marks(values.view(), key), _RRD)
+            asked = {"reviewer": query.get("reviewer", ""), "frame": frame, "blind": query.get("blind") == "1"}
+            self._send(session.marks(_Values(asked).view(), key), _RRD)
         elif path == "/look":
             aspect = _whole(query, "aspect") / 1000.0
             point = session.point_of(frame, key) if key is not None else None

@@ -152,7 +152,7 @@ class ReviewSession:
 
     def named(self, view: Viewpoint, a: str, b: str) -> dict[str, Any]:
         """Select a pair by the names of its bodies, whether or not it is a candidate."""
-        i, j = (self._rows.get(int(text) if text.lstrip("-").isdigit() else text, self._rows.get(text)) for text in (a, b))
+        i, j = self._row(a), self._row(b)
         present = self.results.tracks.present[self._check(view.frame)]
         n = self.results.grains.count
         if i is None or j is None or i == j or min(i, j) >= n:
@@ -290,6 +290,12 @@ class ReviewSession:
         return measure_contacts(
             self.results.grains, position, walls_at(self.results, frame), key // bodies, key % bodies
         )
+
+    def _row(self, name: str) -> int | None:
+        """Row of a body by what a person calls it; a wall's name goes before a grain's id."""
+        if name in self._rows:
+            return self._rows[name]
+        return self._rows.get(int(name)) if name.lstrip("-").isdecimal() else None
 
     def _pair(self, frame: int, i: int, j: int) -> Pair:
         a = self.bodies.name(i)

@@ -48,7 +48,8 @@ def threshold_curve(gap: Array, touching: NDArray[np.bool_], weight: Array, thre
     with np.errstate(invalid="ignore", divide="ignore"):
         precision = np.where(below > 0, hits / below, np.nan)
         recall = hits / total if total > 0 else np.full(len(threshold), np.nan)
-    return ThresholdCurve(threshold, precision, recall, _f(1.0, hits, below, total), _f(RECALL_WEIGHT, hits, below, total))
+    f1, f_beta = _f(1.0, hits, below, total), _f(RECALL_WEIGHT, hits, below, total)
+    return ThresholdCurve(threshold, precision, recall, f1, f_beta)
 
 
 def fit_threshold(

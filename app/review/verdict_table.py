@@ -60,7 +60,8 @@ def import_verdicts(
         if a == b:
             raise table.error(row, "j", "is the grain itself")
         if not first_frame <= number < first_frame + frame_count:
-            raise table.error(row, "frame", f"is not a frame of the results ({first_frame} to {first_frame + frame_count - 1})")
+            last = first_frame + frame_count - 1
+            raise table.error(row, "frame", f"is not a frame of the results ({first_frame} to {last})")
         told = table.text("verdict")[row] if "verdict" in present else Verdict.CONTACT.value
         verdict = told.strip().lower().replace("_", " ")
         if verdict not in {each.value for each in Verdict}:

@@ -47,7 +47,11 @@ MISTAKES = {
     "pressure on no wall": (TOML, lambda f: edit(f, "[walls.top]", "[walls.roof]"), ["walls.roof"]),
     "unknown wall key": (TOML, lambda f: edit(f, "pressure =", "presure ="), ["walls.top.presure"]),
     "missing table": (TOML, lambda f: edit(f, '"walls.csv"', '"wals.csv"'), ["wals.csv", "No such file"]),
-    "eta": (TOML, lambda f: edit(f, "friction = 0.25", "formal_weight = 0.7\nfriction = 0.25"), ["formal_weight", "0.7"]),
+    "eta": (
+        TOML,
+        lambda f: edit(f, "friction = 0.25", "formal_weight = 0.7\nfriction = 0.25"),
+        ["formal_weight", "0.7"],
+    ),
     "missing column": (TRACKS, lambda f: edit(f, "theta", "angle"), ["column theta"]),
     "nan": (TRACKS, lambda f: swap_row(f, 8, {2: "nan"}), ["row 8", "x = 'nan'"]),
     "not a number": (TRACKS, lambda f: swap_row(f, 9, {3: "left"}), ["row 9", "y = 'left'"]),

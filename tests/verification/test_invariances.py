@@ -75,9 +75,7 @@ def test_forces_do_not_depend_on_the_names_of_the_grains(heap):
         GrainMotion(state.position[order], state.velocity[order], state.spin[order], state.present[order]),
         walls,
     )
-    by_pair = {
-        frozenset((int(i), int(j))): fn for i, j, fn in zip(renamed.i, renamed.j, found, strict=True)
-    }
+    by_pair = {frozenset((int(i), int(j))): fn for i, j, fn in zip(renamed.i, renamed.j, found, strict=True)}
     for i, j, fn in zip(contacts.i, contacts.j, expected, strict=True):
         new_j = int(place[j]) if j < grains.count else int(j)
         assert by_pair[frozenset((int(place[i]), new_j))] == pytest.approx(fn, abs=SAME * expected.max())

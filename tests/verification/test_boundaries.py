@@ -1,0 +1,104 @@
+"""Walls of any convex arrangement, several plates under load, weight: what statics demands of them."""
+
+import numpy as np
+import pytest
+
+from solver.boundaries import Walls
+from solver.chain import ChainSettings, Packing, advance_chain
+from solver.contacts import detect_contacts
+from solver.convex import assemble_balance, polish
+from solver.motion import Snapshot, no_motion
+from solver.network import NearPairs
+from solver.nlgs import NlgsSettings, solve
+from solver.problem import Material, assemble
+from solver.stress import wall_forces
+from solver.warm_start import ForceMemory
+from tests.packings import LENGTH, box, motion, rods
+
+CONVERGED = 1e-6  # relative, of an iteration run far beyond its need
+
+
+def triangle(inradius: float, load: float) -> Walls:
+    """An equilateral triangle around the origin; its first side carries a load [N]."""
+    angle = np.deg2rad([-150.0, -30.0, 90.0])
+    corners = 2.0 * inradius * np.column_stack([np.cos(angle), np.sin(angle)])
+    endpoints = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    return Walls(endpoints, np.zeros((3, 2, 2)), np.array([load, np.nan, np.nan]))
+
+
+def static_forces(grains, position, walls, *, friction=0.3, gravity=(0.0, 0.0)):
+    state = motion(position)
+    contacts = detect_contacts(grains, state.position, state.present, walls, 1e-9)
+    problem = assemble(grains, state, walls, contacts, Material(friction, friction, 0.0, gravity), grains.mass * 1e3)
+    solution = solve(problem, NlgsSettings(sweeps=100_000, natural_map=1e-13), every=20)
+    return contacts, solution
+
+
+def test_a_grain_in_a_triangle_pushes_all_three_sides_alike():
+    contacts, solution = static_forces(rods(0.01), np.zeros((1, 2)), triangle(0.01, 7.0), friction=0.0)
+    assert contacts.count == 3
+    assert solution.fn == pytest.approx([7.0] * 3, rel=CONVERGED)
+    assert wall_forces(contacts, solution.fn, solution.ft).sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def square_lattice(columns, rows, radius=0.01):
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+    return radius * (1 + 2 * np.column_stack([x.ravel(), y.ravel()]).astype(float))
+
+
+def test_two_plates_each_carry_their_own_load():
+    position = square_lattice(3, 2)
+    walls = box(0.06, 0.04)
+    walls = Walls(walls.endpoints, walls.velocity, np.array([np.nan, 8.0, 30.0, np.nan]))
+    contacts, solution = static_forces(rods(*[0.01] * 6), position, walls, friction=0.0)
+    total = wall_forces(contacts, solution.fn, solution.ft)
+    assert total[1] == pytest.approx([8.0, 0.0], rel=CONVERGED, abs=1e-6)
+    assert total[2] == pytest.approx([0.0, 30.0], rel=CONVERGED, abs=1e-6)
+    assert total[0] == pytest.approx([0.0, -30.0], rel=CONVERGED, abs=1e-6)
+    assert total[3] == pytest.approx([-8.0, 0.0], rel=CONVERGED, abs=1e-6)
+
+
+def test_the_floor_carries_weight_and_load():
+    position = square_lattice(2, 3)
+    grains = rods(*[0.01] * 6)
+    contacts, solution = static_forces(grains, position, box(0.04, 0.06, top_load=5.0), gravity=(0.0, -9.81))
+    floor = wall_forces(contacts, solution.fn, solution.ft)[0, 1]
+    sides = wall_forces(contacts, solution.fn, solution.ft)[[1, 3], 1].sum()
+    assert -(floor + sides) == pytest.approx(5.0 + 9.81 * grains.mass.sum(), rel=CONVERGED)
+
+
+def test_weight_may_point_anywhere():
+    grains = rods(*[0.01] * 6)
+    contacts, solution = static_forces(grains, square_lattice(3, 2), box(0.06, 0.04), gravity=(9.81, 0.0))
+    assert wall_forces(contacts, solution.fn, solution.ft).sum(axis=0) == pytest.approx(
+        [9.81 * grains.mass.sum(), 0.0], rel=CONVERGED, abs=1e-6
+    )
+
+
+def test_a_polished_field_balances_every_plate():
+    position = square_lattice(3, 2)
+    walls = box(0.06, 0.04)
+    walls = Walls(walls.endpoints, walls.velocity, np.array([np.nan, 8.0, 30.0, np.nan]))
+    grains = rods(*[0.01] * 6)
+    present = np.ones(6, bool)
+    contacts = detect_contacts(grains, position, present, walls, 1e-9)
+    balance = assemble_balance(
+        contacts, grains, walls, present=present, friction=np.full(contacts.count, 0.3), force_unit=10.0
+    )
+    rough = np.full(contacts.count, 9.0)
+    found = polish(balance, rough, np.zeros(contacts.count))
+    total = wall_forces(contacts, found.fn, found.ft)
+    # The balance is a strong spring, not a constraint: a thousandth of the pull towards the rough field is left.
+    assert total[1, 0] == pytest.approx(8.0, rel=2e-3)
+    assert total[2, 1] == pytest.approx(30.0, rel=2e-3)
+
+
+def test_a_chain_takes_its_loads_from_the_pressures_of_its_walls():
+    grains = rods(*[0.01] * 6)
+    pressure = np.array([np.nan, 2e3, 5e3, np.nan])
+    packing = Packing(grains, LENGTH, Material(0.0, 0.0), pressure)
+    still = Snapshot(0.0, square_lattice(3, 2), np.zeros(6), np.ones(6, bool), box(0.06, 0.04).endpoints, 1e-6)
+    step = advance_chain(packing, no_motion(still), ForceMemory.empty(), ChainSettings(sweeps=4000), NearPairs(1e-9))
+    total = wall_forces(step.contacts, step.solution.fn, step.solution.ft)
+    assert total[1, 0] == pytest.approx(2e3 * 0.04 * LENGTH, rel=1e-4)
+    assert total[2, 1] == pytest.approx(5e3 * 0.06 * LENGTH, rel=1e-4)
