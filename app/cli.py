@@ -30,6 +30,16 @@ Sweeps = Annotated[
     Literal["all", "log", "none"] | None, tyro.conf.arg(help="whose forces the recording holds; default log")
 ]
 
+MaxSize = Annotated[
+    float | None, tyro.conf.arg(metavar="MB", help="of the recording: fewer sweeps where it would be larger")
+]
+FullFrames = Annotated[
+    tuple[int, ...],
+    tyro.conf.arg(
+        metavar="FRAME", help="with --sweeps all: every sweep of these frames to a side file, others thinned"
+    ),
+]
+
 
 def run(
     experiment: ExperimentPath,
@@ -37,6 +47,8 @@ def run(
     out: Out = None,
     view: Literal["none", "native", "web"] = "none",
     sweeps: Sweeps = None,
+    max_size: MaxSize = None,
+    full_frames: FullFrames = (),
     frames: Frames = None,
     settings: Settings = (),
     quiet: Quiet = False,
@@ -47,7 +59,7 @@ def run(
     """
     from app import commands
 
-    return commands.run_all(_request(experiment, out, frames, settings, sweeps, quiet), view)
+    return commands.run_all(_request(experiment, out, frames, settings, sweeps, quiet, max_size, full_frames), view)
 
 
 def check(experiment: ExperimentPath, /, settings: Settings = (), quiet: Quiet = False) -> int:
@@ -65,16 +77,19 @@ def track(
     /,
     out: Out = None,
     frames: Frames = None,
+    report: Annotated[
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write DIR/tracking_report.html: how well it went")
+    ] = False,
     settings: Settings = (),
     quiet: Quiet = False,
 ) -> int:
     """Follow the grains through the photographs, no more.
 
-    Example: rodsight track sample_data/shear
+    Example: rodsight track sample_data/shear --report
     """
     from app import commands
 
-    return commands.track(_request(experiment, out, frames, settings, None, quiet))
+    return commands.track(_request(experiment, out, frames, settings, None, quiet), report=report)
 
 
 def solve(
@@ -100,6 +115,8 @@ def record(
     /,
     out: Out = None,
     sweeps: Sweeps = None,
+    max_size: MaxSize = None,
+    full_frames: FullFrames = (),
     frames: Frames = None,
     settings: Settings = (),
     quiet: Quiet = False,
@@ -110,7 +127,7 @@ def record(
     """
     from app import commands
 
-    return commands.record(_request(experiment, out, frames, settings, sweeps, quiet))
+    return commands.record(_request(experiment, out, frames, settings, sweeps, quiet, max_size, full_frames))
 
 
 def view(
@@ -134,14 +151,47 @@ def score(
         Path | None, tyro.conf.arg(metavar="FILE", help="table frame,i,j,fn,ft; default: the experiment's")
     ] = None,
     as_json: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="print JSON")] = False,
+    fit_threshold: Annotated[
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="refit gap threshold and radii from verdicts")
+    ] = False,
 ) -> int:
-    """Compare inferred contacts and forces with true ones.
+    """Compare inferred contacts and forces with true ones, and with the verdicts of people.
 
     Example: rodsight score runs/shear --json
     """
     from app import commands
 
-    return commands.score(results, truth, as_json=as_json)
+    return commands.score(results, truth, as_json=as_json, fit_threshold=fit_threshold)
+
+
+def review(
+    experiment: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT_OR_DIR")],
+    /,
+    port: Annotated[int, tyro.conf.arg(help="on 127.0.0.1; 0 takes a free one")] = 0,
+    browser: Annotated[bool, tyro.conf.arg(help="open the page")] = True,
+    reviewer: Annotated[str | None, tyro.conf.arg(metavar="NAME", help="default: the user's name")] = None,
+    import_csv: Annotated[
+        Path | None, tyro.conf.arg(metavar="FILE", help="add verdicts of a table frame,i,j[,verdict], and end")
+    ] = None,
+    complete: Annotated[
+        bool,
+        tyro.conf.FlagCreatePairsOff,
+        tyro.conf.arg(help="the imported table lists every contact of its frames: all other candidates are none"),
+    ] = False,
+    export_csv: Annotated[
+        Path | None, tyro.conf.arg(metavar="FILE", help="write the verdicts as a table, and end")
+    ] = None,
+) -> int:
+    """Judge contacts by eye on a local page; the solver obeys.
+
+    Example: rodsight review runs/shear
+    """
+    from app import commands
+
+    return commands.review(
+        experiment, port=port, browser=browser, reviewer=reviewer, import_csv=import_csv, complete=complete,
+        export_csv=export_csv,
+    )  # fmt: skip
 
 
 def synth(
@@ -292,6 +342,7 @@ COMMANDS: tuple[Callable[..., int], ...] = (
     solve,
     record,
     view,
+    review,
     score,
     synth,
     study,
@@ -310,7 +361,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(0)
     app = tyro.extras.SubcommandApp()
     for command in COMMANDS:
-        app.command(command, name=command.__name__.rstrip("_"))
+        app.command(name=command.__name__.rstrip("_"))(command)
     try:
         status = app.cli(prog="rodsight", description=__doc__, args=arguments)
     except InputError as error:
@@ -331,9 +382,12 @@ def _request(
     settings: tuple[str, ...],
     sweeps: str | None,
     quiet: bool,
+    max_size: float | None = None,
+    full_frames: tuple[int, ...] = (),
 ):  # type: ignore[no-untyped-def]
     from app.commands import Request
 
     if sweeps is not None:
         settings = (*settings, f"recording.sweeps={json.dumps(sweeps)}")
-    return Request(experiment, out, frames, settings, quiet, Console(stderr=False, quiet=quiet))
+    console = Console(stderr=False, quiet=quiet)
+    return Request(experiment, out, frames, settings, quiet, console, max_size, full_frames)

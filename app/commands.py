@@ -39,6 +39,8 @@ class Request:
     settings: tuple[str, ...]
     quiet: bool
     console: Console
+    max_size: float | None = None  # [MB] of the recording
+    full_frames: tuple[int, ...] = ()
 
 
 def run_all(request: Request, view: str) -> int:
@@ -53,6 +55,7 @@ def run_all(request: Request, view: str) -> int:
     save_summary(run.file(pipeline.SUMMARY), summary)
     print_summary(request.console, summary)
     request.console.print(f"Results in {run.folder}/ after {seconds['total']:.1f} s.", highlight=False)
+    _tell_notes(run, request.console)
     watched = watch is not None and watch.started  # the viewer is open already
     return _show(recording, "none" if watched else view, request.console)
 
@@ -70,15 +73,20 @@ def check(request: Request) -> int:
     return 0
 
 
-def track(request: Request) -> int:
+def track(request: Request, *, report: bool = False) -> int:
     with _run(request) as run:
-        tracks, _ = pipeline.track(run)
+        if report and run.experiment.config.photographs is None:
+            raise InputError(run.experiment.file, "--report", "shows photographs, and these tracks come from a table")
+        tracks, walls = pipeline.track(run)
+        page = pipeline.report_tracking(run, tracks, walls) if report else None
     lost = int((~tracks.present).sum())
     where = run.file(pipeline.TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
     request.console.print(
         f"{tracks.grain_count} grains over {tracks.frame_count} frames, {lost} poses lost; tracks in {where}.",
         highlight=False,
     )
+    if page is not None:
+        request.console.print(f"How well it went: {page}", highlight=False)
     return 0
 
 
@@ -97,6 +105,7 @@ def record(request: Request) -> int:
     with _run(request) as run:
         results = pipeline.solve(run)
         recording = pipeline.record(run, results, pipeline.load_truth(run, results))
+    _tell_notes(run, request.console)
     return _show(recording, "none", request.console)
 
 
@@ -104,27 +113,65 @@ def view(path: Path, *, web: bool) -> int:
     recording = path / pipeline.RECORDING if path.is_dir() else path
     if not recording.is_file():
         raise InputError(recording, "", "there is no such recording")
-    return _show(recording, "web" if web else "native", Console())
+    side = recording.with_name(pipeline.SIDE)
+    also = (side,) if path.is_dir() and side.is_file() else ()
+    return _show(recording, "web" if web else "native", Console(), *also)
 
 
-def score(path: Path, truth_file: Path | None, *, as_json: bool) -> int:
+def score(path: Path, truth_file: Path | None, *, as_json: bool, fit_threshold: bool = False) -> int:
+    from app.review import scoring
+    from app.review.command import Reviewed
+
     file = path / pipeline.RESULTS if path.is_dir() else path
     results = load_results(file)
     origin = read_origin(file)
     assert origin is not None
     run = pipeline.Run(_stored_experiment(Path(origin.experiment)), file.parent, origin.frames)
     truth = pipeline.load_truth(run, results, truth_file)
-    if truth is None:
-        raise InputError(run.experiment.file, "key truth", "is missing: give --truth FILE")
-    agreement = score_frames(results, truth)
+    reviewed = Reviewed(file, results, run.experiment, origin.frames[0])
+    verdicts = scoring.score_verdicts(reviewed)
+    if truth is None and verdicts is None:
+        raise InputError(
+            run.experiment.file, "key truth", "is missing: give --truth FILE, or verdicts (rodsight review)"
+        )
+    if fit_threshold and verdicts is None:
+        raise InputError(reviewed.log.file, "", "holds no verdicts to fit a threshold to: rodsight review")
+    fitted = scoring.fit(reviewed, verdicts) if fit_threshold and verdicts is not None else None
+    agreement = score_frames(results, truth) if truth is not None else []
     if as_json:
-        print(json.dumps(accuracy(agreement), indent=1))
+        told: dict[str, Any] = accuracy(agreement) if truth is not None else {}
+        if verdicts is not None:
+            told["verdicts"] = scoring.as_json(verdicts, fitted)
+        print(json.dumps(told, indent=1))
+        return 0
+    if verdicts is not None:
+        scoring.print_score(Console(), verdicts, fitted)
+    if truth is None:
         return 0
     summary = summarize(results, agreement, {})
     print_summary(Console(), summary)
     r = correlations(agreement)
     Console().print(f"r(f_n) over all frames: mean {np.nanmean(r):.3f}, least {np.nanmin(r):.3f}.", highlight=False)
     return 0
+
+
+def review(
+    path: Path,
+    *,
+    port: int,
+    browser: bool,
+    reviewer: str | None,
+    import_csv: Path | None,
+    complete: bool,
+    export_csv: Path | None,
+) -> int:
+    from app.review import command
+
+    if import_csv is not None:
+        return command.import_table(path, import_csv, reviewer=reviewer, complete=complete)
+    if export_csv is not None:
+        return command.export_table(path, export_csv)
+    return command.review(path, port=port, browser=browser, reviewer=reviewer)
 
 
 def synth(out: Path, *, quiet: bool, **choices: Any) -> int:
@@ -156,7 +203,10 @@ def _run(request: Request) -> Iterator[pipeline.Run]:
     experiment = load_experiment(request.experiment, request.settings)
     folder = request.out if request.out is not None else Path("runs") / experiment.name
     with progress_of(request.quiet) as progress:
-        yield pipeline.Run(experiment, folder, _frame_range(request.frames), progress)
+        yield pipeline.Run(
+            experiment, folder, _frame_range(request.frames), progress, max_size=_bytes(request.max_size),
+            full_frames=request.full_frames,
+        )  # fmt: skip
 
 
 @contextmanager
@@ -180,14 +230,27 @@ def _frame_range(text: str | None) -> tuple[int, int | None]:
         raise InputError("--frames", text, "is not A:B, such as 0:12") from None
 
 
+def _bytes(megabytes: float | None) -> int | None:
+    if megabytes is None:
+        return None
+    if not (np.isfinite(megabytes) and megabytes > 0.0):
+        raise InputError("--max-size", str(megabytes), "is not a positive number of megabytes")
+    return int(1e6 * megabytes)
+
+
+def _tell_notes(run: pipeline.Run, console: Console) -> None:
+    for note in run.notes:
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
+
+
 def _stored_experiment(file: Path) -> Experiment:
     return load_experiment(file)
 
 
-def _show(recording: Path, how: str, console: Console) -> int:
+def _show(recording: Path, how: str, console: Console, *also: Path) -> int:
     from app.recording.viewer import open_viewer
 
-    hint = open_viewer(recording, how)
+    hint = open_viewer(recording, how, *also)
     if hint is not None:
         console.print(hint, highlight=False, soft_wrap=True)
     return 0

@@ -35,7 +35,10 @@ def compare(first: Path, second: Path | None, *, truth: bool, out: Path | None, 
     size = record_comparison(comparison, target)
     _tell(comparison, console)
     console.print(
-        f"{target}: {1e-6 * size:.1f} MB. To look at it: rodsight view {target}", highlight=False, soft_wrap=True
+        f"{target}: {1e-6 * size:.1f} MB. To look at it: rodsight view {target}",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
     )
     return 0
 
@@ -75,7 +78,7 @@ def _tell(comparison: Comparison, console: Console) -> None:
         f"{first.name} against {second.name}, {len(r)} frames: r(f_n) mean {mean[0]:.3f}, least {least:.3f}; r(f_t) "
         f"mean {mean[1]:.3f}; relative L2 {mean[2]:.3f}; ratio of the sums of f_n {mean[3]:.3f}; friction angles "
         f"apart by {apart:.2f}° rms.",
-        highlight=False, soft_wrap=True,
+        markup=False, highlight=False, soft_wrap=True,
     )  # fmt: skip
     for note in comparison.notes:
-        console.print(note, highlight=False, soft_wrap=True)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)

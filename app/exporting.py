@@ -55,7 +55,7 @@ def export(
     else:
         files = write_sequence(results.tracks, _scale_of(results, pixel_size), target)
     shown = ", ".join(file.name for file in files[:3]) + (f" … {files[-1].name}" if len(files) > 3 else "")
-    console.print(f"{target}/: {shown}.", highlight=False, soft_wrap=True)
+    console.print(f"{target}/: {shown}.", markup=False, highlight=False, soft_wrap=True)
     return 0
 
 
@@ -101,7 +101,7 @@ def _draw(
             text = f"{folder}/: {len(files)} pictures, {files[0].name} … {files[-1].name}."
     except NoPictureError as error:
         raise InputError("export", "", str(error)) from None
-    console.print(text, highlight=False, soft_wrap=True)
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
     return 0
 
 

@@ -19,6 +19,11 @@ LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
 
 FULL_SCALE = 255.0
 
+# What cameras call the data of their sensor; read with the optional package rawpy.
+RAW_SUFFIXES = frozenset(
+    (".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dng", ".iiq", ".nef", ".nrw", ".orf", ".pef", ".raf", ".rw2", ".srw")
+)
+
 
 class Photographs(Sequence[Image]):
     """Photographs in natural order (img2 before img10); item k is read from its file when it is asked for.
@@ -92,7 +97,13 @@ def natural_key(file: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
 
 
 def read_photograph(file: Path) -> Image:
-    """Read one 8- or 16-bit photograph, grey or colour, as float32 grey (H, W) with full scale 255."""
+    """Read one 8- or 16-bit photograph, grey or colour, as float32 grey (H, W) with full scale 255.
+
+    Raw files of cameras are developed to 16 bits, all alike. Raises InputError for what is not a photograph, and for
+    raw files while the package that reads them is not installed.
+    """
+    if file.suffix.lower() in RAW_SUFFIXES:
+        return _to_grey(file, _develop(file))
     try:
         content = file.read_bytes()
     except OSError as error:
@@ -101,6 +112,11 @@ def read_photograph(file: Path) -> Image:
     pixels = _decode(content)
     if pixels is None:
         raise InputError(file, "", "is not a photograph that can be read (PNG, TIFF or JPEG)")
+    return _to_grey(file, pixels)
+
+
+def _to_grey(file: Path, pixels: NDArray) -> Image:
+    """Blue, green, red or grey (H, W[, c]) of either depth to grey."""
     if pixels.dtype == np.uint8:
         scale = np.float32(1.0)
     elif pixels.dtype == np.uint16:
@@ -116,6 +132,23 @@ def read_photograph(file: Path) -> Image:
     if scale != 1.0:
         grey *= scale
     return np.ascontiguousarray(grey, dtype=np.float32)
+
+
+def _develop(file: Path) -> NDArray:
+    """The sensor's data as blue, green, red (H, W, 3) uint16, exposed and coloured alike in every photograph."""
+    try:
+        import rawpy  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise InputError(
+            file, "", "is a camera's raw file: pip install 'rodsight[raw]' reads it, or convert it to 16-bit TIFF"
+        ) from None
+    try:
+        with rawpy.imread(str(file)) as raw:
+            # No brightening by the picture's own content, and no turning: photographs must stay comparable.
+            colours = raw.postprocess(output_bps=16, no_auto_bright=True, use_camera_wb=True, user_flip=0)
+    except (rawpy.LibRawError, OSError) as error:
+        raise InputError(file, "", f"is not a raw file that can be read ({error})") from None
+    return np.ascontiguousarray(colours[:, :, ::-1])
 
 
 def _decode(content: bytes) -> NDArray | None:

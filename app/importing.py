@@ -58,7 +58,7 @@ precision = {precision * pixel_size!r}
     console.print(
         f"{out}: {len(sequence.row)} grains in {len(sequence.number)} frames, {lost} poses lost. Next: add [walls] to "
         f"{out / CONFIG_NAME}, then rodsight run {out}",
-        highlight=False, soft_wrap=True,
+        markup=False, highlight=False, soft_wrap=True,
     )  # fmt: skip
     return 0
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import __version__
+from app.atomic import write_atomically
 from app.calibration import calibrate_tracks
 from app.checkpoint import Checkpoint
 from app.config import ExperimentFile, as_toml
@@ -41,7 +42,8 @@ from app.review.decisions import Bodies, decide, fingerprint
 from app.review.verdicts import VERDICTS, Flag, VerdictLog
 from app.scaling import make_scale
 from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
-from app.tracking.stage import track_photographs, write_tables
+from app.tracking.report import tracking_report
+from app.tracking.stage import DETECTIONS, gather_report, track_photographs, write_tables
 from app.tracks import Tracks, WallTracks
 from app.truth import read_truth, true_names
 from solver.chain import ChainSettings, Packing
@@ -56,6 +58,8 @@ from solver.verdicts import Verdicts
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
+REPORT = "tracking_report.html"
+SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
 UNFINISHED = ".unfinished"  # folder of checkpoints
 
 
@@ -89,6 +93,9 @@ class Run:
     progress: Progress = silent
     timings: Timings = field(default_factory=Timings)
     watch: Watch | None = None  # hears every frame as it is solved
+    max_size: int | None = None  # [bytes] of the recording
+    full_frames: tuple[int, ...] = ()  # whose every sweep goes to a side file, the recording then being thinned
+    notes: list[str] = field(default_factory=list)  # sentences for the user
 
     def file(self, name: str) -> Path:
         return self.folder / name
@@ -113,7 +120,9 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         ids = guess.id if guess is not None else None
         read_corrections(experiment, ids, count)
     _frame_range(run, count)
-    if experiment.config.truth is not None and ids is not None:
+    # Grains of photographs are named by truth_tracks where there is one, and not by their own ids.
+    named = experiment.config.photographs is not None and experiment.config.truth_tracks is not None
+    if experiment.config.truth is not None and ids is not None and not named:
         file = experiment.folder / experiment.config.truth
         read_truth(file, ids, walls.name if walls else (), first_frame=0, frame_count=count)
     return tracks, walls
@@ -129,7 +138,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         return tracks.frames(start, stop), walls.frames(start, stop) if walls is not None else None
     origin = _origin(run, ("photographs", "tracking", "walls"))
     stored = read_origin(run.file(TRACKS))
-    if stored is not None and stored.fingerprint == origin.fingerprint:
+    if stored is not None and stored.fingerprint == origin.fingerprint and run.file(DETECTIONS).exists():
         return load_tracks(run.file(TRACKS))
     check(run)
     since = time.perf_counter()
@@ -146,6 +155,15 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         Checkpoint(unfinished / stage, origin.fingerprint).clear()
     run.timings.add("tracking", since)
     return tracks, walls
+
+
+def report_tracking(run: Run, tracks: Tracks, walls: WallTracks | None) -> Path:
+    """Write the page that shows how well the photographs were tracked."""
+    run.progress("report", 0, 1)
+    tracked = gather_report(run.experiment, run.folder, tracks, walls, run.frames[0])
+    write_atomically(run.file(REPORT), tracking_report(tracked).encode())
+    run.progress("report", 1, 1)
+    return run.file(REPORT)
 
 
 def solve(run: Run) -> Results:
@@ -233,9 +251,7 @@ def _solve_frames(
     settings = sequence_settings(run.experiment.config, overlap)
     done = len(frames)
     run.progress("solving", done, len(snapshots))
-    for forces, state in solve_sequence(
-        packing, snapshots, settings, state=kept_state, first=done, verdicts=verdicts
-    ):
+    for forces, state in solve_sequence(packing, snapshots, settings, state=kept_state, first=done, verdicts=verdicts):
         snapshot = snapshots[forces.frame]
         summary = frame_statistics(
             forces.contacts, forces.fn, forces.ft, forces.state,
@@ -299,6 +315,7 @@ def sequence_settings(config: ExperimentFile, overlap: float) -> SequenceSetting
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     """Write the recording of finished results, the truth beside them where there is one."""
     from app.recording.recorder import record as write_recording
+    from app.recording.side_file import write_side_file
 
     since = time.perf_counter()
     section = run.experiment.config.photographs
@@ -310,15 +327,20 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
         return np.clip(np.rint(photographs[run.frames[0] + frame]), 0, 255).astype(np.uint8)
 
     file = run.file(RECORDING)
-    write_recording(
+    report = write_recording(
         results,
         file,
         photograph=photograph if photographs is not None else None,
         scale=make_scale(section, photographs.shape[0]) if section and photographs is not None else None,
-        sweeps=run.experiment.config.recording.sweeps,
+        sweeps="log" if run.full_frames else run.experiment.config.recording.sweeps,
+        max_size=run.max_size,
         truth=truth,
         progress=lambda done, total: run.progress("recording", done, total),
     )
+    run.notes.extend(report.notes)
+    run.file(SIDE).unlink(missing_ok=True)  # of a former recording
+    if run.full_frames:
+        run.notes.append(write_side_file(results, file, run.file(SIDE), run.full_frames))
     run.timings.add("recording", since)
     return file
 

@@ -48,13 +48,13 @@ def _share(recording: Path, frames: str | None, scale: float, page: bool, out: P
     except ValueError as error:
         raise InputError(recording, "", str(error)) from None
     told = f"{target}: {_size(report.size)} of {_size(report.former_size)}, {report.frames} frames."
-    console.print(f"{told} To look at it: rodsight view {target}", highlight=False, soft_wrap=True)
+    console.print(f"{told} To look at it: rodsight view {target}", markup=False, highlight=False, soft_wrap=True)
     if page:
         file = out if out is not None else target.with_suffix(".html")
         size = write_single_page(target, file, title=name or "Rodsight")
         console.print(
             f"{file}: {_size(size)}, viewer included; any browser opens it, also without network or server.",
-            highlight=False, soft_wrap=True,
+            markup=False, highlight=False, soft_wrap=True,
         )  # fmt: skip
     return 0
 
@@ -73,7 +73,7 @@ def _repair(damaged: Path, out: Path | None, console: Console) -> int:
     console.print(
         f"{target}: the forces of {report.frames} frames saved, {_size(report.size)} of {_size(report.former_size)}. "
         f"To look at it: rodsight view {target}",
-        highlight=False, soft_wrap=True,
+        markup=False, highlight=False, soft_wrap=True,
     )  # fmt: skip
     return 0
 

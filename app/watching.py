@@ -46,7 +46,7 @@ class LiveWatch:
         self.recording.start(run)
         self.started = True
         if self.recording.hint:
-            self._console.print(self.recording.hint, highlight=False, soft_wrap=True)
+            self._console.print(self.recording.hint, markup=False, highlight=False, soft_wrap=True)
 
     def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
         self.recording.frame(forces, statistics)
@@ -72,8 +72,11 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
         watch.recording.close()
         if watch.started:
             console.print(
-                f"What was solved so far: rodsight view {watch.recording.path}", highlight=False, soft_wrap=True
+                f"What was solved so far: rodsight view {watch.recording.path}",
+                markup=False,
+                highlight=False,
+                soft_wrap=True,
             )
         raise
     for note in watch.recording.notes:
-        console.print(note, highlight=False, soft_wrap=True)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)

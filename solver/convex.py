@@ -27,6 +27,8 @@ from solver.contacts import Contacts
 from solver.grains import Array, Grains
 from solver.kinematics import equilibrium_matrix, external_load
 
+SLIP_SIGMAS = 2.8  # noise of u_t in standard deviations of a position: two grains that move and turn, two photographs
+
 
 @dataclass(frozen=True, slots=True)
 class ConvexSettings:
@@ -35,7 +37,7 @@ class ConvexSettings:
     history: float = 3e-3  # λ, pull towards the previous forces
     balance: float = 1e3  # ρ, price of an unbalance
     doubt: float = 0.3  # price of force on a contact that may not exist
-    slip_noise: float = 1.5 * 2.8  # [σ] a slip below this is taken as none: 2.8 σ is the noise of u_t, four poses
+    slip_noise: float = 1.5 * SLIP_SIGMAS  # [σ] a slip below this is taken as none
     polish: float = 0.5  # λ of the polish
     tolerance: float = 1e-6  # of the interior-point method, on residuals and on the duality gap
 

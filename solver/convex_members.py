@@ -1,37 +1,43 @@
-"""The convex members of the ensemble: each reads the motion of its own interval and keeps its own history."""
+"""The convex members of the ensemble: each reads the sliding of its own interval and keeps its own history."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver.boundaries import Walls
 from solver.contacts import Contacts
-from solver.convex import Balance, ConvexForces, ConvexSettings, soft_slip, solve_member
+from solver.convex import SLIP_SIGMAS, Balance, ConvexForces, ConvexSettings, soft_slip, solve_member
 from solver.displacement import contact_displacement, displacement_scale
 from solver.grains import Array, Grains
 from solver.motion import Snapshot
 from solver.warm_start import ForceMemory
 
 
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """The sliding that one member reads off the photographs, and how much the noise leaves of it."""
+
+    value: Array  # (c,) û_t, zero where nothing is known
+    worth: float  # s² / (s² + noise²), from 0 (noise alone) to 1
+
+
 def advance_member(
     balance: Balance,
     contacts: Contacts,
-    grains: Grains,
-    walls: Walls,
     frame: Snapshot,
-    interval: tuple[Snapshot, Snapshot],
+    slip: Slip,
     probability: Array,
     memory: ForceMemory,
     settings: ConvexSettings | None = None,
 ) -> tuple[ConvexForces, ForceMemory]:
     """Take one member to a frame: its forces there, and its memory for the next frame.
 
-    balance, contacts, walls and frame are those of the frame; interval: the earlier and the later snapshot whose
-    motion this member reads (`member_intervals`); probability (c,), P(touch).
+    balance, contacts and frame are those of the frame; slip on these contacts; probability (c,), P(touch).
     """
-    slip = measured_slip(contacts, grains, walls, interval, settings)
     previous = memory.recall(contacts)
-    forces = solve_member(balance, slip, probability, previous[:, 0], previous[:, 1], settings)
+    forces = solve_member(balance, slip.value, probability, previous[:, 0], previous[:, 1], settings)
     return forces, memory.renew(contacts, np.column_stack([forces.fn, forces.ft]), frame.present)
 
 
@@ -42,7 +48,21 @@ def measured_slip(
     interval: tuple[Snapshot, Snapshot],
     settings: ConvexSettings | None = None,
 ) -> Array:
-    """Give û_t (c,) of an interval; zero, that is no evidence, at contacts of a grain missing at either end."""
+    """Give û_t (c,) of an interval alone: `read_slip` without its worth."""
+    return read_slip(contacts, grains, walls, interval, settings).value
+
+
+def read_slip(
+    contacts: Contacts,
+    grains: Grains,
+    walls: Walls,
+    interval: tuple[Snapshot, Snapshot],
+    settings: ConvexSettings | None = None,
+) -> Slip:
+    """Read the sliding of an interval; zero, that is no evidence, at contacts of a grain missing at either end.
+
+    contacts and walls are those of the frame whose forces are sought; interval: the earlier and the later snapshot.
+    """
     earlier, later = (np.where(s.present[:, None], s.position, np.nan) for s in interval)
     sigma = float(np.hypot(interval[0].sigma, interval[1].sigma) / np.sqrt(2.0))
     scale = displacement_scale(earlier, later, np.full(grains.count, sigma))
@@ -50,4 +70,15 @@ def measured_slip(
         contacts, grains.radius, (earlier, later), (interval[0].rotation, interval[1].rotation),
         walls, (interval[0].endpoints, interval[1].endpoints),
     )  # fmt: skip
-    return soft_slip(ut, scale, sigma, settings)
+    return Slip(soft_slip(ut, scale, sigma, settings), scale**2 / (scale**2 + (SLIP_SIGMAS * sigma) ** 2))
+
+
+def steady_slip(before: Slip, after: Slip) -> Slip:
+    """Give the sliding that outlasts the frame: the lesser of the two, none where they are opposed.
+
+    Forces are those of an instant, the photographs show an interval. A contact that slides on both sides of the frame
+    surely slides at it; one that turns round in between may stick, and then its sliding says nothing.
+    """
+    same = before.value * after.value > 0.0
+    lesser = np.sign(before.value) * np.minimum(np.abs(before.value), np.abs(after.value))
+    return Slip(np.where(same, lesser, 0.0), min(before.worth, after.worth))

@@ -78,11 +78,12 @@ def find_reversals(endpoints: Array, position: Array) -> NDArray[np.bool_]:
     return turned
 
 
-def member_intervals(frame: int, reversed_at: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
-    """Give the intervals of the three convex members: (k−1, k), (k−1, k+1), (k−2, k+2), cut to what may be used.
+def member_intervals(frame: int, reversed_at: NDArray[np.bool_]) -> tuple[tuple[int, int] | None, ...]:
+    """Give the intervals (k−1, k), (k, k+1), (k−1, k+1), (k−2, k+2), cut to what may be used; None: nothing of its own.
 
     reversed_at (f,), of `find_reversals`. An interval ends at the first or last frame and at a reversal. The forces at
-    a reversal are those of the motion that led there; the first frame has only the motion that follows.
+    a reversal are those of the motion that led there; the first frame has only the motion that follows. An
+    interval that is cut down to one already given would only repeat it.
     """
     last = len(reversed_at) - 1
     if last < 1:
@@ -93,12 +94,11 @@ def member_intervals(frame: int, reversed_at: NDArray[np.bool_]) -> tuple[tuple[
     highest = min(int(after[0]), last) if len(after) else last
     if frame == 0:
         highest = max(highest, 1)
-
-    def cut(back: int, ahead: int) -> tuple[int, int]:
-        first, end = max(frame - back, lowest), min(frame + ahead, highest)
-        return (first, end) if end > first else (frame, frame + 1)
-
-    return cut(1, 0), cut(1, 1), cut(2, 2)
+    given: list[tuple[int, int] | None] = []
+    for back, ahead in ((1, 0), (0, 1), (1, 1), (2, 2)):
+        interval = max(frame - back, lowest), min(frame + ahead, highest)
+        given.append(None if interval[0] == interval[1] or interval in given else interval)
+    return tuple(given)
 
 
 def _mean_strain(before: Array, after: Array) -> Array:

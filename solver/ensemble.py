@@ -1,8 +1,9 @@
-"""The reported force field: the mean of five members of two kinds, brought into balance.
+"""The reported force field: the mean of members of two kinds, brought into balance.
 
-Two Gauss-Seidel chains of different kinematic number carry inertia and history; three convex programs read the
-sliding of intervals of different length. Each member keeps a history of its own. Their errors differ in kind,
-which is why their mean is better than any of them; averaging more of one kind gains nothing.
+Two Gauss-Seidel chains of different kinematic number carry inertia and history; five convex programs read the
+sliding of intervals before, after and around the frame. Each member keeps a history of its own and counts as much as
+noise leaves of the sliding that it reads. Their errors differ in kind, which is why their mean is better than any of
+them; averaging more of one kind gains nothing.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from solver.boundaries import Walls
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain, force_scale
 from solver.contact_probability import ContactProbabilitySettings, probable_contacts, window_of
 from solver.contacts import Contacts
 from solver.convex import ConvexSettings, assemble_balance, polish
-from solver.convex_members import advance_member
+from solver.convex_members import Slip, advance_member, read_slip, steady_slip
 from solver.displacement import find_reversals, member_intervals
 from solver.grains import Array
 from solver.motion import FrameMotion, Snapshot
@@ -39,14 +41,16 @@ class EnsembleState:
     soft: ForceMemory  # the chain whose sweeps are recorded
     stiff: ForceMemory
     last: ForceMemory  # convex, interval (k − 1, k)
+    ahead: ForceMemory  # convex, (k, k + 1)
     around: ForceMemory  # convex, (k − 1, k + 1)
     wide: ForceMemory  # convex, (k − 2, k + 2)
+    steady: ForceMemory  # convex, what (k − 1, k) and (k, k + 1) have in common
     pairs: PairProbability
 
     @classmethod
     def first(cls) -> EnsembleState:
         memory = ForceMemory.empty()
-        return cls(memory, memory, memory, memory, memory, PairProbability.none())
+        return cls(memory, memory, memory, memory, memory, memory, memory, PairProbability.none())
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +60,30 @@ class EnsembleForces:
     step: ChainStep  # of the first chain
     fn: Array  # (c,) [N] reported
     ft: Array  # (c,) [N]
-    probability: Array  # (c,)
-    member_fn: Array  # (5, c) [N] first chain, second chain, three convex members
-    member_ft: Array  # (5, c) [N]
+    probability: Array  # (c,) P(touch) as detected; 0 for a contact that only people saw
+    member_fn: Array  # (m, c) [N] first chain, second chain, convex members that had something to read
+    member_ft: Array  # (m, c) [N]
+    worth: Array  # (m,) weight of each member in the mean, at most 1
     state: EnsembleState
     remark: str  # what went otherwise than it should, or empty
     forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
+
+    @property
+    def spread_fn(self) -> Array:
+        """Standard deviation of f_n among the members (c,) [N]."""
+        return _spread(self.member_fn, self.worth)
+
+    @property
+    def spread_ft(self) -> Array:
+        """Standard deviation of f_t among the members (c,) [N]."""
+        return _spread(self.member_ft, self.worth)
+
+    @property
+    def disagreement(self) -> float:
+        """D: rms spread of f_n over the rms of f_n; 0 where no contact bears force."""
+        size = float(np.linalg.norm(self.fn))
+        return float(np.linalg.norm(self.spread_fn)) / size if size > 0 else 0.0
 
 
 def solve_ensemble(
@@ -89,8 +110,8 @@ def solve_ensemble(
         detected, verdicts, packing.grains, snapshot.position, snapshot.present, packing.walls(snapshot.endpoints)
     )
     # A pair that people saw touch is certain, whatever its measured gaps say.
-    seen = np.isin(contacts.key, verdicts.forced)
-    probability = np.where(seen, 1.0, touch[before]) if len(touch) else np.ones(contacts.count)
+    told = np.where(before >= 0, touch[before], 0.0) if len(touch) else np.zeros(contacts.count)
+    probability = np.where(np.isin(contacts.key, verdicts.forced), 1.0, told)
     forbidden = np.isin(detected.key, verdicts.forbidden)
     pairs = PairProbability(contacts.key, probability)
     network = ProbablePairs(state.pairs if motion.spans else pairs, pairs)
@@ -108,37 +129,64 @@ def solve_ensemble(
         contacts, packing.grains, walls, present=snapshot.present, friction=friction,
         force_unit=force_scale(packing, chain), gravity=packing.material.gravity, wall_normal_total=wall_total,
     )  # fmt: skip
+    slips = _slips(contacts, packing, walls, snapshots, k, settings)
+    former = (state.last, state.ahead, state.around, state.wide, state.steady)
     fields = [soft.solution.force, stiff.solution.force]
-    memories: list[ForceMemory] = []
+    worth = [1.0, 1.0]
+    memories: list[ForceMemory | None] = []
     remarks: list[str] = []
-    intervals = _intervals(snapshots, k)
-    for (first, last), memory in zip(intervals, (state.last, state.around, state.wide), strict=True):
-        forces, renewed = advance_member(
-            balance, contacts, packing.grains, walls, snapshot, (snapshots[first], snapshots[last]),
-            probability, memory, settings.convex,
-        )  # fmt: skip
+    for slip, memory in zip(slips, former, strict=True):
+        if slip is None:
+            memories.append(None)
+            continue
+        forces, renewed = advance_member(balance, contacts, snapshot, slip, probability, memory, settings.convex)
         if forces.converged:
             fields.append(np.column_stack([forces.fn, forces.ft]))
+            worth.append(slip.worth)
         else:
             remarks.append(f"a convex member was left out ({forces.ending})")
         memories.append(renewed)
     members = np.stack(fields)
-    mean = members.mean(axis=0)
+    mean = np.average(members, axis=0, weights=worth)
     polished = polish(balance, mean[:, 0], mean[:, 1], settings.convex)
     if not polished.converged:
         remarks.append(f"the mean was not polished ({polished.ending})")
     fn, ft = (polished.fn, polished.ft) if polished.converged else (mean[:, 0], mean[:, 1])
+    # A member that had nothing to read here goes on from the reported field.
+    reported = state.last.renew(contacts, np.column_stack([fn, ft]), snapshot.present)
+    chains = (soft.memory, stiff.memory) if motion.spans else (reported, reported)
+    last, ahead, around, wide, steady = (reported if memory is None else memory for memory in memories)
     return EnsembleForces(
-        soft, fn, ft, probability, members[:, :, 0], members[:, :, 1],
-        EnsembleState(
-            soft.memory if motion.spans else ForceMemory.empty(),
-            stiff.memory if motion.spans else ForceMemory.empty(),
-            memories[0], memories[1], memories[2], pairs,
-        ),
+        soft, fn, ft, told, members[:, :, 0], members[:, :, 1], np.array(worth),
+        EnsembleState(*chains, last, ahead, around, wide, steady, pairs),
         "; ".join(remarks), detected.select(forbidden), touch[forbidden],
     )  # fmt: skip
 
 
-def _intervals(snapshots: Sequence[Snapshot], k: int) -> tuple[tuple[int, int], ...]:
+def _spread(member: Array, worth: Array) -> Array:
+    mean = np.average(member, axis=0, weights=worth)
+    return np.sqrt(np.average((member - mean) ** 2, axis=0, weights=worth))
+
+
+def _slips(
+    contacts: Contacts,
+    packing: Packing,
+    walls: Walls,
+    snapshots: Sequence[Snapshot],
+    k: int,
+    settings: EnsembleSettings,
+) -> tuple[Slip | None, ...]:
+    """What the convex members read at frame k: the intervals of `member_intervals`, then what outlasts the frame."""
+    slips = [
+        None if interval is None else read_slip(
+            contacts, packing.grains, walls, (snapshots[interval[0]], snapshots[interval[1]]), settings.convex
+        )
+        for interval in _intervals(snapshots, k)
+    ]  # fmt: skip
+    before, after = slips[:2]
+    return (*slips, None if before is None or after is None else steady_slip(before, after))
+
+
+def _intervals(snapshots: Sequence[Snapshot], k: int) -> tuple[tuple[int, int] | None, ...]:
     position = np.stack([np.where(s.present[:, None], s.position, np.nan) for s in snapshots])
     return member_intervals(k, find_reversals(np.stack([s.endpoints for s in snapshots]), position))

@@ -16,7 +16,14 @@ from solver.contacts import Contacts, detect_contacts
 from solver.ensemble import EnsembleSettings, EnsembleState, solve_ensemble
 from solver.frame_forces import ContactState, FrameForces, FrameStatus
 from solver.grains import Array
-from solver.judgement import Evidence, free_standard_deviation, is_suspect, judge, trust
+from solver.judgement import (
+    Evidence,
+    free_standard_deviation,
+    is_suspect,
+    judge,
+    tangential_standard_deviation,
+    trust,
+)
 from solver.kinematics import relative_motion
 from solver.lost_grains import bridge_lost
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
@@ -25,6 +32,7 @@ from solver.stress import love_weber_stress, packing_area
 from solver.verdicts import NO_VERDICTS, Verdicts, show_forbidden, sources, without_ignored
 from solver.warm_start import ForceMemory
 
+NOTHING_KNOWN = Evidence(True, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0)
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
 SLIDING_TOLERANCE = 1e-6  # of μ f_n
 
@@ -51,6 +59,7 @@ class SequenceState:
     time: float  # [s] of the last frame
     endpoints: Array  # (w, 2, 2) [m] of the last frame
     pressure: float  # [Pa] mean stress of the last frame, NaN: none
+    evidence: Evidence  # what the last frame was judged by
     frames_since_reset: int
     frames_since_event: int
 
@@ -59,7 +68,7 @@ class SequenceState:
         walls = len(packing.pressure)
         return cls(
             EnsembleState.first(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
-            np.nan, np.full((walls, 2, 2), np.nan), np.nan, 0, 0,
+            np.nan, np.full((walls, 2, 2), np.nan), np.nan, NOTHING_KNOWN, 0, 0,
         )  # fmt: skip
 
 
@@ -75,6 +84,8 @@ class _Estimate:
     forbidden: Contacts  # detected, but left out for people forbade them
     forbidden_probability: Array  # (m,)
     remark: str = ""
+    spread_fn: Array | None = None  # (c,) [N] among the members, None of a single chain
+    spread_ft: Array | None = None  # (c,) [N]
 
 
 def solve_sequence(
@@ -150,7 +161,8 @@ def solve_frame(
         seen=state.seen.renewed(snapshot),
         time=snapshot.time,
         endpoints=snapshot.endpoints,
-        pressure=_pressure(packing, motion, estimate.step) if motion.spans else np.nan,
+        pressure=_pressure(packing, motion, estimate.step, estimate.fn, estimate.ft) if motion.spans else np.nan,
+        evidence=evidence,
         frames_since_reset=since_reset,
         frames_since_event=0 if eventful else state.frames_since_event + 1,
     )
@@ -169,15 +181,16 @@ def _estimate_by_chain(
         threshold = settings.threshold_sigmas * float(np.hypot(snapshot.sigma, settings.overlap / np.sqrt(2.0)))
     memory, remark = state.members.soft, ""
     step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold, verdicts))
-    evidence = _evidence(packing, motion, step, state)
+    evidence = _evidence(packing, motion, step, step.solution.fn, step.solution.ft, state)
     if is_suspect(evidence):
         wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold, verdicts))
-        wider_evidence = _evidence(packing, motion, wider, state)
+        wider_evidence = _evidence(packing, motion, wider, wider.solution.fn, wider.solution.ft, state)
         if wider_evidence.correction < evidence.correction:
             step, evidence = wider, wider_evidence
             remark = f"solved again with a gap threshold {WIDER} times as wide"
-    unknown = np.full(step.contacts.count, np.nan)
     near = detect_contacts(packing.grains, snapshot.position, snapshot.present, step.walls, threshold)
+    only_people_saw = np.isin(step.contacts.key, verdicts.forced) & ~np.isin(step.contacts.key, near.key)
+    unknown = np.where(only_people_saw, 0.0, np.nan)
     forbidden = near.select(np.isin(near.key, verdicts.forbidden))
     members = replace(state.members, soft=step.memory if motion.spans else ForceMemory.empty())
     return _Estimate(
@@ -199,30 +212,44 @@ def _estimate_by_ensemble(
         packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble,
         snapshot=snapshot, verdicts=verdicts,
     )  # fmt: skip
-    evidence = _evidence(packing, motion, found.step, state)
+    evidence = _evidence(packing, motion, found.step, found.fn, found.ft, state, found.disagreement)
     return _Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
-        found.remark,
+        found.remark, found.spread_fn, found.spread_ft,
     ), evidence  # fmt: skip
 
 
-def _evidence(packing: Packing, motion: FrameMotion, step: ChainStep, state: SequenceState) -> Evidence:
-    pressure = _pressure(packing, motion, step)
+def _evidence(
+    packing: Packing,
+    motion: FrameMotion,
+    step: ChainStep,
+    fn: Array,
+    ft: Array,
+    state: SequenceState,
+    disagreement: float = np.nan,
+) -> Evidence:
+    """Evidence on the reported field fn, ft (c,) [N]; ε and ū are the chain's."""
+    pressure = _pressure(packing, motion, step, fn, ft)
     jump = abs(pressure - state.pressure) / state.pressure if state.pressure > 0 else np.nan
+    plates = np.isfinite(packing.pressure)
+    load = float(packing.pressure[plates].mean()) if plates.any() else 0.0
     return Evidence(
         reset=len(state.members.soft.key) == 0,
         correction=step.solution.mean_unbalance / step.kappa,
+        disagreement=disagreement,
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
+        load_share=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
+        unbalance=worst_unbalance(packing, step.contacts, fn, ft, motion.grains.present),
         shear=shear_over(motion),
         frames_since_event=state.frames_since_event + 1,
     )
 
 
-def _pressure(packing: Packing, motion: FrameMotion, step: ChainStep) -> float:
+def _pressure(packing: Packing, motion: FrameMotion, step: ChainStep, fn: Array, ft: Array) -> float:
     position = motion.grains.position
     area = packing_area(step.walls, position[motion.grains.present])
-    stress = love_weber_stress(step.contacts, step.solution.fn, step.solution.ft, position, area, packing.length)
+    stress = love_weber_stress(step.contacts, fn, ft, position, area, packing.length)
     return 0.5 * float(np.trace(stress))
 
 
@@ -237,7 +264,7 @@ def _with_verdicts(
     frame: FrameForces, packing: Packing, motion: FrameMotion, estimate: _Estimate, verdicts: Verdicts
 ) -> FrameForces:
     """Mark what people added, and list what they forbade."""
-    frame = replace(frame, source=sources(frame.contacts, verdicts))
+    frame = replace(frame, source=sources(frame.contacts, estimate.probability, verdicts))
     if estimate.forbidden.count == 0:
         return frame
     grains = motion.grains
@@ -298,19 +325,19 @@ def _describe(
         ut=ut,
         state=contact_state(packing, contacts, fn, ft),
         age=age,
-        source=sources(contacts, NO_VERDICTS),
+        source=sources(contacts, estimate.probability, NO_VERDICTS),
         probability=estimate.probability,
-        fn_sd=free_standard_deviation(fn),
-        ft_sd=packing.material.friction * free_standard_deviation(fn),
+        fn_sd=free_standard_deviation(fn, estimate.spread_fn),
+        ft_sd=tangential_standard_deviation(fn, packing.material.friction, estimate.spread_ft),
         status=status,
         reason=reason,
         sweeps=step.sweeps,
         natural_map=step.solution.natural_map,
-        unbalance=worst_unbalance(packing, contacts, fn, ft, motion.grains.present),
+        unbalance=evidence.unbalance,
         kappa=step.kappa,
         correction=evidence.correction,
         old_unbalance=evidence.old_unbalance,
-        trust=trust(evidence.correction) if motion.spans else np.nan,
+        trust=trust(evidence) if motion.spans else np.nan,
         frames_since_reset=since_reset,
         history=step.history,
     )

@@ -14,6 +14,8 @@ from solver.frame_forces import ContactSource, ContactState, FrameForces
 from solver.grains import Array, Grains
 from solver.motion import Snapshot
 
+DETECTED = 0.5  # P(touch) from which on a pair counts as detected
+
 
 def _no_keys() -> NDArray[np.int64]:
     return np.empty(0, np.int64)
@@ -63,10 +65,15 @@ def apply_verdicts(
     return measure_contacts(grains, position, walls, key // bodies, key % bodies), before
 
 
-def sources(contacts: Contacts, verdicts: Verdicts) -> NDArray[np.uint8]:
-    """ContactSource of every contact (c,)."""
+def sources(contacts: Contacts, probability: Array, verdicts: Verdicts) -> NDArray[np.uint8]:
+    """ContactSource of every contact (c,).
+
+    probability (c,): P(touch) as detected, NaN where it was not computed. A forced pair that was detected anyway
+    stays a detected one.
+    """
     source = np.full(contacts.count, ContactSource.DETECTED, np.uint8)
-    source[np.isin(contacts.key, verdicts.forced)] = ContactSource.ADDED_BY_REVIEWER
+    added = np.isin(contacts.key, verdicts.forced) & (probability < DETECTED)
+    source[added] = ContactSource.ADDED_BY_REVIEWER
     return source
 
 
@@ -92,14 +99,11 @@ def show_forbidden(frame: FrameForces, forbidden: Contacts, probability: Array, 
             columns[each.name] = np.concatenate([value, added])[order]
     history = frame.history
     nothing = np.zeros((len(history.recorded), forbidden.count), np.float32)
-    merged = Contacts(
-        *(
-            np.concatenate([getattr(contacts, name), getattr(forbidden, name)])[order]
-            for name in ("i", "j", "gap", "normal", "point")
-        ),
-        contacts.grain_count,
-        contacts.wall_count,
-    )
+    geometry = {
+        name: np.concatenate([getattr(contacts, name), getattr(forbidden, name)])[order]
+        for name in ("i", "j", "gap", "normal", "point")
+    }
+    merged = Contacts(**geometry, grain_count=contacts.grain_count, wall_count=contacts.wall_count)
     return replace(
         frame,
         contacts=merged,

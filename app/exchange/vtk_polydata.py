@@ -17,6 +17,8 @@ from app.results import Results
 from solver.contacts import Contacts
 from solver.grains import Array
 
+UNKNOWN = -1.0  # a probability that was not computed: readers of ASCII files stumble over NaN
+
 _TYPES = {"f": "Float64", "i": "Int64", "u": "Int64"}
 
 
@@ -63,7 +65,8 @@ def _contacts(results: Results, frame: int) -> str:
     ids = np.concatenate([results.tracks.id, -1 - np.arange(results.walls.count)])  # walls: −1, −2, …
     data = {
         "i": ids[contacts.i], "j": ids[contacts.j], "fn": forces.fn, "ft": forces.ft, "gap": contacts.gap,
-        "fn_sd": forces.fn_sd, "probability": forces.probability, "state": forces.state, "age": forces.age,
+        "fn_sd": forces.fn_sd, "probability": np.nan_to_num(forces.probability, nan=UNKNOWN),
+        "state": forces.state, "age": forces.age,
     }  # fmt: skip
     return _polydata(points, "Lines", lines, cell_data=data)
 
@@ -103,7 +106,7 @@ def _data(tag: str, data: Mapping[str, np.ndarray] | None) -> list[str]:
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """All digits of floats: they read back to the same number. NaN is a word that the format knows."""
+    """All digits of floats: they read back to the same number."""
     values = np.asarray(values)
     kind = _TYPES[values.dtype.kind]
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 and name == "points" else ""

@@ -70,7 +70,7 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: b
             state="collapsed",
             timeline=entities.SWEEP if active is Tab.CONVERGENCE else entities.FRAME,
             fps=4.0,
-            play_state="following" if following else "playing",
+            play_state="following" if following else "paused",
             loop_mode="off" if following else "all",
         ),
         auto_views=False,

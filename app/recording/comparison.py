@@ -131,7 +131,7 @@ def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blu
         rrb.Tabs(side, rrb.TextDocumentView(origin=SUMMARY, name="Figures"), name="Rodsight"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=4.0, loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=4.0, play_state="paused", loop_mode="all"),
         auto_views=False,
         auto_layout=False,
     )

@@ -124,17 +124,22 @@ class HeadlessViewer:
         self._running().set_time(timeline, sequence=value, play_state="paused")
 
     def picture(self, view: str | None = None) -> bytes:
-        """A picture (PNG) of the window, or of one view of the tab in front, taken once it stands still."""
+        """A picture (PNG) of the window, or of one view, whose tab comes to the front, taken once it stands still."""
         client = self._running()
-        view_id = None if view is None else self._view_id(view)
+        view_id = None if view is None else self._bring_to_front(view)
         while time.monotonic() < self._clear_at:
             client.take_screenshot(max_size=64)
             time.sleep(0.3)
         end, former = time.monotonic() + ANSWER_SECONDS, b""
         while time.monotonic() < end:
-            picture = client.take_screenshot(view_id)
+            try:
+                picture = client.take_screenshot(view_id)
+            except ConnectionError as error:
+                if "NotFound" not in str(error):
+                    raise
+                picture = b""  # a view that has just come to the front is still laid out
             digest = hashlib.sha256(picture).digest()
-            if digest == former:
+            if picture and digest == former:
                 return picture
             former = digest
             time.sleep(STILL_SECONDS)
@@ -179,6 +184,7 @@ class HeadlessViewer:
             client.take_screenshot(max_size=64)  # views exist once they were drawn
             state = client.get_state()
             if not state.loading and state.active_recording is not None and state.views:
+                client.set_time(play_state="paused")  # a blueprint may start it playing
                 return
             if time.monotonic() > end:
                 raise NoPictureError(f"{self.recording} was not loaded within {ANSWER_SECONDS:g} s")
@@ -200,14 +206,20 @@ class HeadlessViewer:
     def _name(self, item: str) -> str:
         return _display_name(self._running().get_blueprint().blueprint[_path(item)])
 
-    def _view_id(self, name: str) -> str:
-        found = [view for view in self._running().get_state().views if view.name == name]
-        if not found:
-            raise NoPictureError(f"{self.recording} has no view {name!r}; there are {', '.join(self.views)}")
-        if len(found) > 1 and self._tab is not None:
-            inside = self._views_of_tab(self._tab)
-            found = [view for view in found if str(view.view_id) in inside] or found
-        return str(found[0].view_id)
+    def _bring_to_front(self, name: str) -> str:
+        """The view of this name in the tab in front, or else in the first tab that has one."""
+        named = {str(view.view_id) for view in self._running().get_state().views if view.name == name}
+        if not named:
+            shown = ", ".join(sorted(repr(each) for each in set(self.views)))
+            raise NoPictureError(f"{self.recording} has no view {name!r}; there are {shown}")
+        tabs = self.tabs
+        for tab in [self._tab or tabs[0], *tabs]:
+            inside = sorted(named & self._views_of_tab(tab))
+            if inside:
+                if tab != self._tab:
+                    self.show_tab(tab)
+                return inside[0]
+        raise NoPictureError(f"{self.recording}: the view {name!r} is in no tab")
 
     def _views_of_tab(self, tab: str) -> set[str]:
         blueprint = self._running().get_blueprint().blueprint

@@ -48,7 +48,7 @@ def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepCh
         ),
         contact_values(scene, forces),
     )
-    sent = _send_sweeps(clock, style, rows[1:], fn[1:], thin=choice is SweepChoice.ALL) if contacts.count else 0
+    sent = send_sweeps(clock, style, rows[1:], fn[1:], thin=choice is SweepChoice.ALL) if contacts.count else 0
     _log_sliding(clock, scene, forces)
     return 1 + sent
 
@@ -112,7 +112,7 @@ def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:
     }
 
 
-def _send_sweeps(
+def send_sweeps(
     clock: Clock, style: ForceStyle, rows: NDArray[np.int64], fn: NDArray[np.floating], *, thin: bool
 ) -> int:
     """Send widths and colours of rows (r,), fn (r, c); `thin` leaves out rows that look like the one before.

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import uuid
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -121,7 +122,8 @@ class ReviewLayer:
         """A blueprint that frames a part of the picture [px]."""
         # A click asks for a place, and the server knows what lies there. Were the marks themselves to be picked, a slow
         # renderer would answer some pictures late, or not at all.
-        still = {path: rrb.EntityBehavior(interactive=False) for path in (GRAINS, WALLS, CANDIDATES, MARKS, SELECTION)}
+        layers = (GRAINS, WALLS, CANDIDATES, MARKS, SELECTION)
+        still: Any = {path: rrb.EntityBehavior(interactive=False) for path in layers}
         view = rrb.Spatial2DView(
             name="Photograph", origin="/", contents=["/**"], titlebar=False, background=[16, 17, 21], overrides=still,
             visual_bounds=rrb.VisualBounds2D(x_range=[left, left + width], y_range=[top, top + height]),

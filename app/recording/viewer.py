@@ -27,10 +27,10 @@ def viewer_binary() -> Path:
     return Path(rerun_cli.__file__).parent / name
 
 
-def view_command(path: Path | str, *, web: bool = False) -> list[str]:
-    """The command that shows a recording; with `web`, to a browser on this machine only."""
+def view_command(path: Path | str, *also: Path | str, web: bool = False) -> list[str]:
+    """The command that shows a recording, with its side files; with `web`, to a browser on this machine only."""
     options = ["--web-viewer", "--bind", "127.0.0.1"] if web else []
-    return [str(viewer_binary()), *options, str(path)]
+    return [str(viewer_binary()), *options, *map(str, (path, *also))]
 
 
 def has_display() -> bool:
@@ -40,8 +40,8 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE) -> str | None:
-    """Show a recording and return at once; the viewer lives on.
+def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE, *also: Path | str) -> str | None:
+    """Show a recording, with its side files, and return at once; the viewer lives on.
 
     Returns None where a viewer was started, else one line that says how to look at the recording.
     Raises FileNotFoundError where there is no recording.
@@ -55,7 +55,7 @@ def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE) ->
     if kind is ViewerKind.NATIVE and not has_display():
         return f"No display here. In a browser: rodsight view --web {shown}; elsewhere: rerun {shown}"
     subprocess.Popen(
-        view_command(path, web=kind is ViewerKind.WEB),
+        view_command(path, *also, web=kind is ViewerKind.WEB),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

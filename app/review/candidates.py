@@ -11,10 +11,11 @@ from scipy.stats import norm
 from app.results import Results
 from solver.boundaries import Walls
 from solver.contacts import Contacts, detect_contacts, measure_contacts
+from solver.frame_forces import ContactSource
 from solver.grains import Array
+from solver.verdicts import DETECTED
 
 REACH = 4.0  # [σ of a gap] beyond the threshold
-DETECTED = 0.5  # P(touch) from which on a pair counts as detected
 UNLISTED = 3e-3  # P(touch) that a pair which the detector left out has at most
 THRESHOLD_SIGMAS = 6.0  # of a position: the threshold where the configuration names none
 
@@ -94,7 +95,8 @@ def _detection(
         listed = forces.contacts.key[place] == contacts.key
     told = np.full(contacts.count, np.nan)
     told[listed] = forces.probability[place[listed]]
-    by_probability = bool(np.isfinite(forces.probability).any())
+    detector = forces.source == ContactSource.DETECTED  # of an added contact even the plain detector tells P = 0
+    by_probability = bool(np.isfinite(forces.probability[detector]).any())
     unlisted = np.minimum(from_gap, UNLISTED) if by_probability else from_gap
     probability = np.where(np.isfinite(told), told, np.where(listed | ~np.isfinite(unlisted), from_gap, unlisted))
     detected = listed & ~(told < DETECTED)  # a NaN, where no probability was computed, compares false

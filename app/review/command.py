@@ -5,6 +5,7 @@ from __future__ import annotations
 import getpass
 import webbrowser
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from rich.console import Console
 
 from app.errors import InputError
 from app.experiment import CONFIG_NAME, Experiment, load_experiment
+from app.frames import Photographs
 from app.results import Results
 from app.review.candidates import find_candidates
 from app.review.decisions import Bodies
@@ -21,8 +23,8 @@ from app.review.server import ReviewServer
 from app.review.session import ReviewSession
 from app.review.verdict_table import export_verdicts, import_verdicts
 from app.review.verdicts import VERDICTS, VerdictLog
+from app.scaling import make_scale
 from app.store import load_results, read_origin
-from app.units import Scale
 
 RESULTS = "results.h5"
 
@@ -64,15 +66,12 @@ def open_reviewed(path: Path) -> Reviewed:
 
 def open_session(reviewed: Reviewed) -> ReviewSession:
     """Make the session of one run; its log lies beside the results."""
-    section = reviewed.experiment.config.photographs
     photograph, scale = None, None
+    section = reviewed.experiment.config.photographs
     if section is not None:
         photographs = reviewed.experiment.photographs()
-        scale = Scale(section.pixel_size, photographs.shape[0])
-
-        def photograph(frame: int) -> NDArray[np.uint8]:
-            return np.clip(np.rint(photographs[reviewed.first_frame + frame]), 0, 255).astype(np.uint8)
-
+        scale = make_scale(section, photographs.shape[0])
+        photograph = partial(_grey, photographs, reviewed.first_frame)
     picture = Picture(reviewed.results, photograph, scale)
     return ReviewSession(
         reviewed.results, picture, reviewed.log, first_frame=reviewed.first_frame, threshold=reviewed.threshold
@@ -120,6 +119,10 @@ def export_table(path: Path, file: Path) -> int:
     count = export_verdicts(open_reviewed(path).log, file)
     Console().print(f"{count} verdicts in {file}.", highlight=False, soft_wrap=True)
     return 0
+
+
+def _grey(photographs: Photographs, first: int, frame: int) -> NDArray[np.uint8]:
+    return np.clip(np.rint(photographs[first + frame]), 0, 255).astype(np.uint8)
 
 
 def _user() -> str:

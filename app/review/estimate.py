@@ -1,8 +1,10 @@
 """Precision and recall of the detector, estimated from the verdicts given so far, with their intervals.
 
 Each stratum is a population of known size of which a random part was judged. Its unjudged rest is drawn from the
-posterior of the share of contacts (Jeffreys' prior, Beta(½, ½)), so that an interval closes to a point once
-everything was judged. Verdicts on pairs that a person picked are counted as known, but say nothing about the rest.
+posterior of the share of contacts, so that an interval closes to a point once everything was judged. The prior is
+worth one verdict and lies where the detector believes the share to be, though never nearer to certainty than one in
+twenty: a flat one would invent a few contacts in every large stratum that has none. Verdicts on pairs that a person
+picked are counted as known, but say nothing about the rest.
 """
 
 from __future__ import annotations
@@ -12,8 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.grains import Array
+
 DRAWS = 4000
 CREDIBLE = 0.95
+
+SUREST = 0.95  # share of contacts that the prior takes for the surest stratum
 
 UNJUDGED, NO, YES = -1, 0, 1  # outcome of a candidate
 
@@ -39,6 +45,7 @@ class Estimate:
 def estimate(
     stratum: NDArray[np.int64],
     detected: NDArray[np.bool_],
+    probability: Array,
     outcome: NDArray[np.int64],
     chosen: NDArray[np.bool_],
     missed: int,
@@ -46,8 +53,8 @@ def estimate(
 ) -> Estimate:
     """Estimate precision and recall over a population of candidates (c,).
 
-    outcome (c,): UNJUDGED, NO or YES; chosen (c,): judged because the queue chose it. missed: contacts added by hand
-    that no candidate stands for.
+    probability (c,): P(touch) by the detector; outcome (c,): UNJUDGED, NO or YES; chosen (c,): judged because the
+    queue chose it. missed: contacts added by hand that no candidate stands for.
     """
     true = np.zeros((2, DRAWS))  # contacts among the undetected and the detected
     true[0] += missed
@@ -59,7 +66,8 @@ def estimate(
             fair = outcome[here & chosen]
             yes, judged = int((fair == YES).sum()), int((fair != UNJUDGED).sum())
             rest = int((outcome[here] == UNJUDGED).sum())
-            share = rng.beta(0.5 + yes, 0.5 + judged - yes, DRAWS)
+            belief = float(np.clip(probability[here].mean(), 1.0 - SUREST, SUREST))
+            share = rng.beta(belief + yes, 1.0 - belief + judged - yes, DRAWS)
             true[int(found)] += int((outcome[here] == YES).sum()) + rng.binomial(rest, share)
     found_count = max(int(detected.sum()), 1)
     precision = true[1] / found_count

@@ -39,6 +39,4 @@ def gap_at(results: Results, frame: int, point: Array) -> tuple[int, int] | None
 def near_pairs(results: Results, frame: int, gap: float) -> Contacts:
     """All pairs of one frame with less than a gap [m] between them."""
     tracks = results.tracks
-    return detect_contacts(
-        results.grains, tracks.position[frame], tracks.present[frame], walls_at(results, frame), gap
-    )
+    return detect_contacts(results.grains, tracks.position[frame], tracks.present[frame], walls_at(results, frame), gap)

@@ -19,7 +19,7 @@ from solver.grains import Array
 Photograph = NDArray[np.uint8]  # (H, W) grey
 PhotographSource = Callable[[int], Photograph]
 
-CROP_WIDTH, CROP_HEIGHT = 720, 480  # [px] of the crop as sent: twice its size on the page, for sharp screens
+CROP_WIDTH, CROP_HEIGHT = 752, 564  # [px] of the crop as sent: twice its size on the page, for sharp screens
 ZOOMS = (4.4, 2.2, 1.0)  # width of the crop in mean grain diameters
 NEIGHBOURHOOD = 9.0  # width of the viewer's picture in mean grain diameters
 KEPT = 4  # photographs and their pictures
@@ -85,9 +85,7 @@ class Picture:
         x, y = self.canvas.points(point)
         sides = [2.0 * self.canvas.grain_radius * each for each in ZOOMS]
         ratio = CROP_HEIGHT / CROP_WIDTH
-        return tuple(
-            Window(float(x) - 0.5 * side, float(y) - 0.5 * side * ratio, side, side * ratio) for side in sides
-        )
+        return tuple(Window(float(x) - 0.5 * side, float(y) - 0.5 * side * ratio, side, side * ratio) for side in sides)
 
     def crop(self, frame: int, window: Window) -> bytes:
         """The photograph inside a window, magnified, as JPEG; grey beyond its edge and where there is none."""

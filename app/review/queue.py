@@ -32,6 +32,7 @@ class Queue:
     key: NDArray[np.int64]  # (q,)
     stratum: NDArray[np.int64]  # (q,)
     detected: NDArray[np.bool_]  # (q,)
+    probability: Array  # (q,) P(touch) by the detector
 
     @property
     def count(self) -> int:
@@ -102,4 +103,5 @@ def _queue(frames: Sequence[Candidates], stratum: Sequence[NDArray[np.int64]], o
         np.concatenate([each.key for each in frames])[order],
         np.concatenate(stratum)[order],
         np.concatenate([each.detected for each in frames])[order],
+        np.concatenate([each.probability for each in frames])[order],
     )

@@ -14,12 +14,14 @@ from app.errors import InputError
 from app.review.candidates import Candidates, find_candidates, walls_at
 from app.review.command import Reviewed
 from app.review.decisions import Decisions, decide
+from app.review.estimate import NO, UNJUDGED, YES, Estimate, estimate
 from app.review.queue import strata
 from app.review.threshold import ThresholdCurve, ThresholdFit, even_thresholds, fit_threshold, threshold_curve
 from solver.contacts import measure_contacts
 from solver.grains import Array
 
 _SEED = 11  # of the bootstrap
+_ENOUGH = 5  # verdicts of a stratum that speak for the rest of it
 _CURVE_ROWS = 9  # of the curve on the terminal
 
 
@@ -31,6 +33,11 @@ class FrameScore:
     hits: int  # detected, and a contact
     false: int  # detected, but no contact
     missed: int  # a contact, but not detected
+    rejected: int  # neither detected nor a contact
+
+    @property
+    def judged(self) -> int:
+        return self.hits + self.false + self.missed + self.rejected
 
     @property
     def precision(self) -> float:
@@ -42,24 +49,42 @@ class FrameScore:
 
     @property
     def f1(self) -> float:
-        judged = 2 * self.hits + self.false + self.missed
-        return 2 * self.hits / judged if judged else float("nan")
+        all_named = 2 * self.hits + self.false + self.missed
+        return 2 * self.hits / all_named if all_named else float("nan")
 
 
 @dataclass(frozen=True, slots=True)
 class JudgedPairs:
-    """All pairs with a verdict, over all frames."""
+    """All candidates, and contacts added by hand, of the frames with a verdict (c,)."""
 
     gap: Array  # (c,) [m]
-    touching: NDArray[np.bool_]  # (c,)
-    with_wall: NDArray[np.bool_]  # (c,)
-    weight: Array  # (c,) how many candidates of its frame and stratum each stands for
+    with_wall: NDArray[np.bool_]
+    stratum: NDArray[np.int64]  # −1: no candidate
+    detected: NDArray[np.bool_]
+    probability: Array  # P(touch) by the detector
+    outcome: NDArray[np.int64]  # UNJUDGED, NO or YES
+
+    @property
+    def touching(self) -> Array:
+        """How far each pair counts as a contact (c,) 0 … 1.
+
+        A pair without a verdict counts as those of its stratum that have one, or, where they are few, as the detector
+        believes: to leave it out would let the doubtful pairs, which people judge first, speak for all.
+        """
+        share = self.probability.copy()
+        for h in np.unique(self.stratum):
+            said = self.outcome[(self.stratum == h) & (self.outcome != UNJUDGED)]
+            if len(said) >= _ENOUGH:
+                share[self.stratum == h] = (said == YES).mean()
+        share[self.outcome == YES], share[self.outcome == NO] = 1.0, 0.0
+        return share
 
 
 @dataclass(frozen=True, slots=True)
 class VerdictScore:
     frames: list[FrameScore]  # those with a verdict
     total: FrameScore
+    estimate: Estimate  # over all candidates of those frames, judged or not
     pairs: JudgedPairs
     curve: ThresholdCurve
     disputed: int
@@ -68,34 +93,37 @@ class VerdictScore:
 def score_verdicts(reviewed: Reviewed) -> VerdictScore | None:
     """Compare the detector with the verdicts in the log; None where there is none.
 
-    What a reviewer forced or forbade counts as the detector saw it, as far as the results still tell: its P(touch).
+    What a reviewer forced or forbade counts as the detector saw it: results keep its P(touch).
     """
     results = reviewed.results
-    decisions = decide(
-        reviewed.log, reviewed.bodies, first_frame=reviewed.first_frame, frame_count=len(results.frames)
-    )
+    decisions = decide(reviewed.log, reviewed.bodies, first_frame=reviewed.first_frame, frame_count=len(results.frames))
     if decisions.count == 0:
         return None
     frames, parts = [], []
     for frame in sorted({k for k, _ in decisions.contact | decisions.no_contact}):
-        candidates = find_candidates(results, frame, reviewed.threshold)
-        scored, pairs = _score_frame(reviewed, frame, candidates, decisions)
-        frames.append(scored)
+        pairs = _pairs_of(reviewed, find_candidates(results, frame, reviewed.threshold), decisions)
+        yes, no = pairs.outcome == YES, pairs.outcome == NO
+        seen = pairs.detected
+        counts = (int(each.sum()) for each in (yes & seen, no & seen, yes & ~seen, no & ~seen))
+        frames.append(FrameScore(frame + reviewed.first_frame, *counts))
         parts.append(pairs)
     pairs = JudgedPairs(*(np.concatenate([getattr(p, name) for p in parts]) for name in JudgedPairs.__slots__))
-    total = FrameScore(-1, *(sum(getattr(f, name) for f in frames) for name in ("hits", "false", "missed")))
-    curve = threshold_curve(pairs.gap, pairs.touching, pairs.weight, even_thresholds(pairs.gap))
-    return VerdictScore(frames, total, pairs, curve, len(decisions.disputed))
+    total = FrameScore(-1, *(sum(getattr(f, name) for f in frames) for name in ("hits", "false", "missed", "rejected")))
+    known = pairs.stratum >= 0
+    estimated = estimate(
+        pairs.stratum[known], pairs.detected[known], pairs.probability[known], pairs.outcome[known],
+        pairs.outcome[known] != UNJUDGED, int((pairs.outcome[~known] == YES).sum()), np.random.default_rng(_SEED),
+    )  # fmt: skip
+    curve = threshold_curve(pairs.gap, pairs.touching, even_thresholds(pairs.gap))
+    return VerdictScore(frames, total, estimated, pairs, curve, len(decisions.disputed))
 
 
 def fit(reviewed: Reviewed, score: VerdictScore) -> ThresholdFit:
     """Threshold and radius correction that the verdicts recommend."""
     deviation = float(np.mean(reviewed.results.tracks.position_sigma))
-    pairs = score.pairs
+    pairs, rng = score.pairs, np.random.default_rng(_SEED)
     try:
-        return fit_threshold(
-            pairs.gap, pairs.touching, pairs.with_wall, pairs.weight, deviation, np.random.default_rng(_SEED)
-        )
+        return fit_threshold(pairs.gap, pairs.touching, pairs.with_wall, pairs.outcome != UNJUDGED, deviation, rng)
     except ValueError as error:
         raise InputError(reviewed.log.file, "", str(error)) from None
 
@@ -105,8 +133,9 @@ def as_json(score: VerdictScore, fitted: ThresholdFit | None) -> dict[str, Any]:
     told: dict[str, Any] = {
         "frame": [each.frame for each in score.frames],
         **{name: [_plain(getattr(f, name)) for f in score.frames] for name in ("precision", "recall", "f1")},
-        "judged": [f.hits + f.false + f.missed for f in score.frames],
+        "judged": [f.judged for f in score.frames],
         "total": {name: _plain(getattr(score.total, name)) for name in ("precision", "recall", "f1")},
+        "estimate": {name: asdict(getattr(score.estimate, name)) for name in ("precision", "recall", "f1")},
         "disputed": score.disputed,
         "curve": {
             name: [_plain(v) for v in getattr(score.curve, name)] for name in ("threshold", "precision", "recall", "f1")
@@ -119,14 +148,23 @@ def as_json(score: VerdictScore, fitted: ThresholdFit | None) -> dict[str, Any]:
 
 def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | None) -> None:
     """Print the frames, the curve and what is recommended."""
-    table = Table(title="Detector against verdicts", box=None, header_style="bold")
-    for heading in ("frame", "judged contacts", "precision", "recall", "F1"):
+    table = Table(title="Detector against verdicts, judged pairs alone", box=None, header_style="bold")
+    for heading in ("frame", "judged", "precision", "recall", "F1"):
         table.add_column(heading, justify="right")
     for each in [*score.frames, score.total]:
         name = "all" if each is score.total else str(each.frame)
         shares = (f"{value:.3f}" for value in (each.precision, each.recall, each.f1))
-        table.add_row(name, str(each.hits + each.missed), *shares)
+        table.add_row(name, str(each.judged), *shares)
     console.print(table)
+    over = ", ".join(
+        f"{name} {each.value:.3f} ({each.low:.3f} to {each.high:.3f})"
+        for name, each in (("precision", score.estimate.precision), ("recall", score.estimate.recall))
+    )
+    console.print(
+        f"Over all {score.estimate.total} candidates of these frames, estimated from {score.estimate.judged}: {over}.",
+        highlight=False,
+        soft_wrap=True,
+    )
     if score.disputed:
         console.print(f"{score.disputed} pairs are disputed or unsure and count for nothing.", highlight=False)
     curve = Table(title="Touching below a gap of", box=None, header_style="bold")
@@ -141,39 +179,29 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
             f"Recommended from {fitted.contacts} contacts and {fitted.others} others: threshold "
             f"{1e6 * fitted.threshold:.1f} µm (contacts.threshold={fitted.threshold:.4g}, or "
             f"contacts.threshold_sigmas={fitted.threshold_sigmas:.3g}). Radius correction "
-            f"{1e6 * fitted.radius_change:+.1f} ± {1e6 * fitted.radius_change_sd:.1f} µm on every grain; with it the "
+            f"{1e6 * fitted.radius_change:+.2f} ± {1e6 * fitted.radius_change_sd:.2f} µm on every grain; with it the "
             f"threshold is {1e6 * fitted.threshold_with_change:.1f} µm.",
             highlight=False,
             soft_wrap=True,
         )
 
 
-def _score_frame(
-    reviewed: Reviewed, frame: int, candidates: Candidates, decisions: Decisions
-) -> tuple[FrameScore, JudgedPairs]:
-    results = reviewed.results
-    yes, no = decisions.forced(frame), decisions.forbidden(frame)
-    here = results.tracks.present[frame]
+def _pairs_of(reviewed: Reviewed, candidates: Candidates, decisions: Decisions) -> JudgedPairs:
+    results, frame = reviewed.results, candidates.frame
     bodies, n = results.grains.count + results.walls.count, results.grains.count
-    seen = np.concatenate([here, np.ones(results.walls.count, np.bool_)])
-    key = np.union1d(yes, no)
-    key = key[seen[key // bodies] & seen[key % bodies]]
-    touching = np.isin(key, yes)
+    here = np.concatenate([results.tracks.present[frame], np.ones(results.walls.count, np.bool_)])
+    yes, no = decisions.forced(frame), decisions.forbidden(frame)
+    key = np.union1d(candidates.key, np.union1d(yes, no))
+    key = key[here[key // bodies] & here[key % bodies]]
     position, walls = results.tracks.position[frame], walls_at(results, frame)
     contacts = measure_contacts(results.grains, position, walls, key // bodies, key % bodies)
-    detected = np.isin(key, candidates.key[candidates.detected])
-    scored = FrameScore(
-        frame + reviewed.first_frame,
-        int((touching & detected).sum()), int((~touching & detected).sum()), int((touching & ~detected).sum()),
-    )  # fmt: skip
-    weight = np.ones(len(key))
-    stratum = strata(candidates)
-    judged = np.isin(candidates.key, key)
-    for h in np.unique(stratum):
-        inside = stratum == h
-        if (judged & inside).any():
-            weight[np.isin(key, candidates.key[inside])] = inside.sum() / (judged & inside).sum()
-    return scored, JudgedPairs(contacts.gap, touching, contacts.j >= n, weight)
+    place = np.searchsorted(key, candidates.key)
+    stratum = np.full(len(key), -1, np.int64)
+    detected, probability = np.zeros(len(key), np.bool_), np.zeros(len(key))
+    stratum[place], detected[place] = strata(candidates), candidates.detected
+    probability[place] = candidates.probability
+    outcome = np.where(np.isin(key, yes), YES, np.where(np.isin(key, no), NO, UNJUDGED))
+    return JudgedPairs(contacts.gap, contacts.j >= n, stratum, detected, probability, outcome)
 
 
 def _plain(value: Any) -> Any:

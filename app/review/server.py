@@ -130,9 +130,7 @@ class _Values:
         name = " ".join(self.get("reviewer", str).split())
         if not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
             raise BadRequest("a reviewer has a name of 1 to 60 printable characters")
-        return Viewpoint(
-            name, self.get("frame", int), self.get("sampled", bool, False), self.get("blind", bool, False)
-        )
+        return Viewpoint(name, self.get("frame", int), self.get("sampled", bool, False), self.get("blind", bool, False))
 
 
 def _open(server: ReviewServer, values: _Values) -> dict[str, Any]:
@@ -202,7 +200,9 @@ class _Handler(BaseHTTPRequestHandler):
             return
         if entering:
             if self.review.gate.opens(query["token"]):
-                self._send(b"", "text/plain", HTTPStatus.SEE_OTHER, Location="/", Set_Cookie=self.review.gate.set_cookie)
+                self._send(
+                    b"", "text/plain", HTTPStatus.SEE_OTHER, Location="/", Set_Cookie=self.review.gate.set_cookie
+                )
             else:
                 self._say(HTTPStatus.FORBIDDEN, "this token is not the one that `rodsight review` printed")
             return
@@ -229,8 +229,8 @@ class _Handler(BaseHTTPRequestHandler):
         elif path == _MODULE:
             packs = "gzip" in (self.headers.get("Accept-Encoding") or "")
             content = self.review.packed_module() if packs else self.review.viewer().module
-            more = {"Content_Encoding": "gzip"} if packs else {}
-            self._send(content, "application/wasm", Vary="Accept-Encoding", **more)
+            encoding = "gzip" if packs else "identity"
+            self._send(content, "application/wasm", Vary="Accept-Encoding", Content_Encoding=encoding)
         elif path in ("/backdrop", "/marks", "/look", "/crop"):
             self._send_picture(path, query)
         else:

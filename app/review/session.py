@@ -61,7 +61,8 @@ class ReviewSession:
         self._rows = self.bodies.rows()
         self._threshold = threshold
         self._candidates: dict[int, Candidates] = {}
-        self._queues: dict[int | None, Queue] = {}
+        self._queues: dict[int | None, tuple[Queue, dict[tuple[int, int], int]]] = {}
+        self._detections: dict[int, dict[Pair, bool]] = {}
         self._lock = threading.RLock()
 
     def opening(self) -> dict[str, Any]:
@@ -75,16 +76,18 @@ class ReviewSession:
     def status(self, view: Viewpoint) -> dict[str, Any]:
         """Progress, the estimate so far, agreement and flags."""
         self._check(view.frame)
-        queue = self._queue(view)
+        queue, places = self._queue(view)
         judged = self._judged(view.reviewer)
-        here = [(int(f), int(k)) for f, k in zip(queue.frame, queue.key, strict=True)]
         flags = [e.flag.value for e in self.log.last_words(view.reviewer) if e.flag and e.on and self._here(e, view)]
         told: dict[str, Any] = {
-            "judged": sum(pair in judged for pair in here), "total": len(here), "flags": flags,
-            "spoken": len(judged), "torn": self.log.torn,
-        }  # fmt: skip
+            "judged": sum(pair in places for pair in judged),
+            "total": queue.count,
+            "flags": flags,
+            "spoken": len(judged),
+            "torn": self.log.torn,
+        }
         if not view.blind:
-            told["estimate"] = self._estimate(queue, here, judged, None if view.sampled else view.frame)
+            told["estimate"] = self._estimate(queue, places, judged, None if view.sampled else view.frame)
             told["agreement"] = self.agreement()
         return told
 
@@ -93,14 +96,12 @@ class ReviewSession:
         detected: dict[Pair, bool] = {}
         for frame in {pair[0] - self.first_frame for pair, _ in self.log.verdicts()}:
             if 0 <= frame < len(self.results.frames):
-                found = self.candidates(frame)
-                for i, j, yes in zip(found.contacts.i, found.contacts.j, found.detected, strict=True):
-                    detected[self._pair(frame, int(i), int(j))] = bool(yes)
+                detected |= self._detection(frame)
         return [_finite(asdict(each)) for each in agreements(self.log, detected)]
 
     def following(self, view: Viewpoint, after: tuple[int, int] | None = None) -> dict[str, Any] | None:
         """The next doubtful candidate, None when all are judged."""
-        queue = self._queue(view)
+        queue, _ = self._queue(view)
         place = queue.following(self._judged(view.reviewer), after)
         if place is None:
             return None
@@ -222,13 +223,25 @@ class ReviewSession:
                 self._candidates[frame] = find_candidates(self.results, frame, self._threshold)
             return self._candidates[frame]
 
-    def _queue(self, view: Viewpoint) -> Queue:
+    def _queue(self, view: Viewpoint) -> tuple[Queue, dict[tuple[int, int], int]]:
+        """The queue of a frame or of the sample, with every candidate's place in it."""
         which = None if view.sampled else self._check(view.frame)
         with self._lock:
             if which not in self._queues:
                 every = [self.candidates(k) for k in range(len(self.results.frames))] if which is None else []
-                self._queues[which] = sampled_queue(every) if which is None else frame_queue(self.candidates(which))
+                queue = sampled_queue(every) if which is None else frame_queue(self.candidates(which))
+                pairs = zip(queue.frame.tolist(), queue.key.tolist(), strict=True)
+                self._queues[which] = queue, {pair: place for place, pair in enumerate(pairs)}
             return self._queues[which]
+
+    def _detection(self, frame: int) -> dict[Pair, bool]:
+        """What the detector said of a frame's candidates, by name."""
+        with self._lock:
+            if frame not in self._detections:
+                found = self.candidates(frame)
+                rows = zip(found.contacts.i.tolist(), found.contacts.j.tolist(), found.detected.tolist(), strict=True)
+                self._detections[frame] = {self._pair(frame, i, j): yes for i, j, yes in rows}
+            return self._detections[frame]
 
     def _judged(self, reviewer: str) -> dict[tuple[int, int], Entry]:
         """The reviewer's last word on every pair of the run, by frame and key."""
@@ -240,22 +253,25 @@ class ReviewSession:
         return found
 
     def _estimate(
-        self, queue: Queue, pairs: list[tuple[int, int]], judged: dict[tuple[int, int], Entry], frame: int | None
+        self,
+        queue: Queue,
+        places: dict[tuple[int, int], int],
+        judged: dict[tuple[int, int], Entry],
+        frame: int | None,
     ) -> dict[str, Any]:
         outcome = np.full(queue.count, UNJUDGED)
         chosen = np.zeros(queue.count, np.bool_)
-        for place, pair in enumerate(pairs):
-            entry = judged.get(pair)
-            if entry is not None and entry.verdict is not None:
+        missed = 0
+        for pair, entry in judged.items():
+            assert entry.verdict is not None
+            place = places.get(pair)
+            if place is not None:
                 outcome[place] = _OUTCOMES[entry.verdict]
                 chosen[place] = entry.origin is Origin.QUEUE
-        known = set(pairs)
-        missed = sum(
-            entry.verdict is Verdict.CONTACT and pair not in known and (frame is None or pair[0] == frame)
-            for pair, entry in judged.items()
-        )
+            elif entry.verdict is Verdict.CONTACT and (frame is None or pair[0] == frame):
+                missed += 1
         rng = np.random.default_rng(_ESTIMATE_SEED)
-        return asdict(estimate(queue.stratum, queue.detected, outcome, chosen, missed, rng))
+        return asdict(estimate(queue.stratum, queue.detected, queue.probability, outcome, chosen, missed, rng))
 
     def _measured(self, frame: int, key: int, pair: Contacts) -> dict[str, Any]:
         candidates = self.candidates(frame)

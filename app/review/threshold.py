@@ -38,13 +38,16 @@ class ThresholdFit:
     others: int
 
 
-def threshold_curve(gap: Array, touching: NDArray[np.bool_], weight: Array, threshold: Array) -> ThresholdCurve:
-    """Measure the curve on judged pairs: gap (c,) [m], touching (c,), weight (c,) of a pair, threshold (m,) [m]."""
+def threshold_curve(gap: Array, touching: Array, threshold: Array) -> ThresholdCurve:
+    """Measure the curve on pairs: gap (c,) [m], touching (c,) 0 … 1, how far a pair counts as a contact.
+
+    threshold (m,) [m].
+    """
     order = np.argsort(gap, kind="stable")
     place = np.searchsorted(gap[order], threshold, side="left")  # pairs with a gap below the threshold
-    below = np.concatenate([[0.0], np.cumsum(weight[order])])[place]
-    hits = np.concatenate([[0.0], np.cumsum((weight * touching)[order])])[place]
-    total = float(weight[touching].sum())
+    below = place.astype(np.float64)
+    hits = np.concatenate([[0.0], np.cumsum(touching[order], dtype=np.float64)])[place]
+    total = float(touching.sum())
     with np.errstate(invalid="ignore", divide="ignore"):
         precision = np.where(below > 0, hits / below, np.nan)
         recall = hits / total if total > 0 else np.full(len(threshold), np.nan)
@@ -53,28 +56,32 @@ def threshold_curve(gap: Array, touching: NDArray[np.bool_], weight: Array, thre
 
 
 def fit_threshold(
-    gap: Array, touching: NDArray[np.bool_], with_wall: NDArray[np.bool_], weight: Array, deviation: float,
+    gap: Array,
+    touching: Array,
+    with_wall: NDArray[np.bool_],
+    judged: NDArray[np.bool_],
+    deviation: float,
     rng: np.random.Generator,
-) -> ThresholdFit:  # fmt: skip
-    """Fit threshold and radius correction to judged pairs (c,).
+) -> ThresholdFit:
+    """Fit threshold and radius correction to the pairs (c,) of frames that people judged.
 
-    The threshold maximises F₂. The radius correction brings the median gap of judged contacts to zero; a gap between
-    two grains closes by twice the change, that to a wall by once. deviation [m]: of a position component.
-    Raises ValueError where no contact, or nothing but contacts, was judged.
+    touching (c,) 0 … 1; judged (c,): a person said so, rather than the detector. The threshold maximises F₂. The
+    radius correction brings the median gap of contacts to zero; a gap between two grains closes by twice the change,
+    that to a wall by once. deviation [m]: of a position component. Raises ValueError where no contact, or nothing but
+    contacts, was judged.
     """
-    if not touching.any() or touching.all():
+    contacts, others = int((judged & (touching > 0.5)).sum()), int((judged & (touching <= 0.5)).sum())
+    if contacts == 0 or others == 0:
         raise ValueError("a threshold needs verdicts of both kinds: contact and no contact")
     sides = np.where(with_wall, 1.0, 2.0)
-    level, weights = (gap / sides)[touching], weight[touching]
-    change = _weighted_median(level, weights)
+    level = gap / sides
+    change = _weighted_median(level, touching)
     rows = rng.integers(0, len(level), (RESAMPLES, len(level)))
-    spread = float(np.std([_weighted_median(level[r], weights[r]) for r in rows]))
-    best = _best(gap, touching, weight)
-    changed = _best(gap - sides * change, touching, weight)
-    return ThresholdFit(
-        best, best / deviation if deviation > 0 else float("nan"), change, spread, changed,
-        int(touching.sum()), int((~touching).sum()),
-    )  # fmt: skip
+    spread = float(np.std([_weighted_median(level[r], touching[r]) for r in rows]))
+    best = _best(gap, touching)
+    changed = _best(gap - sides * change, touching)
+    sigmas = best / deviation if deviation > 0 else float("nan")
+    return ThresholdFit(best, sigmas, change, spread, changed, contacts, others)
 
 
 def even_thresholds(gap: Array) -> Array:
@@ -82,11 +89,11 @@ def even_thresholds(gap: Array) -> Array:
     return np.linspace(float(gap.min()), float(gap.max()) + 1e-9, POINTS)
 
 
-def _best(gap: Array, touching: NDArray[np.bool_], weight: Array) -> float:
+def _best(gap: Array, touching: Array) -> float:
     """The threshold with the greatest F_β, midway between the two judged gaps it separates."""
     values = np.unique(gap)
     between = np.concatenate([0.5 * (values[:-1] + values[1:]), values[-1:] + 1e-9])
-    return float(between[np.argmax(threshold_curve(gap, touching, weight, between).f_beta)])
+    return float(between[np.argmax(threshold_curve(gap, touching, between).f_beta)])
 
 
 def _f(beta: float, hits: Array, below: Array, total: float) -> Array:

@@ -32,7 +32,7 @@ except ImportError:  # pragma: no cover - Windows: one program at a time
 
 VERDICTS = "verdicts.jsonl"
 Body = int | str  # a grain's id, or a wall's name
-Pair = tuple[int, Body, Body]  # frame, a, b
+Pair = tuple[int, int, Body]  # frame, a grain, a grain or a wall
 
 
 class Verdict(StrEnum):
@@ -213,7 +213,7 @@ class VerdictLog:
 def canonical(pair: Pair) -> Pair:
     """The same name for a pair from either side: the lower id first, a wall last."""
     frame, a, b = pair
-    return (frame, b, a) if isinstance(a, int) and isinstance(b, int) and b < a else pair
+    return (frame, b, a) if isinstance(b, int) and b < a else pair
 
 
 def _stamped(entry: Entry) -> Entry:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.frames import Image
 from app.tracking import correlation_kernels as kernels
-from app.tracking.search import search_patch
+from app.tracking.search import angle_steps, search_patch
 from app.tracking.splines import HALFWAY_VARIANCE, Pyramid
 from solver.grains import Array
 
@@ -26,6 +26,14 @@ ACCIDENTAL_DEVIATIONS = 4.5
 
 # Radius [px] below which a patch is not shrunk any further for the search.
 COARSE_REACH = 8.0
+
+
+# A window wider than this, in pixels of the level that is searched, is sifted on the next coarser level first, if a
+# patch has this radius there and a pixel of it is not coarser than paint. The true place has been among the first few.
+WIDE = 8.0
+SIFTED_REACH = 4.5
+SIFTED_COARSEST = 4
+SIFTED_PLACES = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,33 +166,65 @@ class Correlator:
         loss = _interpolation_loss(pose, patches.reach[rows])
         return _fits(pose, fit, covariance * loss[:, None, None])
 
-    def search(self, photograph: Pyramid, rows: Rows, pose: Array, window: Array, sweep: float, count: int) -> Array:
+    def sifts(self, rows: Rows, window: Array) -> NDArray[np.bool_]:
+        """Which searches (m,) look for places worth trying on a level coarser still than a patch is searched on."""
+        factor = self.patches.search_factor[rows]
+        wide = window > WIDE * factor
+        return wide & (self.patches.reach[rows] >= SIFTED_REACH * 2.0 * factor) & (2 * factor <= SIFTED_COARSEST)
+
+    def search(
+        self, photograph: Pyramid, rows: Rows, pose: Array, window: Array, sweep: float, count: int,
+        *, thorough: bool = False,
+    ) -> Array:  # fmt: skip
         """The `count` most similar places of every grain (m, count, 4): x, y [px], rotation [rad], ZNCC.
 
         pose (m, 3): middle; window (m,) [px] and sweep [rad]: half widths. Places that are not there have ZNCC −1.
+        thorough: nothing is sifted; it takes ten times as long.
         """
         patches = self.patches
         best = np.empty((len(rows), count, 4))
         factor = patches.search_factor[rows]
-        for level in np.unique(factor):  # made before the threads ask for them
+        sifted = self.sifts(rows, window) & (not thorough)
+        for level in np.unique(np.concatenate([factor, 2 * factor[sifted]])):  # made before the threads ask for them
             patches.reference.coefficients(int(level))
             photograph.level(int(level))
 
         def one(k: int) -> None:
-            row, level = rows[k], int(factor[k])
-            shift = 0.5 * (level - 1)
-            side = int(np.ceil(2.0 * window[k] / level)) + 4
-            buffers = np.empty((3, side, side), np.float32)
-            search_patch(
-                patches.reference.coefficients(level), photograph.level(level),
-                (patches.centre[row, 0] - shift) / level, (patches.centre[row, 1] - shift) / level,
-                patches.reach[row] / level, (pose[k, 0] - shift) / level, (pose[k, 1] - shift) / level,
-                pose[k, 2], window[k] / level, sweep, 3.0, best[k], buffers[0], buffers[1], buffers[2],
-            )  # fmt: skip
-            best[k, :, :2] = best[k, :, :2] * level + shift
+            if not sifted[k]:
+                self._search_level(photograph, rows[k], int(factor[k]), pose[k], float(window[k]), sweep, best[k])
+                return
+            level = int(factor[k])
+            places = np.empty((SIFTED_PLACES, 4))
+            self._search_level(photograph, rows[k], 2 * level, pose[k], float(window[k]), sweep, places, spacing=2.0)
+            # Half a step of the coarse angles to either side, and a pixel and a half of the coarse level.
+            half = 0.6 * sweep / angle_steps(float(patches.reach[rows[k]]) / (2 * level), sweep)
+            looked = np.full((SIFTED_PLACES, 1, 4), -1.0)
+            beyond_doubt = min(float(patches.accidental_zncc[rows[k]]) + 0.2, 0.9)
+            for m in np.flatnonzero(places[:, 3] > 0.0):
+                self._search_level(photograph, rows[k], level, places[m, :3], 3.0 * level, half, looked[m])
+                if looked[m, 0, 3] > beyond_doubt:
+                    break
+            best[k] = _most_similar(looked[:, 0], count, 3.0 * level)
 
         self._each(len(rows), one)
         return best
+
+    def _search_level(
+        self, photograph: Pyramid, row: int, level: int, pose: Array, window: float, sweep: float, best: Array,
+        spacing: float = 3.0,
+    ) -> None:  # fmt: skip
+        """Search one grain on one level; best (c, 4) in pixels of the photograph, spacing in those of the level."""
+        patches = self.patches
+        shift = 0.5 * (level - 1)
+        side = int(np.ceil(2.0 * window / level)) + 4
+        buffers = np.empty((3, side, side), np.float32)
+        search_patch(
+            patches.reference.coefficients(level), photograph.level(level),
+            (patches.centre[row, 0] - shift) / level, (patches.centre[row, 1] - shift) / level,
+            patches.reach[row] / level, (pose[0] - shift) / level, (pose[1] - shift) / level,
+            pose[2], window / level, sweep, spacing, best, buffers[0], buffers[1], buffers[2],
+        )  # fmt: skip
+        best[:, :2] = best[:, :2] * level + shift
 
     def _each(self, count: int, one: Callable[[int], None]) -> None:
         def chunk(first: int) -> None:
@@ -197,6 +237,21 @@ class Correlator:
             return
         with ThreadPoolExecutor(self._workers) as pool:
             list(pool.map(chunk, range(0, count, CHUNK)))
+
+
+def _most_similar(places: Array, count: int, spacing: float) -> Array:
+    """The best `count` (count, 4) of places (m, 4), no two nearer than `spacing` [px]; ZNCC −1 where there is none."""
+    best = np.full((count, 4), 0.0)
+    best[:, 3] = -1.0
+    found = 0
+    for m in np.argsort(-places[:, 3], kind="stable"):
+        if found == count or not places[m, 3] > 0.0:
+            break
+        away = np.hypot(best[:found, 0] - places[m, 0], best[:found, 1] - places[m, 1])
+        if (away >= spacing).all():
+            best[found] = places[m]
+            found += 1
+    return best
 
 
 def _fits(pose: Array, fit: Array, covariance: Array) -> Fits:

@@ -74,7 +74,7 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
         # what a better circle strikes out later.
         chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
         unjudged[chosen] = False
-        judged = _best_alternatives(outliner, rough, chosen, known)
+        judged = _alternatives(outliner, rough, chosen, known)
         table = np.concatenate([table, judged[judged[:, 3] > settings.quality_least]])
         # A longer outline is the more significant at the same share.
         table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
@@ -111,8 +111,11 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
     return _detection(tied, radius)
 
 
-def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], known: bool) -> Array:
-    """x, y, radius, quality (c, 4) of every chosen circle, or of the better one of another radius around it."""
+def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], known: bool) -> Array:
+    """x, y, radius, quality (c, 4) of every chosen circle, and of the circles of other known radii around it.
+
+    Which of them is the grain is told by those about it: the better one may lie over another grain.
+    """
     tree = KDTree(np.stack([rough.x, rough.y], axis=1))
     widest = float(rough.radius.max() - rough.radius.min()) if len(rough.radius) else 0.0
     rows = []
@@ -122,7 +125,6 @@ def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np
         near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + RING_UNCERTAINTY]
         # They are in the order of their score: the first of every radius is its best.
         _, first = np.unique(rough.radius[near], return_index=True)
-        best, best_value = None, -1.0
         for m in near[np.sort(first)] if known else [k]:
             scatter = 0.3 if known else np.inf
             one = outliner.measure(
@@ -134,11 +136,7 @@ def _best_alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np
                 # too easily satisfied.
                 one = outliner.measure(one.x, one.y, float(rough.radius[m]), 0.5 * RING_UNCERTAINTY, 0.0, scatter)
                 quality = min(one.quality, 2.0 * quality)
-            value = quality * np.sqrt(one.radius)
-            if value > best_value:
-                best, best_value = (one.x, one.y, rough.radius[m] if known else one.radius, quality), value
-        if best is not None:
-            rows.append(best)
+            rows.append((one.x, one.y, rough.radius[m] if known else one.radius, quality))
     return np.array(rows).reshape(-1, 4)
 
 

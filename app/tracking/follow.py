@@ -99,7 +99,7 @@ def follow_walls(
     """
     frame_count = len(walls.endpoints)
     tracker = WallTracker(photographs[0], walls.endpoints[0], scale, depth, workers=workers)
-    asked = np.isnan(walls.endpoints).any(axis=(2, 3))
+    asked = np.asarray(np.isnan(walls.endpoints).any(axis=(2, 3)), dtype=np.bool_)
     for w in np.flatnonzero(asked.any(axis=0) & (tracker.patch_count < tracker.settings.least_patches)):
         raise InputError(
             source,
@@ -112,7 +112,7 @@ def follow_walls(
         progress("walls", k, frame_count)
         pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:])
         pose = _measured_where_told(pose, walls.endpoints[k], ~asked[k])
-        missing: NDArray[np.bool_] = np.isnan(pose.endpoints).any(axis=(1, 2))
+        missing = np.asarray(np.isnan(pose.endpoints).any(axis=(1, 2)), dtype=np.bool_)
         for w in np.flatnonzero(missing):
             raise InputError(
                 source,

@@ -22,6 +22,9 @@ NEAR_SWEEP = np.deg2rad(30.0)
 NEWS = 0.25
 
 
+# Places of the near search that are tried: where few places compete the true one is among the first.
+NEAR_CANDIDATES = 2
+
 # A plain fit that reaches this share of the greatest accidental ZNCC may be the right place, partly hidden.
 PROMISING = 0.7
 
@@ -37,25 +40,30 @@ def rescue(
     """
     reach = correlator.patches.reach
     near, wide = 0.5 * reach, np.maximum(settings.search_window, 1.5 * reach)
-    searched = np.full((2, len(reach), 2), np.inf)  # where the near and the wide search have been
+    searched = np.full((3, len(reach), 2), np.inf)  # where each search has been
     while findings.open.any():
         before = findings.accepted.sum()
         follow_neighbours(correlator, photograph, findings, last)
-        for which, (window, sweep) in enumerate(((near, NEAR_SWEEP), (wide, np.pi))):
+        for which, (window, sweep) in enumerate(((near, NEAR_SWEEP), (wide, np.pi), (wide, np.pi))):
             findings.expect_from_neighbours(last)
             middle = np.where(np.isfinite(findings.expected), findings.expected, last)
             with np.errstate(invalid="ignore"):
                 news = ~(np.linalg.norm(middle[:, :2] - searched[which], axis=1) < NEWS * window)
             rows = np.flatnonzero(findings.open & news)
+            thorough = which == 2
+            if thorough:  # what sifting may have lost, and only that
+                rows = rows[correlator.sifts(rows, window[rows])]
             searched[which, rows] = middle[rows, :2]
-            if len(rows):
-                if which == 1:  # before the costly search: it may be where it should be, under a stain
-                    refit_hidden(correlator, photograph, findings, rows, middle[rows], noise)
-                    rows = rows[findings.open[rows]]
-                places = correlator.search(
-                    photograph, rows, middle[rows], window[rows], float(sweep), settings.candidates
-                )
-                _try_places(correlator, photograph, findings, rows, places, noise)
+            if len(rows) == 0:
+                continue
+            count = NEAR_CANDIDATES if which == 0 else settings.candidates
+            places = correlator.search(
+                photograph, rows, middle[rows], window[rows], float(sweep), count, thorough=thorough
+            )
+            _try_places(correlator, photograph, findings, rows, places, noise, hidden=which > 0)
+            if which == 1:  # it may be where it should be, under a stain
+                rows = rows[findings.open[rows]]
+                refit_hidden(correlator, photograph, findings, rows, middle[rows], noise)
         if findings.accepted.sum() == before:
             return
 
@@ -89,9 +97,19 @@ def refit_hidden(
 
 
 def _try_places(
-    correlator: Correlator, photograph: Pyramid, findings: Findings, rows: Rows, places: Array, noise: float
+    correlator: Correlator,
+    photograph: Pyramid,
+    findings: Findings,
+    rows: Rows,
+    places: Array,
+    noise: float,
+    *,
+    hidden: bool,
 ) -> None:
-    """Fit the candidates (m, c, 4) in the order of their coarse correlation until one is accepted."""
+    """Fit the candidates (m, c, 4) in the order of their coarse correlation until one is accepted.
+
+    hidden: what almost correlates is refitted robustly, too.
+    """
     left = np.arange(len(rows))
     for candidate in range(places.shape[1]):
         left = left[places[left, candidate, 3] > 0.0]
@@ -100,7 +118,8 @@ def _try_places(
         chosen, start = rows[left], places[left, candidate, :3]
         fits = correlator.fit(photograph, chosen, start, leash(correlator, chosen))
         findings.take(chosen, fits, TrackStatus.RESCUED)
-        hidden = findings.open[chosen] & (fits.zncc > PROMISING * correlator.patches.accidental_zncc[chosen])
-        pose = np.where(fits.converged[:, None], fits.pose, start)
-        refit_hidden(correlator, photograph, findings, chosen[hidden], pose[hidden], noise)
+        if hidden:
+            promising = findings.open[chosen] & (fits.zncc > PROMISING * correlator.patches.accidental_zncc[chosen])
+            pose = np.where(fits.converged[:, None], fits.pose, start)
+            refit_hidden(correlator, photograph, findings, chosen[promising], pose[promising], noise)
         left = left[findings.open[chosen]]

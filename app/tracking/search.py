@@ -13,6 +13,12 @@ from numba import njit
 from app.tracking.correlation_kernels import interpolate
 
 
+@njit(cache=True, nogil=True)
+def angle_steps(reach, sweep):
+    """Steps of the angle to either side: the rim, `reach` [px] from the centre, moves by 1.2 px at most in each."""
+    return max(int(np.ceil(sweep * reach / 1.2)), 1)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def search_patch(
     reference, image, origin_x, origin_y, reach, x, y, angle, window, sweep, spacing, best, scratch, energy, steepest
@@ -53,7 +59,7 @@ def search_patch(
     _window_energy(image, offset_x, offset_y, x_from, y_from, nx, ny, scratch, energy)
     peak = scratch  # reused: the best ZNCC of every position over the angles
     peak[:ny, :nx] = -1.0
-    steps = max(int(np.ceil(sweep * reach / 1.2)), 1)
+    steps = angle_steps(reach, sweep)
     full_turn = sweep >= np.pi - 1e-6
     trials = 2 * steps if full_turn else 2 * steps + 1
     rows = np.empty((ny, nx), np.float32)

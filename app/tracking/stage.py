@@ -16,11 +16,12 @@ from app.experiment import Experiment, read_grain_guess, read_times, read_walls
 from app.frames import Image
 from app.progress import Progress
 from app.scaling import make_scale
-from app.tables import write_table
+from app.tables import read_table, write_table
 from app.tracking.bar_depth import visible_depth
 from app.tracking.corrections import Corrections
 from app.tracking.detection import Detection, DetectionSettings, detect_grains, refine_grains
 from app.tracking.follow import FollowedWalls, follow_photographs, follow_walls
+from app.tracking.report import Tracked
 from app.tracking.tracker import TrackingSettings
 from app.tracks import Tracks, WallTracks
 from app.units import Scale
@@ -79,6 +80,25 @@ def write_tables(folder: Path, tables: dict[str, Columns]) -> None:
     for name, columns in tables.items():
         with replacing(folder / name) as part:
             write_table(part, {key: values.tolist() for key, values in columns.items()})
+
+
+def gather_report(
+    experiment: Experiment, folder: Path, tracks: Tracks, walls: WallTracks | None, first_frame: int
+) -> Tracked:
+    """What a report needs of finished tracks; folder: where `write_tables` left the grains of photograph 0."""
+    assert experiment.config.photographs is not None
+    photographs = experiment.photographs()
+    table = read_table(folder / DETECTIONS, ("id", "x", "y", "radius", "quality"))
+    row = {int(name): k for k, name in enumerate(table.integers("id"))}
+    for name in tracks.id:
+        if int(name) not in row:
+            raise InputError(table.file, f"id = {name}", "is missing: the table was edited; track again without it")
+    order = [row[int(name)] for name in tracks.id]
+    centre = np.stack([table.numbers("x"), table.numbers("y")], axis=1)[order]
+    return Tracked(
+        experiment.name, tracks, walls, first_frame, make_scale(experiment.config.photographs, photographs.shape[0]),
+        centre, table.numbers("radius")[order], table.numbers("quality")[order], photographs.__getitem__,
+    )  # fmt: skip
 
 
 def _detect(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import cv2
 import numpy as np
@@ -116,3 +118,54 @@ def test_different_size_is_named(tmp_path: Path) -> None:
     photographs = Photographs.matching(tmp_path, "*.png")
     with pytest.raises(InputError, match=r"a2\.png: photograph 1: is 4 x 6 pixels, the first photograph 6 x 4"):
         photographs[1]
+
+
+def fake_rawpy(pixels: np.ndarray | None, asked: dict[str, object]) -> ModuleType:
+    """The part of rawpy that is used: red, green, blue `pixels`, or a file that it cannot read."""
+
+    class LibRawError(Exception):
+        pass
+
+    class Raw:
+        def __enter__(self) -> SimpleNamespace:
+            def postprocess(**choices: object) -> np.ndarray:
+                asked.update(choices)
+                assert pixels is not None
+                return pixels
+
+            return SimpleNamespace(postprocess=postprocess)
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+    def imread(_: str) -> Raw:
+        if pixels is None:
+            raise LibRawError("Unsupported file format")
+        return Raw()
+
+    module = ModuleType("rawpy")
+    module.__dict__.update(LibRawError=LibRawError, imread=imread)
+    return module
+
+
+def test_raw_files_are_developed_alike_and_to_full_depth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    red_green_blue = np.array([[[65535, 0, 0], [0, 65535, 0], [0, 0, 65535], [257, 257, 257]]], np.uint16)
+    asked: dict[str, object] = {}
+    monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(red_green_blue, asked))
+    image = read_photograph(tmp_path / "a.NEF")
+    assert image[0] == pytest.approx([0.299 * 255, 0.587 * 255, 0.114 * 255, 1.0], abs=ROUNDING)
+    assert asked["output_bps"] == 16
+    assert asked["no_auto_bright"] is True
+    assert asked["user_flip"] == 0
+
+
+def test_a_raw_file_without_its_reader_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rawpy", None)
+    with pytest.raises(InputError, match=r"a\.CR2.*rodsight\[raw\]"):
+        read_photograph(tmp_path / "a.CR2")
+
+
+def test_a_raw_file_that_is_none_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(None, {}))
+    with pytest.raises(InputError, match=r"a\.dng.*Unsupported file format"):
+        read_photograph(tmp_path / "a.dng")

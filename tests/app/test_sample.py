@@ -20,7 +20,7 @@ SAMPLE = Path(__file__).parents[2] / "sample_data" / "shear"
 SEED = 12
 LEAST_R = 0.90  # of every frame from the fifth on, through the photographs
 LEAST_MEAN_R = 0.95  # over those frames
-# Sensor noise of 2 grey levels, rounding, and JPEG of quality 92 (about 2 more): a wrong pose of one rod alone exceeds it.
+# Sensor noise of 2 grey levels, rounding, JPEG of quality 92 (2 more): one rod in a wrong pose exceeds it.
 PICTURE_NOISE = 4.0  # [grey levels] rms
 BALANCE = 1e-3  # mean |ΣF| of a grain over the mean force; the truth's own check allows 1e-2
 

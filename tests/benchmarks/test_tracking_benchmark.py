@@ -7,14 +7,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.experiment import load_experiment, read_walls
+from app.frames import LUMA
+from app.scaling import make_scale
+from app.tracking.bar_depth import visible_depth
 from app.tracking.tracker import FramePoses, Tracker
+from app.tracking.walls import WallTracker
 from app.tracks import TrackStatus
+from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import Rods, grid_of_rods
 
+SAMPLE = Path(__file__).parents[2] / "sample_data" / "shear"
 PATCH_RADIUS = 20.0  # [px]
 RADIUS = PATCH_RADIUS / 0.85  # [px]
 WRONG = 0.5  # [px]
@@ -150,3 +158,60 @@ def test_long_way_with_an_avalanche(benchmark: Benchmark) -> None:
         assert wrong == 0
 
     benchmark.pedantic(run, rounds=1)
+
+
+@pytest.mark.benchmark(group="tracking")
+def test_walls_of_the_sample(benchmark: Benchmark) -> None:
+    experiment = load_experiment(SAMPLE)
+    photographs = experiment.photographs()
+    walls = read_walls(experiment, len(photographs))
+    assert walls is not None
+    assert experiment.config.photographs is not None
+    scale = make_scale(experiment.config.photographs, photographs.shape[0])
+    images = list(photographs)
+    depth = visible_depth(images[0], walls.endpoints[0], scale, 0.025)
+
+    def run() -> None:
+        tracker = WallTracker(images[0], walls.endpoints[0], scale, depth, workers=1)
+        history = [tracker.first()]
+        for image in images[1:]:
+            history.append(tracker.follow(image, history[-8:]))
+        found = np.stack([pose.endpoints for pose in history])
+        along = walls.endpoints[:, :, 1] - walls.endpoints[:, :, 0]
+        normal = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=-1, keepdims=True)
+        off = 1e6 * np.einsum("fwek,fwk->fwe", found - walls.endpoints, normal)[1:]
+        sigma = 1e6 * np.stack([pose.sigma for pose in history[1:]])
+        report(
+            f"4 walls, {len(images)} photographs: along the normal rms {rms(off):.2f} µm, at most "
+            f"{np.abs(off).max():.2f} µm, σ {np.median(sigma):.2f} µm (pixel 250 µm)"
+        )
+        assert np.abs(off).max() < 5.0
+
+    benchmark.pedantic(run, rounds=1, warmup_rounds=1)
+
+
+@pytest.mark.benchmark(group="tracking")
+@pytest.mark.parametrize("radius", [12.0, 14.0, 24.0])
+def test_search_of_brown_rods_without_speckle(benchmark: Benchmark, radius: float) -> None:
+    generator = np.random.default_rng(0)
+    rods = grid_of_rods(8, 8, radius=radius, pitch=2.1 * radius, margin=90.0)
+    turn = generator.uniform(-np.pi, np.pi, rods.count)
+
+    def photograph(dx: float, dy: float, turn: np.ndarray, noise_seed: int) -> np.ndarray:
+        image = brown_photograph(
+            Laboratory(), rods.width, rods.height, rods.x + dx, rods.y + dy, rods.radius, turn,
+            pattern_seed=1, noise_seed=noise_seed,
+        )  # fmt: skip
+        return (image @ LUMA).astype(np.float32)
+
+    tracker = Tracker(photograph(0.0, 0.0, 0.0 * turn, 1), (rods.x, rods.y, rods.radius), workers=1)
+    image = photograph(33.3, -24.2, turn, 2)
+    poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=1, warmup_rounds=1)
+    seconds = cpu_seconds(tracker, image)
+    lost, wrong = int((~poses.has_pose).sum()), wrong_unflagged(poses, rods.x + 33.3, rods.y - 24.2)
+    report(
+        f"brown rods, R = {radius:.0f} px, jump of 41 px with any rotation: {rods.count / seconds:.0f} grains/s, "
+        f"{lost} of {rods.count} lost, {wrong} wrong unflagged"
+    )
+    assert lost == 0
+    assert wrong == 0

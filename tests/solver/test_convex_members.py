@@ -4,7 +4,7 @@ from solver.boundaries import Walls
 from solver.contact_probability import probable_contacts, window_of
 from solver.contacts import Contacts, detect_contacts
 from solver.convex import Balance, assemble_balance, solve_member
-from solver.convex_members import advance_member, measured_slip
+from solver.convex_members import Slip, advance_member, measured_slip, read_slip, steady_slip
 from solver.grains import Grains
 from solver.lost_grains import bridge_lost
 from solver.motion import Snapshot
@@ -66,6 +66,24 @@ def test_an_unseen_motion_is_no_evidence():
     assert np.any(slip[~touched] != 0)
 
 
+def test_noise_takes_a_member_its_worth():
+    worth = []
+    for noise in (1e-7, 4e-6, 4e-5):
+        frames = sheared(2, noise=noise)
+        grains, walls, contacts, _ = problem(frames[1])
+        worth.append(read_slip(contacts, grains, walls, (frames[0], frames[1])).worth)
+    assert worth[0] > 0.99
+    assert worth[0] > worth[1] > worth[2]
+    assert worth[2] < 0.5
+
+
+def test_only_sliding_on_both_sides_of_a_frame_is_steady():
+    before, after = Slip(np.array([1.0, -2.0, 1.0, 0.0]), 0.9), Slip(np.array([0.5, -3.0, -1.0, 1.0]), 0.8)
+    steady = steady_slip(before, after)
+    assert steady.value.tolist() == [0.5, -2.0, 0.0, 0.0]
+    assert steady.worth == 0.8
+
+
 def test_a_member_solves_with_its_own_history():
     frames = sheared(3)
     memory = ForceMemory.empty()
@@ -73,9 +91,9 @@ def test_a_member_solves_with_its_own_history():
         grains, walls, contacts, balance = problem(frames[k])
         former, sure = memory.recall(contacts), np.ones(contacts.count)
         interval = (frames[k - 1], frames[k])
-        forces, memory = advance_member(balance, contacts, grains, walls, frames[k], interval, sure, memory)
-        slip = measured_slip(contacts, grains, walls, interval)
-        again = solve_member(balance, slip, sure, former[:, 0], former[:, 1])
+        slip = read_slip(contacts, grains, walls, interval)
+        forces, memory = advance_member(balance, contacts, frames[k], slip, sure, memory)
+        again = solve_member(balance, slip.value, sure, former[:, 0], former[:, 1])
         np.testing.assert_allclose(forces.fn, again.fn, atol=SAME)
         np.testing.assert_allclose(memory.recall(contacts)[:, 1], forces.ft, atol=SAME)
     assert forces.converged

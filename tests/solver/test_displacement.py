@@ -97,11 +97,12 @@ def test_grains_tell_a_reversal_where_no_wall_moves():
 def test_no_interval_crosses_a_reversal_or_the_ends():
     turned = np.zeros(12, bool)
     turned[6] = True
-    assert member_intervals(4, turned) == ((3, 4), (3, 5), (2, 6))
-    assert member_intervals(5, turned) == ((4, 5), (4, 6), (3, 6))
-    assert member_intervals(6, turned) == ((5, 6), (5, 6), (4, 6))
-    assert member_intervals(7, turned) == ((6, 7), (6, 8), (6, 9))
-    assert member_intervals(0, turned) == ((0, 1), (0, 1), (0, 2))
-    assert member_intervals(11, turned) == ((10, 11), (10, 11), (9, 11))
+    assert member_intervals(4, turned) == ((3, 4), (4, 5), (3, 5), (2, 6))
+    assert member_intervals(5, turned) == ((4, 5), (5, 6), (4, 6), (3, 6))
+    assert member_intervals(6, turned) == ((5, 6), None, None, (4, 6))
+    assert member_intervals(7, turned) == ((6, 7), (7, 8), (6, 8), (6, 9))
+    assert member_intervals(0, turned) == (None, (0, 1), None, (0, 2))
+    assert member_intervals(11, turned) == ((10, 11), None, None, (9, 11))
+    assert member_intervals(1, np.zeros(2, bool)) == ((0, 1), None, None, None)
     with pytest.raises(ValueError, match="single frame"):
         member_intervals(0, np.zeros(1, bool))

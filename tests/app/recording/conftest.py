@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
-from fake_results import RADIUS, make_results, make_truth
+from fake_photographs import PIXEL, SHAPE, photograph
+from fake_results import make_results, make_truth
 
 from app.recording import RecordingReport, record
 from app.results import Results, TruthContacts
 from app.units import Scale
 
-PIXEL = RADIUS / 12.0  # [m], small photographs
-SHAPE = (240, 300)
 LOST = (20, 2)  # grain and the frame it is lost from
 
 
@@ -31,10 +30,6 @@ def results() -> Results:
 @pytest.fixture(scope="session")
 def truth(results) -> TruthContacts:
     return make_truth(results, np.random.default_rng(3))
-
-
-def photograph(frame: int) -> np.ndarray:
-    return np.random.default_rng(frame).integers(40, 220, SHAPE, dtype=np.uint8)
 
 
 @pytest.fixture(scope="session")

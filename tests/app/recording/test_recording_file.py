@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rerun as rr
-from conftest import PIXEL, SHAPE, photograph
+from fake_photographs import PIXEL, SHAPE, photograph
 from fake_results import make_results
+from rerun.chunk import RrdReader
+from rows import latest
 
 from app.recording import Recorder, Scene, SweepChoice, Tab, entities, read_forces, record
 from app.recording.canvas import Canvas
@@ -45,8 +47,6 @@ def test_the_comparison_sees_a_force_that_differs(results, tmp_path):
 
 
 def test_the_file_embeds_its_blueprint(recording):
-    from rerun.chunk import RrdReader
-
     assert len(RrdReader(str(recording.path)).blueprints()) == 1
     assert len(RrdReader(str(recording.path)).recordings()) == 1
 
@@ -155,3 +155,25 @@ def test_a_file_without_its_end_is_not_taken_for_a_recording(tmp_path):
     stream.disconnect()
     with pytest.raises(OSError, match="whole"):
         _check_whole(tmp_path / "cut.rrd")
+
+
+def test_a_side_file_opens_as_one_recording_with_every_sweep(tmp_path):
+    from app.recording.side_file import record_side_file
+
+    results = make_results(3, sweeps=200)
+    main = record(results, tmp_path / "run.rrd", sweeps="log").path
+    size = record_side_file(results, main, tmp_path / "side.rrd", [1])
+    assert size == (tmp_path / "side.rrd").stat().st_size
+    entries = [RrdReader(str(path)).recordings()[0] for path in (main, tmp_path / "side.rrd")]
+    assert entries[0].recording_id == entries[1].recording_id
+    assert entries[0].application_id == entries[1].application_id
+    done = rerun("rrd", "merge", main, tmp_path / "side.rrd", "-o", tmp_path / "both.rrd")
+    assert done.returncode == 0, done.stderr
+    assert len(RrdReader(str(tmp_path / "both.rrd")).recordings()) == 1
+    style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(results.frames))
+    for sweep in (57, 58, 101):  # log spacing has at most one of two neighbours
+        shown = latest(tmp_path / "both.rrd", entities.FORCES, entities.SWEEP, 201 + sweep)
+        assert shown["LineStrips2D:radii"] == style.radii(results.frames[1].history.fn[sweep]).tolist()
+        assert shown["fn"] == results.frames[1].fn.tolist()
+    with pytest.raises(ValueError, match="no frame 7"):
+        record_side_file(results, main, tmp_path / "side.rrd", [7])

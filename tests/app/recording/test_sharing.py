@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from browser import Browser, warm_share
-from conftest import PIXEL, SHAPE, photograph
+from fake_photographs import PIXEL, SHAPE, photograph
 from fake_results import make_results
 from rows import latest, rows
 

@@ -62,7 +62,11 @@ def _draw(
         spot = np.hypot(u - px, v - py) < paint.uniform(0.03, 0.1) * r * FINE
         skin[spot] += paint.choice([-50.0, 45.0])
     for _ in range(3):  # two scratches and the pencil
-        angle, off, breadth = paint.uniform(0, np.pi), paint.uniform(-0.5, 0.5) * r * FINE, paint.uniform(0.3, 0.9) * FINE
+        angle, off, breadth = (
+            paint.uniform(0, np.pi),
+            paint.uniform(-0.5, 0.5) * r * FINE,
+            paint.uniform(0.3, 0.9) * FINE,
+        )
         line = np.abs(u * np.sin(angle) - v * np.cos(angle) - off) < breadth
         skin[line] += paint.choice([-25.0, 18.0])
     cx, cy = x * FINE + 1.0, y * FINE + 1.0  # of the sub-pixel grid

@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import numpy as np
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+
+from app.cli import main
+from app.exchange.tidy_tables import make_tables, write_tables
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_tables_read_back_with_every_digit(results, tmp_path, kind):
+    write_tables(results, tmp_path, kind)
+    read = pyarrow.csv.read_csv if kind == "csv" else pyarrow.parquet.read_table
+    contacts = read(tmp_path / f"contacts.{kind}")
+    for name in ("fn", "ft", "gap", "nlgs_fn"):
+        column = contacts.column(name).to_numpy()
+        part = [getattr(f, name, None) if name != "gap" else f.contacts.gap for f in results.frames]
+        assert np.array_equal(column, np.concatenate(part))
+    grains = read(tmp_path / f"grains.{kind}")
+    assert np.array_equal(grains.column("x").to_numpy(), results.tracks.position[:, :, 0].ravel())
+    frames = read(tmp_path / f"frames.{kind}")
+    assert np.array_equal(frames.column("pressure").to_numpy(), [s.pressure for s in results.statistics])
+    assert frames.column("status").to_pylist() == [f.status.name.lower() for f in results.frames]
+
+
+def test_what_is_not_known_is_null(with_a_loss):
+    tables = make_tables(with_a_loss)
+    lost = tables["grains"].column("x").is_null().to_numpy()
+    assert np.flatnonzero(lost).tolist() == [2 * 40 + 3, 3 * 40 + 3]
+    assert tables["frames"].column("trust").null_count == 1  # of frame 0
+
+
+def test_walls_have_their_names_and_columns_their_units(results):
+    table = make_tables(results)["contacts"]
+    wall = np.array(table.column("with_wall"))
+    assert set(np.array(table.column("j"))[wall]) <= set(results.walls.name)
+    assert table.schema.field("fn").metadata == {b"unit": b"N"}
+    frames = make_tables(results)["frames"]
+    force = np.array(frames.column("wall_force_top_y"))
+    top = results.walls.name.index("top")
+    assert np.array_equal(force, [s.wall_force[top, 1] for s in results.statistics])
+
+
+def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
+    out = tmp_path / "out"
+    for arguments in (
+        ["solve", str(tracked), "--out", str(out), "--set", "solver.sweeps=20", "--quiet"],
+        ["export", "tables", str(out)],
+        ["export", "vtk", str(out)],
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        assert not end.value.code
+    assert {file.name for file in (out / "tables").iterdir()} == {"contacts.csv", "grains.csv", "frames.csv"}
+    assert (out / "vtk" / "contacts.pvd").is_file()
+    with pytest.raises(SystemExit) as end:
+        main(["export", "dic", str(out)])
+    assert end.value.code == 2
+    assert "--pixel-size" in capsys.readouterr().err

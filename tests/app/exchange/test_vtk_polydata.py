@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+
+from app.exchange.vtk_polydata import write_polydata
+
+
+def arrays(file: Path, place: str) -> dict[str, np.ndarray]:
+    """The arrays of a part of a file, as a reader of the format finds them."""
+    part = ET.parse(file).getroot().find(f"PolyData/Piece/{place}")
+    assert part is not None
+    found = {}
+    for each in part.findall("DataArray"):
+        values = np.array((each.text or "").split(), float)
+        width = int(each.get("NumberOfComponents", "1"))
+        found[str(each.get("Name"))] = values.reshape(-1, width) if width > 1 else values
+    return found
+
+
+def test_contacts_read_back_with_every_digit(results, tmp_path):
+    write_polydata(results, tmp_path)
+    for frame, forces in enumerate(results.frames):
+        file = tmp_path / f"contacts_{frame:04d}.vtp"
+        piece = ET.parse(file).getroot().find("PolyData/Piece")
+        assert piece is not None
+        assert piece.get("NumberOfLines") == str(forces.contacts.count)
+        data = arrays(file, "CellData")
+        assert np.array_equal(data["fn"], forces.fn)
+        assert np.array_equal(data["ft"], forces.ft)
+        points, lines = arrays(file, "Points")["points"], arrays(file, "Lines")
+        assert points.shape == (2 * forces.contacts.count, 3)
+        ends = points[lines["connectivity"].astype(int).reshape(-1, 2), :2]
+        assert np.array_equal(ends[:, 0], results.tracks.position[frame][forces.contacts.i])
+        assert lines["offsets"].tolist() == (2 * np.arange(1, forces.contacts.count + 1)).tolist()
+        branch = ends[:, 1] - ends[:, 0]
+        along = np.einsum("ck,ck->c", branch, forces.contacts.normal)
+        assert np.all(along > 0.0)
+
+
+def test_grains_that_are_lost_are_not_drawn(with_a_loss, tmp_path):
+    write_polydata(with_a_loss, tmp_path)
+    ids = arrays(tmp_path / "grains_0002.vtp", "PointData")["id"]
+    assert with_a_loss.tracks.id[3] not in ids
+    assert len(ids) == with_a_loss.grains.count - 1
+    assert np.isfinite(arrays(tmp_path / "grains_0002.vtp", "Points")["points"]).all()
+
+
+def test_the_collections_carry_the_times_and_name_files_that_are_there(results, tmp_path):
+    for collection in write_polydata(results, tmp_path):
+        rows = ET.parse(collection).getroot().findall("Collection/DataSet")
+        assert [float(row.get("timestep", "nan")) for row in rows] == results.tracks.time.tolist()
+        assert all((tmp_path / str(row.get("file"))).is_file() for row in rows)

@@ -1,0 +1,111 @@
+"""Size and speed of a recording of every sweep: 60 frames of 1172 rods, 1000 sweeps each, of the true solver.
+
+pytest tests/benchmarks/test_recording_benchmark.py -o addopts= -s
+
+The experiment is synthetic (preset paper, 10 µm of noise), solved with one Gauss-Seidel chain of five sub-steps of
+200 sweeps. Frames are recorded as they are solved and then forgotten: all sweeps at once would need more than 1 GB.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rerun as rr
+
+from app import pipeline
+from app.experiment import load_experiment, make_packing, read_tracks, read_walls
+from app.recording import Canvas, ForceRange, ForceStyle, Layout, Recorder, Scene, SweepChoice, make_blueprint
+from app.recording.headless import HeadlessViewer, vulkan_drivers
+from app.recording.layout_property import send_layout
+from app.recording.recorder import BATCHES
+from app.synthetic.experiment import synthesize
+from solver.frame_forces import FrameForces
+from solver.frame_statistics import FrameStatistics, frame_statistics
+from solver.sequence import solve_sequence
+
+pytestmark = pytest.mark.slow
+
+FRAMES, SWEEPS = 60, 1000
+LARGEST = 160e6  # [bytes] with every visible sweep, without photographs
+SECONDS = 10.0  # of processor time for logging all of it
+SEEK_SECONDS = 5.0  # for a still picture of another sweep: two drawn in software, on a busy machine
+
+
+@pytest.fixture(scope="module")
+def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("benchmark") / "paper"
+    synthesize(folder, preset="paper", frames=FRAMES, photographs=False, noise=1e-5, seed=4)
+    return folder
+
+
+@pytest.mark.parametrize("choice", [SweepChoice.LOG, SweepChoice.ALL])
+def test_every_sweep_fits_into_a_file_that_can_be_sent(experiment: Path, tmp_path: Path, choice: SweepChoice):
+    path = tmp_path / "run.rrd"
+    seconds, contacts, rows = record_as_solved(experiment, path, choice)
+    size = path.stat().st_size
+    peak = 1e-3 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(
+        f"\n{choice}: {FRAMES} frames × {SWEEPS} sweeps × {contacts:.0f} contacts: {1e-6 * size:.1f} MB, "
+        f"{seconds:.2f} s of processor time, {rows} rows of forces, "
+        f"{1e-6 * rows * contacts / seconds:.1f} M contacts/s; peak memory {peak:.0f} MB"
+    )
+    assert size <= LARGEST
+    assert seconds <= SECONDS
+    if not vulkan_drivers():
+        return
+    begin = time.perf_counter()
+    with HeadlessViewer(path, width=1000, height=700) as viewer:
+        last = viewer.timeline("sweep")[1]
+        viewer.picture("Force network")
+        print(f"first still picture after {time.perf_counter() - begin:.1f} s")
+        took = []
+        for sweep in (last // 2, last // 2 + 1, 17, last - 5, last // 3):
+            begin = time.perf_counter()
+            viewer.set_time("sweep", sweep)
+            viewer.picture("Force network")
+            took.append(time.perf_counter() - begin)
+    print("seek to a still picture [s]:", ", ".join(f"{each:.2f}" for each in took))
+    assert sorted(took)[len(took) // 2] <= SEEK_SECONDS
+
+
+def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[float, float, int]:
+    """Solve and record frame by frame; processor seconds of recording, mean number of contacts, rows of forces."""
+    experiment = load_experiment(folder, ("solver.estimator=nlgs", "solver.sweeps=200", "recording.sweeps=all"))
+    tracks = read_tracks(experiment)
+    walls = read_walls(experiment, tracks.frame_count)
+    assert walls is not None
+    packing = make_packing(experiment, tracks.radius, walls.pressure)
+    canvas = Canvas.around(tracks, None)
+    stream = rr.RecordingStream("rodsight", batcher_config=BATCHES)
+    layout = Layout(canvas, packing.length, tracks.frame_count, SWEEPS, False, False)
+    stream.save(path, default_blueprint=make_blueprint(layout))
+    recorder, seconds, contacts = Recorder(stream, sweeps=choice), 0.0, 0
+    for forces, statistics in _solved(experiment, tracks, walls, packing):
+        begin = time.process_time()
+        if forces.frame == 0:
+            style = ForceStyle.on(canvas, ForceRange.of([forces]))
+            scene = Scene("benchmark", tracks, walls, packing.grains, packing.material.friction, "", canvas, style)
+            recorder.start(scene)
+            send_layout(stream, layout)
+        recorder.frame(forces, statistics)
+        seconds += time.process_time() - begin
+        contacts += forces.contacts.count
+    begin = time.process_time()
+    recorder.finish()
+    stream.disconnect()
+    return seconds + time.process_time() - begin, contacts / tracks.frame_count, recorder.network_rows
+
+
+def _solved(experiment, tracks, walls, packing) -> Iterator[tuple[FrameForces, FrameStatistics]]:  # type: ignore[no-untyped-def]
+    settings = pipeline.sequence_settings(experiment.config, 0.0)
+    snapshots = pipeline.make_snapshots(tracks, walls)
+    for forces, _ in solve_sequence(packing, snapshots, settings):
+        snapshot = snapshots[forces.frame]
+        yield forces, frame_statistics(
+            forces.contacts, forces.fn, forces.ft, forces.state, snapshot.position, snapshot.present,
+            packing.walls(snapshot.endpoints), packing.length, grains=packing.grains, material=packing.material,
+        )  # fmt: skip
