@@ -17,6 +17,7 @@ from rich.console import Console
 from app import pipeline
 from app.errors import InputError
 from app.experiment import Experiment, load_experiment
+from app.frame_range import parse_frames
 from app.progress import Progress, silent
 from app.results import Results
 from app.store import load_results, read_origin
@@ -204,7 +205,7 @@ def _run(request: Request) -> Iterator[pipeline.Run]:
     folder = request.out if request.out is not None else Path("runs") / experiment.name
     with progress_of(request.quiet) as progress:
         yield pipeline.Run(
-            experiment, folder, _frame_range(request.frames), progress, max_size=_bytes(request.max_size),
+            experiment, folder, parse_frames(request.frames), progress, max_size=_bytes(request.max_size),
             full_frames=request.full_frames,
         )  # fmt: skip
 
@@ -216,18 +217,6 @@ def progress_of(quiet: bool) -> Iterator[Progress]:
     else:
         with progress_bars() as progress:
             yield progress
-
-
-def _frame_range(text: str | None) -> tuple[int, int | None]:
-    if text is None:
-        return 0, None
-    first, colon, last = text.partition(":")
-    try:
-        if not colon:
-            raise ValueError
-        return int(first or 0), int(last) if last else None
-    except ValueError:
-        raise InputError("--frames", text, "is not A:B, such as 0:12") from None
 
 
 def _bytes(megabytes: float | None) -> int | None:

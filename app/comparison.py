@@ -135,7 +135,8 @@ def _match_grains(a: Results, b: Results, frame_a: int, frame_b: int) -> tuple[N
     if both.sum() > 0.5 * len(rows) and near.mean() > 0.9:
         return rows, ""
     present_a, present_b = np.flatnonzero(a.tracks.present[frame_a]), np.flatnonzero(b.tracks.present[frame_b])
-    distance, nearest = KDTree(place_a[present_a]).query(place_b[present_b])
+    found = KDTree(place_a[present_a]).query(place_b[present_b])
+    distance, nearest = np.asarray(found[0]), np.asarray(found[1])
     close = distance < CLOSE * b.tracks.radius[present_b]
     if close.mean() < 0.5:
         raise DifferentPackingError(

@@ -100,7 +100,8 @@ def solve_sequence(
     """Solve the frames first, first + 1, … one after the other; yields each frame with the state after it.
 
     The motion that leads to a frame is that since the frame before. Nothing leads to frame 0: it takes the motion
-    that follows it, and the chains of the frame after it start afresh. verdicts: what people said of frames, by frame.
+    that follows it. After it a single chain starts afresh, the ensemble from what its convex members read of frame 0.
+    verdicts: what people said of frames, by frame.
     """
     state = SequenceState.first(packing) if state is None else state
     verdicts = {} if verdicts is None else verdicts

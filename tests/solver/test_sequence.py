@@ -165,3 +165,20 @@ def test_a_single_frame_falls_back_to_the_chain():
     packing, snapshots = sheared_frames(1)
     frame, _ = run(packing, snapshots, ENSEMBLE)[0]
     assert np.array_equal(frame.fn, frame.nlgs_fn)
+
+
+def test_the_members_disagreement_is_evidence_and_a_single_chain_has_none():
+    packing, snapshots = sheared_frames(4)
+    for frame, state in run(packing, snapshots, ENSEMBLE):
+        assert state.evidence.disagreement > 0
+        assert state.evidence.unbalance == frame.unbalance
+        assert np.all(frame.fn_sd[frame.fn > 0] > 0)
+    for _, state in run(packing, snapshots):
+        assert np.isnan(state.evidence.disagreement)
+
+
+def test_a_share_of_the_load_is_evidence_only_where_a_load_is_known():
+    packing, snapshots = sheared_frames(3)
+    imposed = Packing(packing.grains, packing.length, packing.material, np.full(4, np.nan))
+    assert run(packing, snapshots)[2][1].evidence.load_share > 0
+    assert np.isnan(run(imposed, snapshots)[2][1].evidence.load_share)

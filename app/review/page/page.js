@@ -102,6 +102,7 @@ async function showCrop() {
   await image.decode().catch(() => {});
 }
 
+let wakeTimer = 0;
 async function showPicture(look = true) {
   if (!state.viewer) return;
   const pair = state.pair && state.pair.frame === state.frame ? state.pair : null;
@@ -113,6 +114,11 @@ async function showPicture(look = true) {
   wanted.push(bytes("/marks", { frame: state.frame, reviewer: state.reviewer, blind: state.blind ? 1 : 0, ...key }));
   if (look) wanted.push(bytes("/look", { frame: state.frame, aspect, ...(state.whole ? {} : key) }));
   for (const part of await Promise.all(wanted)) state.viewer.show(part);
+  clearTimeout(wakeTimer); // what came last is drawn at the next event: see that there is one
+  wakeTimer = setTimeout(() => {
+    state.viewer.leave();
+    wakeTimer = setTimeout(state.viewer.leave, 500);
+  }, 150);
   state.shownFrame = state.frame;
 }
 
