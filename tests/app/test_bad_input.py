@@ -129,7 +129,7 @@ def test_bad_input_leaves_finished_results_alone(tracked, tmp_path, capsys):
 
 
 def test_an_experiment_without_walls_can_be_tracked_but_not_solved(tracked, tmp_path, capsys):
-    edit(tracked / TOML, '[walls]\nfile = "walls.csv"\n', "")
+    edit(tracked / TOML, '[walls]\nfile = "walls.csv"\nforces = "wall_forces.csv"\n', "")
     edit(tracked / TOML, "[walls.top]\npressure = 50000.0\n", "")
     edit(tracked / TOML, 'truth = "truth_contacts.csv"\n', "")
     assert "walls" in refuse(capsys, tmp_path / "out", "run", str(tracked))
