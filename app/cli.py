@@ -226,7 +226,9 @@ def synth(
 
 def study(
     subject: Annotated[
-        Literal["paper", "accuracy"], tyro.conf.Positional, tyro.conf.arg(help="the paper's claims, or r against noise")
+        Literal["paper", "accuracy", "status"],
+        tyro.conf.Positional,
+        tyro.conf.arg(help="the paper's claims; r against noise; trust, status and error bars refitted"),
     ],
     /,
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(help="of the simulated packings")] = (0, 1, 2),

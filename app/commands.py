@@ -189,11 +189,19 @@ def synth(out: Path, *, quiet: bool, **choices: Any) -> int:
 def study(subject: str, *, seeds: tuple[int, ...], grains: int, estimator: str, folder: Path, quiet: bool) -> int:
     from app.study.accuracy import study_accuracy
     from app.study.claims import study_claims
+    from app.study.status import refit_status
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDE)
+    if subject == "status" and len(seeds) < 2:
+        raise InputError("--seeds", " ".join(map(str, seeds)), "must be two or more: to fit on, and to judge on")
     with progress_of(quiet) as progress:
         if subject == "accuracy":
             study_accuracy(seeds, grains=grains, folder=folder, estimator=estimator, console=console, progress=progress)
+        elif subject == "status":
+            half = (len(seeds) + 1) // 2
+            refit_status(
+                seeds[:half], seeds[half:], grains=(grains,), folder=folder, console=console, progress=progress
+            )
         else:
             study_claims(seeds, grains=grains, folder=folder, console=console, progress=progress)
     return 0

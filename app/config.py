@@ -187,6 +187,7 @@ class SolverSection(Section):
     sweeps: Annotated[int, Field(ge=1)] = 1000  # per sub-step
     relaxation: Annotated[float, Field(gt=0, lt=2)] = 1.0
     force_change: Positive | None = None  # the paper's ε_f as a stopping level
+    keep_members: bool = False  # store the field of every member of the ensemble
     reset: Literal["never", "rearrangement"] = "never"  # go back to zero forces
 
 

@@ -53,6 +53,7 @@ UNITS = {
     "statistics/stress": "Pa",
     "statistics/wall_force": "N",
     "statistics/wall_ratio_angle": "rad",
+    "members/force": "N",
     "sweeps/fn": "N",
     "sweeps/ft": "N",
     "tracks/position": "m",

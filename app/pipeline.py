@@ -305,6 +305,7 @@ def sequence_settings(config: ExperimentFile, overlap: float) -> SequenceSetting
         estimator="nlgs" if paper else solver.estimator,
         chain=chain,
         ensemble=EnsembleSettings(probability=ContactProbabilitySettings(overlap=overlap)),
+        keep_members=solver.keep_members,
         overlap=overlap,
         threshold_sigmas=contacts.threshold_sigmas,
         threshold=contacts.threshold,

@@ -33,6 +33,7 @@ from app.results import Results
 from app.tracks import Tracks, TrackStatus, WallTracks
 from solver.calibration import Calibration
 from solver.contacts import Contacts
+from solver.ensemble import MEMBERS
 from solver.frame_forces import ContactSource, ContactState, FrameForces, FrameStatus, SweepHistory
 from solver.frame_statistics import FrameStatistics
 from solver.friction_check import FrictionCheck
@@ -78,6 +79,7 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         _write_frames(store, results)
         _write_contacts(store, results.frames)
         _write_sweeps(store, results.frames)
+        _write_members(store, results.frames)
         for each in fields(FrameStatistics):
             values = np.array([getattr(s, each.name) for s in results.statistics])
             store.create_dataset(f"statistics/{each.name}", data=values)
@@ -214,6 +216,13 @@ def _write_contacts(store: h5py.File, frames: Any) -> None:
         _compressed(store, f"forces/{key}", np.concatenate([getattr(f, key) for f in frames]))
 
 
+def _write_members(store: h5py.File, frames: Any) -> None:
+    if any(f.member_force is None for f in frames):
+        return
+    _compressed(store, "members/force", np.concatenate([f.member_force for f in frames]))
+    store["members/force"].attrs["member"] = list(MEMBERS)
+
+
 def _write_sweeps(store: h5py.File, frames: Any) -> None:
     histories = [f.history for f in frames]
     store.create_dataset("sweeps/offset", data=np.concatenate([[0], np.cumsum([h.count for h in histories])]))
@@ -257,6 +266,7 @@ def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[Fr
     history = {key: _read(store, f"sweeps/{key}") for key in (*HISTORY_COLUMNS, "recorded", "fn", "ft")}
     offset, sweep_offset = _read(store, "contacts/offset"), _read(store, "sweeps/offset")
     kept_offset = _read(store, "sweeps/recorded_offset")
+    members = _read(store, "members/force") if "members/force" in store else None
     frames, at = [], 0
     for k in range(len(status)):
         rows, sweeps = slice(offset[k], offset[k + 1]), slice(sweep_offset[k], sweep_offset[k + 1])
@@ -279,6 +289,7 @@ def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[Fr
                     fn=history["fn"][block].reshape(len(recorded), count),
                     ft=history["ft"][block].reshape(len(recorded), count),
                 ),
+                member_force=None if members is None else members[rows],
             )
         )
     return frames

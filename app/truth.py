@@ -15,6 +15,7 @@ from app.results import Results, TruthContacts
 from app.tables import check_frames, check_unique, read_table
 from app.tracks import Tracks
 from solver.agreement import Agreement, compare_forces
+from solver.frame_forces import ContactSource
 from solver.grains import Array
 
 CLOSE = 0.5  # of a radius: a grain whose true place is nearer than this is that grain
@@ -92,8 +93,8 @@ def score(results: Results, truth: TruthContacts) -> list[Agreement]:
     bounds = np.searchsorted(truth.frame, np.arange(len(results.frames) + 1))
     return [
         compare_forces(
-            frame.contacts.key,
-            np.column_stack([frame.fn, frame.ft]),
+            frame.contacts.key[(listed := frame.source != ContactSource.FORBIDDEN_BY_REVIEWER)],
+            np.column_stack([frame.fn, frame.ft])[listed],
             key[bounds[k] : bounds[k + 1]],
             force[bounds[k] : bounds[k + 1]],
         )

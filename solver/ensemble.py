@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.boundaries import Walls
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain, force_scale
@@ -53,6 +54,9 @@ class EnsembleState:
         return cls(memory, memory, memory, memory, memory, memory, memory, PairProbability.none())
 
 
+MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programs
+
+
 @dataclass(frozen=True, slots=True)
 class EnsembleForces:
     """One frame of the ensemble, all on the contacts of `step`."""
@@ -64,10 +68,18 @@ class EnsembleForces:
     member_fn: Array  # (m, c) [N] first chain, second chain, convex members that had something to read
     member_ft: Array  # (m, c) [N]
     worth: Array  # (m,) weight of each member in the mean, at most 1
+    place: NDArray[np.intp]  # (m,) of each member in MEMBERS
     state: EnsembleState
     remark: str  # what went otherwise than it should, or empty
     forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
+
+    @property
+    def member_force(self) -> Array:
+        """(f_n, f_t) of every one of MEMBERS (c, 7, 2) [N], NaN for those that had nothing to read."""
+        force = np.full((self.member_fn.shape[1], len(MEMBERS), 2), np.nan)
+        force[:, self.place, 0], force[:, self.place, 1] = self.member_fn.T, self.member_ft.T
+        return force
 
     @property
     def spread_fn(self) -> Array:
@@ -132,10 +144,10 @@ def solve_ensemble(
     slips = _slips(contacts, packing, walls, snapshots, k, settings)
     former = (state.last, state.ahead, state.around, state.wide, state.steady)
     fields = [soft.solution.force, stiff.solution.force]
-    worth = [1.0, 1.0]
+    worth, place = [1.0, 1.0], [0, 1]
     memories: list[ForceMemory | None] = []
     remarks: list[str] = []
-    for slip, memory in zip(slips, former, strict=True):
+    for number, (slip, memory) in enumerate(zip(slips, former, strict=True), start=2):
         if slip is None:
             memories.append(None)
             continue
@@ -143,6 +155,7 @@ def solve_ensemble(
         if forces.converged:
             fields.append(np.column_stack([forces.fn, forces.ft]))
             worth.append(slip.worth)
+            place.append(number)
         else:
             remarks.append(f"a convex member was left out ({forces.ending})")
         memories.append(renewed)
@@ -157,7 +170,7 @@ def solve_ensemble(
     chains = (soft.memory, stiff.memory) if motion.spans else (reported, reported)
     last, ahead, around, wide, steady = (reported if memory is None else memory for memory in memories)
     return EnsembleForces(
-        soft, fn, ft, told, members[:, :, 0], members[:, :, 1], np.array(worth),
+        soft, fn, ft, told, members[:, :, 0], members[:, :, 1], np.array(worth), np.array(place),
         EnsembleState(*chains, last, ahead, around, wide, steady, pairs),
         "; ".join(remarks), detected.select(forbidden), touch[forbidden],
     )  # fmt: skip

@@ -78,3 +78,4 @@ class FrameForces:
     trust: float  # T, an estimate of the correlation with the true forces, given these inputs
     frames_since_reset: int
     history: SweepHistory
+    member_force: Array | None = None  # (c, m, 2) [N] (f_n, f_t) of every member of the ensemble, where asked for

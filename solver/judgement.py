@@ -53,6 +53,8 @@ class Evidence:
 
 def trust(evidence: Evidence) -> float:
     """T in [0, 1], a conservative estimate of the correlation with the true normal forces."""
+    if math.isnan(evidence.correction):
+        return math.nan
     correction, disagreement = max(evidence.correction, 0.0), evidence.disagreement
     if math.isnan(disagreement):
         doubt = CHAIN_CORRECTION[0] * correction ** CHAIN_CORRECTION[1]

@@ -33,6 +33,7 @@ from solver.verdicts import NO_VERDICTS, Verdicts, show_forbidden, sources, with
 from solver.warm_start import ForceMemory
 
 NOTHING_KNOWN = Evidence(True, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0)
+NEGLIGIBLE_KAPPA = 1e-5  # below it measured motion has no influence on the forces
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
 SLIDING_TOLERANCE = 1e-6  # of μ f_n
 
@@ -42,6 +43,7 @@ class SequenceSettings:
     estimator: Literal["ensemble", "nlgs"] = "ensemble"
     chain: ChainSettings = field(default_factory=ChainSettings)  # nlgs: the estimator; ensemble: its first member
     ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
+    keep_members: bool = False  # ensemble: keep the field of every member
     overlap: float = 0.0  # [m] typical overlap or roughness of touching surfaces
     threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
@@ -86,6 +88,7 @@ class _Estimate:
     remark: str = ""
     spread_fn: Array | None = None  # (c,) [N] among the members, None of a single chain
     spread_ft: Array | None = None  # (c,) [N]
+    member_force: Array | None = None  # (c, m, 2) [N]
 
 
 def solve_sequence(
@@ -216,7 +219,7 @@ def _estimate_by_ensemble(
     evidence = _evidence(packing, motion, found.step, found.fn, found.ft, state, found.disagreement)
     return _Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
-        found.remark, found.spread_fn, found.spread_ft,
+        found.remark, found.spread_fn, found.spread_ft, found.member_force if settings.keep_members else None,
     ), evidence  # fmt: skip
 
 
@@ -236,7 +239,8 @@ def _evidence(
     load = float(packing.pressure[plates].mean()) if plates.any() else 0.0
     return Evidence(
         reset=len(state.members.soft.key) == 0,
-        correction=step.solution.mean_unbalance / step.kappa,
+        # Inertia alone corrects nothing that could be measured: there is no ε then.
+        correction=step.solution.mean_unbalance / step.kappa if step.kappa > NEGLIGIBLE_KAPPA else np.nan,
         disagreement=disagreement,
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
@@ -341,4 +345,5 @@ def _describe(
         trust=trust(evidence) if motion.spans else np.nan,
         frames_since_reset=since_reset,
         history=step.history,
+        member_force=estimate.member_force,
     )

@@ -182,3 +182,22 @@ def test_a_share_of_the_load_is_evidence_only_where_a_load_is_known():
     imposed = Packing(packing.grains, packing.length, packing.material, np.full(4, np.nan))
     assert run(packing, snapshots)[2][1].evidence.load_share > 0
     assert np.isnan(run(imposed, snapshots)[2][1].evidence.load_share)
+
+
+def test_members_are_kept_when_asked_for():
+    packing, snapshots = sheared_frames(4)
+    asked = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40), keep_members=True)
+    for (frame, _), (without, _) in zip(run(packing, snapshots, asked), run(packing, snapshots, ENSEMBLE), strict=True):
+        assert without.member_force is None
+        assert frame.member_force is not None
+        assert frame.member_force.shape == (frame.contacts.count, 7, 2)
+        assert np.array_equal(frame.member_force[:, 0, 0], frame.nlgs_fn)  # the first member is the recorded chain
+        assert np.array_equal(frame.fn, without.fn)
+
+
+def test_inertia_alone_has_no_correction_and_no_trust():
+    packing, snapshots = sheared_frames(3)
+    chain = ChainSettings(kappa=None, sweeps=40)
+    frame, _ = run(packing, snapshots, SequenceSettings(estimator="nlgs", chain=chain, threshold=2e-4))[2]
+    assert np.isnan(frame.correction)
+    assert np.isnan(frame.trust)
