@@ -189,6 +189,8 @@ class SolverSection(Section):
     force_change: Positive | None = None  # the paper's ε_f as a stopping level
     keep_members: bool = False  # store the field of every member of the ensemble
     reset: Literal["never", "rearrangement"] = "never"  # go back to zero forces
+    reset_frames: tuple[Annotated[int, Field(ge=0)], ...] = ()  # do so at these frames, whatever is found
+    kept_frames: tuple[Annotated[int, Field(ge=0)], ...] = ()  # never do so at these
 
 
 class RecordingSection(Section):

@@ -14,8 +14,8 @@ from solver.friction_check import FRAMES, FrictionCheck, check_friction
 from solver.motion import Snapshot
 from solver.radius_tuning import RadiusTuning, tune_radii
 
-REACH = 0.01  # radii are changed by this share of the mean radius at most, either way
-CURVE_POINTS = 41
+REACH = 0.04  # radii are changed by this share of the mean radius at most, either way
+CURVE_POINTS = 81
 
 
 def friction_of(

@@ -193,7 +193,7 @@ def solve(run: Run) -> Results:
         tuning = tuned_radii(packing, tracks, walls, experiment.config.contacts.coordination)
         if not tuning.met:
             low, high = tuning.coordination_number.min(), tuning.coordination_number.max()
-            problem = f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 1 %"
+            problem = f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 4 %"
             raise InputError(experiment.file, f"key contacts.coordination = {tuning.wanted}", problem)
         tracks = replace(tracks, radius=tracks.radius + tuning.found)
         packing = make_packing(experiment, tracks.radius, walls.pressure)
@@ -309,6 +309,8 @@ def sequence_settings(config: ExperimentFile, overlap: float) -> SequenceSetting
         overlap=overlap,
         threshold_sigmas=contacts.threshold_sigmas,
         threshold=contacts.threshold,
+        reset_frames=frozenset(solver.reset_frames),
+        kept_frames=frozenset(solver.kept_frames),
         reset_to_zero=paper or solver.reset == "rearrangement",
     )
 

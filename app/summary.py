@@ -47,6 +47,8 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "status": [frame.status.name.lower() for frame in frames],
         "status_count": dict(status),
         "settled_after": settled[0] if settled else None,
+        "reasons": [frame.reason for frame in frames],
+        "radius_curve": _radius_curve(results),
         "resets": [frame.frame for frame in frames if frame.status is FrameStatus.RESET],
         "rearrangements": [frame.frame for frame in frames if frame.status is FrameStatus.REARRANGING],
         "suspects": [frame.frame for frame in frames if frame.status is FrameStatus.SUSPECT],
@@ -124,6 +126,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     if summary["calibration"] is not None:
         lines.append(f"Self-calibration {summary['calibration']}.")
     if summary["radius_change"] is not None:
+        lines.append(_curve_line(summary["radius_curve"]))
         lines.append(
             f"All radii changed by {summary['radius_change'] * 1e6:+.1f} µm for the wanted coordination number."
         )
@@ -172,6 +175,21 @@ def _frame_table(summary: dict[str, Any]) -> Table:
 
 def _cell(value: float | None, form: str) -> str:
     return "–" if value is None else format(value, form)
+
+
+def _radius_curve(results: Results) -> dict[str, list[float]] | None:
+    """The curve z(δR) that a wanted coordination number was looked up on; δR in metres."""
+    tuning = results.radius_tuning
+    if tuning is None:
+        return None
+    return {"change": tuning.change.tolist(), "coordination_number": tuning.coordination_number.tolist()}
+
+
+def _curve_line(curve: dict[str, list[float]]) -> str:
+    """The curve in one line, thinned to nine points."""
+    shown = np.linspace(0, len(curve["change"]) - 1, 9).round().astype(int)
+    points = (f"{curve['change'][k] * 1e6:+.0f}: {curve['coordination_number'][k]:.2f}" for k in shown)
+    return "Coordination number without rattlers against the change of all radii [µm]: " + ", ".join(points) + "."
 
 
 def _wall_force_error(results: Results) -> dict[str, float]:

@@ -47,7 +47,9 @@ class SequenceSettings:
     overlap: float = 0.0  # [m] typical overlap or roughness of touching surfaces
     threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
-    reset_to_zero: bool = False  # nlgs: the paper's reset at a rearrangement
+    reset_to_zero: bool = False  # the paper's reset at a rearrangement
+    reset_frames: frozenset[int] = frozenset()  # frames that start from zero forces whatever is found
+    kept_frames: frozenset[int] = frozenset()  # frames that never do
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,8 @@ def solve_frame(
     verdicts: Verdicts = NO_VERDICTS,
 ) -> tuple[FrameForces, SequenceState]:
     """Solve frame k from the state that the frame before it left behind."""
-    if verdicts.reset:
+    asked = verdicts.reset or k in settings.reset_frames
+    if asked:
         state = replace(state, members=EnsembleState.first())
     window = window_of(k, len(snapshots))
     snapshot, bridged = bridge_lost([snapshots[f] for f in window], k - window.start)
@@ -131,22 +134,28 @@ def solve_frame(
         motion = motion_to(snapshot, state.seen, state.time, state.endpoints)
     else:
         motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
-    if settings.estimator == "ensemble" and len(snapshots) > 1:
-        estimate, evidence = _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, state, settings, verdicts)
-    else:
-        estimate, evidence = _estimate_by_chain(packing, snapshot, motion, state, settings, verdicts)
+
+    def estimate_from(former: SequenceState) -> tuple[_Estimate, Evidence]:
+        if settings.estimator == "ensemble" and len(snapshots) > 1:
+            return _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, former, settings, verdicts)
+        return _estimate_by_chain(packing, snapshot, motion, former, settings, verdicts)
+
+    estimate, evidence = estimate_from(state)
     status, why = judge(evidence)
     if not motion.spans:
         why = "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
     if verdicts.rearrangement and status is not FrameStatus.RESET:
         status, why = FrameStatus.REARRANGING, "a reviewer saw a rearrangement here; " + why
-    if verdicts.reset:
-        status, why = FrameStatus.RESET, "a reviewer asked for a reset here; " + why
-    if status is FrameStatus.REARRANGING and settings.reset_to_zero:
-        fresh = replace(state, members=EnsembleState.first())
-        estimate, renewed = _estimate_by_chain(packing, snapshot, motion, fresh, settings, verdicts)
+    if asked:
+        who = "a reviewer" if verdicts.reset else "the experiment"
+        status, why = FrameStatus.RESET, f"{who} asked for a reset here; " + why
+    if status is FrameStatus.REARRANGING and settings.reset_to_zero and k not in settings.kept_frames:
+        carried = estimate
+        estimate, renewed = estimate_from(replace(state, members=EnsembleState.first()))
         evidence = replace(renewed, old_unbalance=evidence.old_unbalance)
-        status, why = FrameStatus.RESET, "reset to zero forces, as asked for at a rearrangement: " + why
+        change = 100.0 * _relative_change(carried, estimate)
+        asked_for = f"reset to zero forces, as asked for at a rearrangement, which changed the forces by {change:.0f} %"
+        status, why = FrameStatus.RESET, f"{asked_for}: {why}"
     eventful = status in (FrameStatus.RESET, FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED)
     if verdicts.ignored:  # no event of the packing: the frames after it do not settle anew
         status = FrameStatus.SUSPECT
@@ -221,6 +230,17 @@ def _estimate_by_ensemble(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
         found.remark, found.spread_fn, found.spread_ft, found.member_force if settings.keep_members else None,
     ), evidence  # fmt: skip
+
+
+def _relative_change(before: _Estimate, after: _Estimate) -> float:
+    """‖f_after − f_before‖ / ‖f_before‖ of the reported fields, absent contacts at zero."""
+    former = ForceMemory(before.step.contacts.key, np.column_stack([before.fn, before.ft]))
+    key = np.union1d(former.key, after.step.contacts.key)
+    a, b = np.zeros((len(key), 2)), np.zeros((len(key), 2))
+    a[np.searchsorted(key, former.key)] = former.force
+    b[np.searchsorted(key, after.step.contacts.key)] = np.column_stack([after.fn, after.ft])
+    size = float(np.linalg.norm(a))
+    return float(np.linalg.norm(b - a)) / size if size > 0 else 0.0
 
 
 def _evidence(

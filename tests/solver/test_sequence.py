@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -201,3 +203,26 @@ def test_inertia_alone_has_no_correction_and_no_trust():
     frame, _ = run(packing, snapshots, SequenceSettings(estimator="nlgs", chain=chain, threshold=2e-4))[2]
     assert np.isnan(frame.correction)
     assert np.isnan(frame.trust)
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
+def test_a_reset_can_be_forced_at_a_frame(settings):
+    packing, snapshots = sheared_frames(5)
+    frames = [frame for frame, _ in run(packing, snapshots, replace(settings, reset_frames=frozenset({3})))]
+    assert frames[3].status is FrameStatus.RESET
+    assert "asked for a reset" in frames[3].reason
+    assert [frame.frames_since_reset for frame in frames[3:]] == [0, 1]
+
+
+def test_a_reset_at_a_rearrangement_says_what_it_changed_and_can_be_forbidden(monkeypatch):
+    def rearranging(evidence):
+        return (FrameStatus.RESET if evidence.reset else FrameStatus.REARRANGING), "so this test says"
+
+    monkeypatch.setattr("solver.sequence.judge", rearranging)
+    packing, snapshots = sheared_frames(5)
+    settings = replace(SETTINGS, reset_to_zero=True, kept_frames=frozenset({3}))
+    frames = [frame for frame, _ in run(packing, snapshots, settings)]
+    assert [frame.status for frame in frames[2:]] == [FrameStatus.RESET, FrameStatus.REARRANGING, FrameStatus.RESET]
+    assert "changed the forces by" in frames[2].reason
+    carried = [frame for frame, _ in run(packing, snapshots)]
+    assert not np.array_equal(frames[2].fn, carried[2].fn)
