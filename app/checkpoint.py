@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import shutil
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -51,7 +52,10 @@ class Checkpoint:
             return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
 
     def clear(self) -> None:
+        """Remove the frames, and the folder above once no stage is left in it."""
         shutil.rmtree(self.folder, ignore_errors=True)
+        with suppress(OSError):
+            self.folder.parent.rmdir()
 
     def _file(self, frame: int) -> Path:
         return self.folder / f"{frame:06d}.npz"
