@@ -16,10 +16,9 @@ from rich.console import Console
 
 from app import pipeline
 from app.errors import InputError
-from app.experiment import Experiment, load_experiment
+from app.experiment import load_experiment
 from app.frame_range import parse_frames
 from app.progress import Progress, silent
-from app.results import Results
 from app.store import load_results, read_origin
 from app.summary import print_summary, save_summary, summarize
 from app.terminal import progress_bars
@@ -127,7 +126,7 @@ def score(path: Path, truth_file: Path | None, *, as_json: bool, fit_threshold: 
     results = load_results(file)
     origin = read_origin(file)
     assert origin is not None
-    run = pipeline.Run(_stored_experiment(Path(origin.experiment)), file.parent, origin.frames)
+    run = pipeline.Run(load_experiment(Path(origin.experiment)), file.parent, origin.frames)
     truth = pipeline.load_truth(run, results, truth_file)
     reviewed = Reviewed(file, results, run.experiment, origin.frames[0])
     verdicts = scoring.score_verdicts(reviewed)
@@ -240,10 +239,6 @@ def _tell_notes(run: pipeline.Run, console: Console) -> None:
         console.print(note, markup=False, highlight=False, soft_wrap=True)
 
 
-def _stored_experiment(file: Path) -> Experiment:
-    return load_experiment(file)
-
-
 def _show(recording: Path, how: str, console: Console, *also: Path) -> int:
     from app.recording.viewer import open_viewer
 
@@ -251,8 +246,3 @@ def _show(recording: Path, how: str, console: Console, *also: Path) -> int:
     if hint is not None:
         console.print(hint, highlight=False, soft_wrap=True)
     return 0
-
-
-def results_of(path: Path) -> Results:
-    """Results from a run's folder or from results.h5 itself."""
-    return load_results(path / pipeline.RESULTS if path.is_dir() else path)

@@ -24,10 +24,7 @@ class Agreement:
 
 def compare_forces(key: NDArray[np.int64], force: Array, true_key: NDArray[np.int64], true_force: Array) -> Agreement:
     """Compare forces (c, 2) [N] on contacts named by key (c,) with true ones (t, 2) [N] on true_key (t,)."""
-    union = np.union1d(key, true_key)
-    ours, true = np.zeros((len(union), 2)), np.zeros((len(union), 2))
-    ours[np.searchsorted(union, key)] = force
-    true[np.searchsorted(union, true_key)] = true_force
+    ours, true = align_forces(key, force, true_key, true_force)
     bearing = np.unique(true_key[true_force[:, 0] > 0])
     hit = len(np.intersect1d(np.unique(key), bearing))
     size, total = float(np.linalg.norm(true)), float(true[:, 0].sum())
@@ -39,6 +36,17 @@ def compare_forces(key: NDArray[np.int64], force: Array, true_key: NDArray[np.in
         contact_precision=hit / len(key) if len(key) else float("nan"),
         contact_recall=hit / len(bearing) if len(bearing) else float("nan"),
     )
+
+
+def align_forces(
+    key: NDArray[np.int64], force: Array, other_key: NDArray[np.int64], other_force: Array
+) -> tuple[Array, Array]:
+    """Bring two sets of forces (c, …) and (t, …) [N], named by key, onto the union of their contacts; absent is 0."""
+    union = np.union1d(key, other_key)
+    one, other = np.zeros((len(union), *force.shape[1:])), np.zeros((len(union), *other_force.shape[1:]))
+    one[np.searchsorted(union, key)] = force
+    other[np.searchsorted(union, other_key)] = other_force
+    return one, other
 
 
 def pearson(a: Array, b: Array) -> float:

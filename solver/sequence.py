@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.admissibility import worst_unbalance
+from solver.agreement import align_forces
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain
 from solver.contact_probability import window_of
 from solver.contacts import Contacts, detect_contacts
@@ -234,11 +235,10 @@ def _estimate_by_ensemble(
 
 def _relative_change(before: _Estimate, after: _Estimate) -> float:
     """‖f_after − f_before‖ / ‖f_before‖ of the reported fields, absent contacts at zero."""
-    former = ForceMemory(before.step.contacts.key, np.column_stack([before.fn, before.ft]))
-    key = np.union1d(former.key, after.step.contacts.key)
-    a, b = np.zeros((len(key), 2)), np.zeros((len(key), 2))
-    a[np.searchsorted(key, former.key)] = former.force
-    b[np.searchsorted(key, after.step.contacts.key)] = np.column_stack([after.fn, after.ft])
+    a, b = align_forces(
+        before.step.contacts.key, np.column_stack([before.fn, before.ft]),
+        after.step.contacts.key, np.column_stack([after.fn, after.ft]),
+    )  # fmt: skip
     size = float(np.linalg.norm(a))
     return float(np.linalg.norm(b - a)) / size if size > 0 else 0.0
 

@@ -15,6 +15,7 @@ from app.recording.plots import Axes, round_step
 from app.recording.scene import Clock, Scene
 from app.recording.values import known, log_scalar
 from app.results import TruthContacts
+from solver.agreement import align_forces
 from solver.contacts import measure_contacts
 from solver.frame_forces import FrameForces
 from solver.grains import Array
@@ -87,8 +88,9 @@ class TruthWriter:
             rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
         )
         clock.end()
-        true_fn, inferred_fn = align(key, truth.fn[rows], forces.contacts.key, forces.fn)
-        true_ft, inferred_ft = align(key, truth.ft[rows], forces.contacts.key, forces.ft)
+        ours = forces.contacts.key
+        true_fn, inferred_fn = align_forces(key, truth.fn[rows], ours, np.nan_to_num(forces.fn))
+        true_ft, inferred_ft = align_forces(key, truth.ft[rows], ours, np.nan_to_num(forces.ft))
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,
@@ -112,15 +114,6 @@ class TruthWriter:
         n, present = self._scene.grains.count, self._scene.tracks.present[frame]
         i, j = self._truth.i[rows], self._truth.j[rows]
         return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])
-
-
-def align(true_key: np.ndarray, true: Array, key: np.ndarray, inferred: Array) -> tuple[Array, Array]:
-    """Both forces on the union of their contacts, 0 where one side has none (u,), (u,)."""
-    union = np.union1d(true_key, key)
-    both = np.zeros((2, len(union)))
-    both[0, np.searchsorted(union, true_key)] = true
-    both[1, np.searchsorted(union, key)] = np.nan_to_num(inferred)
-    return both[0], both[1]
 
 
 def relative_error(true: Array, inferred: Array) -> float:

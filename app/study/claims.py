@@ -13,7 +13,7 @@ from rich.table import Table
 from app.progress import Progress, silent
 from app.study.accuracy import default_settings
 from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
-from solver.agreement import pearson
+from solver.agreement import align_forces, pearson
 from solver.chain import ChainSettings
 from solver.contacts import measure_contacts
 from solver.dem import DemTruth
@@ -122,10 +122,7 @@ def _boundaries(loaded: list[_Sequence], imposed: list[_Sequence]) -> Verdict:
     for one, other in zip(loaded, imposed, strict=True):
         factors = []
         for a, b in zip(one.frames[3:], other.frames[3:], strict=True):
-            key = np.union1d(a.contacts.key, b.contacts.key)
-            fa, fb = np.zeros(len(key)), np.zeros(len(key))
-            fa[np.searchsorted(key, a.contacts.key)] = a.fn
-            fb[np.searchsorted(key, b.contacts.key)] = b.fn
+            fa, fb = align_forces(a.contacts.key, a.fn, b.contacts.key, b.fn)
             r.append(pearson(fa, fb))
             factors.append(fb.sum() / fa.sum())
         factor.append(np.std(factors) / np.mean(factors))

@@ -15,8 +15,9 @@ from app.recording.rods import turns_from_axis
 from app.recording.scene import Clock
 from app.recording.stress_and_fabric import BINS, direction_shares, rose_outline
 from app.recording.texts import printable
-from app.recording.truth import TruthWriter, align, relative_error
+from app.recording.truth import TruthWriter, relative_error
 from app.results import TruthContacts
+from solver.agreement import align_forces
 from solver.contacts import Contacts
 
 ROUNDING = 1e-12
@@ -106,7 +107,7 @@ def test_capsules_turn_onto_their_branches():
 
 
 def test_absent_contacts_count_as_zero_against_the_truth():
-    true, inferred = align(np.array([2, 5]), np.array([1.0, 2.0]), np.array([5, 9]), np.array([4.0, 3.0]))
+    true, inferred = align_forces(np.array([2, 5]), np.array([1.0, 2.0]), np.array([5, 9]), np.array([4.0, 3.0]))
     assert true.tolist() == [1.0, 2.0, 0.0]
     assert inferred.tolist() == [0.0, 4.0, 3.0]
     assert relative_error(true, inferred) == pytest.approx(np.sqrt((1 + 4 + 9) / 5))
