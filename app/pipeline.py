@@ -22,7 +22,7 @@ from app import __version__
 from app.atomic import write_atomically
 from app.calibration import calibrate_tracks
 from app.checkpoint import Checkpoint
-from app.config import ExperimentFile, as_toml
+from app.config import as_toml
 from app.corrections import read_corrections
 from app.errors import InputError
 from app.experiment import (
@@ -41,23 +41,20 @@ from app.results import Results, TruthContacts
 from app.review.decisions import Bodies, decide, fingerprint
 from app.review.verdicts import VERDICTS, Flag, VerdictLog
 from app.scaling import make_scale
+from app.solver_input import make_snapshots, sequence_settings, typical_overlap
 from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
 from app.tracking.report import tracking_report
 from app.tracking.stage import DETECTIONS, gather_report, track_photographs, write_tables
 from app.tracks import Tracks, WallTracks
 from app.truth import read_truth, true_names
-from solver.chain import ChainSettings, Packing
+from solver.chain import Packing
 from solver.contact_probability import ContactProbabilitySettings
-from solver.ensemble import EnsembleSettings
 from solver.frame_forces import FrameForces
 from solver.frame_statistics import FrameStatistics, frame_statistics
-from solver.grains import Array
-from solver.motion import Snapshot
-from solver.sequence import SequenceSettings, SequenceState, solve_sequence
+from solver.sequence import SequenceState, solve_sequence
 from solver.verdicts import Verdicts
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
-SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 REPORT = "tracking_report.html"
 SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
 UNFINISHED = ".unfinished"  # folder of checkpoints
@@ -265,54 +262,6 @@ def _solve_frames(
             run.watch.frame(forces, summary)
         run.progress("solving", len(frames), len(snapshots))
     return frames, statistics
-
-
-def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
-    """What the solver reads of tracks and walls."""
-    present, sigma = tracks.present, tracks.position_sigma
-    return [
-        Snapshot(
-            float(tracks.time[k]), tracks.position[k], tracks.rotation[k], present[k], walls.endpoints[k],
-            float(sigma[k]),
-        )
-        for k in range(tracks.frame_count)
-    ]  # fmt: skip
-
-
-def typical_overlap(config: ExperimentFile, radius: Array) -> float:
-    """How far touching surfaces overlap or stand apart by elasticity and roughness [m]; radius (n,) [m].
-
-    A missed contact costs far more than a false one, so it is rather too large than too small.
-    """
-    given = config.contacts.overlap
-    return SURFACE * 2.0 * float(radius.mean()) if given is None else given
-
-
-def sequence_settings(config: ExperimentFile, overlap: float) -> SequenceSettings:
-    """The solver's settings from the experiment file; overlap [m] of touching surfaces."""
-    solver, contacts = config.solver, config.contacts
-    paper = solver.preset == "paper"
-    chain = ChainSettings(
-        kappa=None if paper else solver.kappa,
-        substeps=1 if paper else solver.substeps,
-        spin_up=1 if paper else solver.spin_up,
-        sweeps=solver.sweeps * (solver.substeps if paper else 1),
-        relaxation=solver.relaxation,
-        force_change=solver.force_change,
-        keep=config.recording.sweeps,
-    )
-    return SequenceSettings(
-        estimator="nlgs" if paper else solver.estimator,
-        chain=chain,
-        ensemble=EnsembleSettings(probability=ContactProbabilitySettings(overlap=overlap)),
-        keep_members=solver.keep_members,
-        overlap=overlap,
-        threshold_sigmas=contacts.threshold_sigmas,
-        threshold=contacts.threshold,
-        reset_frames=frozenset(solver.reset_frames),
-        kept_frames=frozenset(solver.kept_frames),
-        reset_to_zero=paper or solver.reset == "rearrangement",
-    )
 
 
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:

@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from app.config import ExperimentFile
-from app.pipeline import sequence_settings, typical_overlap
 from app.progress import Progress, silent
+from app.solver_input import sequence_settings, typical_overlap
 from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of
 from solver.dem import DemTruth
 from solver.sequence import SequenceSettings, solve_sequence

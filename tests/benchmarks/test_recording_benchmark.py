@@ -16,12 +16,12 @@ from pathlib import Path
 import pytest
 import rerun as rr
 
-from app import pipeline
 from app.experiment import load_experiment, make_packing, read_tracks, read_walls
 from app.recording import Canvas, ForceRange, ForceStyle, Layout, Recorder, Scene, SweepChoice, make_blueprint
 from app.recording.headless import HeadlessViewer, vulkan_drivers
 from app.recording.layout_property import send_layout
 from app.recording.recorder import BATCHES
+from app.solver_input import make_snapshots, sequence_settings
 from app.synthetic.experiment import synthesize
 from solver.frame_forces import FrameForces
 from solver.frame_statistics import FrameStatistics, frame_statistics
@@ -101,8 +101,8 @@ def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[flo
 
 
 def _solved(experiment, tracks, walls, packing) -> Iterator[tuple[FrameForces, FrameStatistics]]:  # type: ignore[no-untyped-def]
-    settings = pipeline.sequence_settings(experiment.config, 0.0)
-    snapshots = pipeline.make_snapshots(tracks, walls)
+    settings = sequence_settings(experiment.config, 0.0)
+    snapshots = make_snapshots(tracks, walls)
     for forces, _ in solve_sequence(packing, snapshots, settings):
         snapshot = snapshots[forces.frame]
         yield forces, frame_statistics(
