@@ -1,14 +1,16 @@
 """Nonlinear Gauss-Seidel: settings, one's hand on every sweep, and the solution.
 
 `sweeps` is the method, driven by hand; `solve` runs it to an end that is a value with a sentence. Whoever listens
-sets the stride of the compiled loop and nothing else: with or without a listener the forces are the same bits.
+sets the strides of the compiled loop and what it measures on its way, and nothing else: with or without a listener
+the forces are the same bits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -54,13 +56,25 @@ class Stop(Enum):
 
 
 class Sweep(NamedTuple):
-    """The state after a sweep. `force` is live memory: copy what you keep."""
+    """The state after a sweep that is heard. `force` is live memory: copy what you keep."""
 
     number: int  # 1 … sweeps
     force: Array  # (p + q, 2) [N] in visiting order
-    force_change: float  # greatest |Δf| / |f| in this sweep
-    natural_map: float  # relative residual
-    unbalance: float  # worst |ΣF| on a grain / mean f_n
+    # (s, 3) of the sweeps since the one heard before, this one last: greatest |Δf| / |f| in the sweep, relative
+    # natural-map residual after it, worst |ΣF| on a grain / mean f_n. NaN where not measured; this sweep's always are.
+    residuals: Array
+
+    @property
+    def force_change(self) -> float:
+        return float(self.residuals[-1, 0])
+
+    @property
+    def natural_map(self) -> float:
+        return float(self.residuals[-1, 1])
+
+    @property
+    def unbalance(self) -> float:
+        return float(self.residuals[-1, 2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,32 +94,37 @@ class Solution:
 
 
 def sweeps(
-    problem: ContactProblem, settings: NlgsSettings, *, guess: Array | None = None, every: int = 1
+    problem: ContactProblem,
+    settings: NlgsSettings,
+    *,
+    guess: Array | None = None,
+    every: int | Iterable[int] = 1,
+    between: int = 0,
 ) -> Iterator[Sweep]:
-    """Advance `every` sweeps at a time from a guess, without end.
+    """Advance `every` sweeps at a time from a guess: without end, or by strides that come to one.
 
-    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent. With acceleration the forces
-    take a step every PERIOD sweeps, heard or not.
+    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent. Of the sweeps that are not heard
+    every so many-th is measured, too, as `between` says; 0: none. With acceleration the forces take a step every
+    PERIOD sweeps, heard or not.
     """
     force, body, plate = _start(problem, guess)
-    before, number, residuals = np.empty_like(force), 0, (0.0, 0.0, 0.0)
-    if settings.acceleration == 0:
-        while True:
-            residuals = advance_and_measure(problem, body, plate, force, before, every, settings.relaxation)
-            number += every
-            yield Sweep(number, force, *residuals)
-    acceleration = Acceleration(problem, force, settings.acceleration)
-    while True:
-        heard = number + every
-        while number < heard:
+    before, number, relaxation = np.empty_like(force), 0, settings.relaxation
+    acceleration = Acceleration(problem, force, settings.acceleration) if settings.acceleration else None
+    for stride in repeat(every) if isinstance(every, int) else every:
+        residuals = np.empty((stride, 3))
+        if acceleration is None:
+            advance_and_measure(problem, body, plate, force, before, relaxation, number, between, residuals)
+            number += stride
+        row = 0 if acceleration else stride
+        while acceleration and row < stride:
             if number % PERIOD == 0 and number > 0:
                 acceleration.step(body, plate, force)
-            count = min(heard, number - number % PERIOD + PERIOD) - number
-            residuals = advance_and_measure(problem, body, plate, force, before, count, settings.relaxation)
-            number += count
+            part = residuals[row : row + PERIOD - number % PERIOD]
+            advance_and_measure(problem, body, plate, force, before, relaxation, number, between, part)
+            row, number = row + len(part), number + len(part)
             if number % PERIOD == 0 and acceleration.settle(body, plate, force):
-                residuals = (residuals[0], *measure_state(problem, body, plate, force))
-        yield Sweep(number, force, *residuals)
+                part[-1, 1:] = measure_state(problem, body, plate, force)
+        yield Sweep(number, force, residuals)
 
 
 def solve(
@@ -114,11 +133,13 @@ def solve(
     *,
     guess: Array | None = None,
     observer: Callable[[Sweep], None] | None = None,
-    every: int = 1,
+    every: int | Iterable[int] = 1,
+    between: int = 0,
 ) -> Solution:
     """Sweep until a stopping level or the number of sweeps is reached.
 
-    The stopping levels are looked at every `every` sweeps; the observer, too, hears every such sweep.
+    The observer hears a sweep every `every` sweeps, or after each of the given strides, and the last one; at these
+    sweeps the stopping levels are looked at. `between`: as for `sweeps`.
     """
     if len(problem.rows) == 0:
         return Solution(np.empty(0), np.empty(0), Stop.EMPTY, 0, 0.0, 0.0, 0.0)
@@ -129,8 +150,9 @@ def solve(
         return _finish(problem, force, Stop.SWEEPS, settings.sweeps)
     if observer is None and not stopping:
         every = max(1, settings.sweeps)
+    strides = _strides(every, settings.sweeps)
     stop, number, force = Stop.SWEEPS, 0, _start(problem, guess)[0]
-    for sweep in sweeps(problem, settings, guess=guess, every=every) if settings.sweeps > 0 else ():
+    for sweep in sweeps(problem, settings, guess=guess, every=strides, between=between):
         force, number = sweep.force, sweep.number
         if observer is not None:
             observer(sweep)
@@ -139,8 +161,6 @@ def solve(
             break
         if settings.force_change is not None and sweep.force_change <= settings.force_change:
             stop = Stop.FORCE_CHANGE
-            break
-        if number >= settings.sweeps:
             break
     return _finish(problem, force, stop, number)
 
@@ -158,6 +178,18 @@ def to_contact_order(problem: ContactProblem, force: Array) -> Array:
     result = np.empty_like(force)
     result[..., problem.rows, :] = force
     return result
+
+
+def _strides(every: int | Iterable[int], total: int) -> Iterator[int]:
+    """Strides that end at a number of sweeps."""
+    left = total
+    for stride in repeat(every) if isinstance(every, int) else every:
+        if left == 0:
+            return
+        yield min(stride, left)
+        left -= min(stride, left)
+    if left > 0:
+        yield left
 
 
 def _start(problem: ContactProblem, guess: Array | None) -> tuple[Array, Array, Array]:

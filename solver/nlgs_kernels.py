@@ -3,8 +3,8 @@
 A state is three arrays: body (n, 4), plate (w, 2) as in ContactProblem but under the present forces, and
 force (p + q, 2) [N] in visiting order.
 
-A group of contacts that share no grain goes through three short loops: velocities of its grains into a small
-workspace, one row per quantity; the law on rows, which the compiler turns into vector instructions; velocities back.
+A group of contacts that share no grain is worked on in three steps: the records of its grains into a small
+workspace, one row per quantity; the law on rows, which the compiler turns into vector instructions; the records back.
 Arrays are read flat, since the compiler knows the strides of those alone, and ids as unsigned numbers, since
 a signed index is first looked at for being negative.
 """
@@ -16,10 +16,11 @@ import numpy as np
 from numba import njit
 
 from solver.contact_law import project_on_cone, relax_contact
+from solver.grain_records import WIDTH, gather_records, scatter_records
 from solver.ordering import GROUP as L
 
 THIRD = 1.0 / 3.0  # W_nn over W_tt between two solid rods
-PAIR, IDS = 6 * L, 2 * L  # numbers in a block
+PAIR, IDS = 4 * L, 2 * L  # numbers in a block
 U = np.uint64
 U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 
@@ -71,12 +72,10 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, flat_force = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = workspace(6 * L)
-    # Numbers are moved as integers, of which the processor stores two at a time.
-    store, source = work.view(np.int64), flat.view(np.int64)
+    work = workspace(8 * L)
     for _ in range(sweeps):
         for block in range(problem.grouped // L):
-            _relax_group(pair, ids, source, flat_force, work, store, block, relaxation, mu)
+            _relax_group(pair, ids, flat, flat_force, work, block, relaxation, mu)
         for c in range(problem.grouped, first):
             _relax_pair(pair, ids, flat, flat_force, c, relaxation, mu)
         for c in range(len(problem.wall)):
@@ -92,34 +91,17 @@ def workspace(size):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _relax_group(pair, ids, source, force, work, store, block, relaxation, mu):  # type: ignore[no-untyped-def]
+def _relax_group(pair, ids, body, force, work, block, relaxation, mu):  # type: ignore[no-untyped-def]
     p, e, f = block * PAIR, block * IDS, block * IDS
+    for k in range(0, L, WIDTH):
+        gather_records(body, ids, e + k, work, k, L)
+        gather_records(body, ids, e + L + k, work, 4 * L + k, L)
     for k in range(L):
-        i, j = U4 * U(ids[e + k]), U4 * U(ids[e + L + k])
-        store[k] = source[i]
-        store[L + k] = source[i + U1]
-        store[2 * L + k] = source[i + U2]
-        store[3 * L + k] = source[j]
-        store[4 * L + k] = source[j + U1]
-        store[5 * L + k] = source[j + U2]
-    for k in range(L):
-        nx, ny, wn, ci, cj = (
-            pair[p + k],
-            pair[p + L + k],
-            relaxation * pair[p + 2 * L + k],
-            pair[p + 3 * L + k],
-            pair[p + 4 * L + k],
-        )
-        ax, ay, aw, bx, by, bw = (
-            work[k],
-            work[L + k],
-            work[2 * L + k],
-            work[3 * L + k],
-            work[4 * L + k],
-            work[5 * L + k],
-        )
+        nx, ny, wn = pair[p + k], pair[p + L + k], relaxation * pair[p + 2 * L + k]
+        ax, ay, aw, ci = work[k], work[L + k], work[2 * L + k], work[3 * L + k]
+        bx, by, bw, cj = work[4 * L + k], work[5 * L + k], work[6 * L + k], work[7 * L + k]
         dx, dy = bx - ax, by - ay
-        un = dx * nx + dy * ny + pair[p + 5 * L + k]
+        un = dx * nx + dy * ny + pair[p + 3 * L + k]
         ut = dy * nx - dx * ny - aw - bw
         fn, ft = force[f + 2 * k], force[f + 2 * k + 1]
         new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
@@ -130,17 +112,12 @@ def _relax_group(pair, ids, source, force, work, store, block, relaxation, mu): 
         work[k] = ax - ci * fx
         work[L + k] = ay - ci * fy
         work[2 * L + k] = aw - ci * turn
-        work[3 * L + k] = bx + cj * fx
-        work[4 * L + k] = by + cj * fy
-        work[5 * L + k] = bw - cj * turn
-    for k in range(L):
-        i, j = U4 * U(ids[e + k]), U4 * U(ids[e + L + k])
-        source[i] = store[k]
-        source[i + U1] = store[L + k]
-        source[i + U2] = store[2 * L + k]
-        source[j] = store[3 * L + k]
-        source[j + U1] = store[4 * L + k]
-        source[j + U2] = store[5 * L + k]
+        work[4 * L + k] = bx + cj * fx
+        work[5 * L + k] = by + cj * fy
+        work[6 * L + k] = bw - cj * turn
+    for k in range(0, L, WIDTH):
+        scatter_records(work, k, L, body, ids, e + k)
+        scatter_records(work, 4 * L + k, L, body, ids, e + L + k)
 
 
 @njit(inline="always")
@@ -148,9 +125,9 @@ def _relax_pair(pair, ids, body, force, c, relaxation, mu):  # type: ignore[no-u
     k = c % L
     p, e = (c // L) * PAIR + k, (c // L) * IDS + k
     i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
-    nx, ny, wn, ci, cj = pair[p], pair[p + L], relaxation * pair[p + 2 * L], pair[p + 3 * L], pair[p + 4 * L]
+    nx, ny, wn, ci, cj = pair[p], pair[p + L], relaxation * pair[p + 2 * L], body[i + U3], body[j + U3]
     dx, dy = body[j] - body[i], body[j + U1] - body[i + U1]
-    un = dx * nx + dy * ny + pair[p + 5 * L]
+    un = dx * nx + dy * ny + pair[p + 3 * L]
     ut = dy * nx - dx * ny - body[i + U2] - body[j + U2]
     fn, ft = force[2 * c], force[2 * c + 1]
     new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
@@ -180,15 +157,29 @@ def _relax_wall(wall, wall_body, body, plate, force, row, c, relaxation, mu):  #
 
 
 @njit(cache=True, error_model="numpy")
-def advance_and_measure(problem, body, plate, force, before, sweeps, relaxation):  # type: ignore[no-untyped-def]
-    """Advance, and measure the last sweep, in one call: greatest force change, natural-map residual, unbalance."""
-    if sweeps > 1:
-        advance(problem, body, plate, force, sweeps - 1, relaxation)
-    before.reshape(before.size)[:] = force.reshape(force.size)  # flat: copied at once
-    advance(problem, body, plate, force, 1, relaxation)
-    change, norm, mean = measure_forces(force, before)
-    worst, _ = measure_unbalance(problem, body)
-    return change, measure_natural_map(problem, body, plate, force, norm), worst / mean if mean > 0.0 else 0.0
+def advance_and_measure(problem, body, plate, force, before, relaxation, done, spacing, residuals):  # type: ignore[no-untyped-def]
+    """Advance by as many sweeps as residuals has rows (s, 3), and measure some of them.
+
+    A row holds the greatest force change, the natural-map residual and the worst unbalance over the mean f_n after
+    that sweep, or NaN where they are not measured. Measured are the last sweep and, counted on from `done`, the
+    sweeps 1, 2, 4, … up to a `spacing` and its multiples; the last one alone if it is 0. before: room for the forces.
+    """
+    residuals[:] = np.nan
+    row = 0
+    while row < len(residuals):
+        step = len(residuals) - row
+        if spacing > 0:
+            number = done + row
+            step = min(step, max(number, 1), spacing - number % spacing)
+        advance(problem, body, plate, force, step - 1, relaxation)
+        before.reshape(before.size)[:] = force.reshape(force.size)  # flat: copied at once
+        advance(problem, body, plate, force, 1, relaxation)
+        row += step
+        change, norm, mean = measure_forces(force, before)
+        worst, _ = measure_unbalance(problem, body)
+        residuals[row - 1, 0] = change
+        residuals[row - 1, 1] = measure_natural_map(problem, body, plate, force, norm)
+        residuals[row - 1, 2] = worst / mean if mean > 0.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -245,29 +236,28 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, f = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = workspace(4 * L)  # relative velocities, and the sum of squares per lane
-    work[:] = 0.0
+    work = workspace(9 * L)  # the grains' records, and the sum of squares per lane
+    work[8 * L :] = 0.0
     for block in range(problem.grouped // L):
         p, e = block * PAIR, block * IDS
+        for k in range(0, L, WIDTH):
+            gather_records(flat, ids, e + k, work, k, L)
+            gather_records(flat, ids, e + L + k, work, 4 * L + k, L)
         for k in range(L):
-            i, j = U4 * U(ids[e + k]), U4 * U(ids[e + L + k])
-            work[k] = flat[j] - flat[i]
-            work[L + k] = flat[j + U1] - flat[i + U1]
-            work[2 * L + k] = flat[j + U2] + flat[i + U2]
-        for k in range(L):
-            nx, ny, wn, dx, dy = pair[p + k], pair[p + L + k], pair[p + 2 * L + k], work[k], work[L + k]
-            un = dx * nx + dy * ny + pair[p + 5 * L + k]
-            ut = dy * nx - dx * ny - work[2 * L + k]
-            work[3 * L + k] += _miss(f[e + 2 * k], f[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
+            nx, ny, wn = pair[p + k], pair[p + L + k], pair[p + 2 * L + k]
+            dx, dy = work[4 * L + k] - work[k], work[5 * L + k] - work[L + k]
+            un = dx * nx + dy * ny + pair[p + 3 * L + k]
+            ut = dy * nx - dx * ny - work[2 * L + k] - work[6 * L + k]
+            work[8 * L + k] += _miss(f[e + 2 * k], f[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
     total = 0.0
     for k in range(L):
-        total += work[3 * L + k]
+        total += work[8 * L + k]
     for c in range(problem.grouped, first):
         p, e = (c // L) * PAIR + c % L, (c // L) * IDS + c % L
         i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
         nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
         dx, dy = flat[j] - flat[i], flat[j + U1] - flat[i + U1]
-        un = dx * nx + dy * ny + pair[p + 5 * L]
+        un = dx * nx + dy * ny + pair[p + 3 * L]
         ut = dy * nx - dx * ny - flat[i + U2] - flat[j + U2]
         total += _miss(f[2 * c], f[2 * c + 1], un, ut, wn, THIRD * wn, mu)
     for c in range(len(problem.wall)):

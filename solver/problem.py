@@ -35,7 +35,7 @@ class ContactProblem(NamedTuple):
     body: Array  # (n, 4) free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Array  # (w, 2) free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
     pair_body: NDArray[np.int32]  # (blocks, 2, L) grains i, j
-    pair: Array  # (blocks, 6, L) nx, ny, 1/W_nn, 1/Z of i, 1/Z of j, and the velocity [m/s] added to u_n: gap to close
+    pair: Array  # (blocks, 4, L) nx, ny, 1/W_nn, and the velocity [m/s] added to u_n: gap to close
     grouped: int  # a multiple of L, at most p
     wall_body: NDArray[np.int32]  # (q, 2) grain, wall
     wall: Array  # (q, 6) nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
@@ -120,10 +120,8 @@ def assemble(
     rows_wall = rows_wall[order]
     closing = np.zeros(contacts.count) if closing is None else closing
 
-    pair_i, pair_j = compliance[i[rows_pair]], compliance[j[rows_pair]]
-    pair = np.column_stack(
-        [contacts.normal[rows_pair], 1.0 / (pair_i + pair_j), pair_i, pair_j, closing[rows_pair]]
-    )  # fmt: skip
+    pair_w = compliance[i[rows_pair]] + compliance[j[rows_pair]]
+    pair = np.column_stack([contacts.normal[rows_pair], 1.0 / pair_w, closing[rows_pair]])
 
     wall_body = np.stack([i[rows_wall], j[rows_wall] - n], axis=1)
     wall_w = compliance[wall_body[:, 0]]

@@ -1,7 +1,13 @@
-"""A listener that keeps what a frame's sweeps did: the residuals of all, the forces of some."""
+"""A listener that keeps what a frame's sweeps did: the residuals of many, the forces of some.
+
+To measure a sweep takes about as long as to do one. Residuals are therefore those of every MEASURED_EVERY-th
+sweep, of every sweep that keeps its forces and of the last one of a sub-step; exact ones all. Other rows hold NaN.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,13 +16,13 @@ from numpy.typing import NDArray
 from solver.contacts import Contacts
 from solver.frame_forces import SweepHistory
 from solver.grains import Array
-from solver.nlgs import Sweep, to_contact_order
+from solver.nlgs import Sweep
 from solver.problem import ContactProblem
-from solver.warm_start import ForceMemory
 
 Keep = Literal["log", "all", "none"]
 FIRST = 8  # sweeps kept one by one before the spacing becomes logarithmic
 LOG_SPACED = 40  # sweeps kept of a frame
+MEASURED_EVERY = 32  # sweeps
 
 
 def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
@@ -31,45 +37,68 @@ def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
     return np.unique(np.clip(np.concatenate([np.arange(FIRST), spaced, [total - 1]]), 0, total - 1))
 
 
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A sub-step, and the forces that were kept of its sweeps."""
+
+    problem: ContactProblem
+    contacts: Contacts
+    force: list[NDArray[np.float32]]  # (2, c) [N] each, f_n and f_t in visiting order
+
+    def place_of(self, contacts: Contacts) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Where other contacts (c,) stand in the visiting order, and which of them the sub-step knows at all."""
+        key = self.contacts.key[self.problem.rows]
+        order = np.argsort(key)
+        place = order[np.minimum(np.searchsorted(key, contacts.key, sorter=order), len(key) - 1)]
+        return place, key[place] == contacts.key
+
+
 class SweepRecorder:
     """Hears the sweeps of a frame's successive sub-steps."""
 
     def __init__(self, expected: int, keep: Keep) -> None:
         self._wanted = recorded_sweeps(expected, keep)
-        self._next = 0
+        self._recorded: list[int] = []
         self._count = 0
-        self._force_change: list[float] = []
-        self._natural_map: list[float] = []
-        self._unbalance: list[float] = []
-        self._kept: list[tuple[int, Contacts, Array]] = []
-        self._problem: ContactProblem | None = None
-        self._contacts: Contacts | None = None
+        self._residuals: list[Array] = [np.empty((0, 3))]
+        self._steps: list[_Step] = []
 
     def begin(self, problem: ContactProblem, contacts: Contacts) -> None:
         """From now on sweeps are those of this problem."""
-        self._problem, self._contacts = problem, contacts
+        self._steps.append(_Step(problem, contacts, []))
+
+    def strides(self) -> Iterator[int]:
+        """How many sweeps there are from now to the next one that keeps its forces, then to the one after it, …"""
+        count = self._count
+        for wanted in self._wanted[len(self._recorded) :].tolist():
+            yield wanted + 1 - count
+            count = wanted + 1
 
     def hear(self, sweep: Sweep) -> None:
-        assert self._problem is not None
-        assert self._contacts is not None
-        self._force_change.append(sweep.force_change)
-        self._natural_map.append(sweep.natural_map)
-        self._unbalance.append(sweep.unbalance)
-        if self._next < len(self._wanted) and self._count == self._wanted[self._next]:
-            self._kept.append((self._count, self._contacts, to_contact_order(self._problem, sweep.force)))
-            self._next += 1
-        self._count += 1
+        """Take the residuals up to this sweep, and its forces if they are to be kept."""
+        self._residuals.append(sweep.residuals)
+        self._count += len(sweep.residuals)
+        last, kept = self._count - 1, len(self._recorded)
+        if kept < len(self._wanted) and last == self._wanted[kept]:
+            self._steps[-1].force.append(np.ascontiguousarray(sweep.force.T, np.float32))
+            self._recorded.append(last)
 
     def history(self, contacts: Contacts) -> SweepHistory:
         """All that was heard, the forces on the frame's own contacts."""
-        force = np.zeros((len(self._kept), contacts.count, 2), np.float32)
-        for row, (_, of, kept) in enumerate(self._kept):
-            force[row] = kept if of is contacts else ForceMemory(of.key, kept).recall(contacts)
+        force_change, natural_map, unbalance = np.concatenate(self._residuals).T.copy()
+        force = np.zeros((2, len(self._recorded), contacts.count), np.float32)
+        row = 0
+        for step in [step for step in self._steps if step.force]:
+            place, known = step.place_of(contacts)
+            for kept in step.force:
+                for component in range(2):
+                    np.multiply(kept[component].take(place), known, out=force[component, row])
+                row += 1
         return SweepHistory(
-            np.array(self._force_change),
-            np.array(self._natural_map),
-            np.array(self._unbalance),
-            np.array([number for number, _, _ in self._kept], np.int64),
-            force[:, :, 0].copy(),
-            force[:, :, 1].copy(),
+            force_change,
+            natural_map,
+            unbalance,
+            np.array(self._recorded, np.int64),
+            force[0],
+            force[1],
         )

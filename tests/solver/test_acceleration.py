@@ -56,6 +56,17 @@ def test_a_listener_does_not_change_a_bit_of_an_accelerated_solve(heap):
         assert np.array_equal(silent.force, loud.force)
 
 
+def test_sweeps_between_those_heard_of_an_accelerated_solve_are_measured_alike(heap):
+    problem = assemble(*heap)
+    each = np.concatenate([sweep.residuals for sweep in sweeps(problem, settings(5), every=[1] * 5 * PERIOD)])
+    (few,) = (sweep.residuals for sweep in sweeps(problem, settings(5), every=[5 * PERIOD], between=8))
+    known = np.isfinite(few).all(axis=1)
+    assert known[7::8].all()
+    assert known[-1]
+    assert not known.all()
+    assert np.array_equal(few[known], each[known])
+
+
 def state_of(problem):
     force, body, plate = np.zeros((len(problem.rows), 2)), problem.body.copy(), problem.plate.copy()
     apply_forces(problem, body, plate, force)

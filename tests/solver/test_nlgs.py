@@ -28,16 +28,35 @@ def test_compiled_sweeps_equal_plain_ones(heap):
     assert found.ft == pytest.approx(expected[:, 1], abs=ROUNDING * scale)
 
 
-def test_a_listener_does_not_change_a_bit(heap):
+@pytest.mark.parametrize(("every", "between"), [(1, 0), (7, 0), (20, 4), ((1, 30, 11), 8)])
+def test_a_listener_does_not_change_a_bit(heap, every, between):
     problem = assemble(*heap)
     silent = solve(problem, NlgsSettings(sweeps=60))
     heard = []
-    for every in (1, 7, 20):
-        loud = solve(problem, NlgsSettings(sweeps=60), observer=heard.append, every=every)
-        if 60 % every == 0:
-            assert np.array_equal(silent.fn, loud.fn)
-            assert np.array_equal(silent.ft, loud.ft)
-    assert len(heard) >= 60
+    loud = solve(problem, NlgsSettings(sweeps=60), observer=heard.append, every=every, between=between)
+    assert np.array_equal(silent.fn, loud.fn)
+    assert np.array_equal(silent.ft, loud.ft)
+    assert silent.sweeps == loud.sweeps == heard[-1].number == sum(len(sweep.residuals) for sweep in heard) == 60
+
+
+def test_strides_say_which_sweeps_are_heard(heap):
+    problem = assemble(*heap)
+    assert [sweep.number for sweep in sweeps(problem, NlgsSettings(), every=(1, 30, 11))] == [1, 31, 42]
+    heard = []
+    solve(problem, NlgsSettings(sweeps=35), observer=lambda sweep: heard.append(sweep.number), every=(1, 30, 11))
+    assert heard == [1, 31, 35]
+
+
+def test_sweeps_between_those_heard_are_measured_where_asked_for(heap):
+    problem = assemble(*heap)
+    each = np.concatenate([sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[1] * 40)])
+    (few,) = (sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[39], between=8))
+    (last,) = (sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[39]))
+    measured = np.array([1, 2, 4, 8, 16, 24, 32, 39]) - 1
+    assert np.array_equal(np.flatnonzero(np.isfinite(few).all(axis=1)), measured)
+    assert np.array_equal(few[measured], each[measured])
+    assert np.array_equal(np.flatnonzero(np.isfinite(last).any(axis=1)), [38])
+    assert np.array_equal(last[38], each[38])
 
 
 def test_every_force_lies_in_the_coulomb_cone(heap):

@@ -1,0 +1,128 @@
+"""Records of eight grains at a time, in and out of rows: the one place that speaks to the compiler in its own tongue.
+
+A grain's record is four numbers that lie together: vx, vy, ω R, 1/Z. Vectors want them apart, one row per quantity.
+Number by number the moves between the two take longer than the mechanics; here every record is loaded and stored at
+once, and eight of them are transposed in registers. LLVM makes of it what the processor has: AVX-512, AVX2, NEON.
+
+The functions say in Python what they do; compiled code takes the vectors instead.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir  # of numba, whose only way to such vectors it is
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+RECORD = 4  # numbers
+WIDTH = 8  # grains
+
+_NUMBER, _INDEX, _LANE = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+_EVEN, _ODD = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
+_LOW, _HIGH = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
+
+
+def gather_records(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
+    """Copy the records of the grains ids[first : first + WIDTH] to rows[at + q * stride], q the quantity.
+
+    body (4 n,), ids int32, rows: flat arrays, contiguous.
+    """
+    for k in range(WIDTH):
+        for q in range(RECORD):
+            rows[at + q * stride + k] = body[RECORD * ids[first + k] + q]
+
+
+def scatter_records(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
+    """Copy rows[at + q * stride] to the records of the grains ids[first : first + WIDTH], no two of them the same."""
+    for k in range(WIDTH):
+        for q in range(RECORD):
+            body[RECORD * ids[first + k] + q] = rows[at + q * stride + k]
+
+
+@overload(gather_records, inline="always")
+def _compiled_gather(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
+    def gather(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
+        _gather(body, ids, first, rows, at, stride)  # pyright: ignore[reportCallIssue]
+
+    return gather
+
+
+@overload(scatter_records, inline="always")
+def _compiled_scatter(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
+    def scatter(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
+        _scatter(rows, at, stride, body, ids, first)  # pyright: ignore[reportCallIssue]
+
+    return scatter
+
+
+@intrinsic
+def _gather(typing, body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        body, ids, first, rows, at, stride = _pointers(context, builder, signature, values)
+        records = [_load(builder, place, RECORD) for place in _records(builder, body, ids, first)]
+        halves = range(RECORD)  # of a vector of eight: grains k and k + 4
+        pairs = [_shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in halves]
+        for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
+            _store(builder, row, place)
+        return context.get_dummy_value()
+
+    return types.void(body, ids, first, rows, at, stride), generate
+
+
+@intrinsic
+def _scatter(typing, rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        rows, at, stride, body, ids, first = _pointers(context, builder, signature, values)
+        pairs = _transposed(builder, [_load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)])
+        records = [_shuffle(builder, pair, pair, range(RECORD)) for pair in pairs]
+        records += [_shuffle(builder, pair, pair, range(RECORD, WIDTH)) for pair in pairs]
+        for record, place in zip(records, _records(builder, body, ids, first), strict=True):
+            _store(builder, record, place)
+        return context.get_dummy_value()
+
+    return types.void(rows, at, stride, body, ids, first), generate
+
+
+def _pointers(context, builder, signature, values):  # type: ignore[no-untyped-def]
+    """Arrays as pointers to their first number, all else as it is."""
+    return [
+        cgutils.create_struct_proxy(kind)(context, builder, value=value).data
+        if isinstance(kind, types.Array)
+        else value
+        for kind, value in zip(signature.args, values, strict=True)
+    ]
+
+
+def _records(builder, body, ids, first):  # type: ignore[no-untyped-def]
+    """Where the records of eight grains begin."""
+    for k in range(WIDTH):
+        grain = builder.load(builder.gep(ids, [builder.add(first, _INDEX(k))]))
+        yield builder.gep(body, [builder.mul(builder.zext(grain, _INDEX), _INDEX(RECORD))])
+
+
+def _rows(builder, rows, at, stride):  # type: ignore[no-untyped-def]
+    """Where the rows of the four quantities begin."""
+    for q in range(RECORD):
+        yield builder.gep(rows, [builder.add(at, builder.mul(stride, _INDEX(q)))])
+
+
+def _transposed(builder, rows):  # type: ignore[no-untyped-def]
+    """Transpose both halves, 4 × 4 each, of four vectors of eight."""
+    even = [_shuffle(builder, rows[k], rows[k + 1], _EVEN) for k in (0, 2)]
+    odd = [_shuffle(builder, rows[k], rows[k + 1], _ODD) for k in (0, 2)]
+    return [_shuffle(builder, pair[0], pair[1], half) for half in (_LOW, _HIGH) for pair in (even, odd)]
+
+
+def _shuffle(builder, a, b, lanes):  # type: ignore[no-untyped-def]
+    lanes = list(lanes)
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_LANE, len(lanes)), lanes))
+
+
+def _load(builder, place, count):  # type: ignore[no-untyped-def]
+    loaded = builder.load(builder.bitcast(place, ir.VectorType(_NUMBER, count).as_pointer()))
+    loaded.align = 8  # of a number: an array need not lie on the bounds of a vector
+    return loaded
+
+
+def _store(builder, vector, place):  # type: ignore[no-untyped-def]
+    builder.store(vector, builder.bitcast(place, vector.type.as_pointer())).align = 8
