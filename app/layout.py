@@ -16,6 +16,9 @@ FRAME_SCALARS = (
     "trust",
     "frames_since_reset",
 )
+# Likewise, but unknown to results that earlier versions wrote.
+LATER_FRAME_SCALARS = ("start_difference", "unseen_grains", "hidden_share")
+TRACK_OPTIONS = ("second_zncc", "reference_frame")  # attributes of Tracks that may be unknown: under tracks/
 GEOMETRY = ("i", "j", "gap", "normal", "point")  # attributes of Contacts
 CONTACT_COLUMNS = ("un", "ut", "state", "age", "source", "probability")
 FORCE_COLUMNS = ("fn", "ft", "nlgs_fn", "nlgs_ft", "fn_sd", "ft_sd")
@@ -23,10 +26,14 @@ HISTORY_COLUMNS = ("force_change", "natural_map", "unbalance")
 UNITS = {
     "calibration/offset": "m",
     "calibration/offset_sd": "m",
+    "calibration/lens": "m",
+    "calibration/lens_sd": "m",
     "calibration/radius": "m",
     "calibration/radius_sd": "m",
     "calibration/wall": "m",
     "calibration/wall_sd": "m",
+    "calibration/wall_tilt": "rad",
+    "calibration/wall_tilt_sd": "rad",
     "contacts/gap": "m",
     "contacts/point": "m",
     "contacts/un": "m/s",
@@ -62,4 +69,5 @@ UNITS = {
     "walls/endpoints": "m",
     "walls/force": "N",
     "walls/pressure": "Pa",
+    "walls/sigma": "m",
 }

@@ -25,8 +25,10 @@ from app.layout import (
     FRAME_SCALARS,
     GEOMETRY,
     HISTORY_COLUMNS,
+    LATER_FRAME_SCALARS,
     SCHEMA,
     SCHEMA_VERSION,
+    TRACK_OPTIONS,
     UNITS,
 )
 from app.results import Results
@@ -41,6 +43,7 @@ from solver.grains import Grains
 from solver.radius_tuning import RadiusTuning
 
 T = TypeVar("T")
+DEVIATIONS = ("forces/fn_sd", "forces/ft_sd")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +81,9 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         store.create_dataset("grains/mass", data=results.grains.mass)
         _write_frames(store, results)
         _write_contacts(store, results.frames)
+        for name in DEVIATIONS:
+            store[name].attrs["source"] = _source_of_deviation(results.ensemble_size)
+            store[name].attrs["ensemble_size"] = results.ensemble_size
         _write_sweeps(store, results.frames)
         _write_members(store, results.frames)
         for each in fields(FrameStatistics):
@@ -113,6 +119,7 @@ def load_results(file: Path) -> Results:
             calibration=_read_part(store, "calibration", Calibration),
             friction_check=_read_part(store, "friction_check", FrictionCheck),
             radius_tuning=_read_part(store, "radius_tuning", RadiusTuning),
+            ensemble_size=int(cast(int, store[DEVIATIONS[0]].attrs.get("ensemble_size", 0))),
         )
 
 
@@ -168,12 +175,17 @@ def _write_tracks(store: h5py.File, tracks: Tracks, walls: WallTracks | None) ->
     _enumerated(store, "tracks/status", tracks.status, TrackStatus)
     if tracks.centre_sigma is not None:
         store.create_dataset("tracks/centre_sigma", data=tracks.centre_sigma)
+    for key in TRACK_OPTIONS:
+        if getattr(tracks, key) is not None:
+            _compressed(store, f"tracks/{key}", getattr(tracks, key))
     if walls is not None:
         store.create_dataset("walls/name", data=np.array(walls.name, dtype=object), dtype=h5py.string_dtype())
         store.create_dataset("walls/endpoints", data=walls.endpoints)
         store.create_dataset("walls/pressure", data=walls.pressure)
         if walls.force is not None:
             store.create_dataset("walls/force", data=walls.force)
+        if walls.sigma is not None:
+            store.create_dataset("walls/sigma", data=walls.sigma)
 
 
 def _read_tracks(store: h5py.File) -> tuple[Tracks, WallTracks | None]:
@@ -183,12 +195,13 @@ def _read_tracks(store: h5py.File) -> tuple[Tracks, WallTracks | None]:
         time=_read(store, "frames/time"),
         **{key: _read(store, f"tracks/{key}") for key in ("position", "rotation", "sigma", "zncc", "status")},
         centre_sigma=_read(store, "tracks/centre_sigma") if "tracks/centre_sigma" in store else None,
+        **{key: _read(store, f"tracks/{key}") for key in TRACK_OPTIONS if f"tracks/{key}" in store},
     )
     if "walls" not in store:
         return tracks, None
     names = tuple(name.decode() for name in _read(store, "walls/name"))
-    force = _read(store, "walls/force") if "walls/force" in store else None
-    return tracks, WallTracks(names, _read(store, "walls/endpoints"), _read(store, "walls/pressure"), force)
+    force, sigma = (_read(store, f"walls/{key}") if f"walls/{key}" in store else None for key in ("force", "sigma"))
+    return tracks, WallTracks(names, _read(store, "walls/endpoints"), _read(store, "walls/pressure"), force, sigma)
 
 
 def _write_frames(store: h5py.File, results: Results) -> None:
@@ -196,7 +209,7 @@ def _write_frames(store: h5py.File, results: Results) -> None:
     _enumerated(store, "frames/status", np.array([f.status for f in frames], np.uint8), FrameStatus)
     reasons = np.array([f.reason for f in frames], dtype=object)
     store.create_dataset("frames/reason", data=reasons, dtype=h5py.string_dtype())
-    for key in FRAME_SCALARS:
+    for key in (*FRAME_SCALARS, *LATER_FRAME_SCALARS):
         store.create_dataset(f"frames/{key}", data=np.array([getattr(f, key) for f in frames]))
 
 
@@ -216,6 +229,12 @@ def _write_contacts(store: h5py.File, frames: Any) -> None:
         _compressed(store, f"forces/{key}", np.concatenate([getattr(f, key) for f in frames]))
 
 
+def _source_of_deviation(ensemble_size: int) -> str:
+    if ensemble_size:
+        return f"spread of {ensemble_size} sequences solved again with resampled noise and varied settings"
+    return "formula fitted on simulated truth"
+
+
 def _write_members(store: h5py.File, frames: Any) -> None:
     if any(f.member_force is None for f in frames):
         return
@@ -225,15 +244,26 @@ def _write_members(store: h5py.File, frames: Any) -> None:
 
 def _write_sweeps(store: h5py.File, frames: Any) -> None:
     histories = [f.history for f in frames]
-    store.create_dataset("sweeps/offset", data=np.concatenate([[0], np.cumsum([h.count for h in histories])]))
+    # Rows of the sweeps that were measured; `number` says which sweeps of their frame they are.
+    measured = [_measured(h) for h in histories]
+    store.create_dataset("sweeps/count", data=np.array([h.count for h in histories], np.int64))
+    store.create_dataset("sweeps/offset", data=np.concatenate([[0], np.cumsum([len(m) for m in measured])]))
+    _compressed(store, "sweeps/number", np.concatenate(measured))
     for key in HISTORY_COLUMNS:
-        _compressed(store, f"sweeps/{key}", np.concatenate([getattr(h, key) for h in histories]))
+        rows = [getattr(h, key)[m] for h, m in zip(histories, measured, strict=True)]
+        _compressed(store, f"sweeps/{key}", np.concatenate(rows))
     # Sweeps whose forces were kept: their numbers, and rows of forces laid end to end over all frames.
     kept = np.concatenate([[0], np.cumsum([len(h.recorded) for h in histories])])
     store.create_dataset("sweeps/recorded_offset", data=kept)
     _compressed(store, "sweeps/recorded", np.concatenate([h.recorded for h in histories]))
     for key in ("fn", "ft"):
         _compressed(store, f"sweeps/{key}", np.concatenate([getattr(h, key).ravel() for h in histories]))
+
+
+def _measured(history: SweepHistory) -> np.ndarray:
+    """Sweeps of a frame, from 0, whose residuals were measured."""
+    rows = np.stack([getattr(history, key) for key in HISTORY_COLUMNS])
+    return np.flatnonzero(~np.isnan(rows).all(axis=0))
 
 
 def _write_part(store: h5py.File, group: str, part: Any) -> None:
@@ -261,9 +291,11 @@ def _read_part(store: h5py.File, group: str, kind: type[T]) -> T | None:
 def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[FrameForces]:
     columns = {key: _read(store, f"contacts/{key}") for key in (*GEOMETRY, *CONTACT_COLUMNS)}
     columns |= {key: _read(store, f"forces/{key}") for key in FORCE_COLUMNS}
-    scalars = {key: _read(store, f"frames/{key}") for key in FRAME_SCALARS}
+    later = [key for key in LATER_FRAME_SCALARS if f"frames/{key}" in store]
+    scalars = {key: _read(store, f"frames/{key}") for key in (*FRAME_SCALARS, *later)}
     status, reason = _read(store, "frames/status"), _read(store, "frames/reason")
-    history = {key: _read(store, f"sweeps/{key}") for key in (*HISTORY_COLUMNS, "recorded", "fn", "ft")}
+    history = {key: _read(store, f"sweeps/{key}") for key in ("number", *HISTORY_COLUMNS, "recorded", "fn", "ft")}
+    sweep_count = _read(store, "sweeps/count")
     offset, sweep_offset = _read(store, "contacts/offset"), _read(store, "sweeps/offset")
     kept_offset = _read(store, "sweeps/recorded_offset")
     members = _read(store, "members/force") if "members/force" in store else None
@@ -284,7 +316,10 @@ def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[Fr
                 reason=reason[k].decode(),
                 **{key: _plain(values[k]) for key, values in scalars.items()},
                 history=SweepHistory(
-                    **{key: history[key][sweeps] for key in HISTORY_COLUMNS},
+                    **{
+                        key: _on_every_sweep(sweep_count[k], history["number"][sweeps], history[key][sweeps])
+                        for key in HISTORY_COLUMNS
+                    },
                     recorded=recorded,
                     fn=history["fn"][block].reshape(len(recorded), count),
                     ft=history["ft"][block].reshape(len(recorded), count),
@@ -293,6 +328,13 @@ def _read_frames(store: h5py.File, grain_count: int, wall_count: int) -> list[Fr
             )
         )
     return frames
+
+
+def _on_every_sweep(count: int, number: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The values of some sweeps on a row for every sweep (count,), NaN where nothing was measured."""
+    every = np.full(count, np.nan)
+    every[number] = values
+    return every
 
 
 def _read(store: h5py.File, path: str) -> Any:

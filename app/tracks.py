@@ -40,6 +40,8 @@ class Tracks:
     zncc: Array  # (f, n) correlation with the reference patch, NaN where unknown
     status: NDArray[np.uint8]  # (f, n) TrackStatus
     centre_sigma: Array | None = None  # (n,) [m], of the error of a centre that is fixed in its grain; None: none
+    second_zncc: Array | None = None  # (f, n) of the best other place, NaN where nothing was searched; None: unknown
+    reference_frame: NDArray[np.int32] | None = None  # (f, n) photograph it is compared with; None: unknown
 
     def __post_init__(self) -> None:
         f, n = len(self.time), len(self.id)
@@ -48,6 +50,10 @@ class Tracks:
         for name in ("rotation", "sigma", "zncc", "status"):
             if getattr(self, name).shape != (f, n):
                 raise ValueError(f"{name} must be ({f}, {n}), not {getattr(self, name).shape}")
+        for name in ("second_zncc", "reference_frame"):
+            value = getattr(self, name)
+            if value is not None and value.shape != (f, n):
+                raise ValueError(f"{name} must be ({f}, {n}), not {value.shape}")
         if self.radius.shape != (n,):
             raise ValueError(f"radius must be ({n},), not {self.radius.shape}")
 
@@ -67,16 +73,25 @@ class Tracks:
         return np.sqrt(variance / np.maximum(self.present.sum(axis=1), 1) + fixed)
 
     @property
+    def renewal_count(self) -> int:
+        """How many grains are compared with a later photograph than the first by the last frame, being damaged."""
+        if self.reference_frame is None:
+            return 0
+        return int((self.reference_frame > 0).any(axis=0).sum())
+
+    @property
     def present(self) -> NDArray[np.bool_]:
         """Which grains have a pose (f, n)."""
         return np.isfinite(self.rotation) & np.isfinite(self.position).all(axis=2)
 
-    def frames(self, start: int, stop: int) -> Tracks:
-        """The frames start … stop − 1 alone."""
-        part = slice(start, stop)
+    def frames(self, start: int, stop: int, step: int = 1) -> Tracks:
+        """Every step-th of the frames start … stop − 1 alone."""
+        part = slice(start, stop, step)
         return Tracks(
             self.id, self.radius, self.time[part], self.position[part], self.rotation[part],
             self.sigma[part], self.zncc[part], self.status[part], self.centre_sigma,
+            None if self.second_zncc is None else self.second_zncc[part],
+            None if self.reference_frame is None else self.reference_frame[part],
         )  # fmt: skip
 
 
@@ -88,12 +103,17 @@ class WallTracks:
     endpoints: Array  # (f, w, 2, 2) [m]; the packing lies to the left of endpoint 0 → 1
     pressure: Array  # (w,) [Pa], NaN where the measured motion is imposed
     force: Array | None = None  # (f, w, 2) [N] recorded by sensors, of the packing on the wall; NaN: not recorded
+    # (f, w) [m] standard deviation of a followed wall's endpoint along its normal, against frame 0, rms over its two
+    # endpoints; NaN in frames where a table gives the wall, None where tables give all
+    sigma: Array | None = None
 
     @property
     def count(self) -> int:
         return len(self.name)
 
-    def frames(self, start: int, stop: int) -> WallTracks:
-        """The frames start … stop − 1 alone."""
-        force = None if self.force is None else self.force[start:stop]
-        return WallTracks(self.name, self.endpoints[start:stop], self.pressure, force)
+    def frames(self, start: int, stop: int, step: int = 1) -> WallTracks:
+        """Every step-th of the frames start … stop − 1 alone."""
+        part = slice(start, stop, step)
+        force = None if self.force is None else self.force[part]
+        sigma = None if self.sigma is None else self.sigma[part]
+        return WallTracks(self.name, self.endpoints[part], self.pressure, force, sigma)

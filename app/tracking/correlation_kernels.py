@@ -14,6 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from app.tracking.interpolation import interpolate, interpolate_finely
+
 CONVERGED = 0
 LEFT_IMAGE = 1
 WANDERED = 2
@@ -23,56 +25,28 @@ UNFINISHED = 3
 ZNCC, RESIDUAL, GAIN, OFFSET, KEPT, CODE = range(6)
 FIT_COLUMNS = 6
 
-HALF = np.float32(0.5)
-ONE = np.float32(1.0)
-SIXTH = np.float32(1.0 / 6.0)
-TWO_THIRDS = np.float32(2.0 / 3.0)
-
 # Tukey's biweight keeps 95 % of the efficiency on Gaussian noise with this width.
 TUKEY_WIDTH = 4.685
 # Steps for which the robust fit keeps the light it was given.
 HELD_STEPS = 3
-# Median of the absolute value of a standard normal variable.
-NORMAL_MEDIAN = 0.6745
-
-
-@njit(cache=True, nogil=True, inline="always")
-def interpolate(coefficients, ix, iy, tx, ty):
-    """Value at (ix + tx, iy + ty), 0 ≤ t < 1."""
-    sx = ONE - tx
-    ax = sx * sx * sx * SIXTH
-    dx = tx * tx * tx * SIXTH
-    bx = TWO_THIRDS - tx * tx * (ONE - HALF * tx)
-    cx = ONE - ax - bx - dx
-    sy = ONE - ty
-    ay = sy * sy * sy * SIXTH
-    dy = ty * ty * ty * SIXTH
-    by = TWO_THIRDS - ty * ty * (ONE - HALF * ty)
-    cy = ONE - ay - by - dy
-    c = coefficients
-    r0 = ax * c[iy - 1, ix - 1] + bx * c[iy - 1, ix] + cx * c[iy - 1, ix + 1] + dx * c[iy - 1, ix + 2]
-    r1 = ax * c[iy, ix - 1] + bx * c[iy, ix] + cx * c[iy, ix + 1] + dx * c[iy, ix + 2]
-    r2 = ax * c[iy + 1, ix - 1] + bx * c[iy + 1, ix] + cx * c[iy + 1, ix + 1] + dx * c[iy + 1, ix + 2]
-    r3 = ax * c[iy + 2, ix - 1] + bx * c[iy + 2, ix] + cx * c[iy + 2, ix + 1] + dx * c[iy + 2, ix + 2]
-    return ay * r0 + by * r1 + cy * r2 + dy * r3
-
-
-@njit(cache=True, nogil=True)
-def sample(coefficients, x, y, out):
-    """Interpolate at points x, y (p,); outside the image the value is NaN."""
-    height, width = coefficients.shape
-    for p in range(len(x)):
-        if not (x[p] >= 1.0 and y[p] >= 1.0 and x[p] < width - 2 and y[p] < height - 2):
-            out[p] = np.nan
-            continue
-        ix, iy = int(x[p]), int(y[p])
-        out[p] = interpolate(coefficients, ix, iy, np.float32(x[p] - ix), np.float32(y[p] - iy))
+# A step [px] below which the patch is interpolated with all six taps; before that four of them show the way.
+FINE_STEP = 0.1
+# Steps after which a fit must be promising. A step is a pixel and a half at most, and a fit's basin two or three.
+PATIENCE = 5
+# Steps after which most of a patch must fit robustly, and the share of its contrast by which it may then be off: a ZNCC
+# of .8 is the least that is ever accepted, and corresponds to .6.
+ROBUST_PATIENCE = 8
+HOPELESS_MISFIT = 0.6
+# The scale is read from the calmer pixels alone, so that half a patch may be something else: this share of them, and
+# the quantile of that share of the absolute value of a standard normal variable.
+CALM = 0.35
+NORMAL_CALM = 0.4538
 
 
 @njit(cache=True, nogil=True)
 def inside(height, width, x, y, reach):
-    """Whether a disc about (x, y) and the spline's support lie within the image."""
-    return x - reach >= 2.0 and y - reach >= 2.0 and x + reach <= width - 3.0 and y + reach <= height - 3.0
+    """Whether a disc about (x, y) and the quintic spline's support lie within the image."""
+    return x - reach >= 3.0 and y - reach >= 3.0 and x + reach <= width - 4.0 and y + reach <= height - 4.0
 
 
 @njit(cache=True, nogil=True)
@@ -152,9 +126,12 @@ def fill_patch(image, coefficients, cx, cy, reach, data, hessian_inverse, facts)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fit_rigid(coefficients, data, hessian_inverse, reach, leash, tolerance, limit, pose, fit):
+def fit_rigid(coefficients, data, hessian_inverse, reach, leash, hopeless, tolerance, limit, pose, fit):
     """Move `pose` (x, y, θ) until the patch fits; give up beyond `leash` [px] from where it began.
 
+    A fit whose ZNCC is below `hopeless` after some steps is given up, too: at a wrong place it would run to the limit.
+    coefficients: of the quintic spline. Read with the cubic one's four taps they show a crisper photograph at the same
+    place, which is enough for every step but the last.
     fit: ZNCC, residual variance per pixel [grey²], gain, offset [grey] (image = gain · f + offset, f of
     unit norm), share of the pixels kept, code.
     """
@@ -164,6 +141,7 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, tolerance, limi
     margin = int(reach) + 2
     fit[CODE] = UNFINISHED
     fit[KEPT] = 1.0
+    fine = limit == 0
     for step in range(limit + 1):
         if not inside(height, width, pose[0], pose[1], reach):
             fit[CODE] = LEFT_IMAGE
@@ -179,7 +157,10 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, tolerance, limi
             x = ox + cos * dx - sin * dy
             y = oy + sin * dx + cos * dy
             ix, iy = int(x), int(y)
-            g = interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
+            if fine:
+                g = interpolate_finely(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
+            else:
+                g = interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
             s0 += g
             s1 += np.float64(g) * g
             sf += np.float64(g) * data[p, 2]
@@ -191,10 +172,10 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, tolerance, limi
         fit[RESIDUAL] = max(power - sf * sf, 0.0) / max(count - 5, 1)
         fit[GAIN] = sf
         fit[OFFSET] = s0 / count + level
-        if not sf > 0.0:
+        if not sf > 0.0 or (step == PATIENCE and fit[ZNCC] < hopeless):
             fit[CODE] = WANDERED
             return
-        if fit[CODE] == CONVERGED or step == limit:
+        if step == limit:
             return
         h = hessian_inverse
         tx = (h[0, 0] * sx + h[0, 1] * sy + h[0, 2] * sr) / sf
@@ -204,7 +185,10 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, tolerance, limi
         if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > leash * leash:
             fit[CODE] = WANDERED
             return
-        if abs(tx) + abs(ty) + reach * abs(tr) < tolerance:
+        length = abs(tx) + abs(ty) + reach * abs(tr)
+        if not fine:
+            fine = length < FINE_STEP or step == limit - 1
+        elif length < tolerance:
             # Gauss-Newton's error after this step is far below the step: what was summed before it stands,
             # its ZNCC differing by less than the square of the tolerance.
             fit[CODE] = CONVERGED
@@ -246,7 +230,7 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
     held = HELD_STEPS
     second = False
     fit[CODE] = UNFINISHED
-    for _ in range(limit):
+    for step in range(limit):
         if not inside(height, width, pose[0], pose[1], reach):
             fit[CODE] = LEFT_IMAGE
             fit[ZNCC] = 0.0
@@ -258,9 +242,13 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             x = ox + cos * data[p, 0] - sin * data[p, 1]
             y = oy + sin * data[p, 0] + cos * data[p, 1]
             ix, iy = int(x), int(y)
-            g[p] = interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
+            g[p] = interpolate_finely(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
             misfit[p] = abs(g[p] - a * data[p, 2] - b)
-        scale = max(np.median(misfit) / NORMAL_MEDIAN, noise)
+        scale = max(np.quantile(misfit, CALM) / NORMAL_CALM, noise)
+        if step == ROBUST_PATIENCE and scale > HOPELESS_MISFIT * a / np.sqrt(count):
+            fit[CODE] = WANDERED
+            fit[ZNCC] = 0.0
+            return
         normal = np.zeros((5, 5))
         right = np.zeros(5)
         row = np.zeros(5)

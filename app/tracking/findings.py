@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from app.tracking.correlation import Fits, Patches, Rows
+from app.tracking.correlation import Fits, Rows
 from app.tracking.neighbours import local_motion, nearby_median
+from app.tracking.patches import Patches
 from app.tracks import TrackStatus
 from solver.grains import Array
 
@@ -22,12 +23,15 @@ class Findings:
     def __init__(self, patches: Patches, accepted_zncc: Array, settings: TrackingSettings) -> None:
         n = len(patches.centre)
         self.settings = settings
+        self._contrast = patches.norm / np.sqrt(np.maximum(patches.pixel_count, 1))  # (n,) [grey]
+        self._common, self._floor = np.inf, 0.0  # [grey²] residual typical of the frame, and the least that noise has
         self.accepted_zncc = accepted_zncc  # (n,)
         self.usable = patches.usable.copy()  # (n,) false too for what a user has settled
         self.pose = np.full((n, 3), np.nan)  # x, y [px], rotation [rad]
         self.expected = np.full((n, 3), np.nan)  # where the neighbours' motion leads
         self.sigma = np.full(n, np.nan)  # [px]
         self.zncc = np.full(n, -1.0)
+        self.second_zncc = np.full(n, np.nan)  # of the best other place, where a search was done
         self.residual = np.full(n, np.nan)  # [grey²]
         self.gain = np.full(n, np.nan)  # [grey]
         self.offset = np.full(n, np.nan)  # [grey]
@@ -48,6 +52,7 @@ class Findings:
         """Keep those fits that converged, whose ZNCC no accident reaches, and that are better than before."""
         good = fits.converged & (fits.zncc > self.accepted_zncc[rows]) & (fits.zncc > self.zncc[rows])
         self._keep(rows, fits, good)
+        self.poor[rows[good]] = fits.residual[good] > self.settings.robust_excess * self._explained(rows[good])
         self.status[rows[good]] = status
 
     def take_robust(self, patches: Patches, rows: Rows, fits: Fits, noise: float) -> None:
@@ -79,7 +84,7 @@ class Findings:
         shift = nearby_median(where, self.offset[clean] - ratio * patches.mean[clean], pose[:, :2])
         return contrast * patches.norm[rows], contrast * patches.mean[rows] + shift
 
-    def judge_residuals(self, patches: Patches, noise: float) -> float:
+    def judge_residuals(self, noise: float) -> float:
         """Mark the grains that fit worse than noise explains; returns a clean residual's deviation [grey].
 
         What is typical of the frame counts as explained (the light changes, paint shines), but no more than
@@ -90,11 +95,14 @@ class Findings:
         self.poor[:] = False
         if len(accepted) == 0:
             return float(np.sqrt(floor))
-        contrast = patches.norm / np.sqrt(np.maximum(patches.pixel_count, 1))
-        common = float(np.median(self.residual[accepted]))
-        explained = np.maximum(np.minimum(common, (0.15 * contrast[accepted]) ** 2), floor)
+        self._common, self._floor = float(np.median(self.residual[accepted])), floor
+        explained = self._explained(accepted)
         self.poor[accepted] = self.residual[accepted] > self.settings.robust_excess * explained
         return float(np.sqrt(np.median(explained)))
+
+    def _explained(self, rows: Rows) -> Array:
+        """The residual variance (m,) [grey²] that noise and the light account for."""
+        return np.maximum(np.minimum(self._common, (0.15 * self._contrast[rows]) ** 2), self._floor)
 
     def doubt(self, rows: Rows) -> None:
         self.status[rows[self.status[rows] != TrackStatus.GIVEN]] = TrackStatus.SUSPECT

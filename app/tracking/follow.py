@@ -14,8 +14,10 @@ from app.errors import InputError
 from app.frames import Photographs
 from app.progress import Progress, silent
 from app.tracking.corrections import Corrections
+from app.tracking.correlation import Rows
 from app.tracking.detection import Detection
-from app.tracking.tracker import FramePoses, Tracker, TrackingSettings
+from app.tracking.poses import FramePoses
+from app.tracking.tracker import Tracker, TrackingSettings
 from app.tracking.walls import WallPoses, WallTracker
 from app.tracks import Tracks, WallTracks
 from app.units import Scale
@@ -61,9 +63,16 @@ def follow_photographs(
     poses: list[FramePoses] = [
         checkpoint.load(k, FramePoses)[0] for k in range(min(checkpoint.finished(), frame_count))
     ]
+    for k in range(1, len(poses)):
+        _renew(tracker, photographs, poses[:k], np.flatnonzero(poses[k].reference != poses[k - 1].reference))
     for k in range(len(poses), frame_count):
         progress("tracking", k, frame_count)
-        pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:], told.get(k))
+        if k == 0:
+            pose = tracker.first()
+        else:
+            recent = poses[-HISTORY:]
+            _renew(tracker, photographs, poses, tracker.find_damaged(recent, k - len(recent), photographs.__getitem__))
+            pose = tracker.follow(photographs[k], recent, told.get(k))
         checkpoint.save(k, pose)
         poses.append(pose)
     progress("tracking", frame_count, frame_count)
@@ -78,8 +87,16 @@ def follow_photographs(
         sigma=np.stack([p.sigma for p in poses]) * scale.size_at(pixels),
         zncc=np.stack([p.zncc for p in poses]),
         status=np.stack([p.status for p in poses]),
+        second_zncc=np.stack([p.second_zncc for p in poses]),
+        reference_frame=np.stack([p.reference for p in poses]),
         centre_sigma=np.where(np.isfinite(detection.sigma), detection.sigma, UNSEEN_SIGMA) * scale.size_at(centre),
     )
+
+
+def _renew(tracker: Tracker, photographs: Photographs, poses: list[FramePoses], rows: Rows) -> None:
+    """Take the references of `rows` (m,) anew from the last frame of poses."""
+    if len(rows):
+        tracker.renew(rows, len(poses) - 1, photographs[len(poses) - 1], poses[-1])
 
 
 def follow_walls(

@@ -88,7 +88,22 @@ def _summary(tracked: Tracked) -> str:
         f"<p>{tracks.grain_count} grains in {tracks.frame_count} photographs; median ZNCC "
         f"{_percentile(tracks.zncc, 50.0):.4f}, median σ of a displacement {1e6 * sigma:.2f} µm "
         f"({sigma / tracked.scale.mean_size:.4f} px).</p><table><tr><th>status</th><th>poses</th><th></th></tr>{rows}"
-        "</table>"
+        f"</table>{_renewed(tracks)}"
+    )
+
+
+def _renewed(tracks: Tracks) -> str:
+    """Which grains are compared with a later photograph than the first."""
+    if tracks.reference_frame is None or tracks.renewal_count == 0:
+        return ""
+    names = ", ".join(
+        f"{tracks.id[row]} (from photograph {' and '.join(str(k) for k in np.unique(column) if k > 0)})"
+        for row, column in enumerate(tracks.reference_frame.T)
+        if (column > 0).any()
+    )
+    return (
+        f"<p>{tracks.renewal_count} grains were damaged and got a new reference, whose own error counts in their σ: "
+        f"{names}.</p>"
     )
 
 
@@ -180,12 +195,22 @@ def _worst(tracked: Tracked, reference: Image) -> str:
         parts.append(
             f'<figure><img src="{as_data(side_by_side(seen))}" alt="grain {tracks.id[row]}"><figcaption>grain '
             f"{tracks.id[row]}, photograph {number}: ZNCC {tracks.zncc[frame, row]:.4f}, σ "
-            f"{1e6 * tracks.sigma[frame, row]:.2f} µm, {status}</figcaption></figure>"
+            f"{1e6 * tracks.sigma[frame, row]:.2f} µm, {status}{_told(tracks, frame, row)}</figcaption></figure>"
         )
     return (
         "<h2>The worst grains</h2><p>Each at its least ZNCC: on the first photograph, on that one (turned back), "
         f'and the residual.</p><div class="grains">{"".join(parts)}</div>'
     )
+
+
+def _told(tracks: Tracks, frame: int, row: int) -> str:
+    """What is known beyond ZNCC, σ and status."""
+    told = ""
+    if tracks.second_zncc is not None and np.isfinite(tracks.second_zncc[frame, row]):
+        told += f", second best ZNCC {tracks.second_zncc[frame, row]:.4f}"
+    if tracks.reference_frame is not None and tracks.reference_frame[frame, row] > 0:
+        told += f", compared with photograph {tracks.reference_frame[frame, row]}"
+    return told
 
 
 def _to_be_looked_at(tracked: Tracked) -> str:

@@ -1,8 +1,8 @@
 """Exhaustive search for a patch over position and angle, on one level of the pyramid.
 
 Every whole-pixel position of a window and every angle of a range is tried with the zero-normalised
-cross-correlation. The best few positions that are not neighbours of one another are handed on: on a
-coarse level the highest peak need not be the true one.
+cross-correlation. The best few maxima that are distinct from one another, in position or in angle, are
+handed on: on a coarse level the highest peak need not be the true one.
 """
 
 from __future__ import annotations
@@ -10,7 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.tracking.correlation_kernels import interpolate
+from app.tracking.interpolation import interpolate
+
+# Two maxima at one place are distinct when their angles differ by more than this [rad]. A maximum is a speckle's size
+# wide, which is much less at the rim of any patch that can be told from another.
+DISTINCT_TURN = 0.5
+
+# For each position the best angle is kept of every part of the range that is no wider than this [rad].
+SECTOR = 0.5 * np.pi
+
+# Positions that are correlated together: the pixels under all of them stay in a core's second cache.
+BLOCK = 256
 
 
 @njit(cache=True, nogil=True)
@@ -20,15 +30,13 @@ def angle_steps(reach, sweep):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def search_patch(
-    reference, image, origin_x, origin_y, reach, x, y, angle, window, sweep, spacing, best, scratch, energy, steepest
-):
+def search_patch(reference, image, origin_x, origin_y, reach, x, y, angle, window, sweep, spacing, best):
     """Find the most similar places of `image` to the disc of `reference` about (origin_x, origin_y).
 
     reference: spline coefficients (h, w) of the level of the reference photograph; image (h, w): the same
     level of this one; x, y, angle: middle of what is searched; window [px] and sweep [rad]: half widths;
-    spacing [px]: how far apart two places must be; best (k, 4): x, y, angle, ZNCC, best first, −1 where
-    there are fewer. scratch, energy, steepest: (2 · window + 3)² buffers. All pixels are of this level.
+    spacing [px]: how far apart two places of one angle must be; best (k, 4): x, y, angle, ZNCC, best first,
+    −1 where there are fewer. All pixels are of this level.
     """
     height, width = image.shape
     side = int(reach)
@@ -40,76 +48,108 @@ def search_patch(
     nx, ny = x_to - x_from + 1, y_to - y_from + 1
     if nx < 1 or ny < 1:
         return
-    limit = reach * reach
-    count = 0
-    for dy in range(-side, side + 1):
-        for dx in range(-side, side + 1):
-            if dx * dx + dy * dy <= limit:
-                count += 1
-    offset_x = np.empty(count, np.int32)
-    offset_y = np.empty(count, np.int32)
-    template = np.empty(count, np.float32)
-    p = 0
-    for dy in range(-side, side + 1):
-        for dx in range(-side, side + 1):
-            if dx * dx + dy * dy <= limit:
-                offset_x[p], offset_y[p] = dx, dy
-                p += 1
-
-    _window_energy(image, offset_x, offset_y, x_from, y_from, nx, ny, scratch, energy)
-    peak = scratch  # reused: the best ZNCC of every position over the angles
-    peak[:ny, :nx] = -1.0
+    offset_x, offset_y, _ = disc(reach)
+    count = len(offset_x)
     steps = angle_steps(reach, sweep)
-    full_turn = sweep >= np.pi - 1e-6
-    trials = 2 * steps if full_turn else 2 * steps + 1
-    rows = np.empty((ny, nx), np.float32)
+    trials = 2 * steps if sweep >= np.pi - 1e-6 else 2 * steps + 1
+    sectors = max(int(np.ceil(2.0 * sweep / SECTOR - 1e-6)), 1)
+    turn = np.empty(trials)
+    template = np.empty((trials, count), np.float32)
     for trial in range(trials):
-        turn = angle + sweep * (trial - steps) / steps
-        if not _turn_template(reference, origin_x, origin_y, turn, offset_x, offset_y, template):
-            continue
-        rows[:, :] = 0.0
-        for q in range(count):
-            t = template[q]
-            first = x_from + offset_x[q]
-            for k in range(ny):
-                # Slices of equal length, indexed from zero: the compiler then adds whole vectors.
-                source = image[y_from + k + offset_y[q], first : first + nx]
-                row = rows[k]
+        turn[trial] = angle + sweep * (trial - steps) / steps
+        turn_template(reference, origin_x, origin_y, turn[trial], offset_x, offset_y, template[trial])
+
+    peak = np.full((sectors, ny, nx), np.float32(-1.0))
+    steepest = np.zeros((sectors, ny, nx), np.int16)
+    rows_at_once = max(BLOCK // nx, 1)
+    under = np.empty((count, rows_at_once * nx), np.float32)
+    energy = np.empty(rows_at_once * nx, np.float32)
+    total = np.empty(rows_at_once * nx, np.float32)
+    for first in range(0, ny, rows_at_once):
+        ahead = min(rows_at_once, ny - first)
+        lay_out(image, offset_x, offset_y, x_from, y_from + first, nx, ahead, under, total, energy)
+        for trial in range(trials):
+            correlate(template[trial], under, ahead * nx, total)
+            sector = trial * sectors // trials
+            for k in range(ahead):
                 for m in range(nx):
-                    row[m] += t * source[m]
-        for k in range(ny):
-            for m in range(nx):
-                value = rows[k, m] * energy[k, m]
-                if value > peak[k, m]:
-                    peak[k, m] = value
-                    steepest[k, m] = turn
-    _collect(peak, steepest, x_from, y_from, nx, ny, spacing, best)
+                    value = total[k * nx + m] * energy[k * nx + m]
+                    if value > peak[sector, first + k, m]:
+                        peak[sector, first + k, m] = value
+                        steepest[sector, first + k, m] = trial
+    collect(peak, steepest, turn, x_from, y_from, spacing, best)
+
+
+@njit(cache=True, nogil=True)
+def disc(reach):
+    """Whole pixels (q,) of a disc, dx and dy, quarter after quarter, and where each quarter begins (5,)."""
+    side = int(reach)
+    limit = reach * reach
+    offset_x = np.empty((2 * side + 1) ** 2, np.int32)
+    offset_y = np.empty((2 * side + 1) ** 2, np.int32)
+    start = np.zeros(5, np.int64)
+    q = 0
+    for quarter in range(4):
+        for dy in range(-side, side + 1):
+            for dx in range(-side, side + 1):
+                # Turned a quarter further each time: (+, +), (−, +), (−, −), (+, −).
+                here = (0 if dx >= 0 else 1) if dy >= 0 else (2 if dx < 0 else 3)
+                if here == quarter and dx * dx + dy * dy <= limit:
+                    offset_x[q], offset_y[q] = dx, dy
+                    q += 1
+        start[quarter + 1] = q
+    return offset_x[:q].copy(), offset_y[:q].copy(), start
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _window_energy(image, offset_x, offset_y, x_from, y_from, nx, ny, total, energy):
-    """One over the norm of the image about its mean under the disc, at every position."""
-    total[:ny, :nx] = 0.0
-    energy[:ny, :nx] = 0.0
+def lay_out(image, offset_x, offset_y, x_from, y_from, nx, ny, under, total, energy):
+    """Write what lies under every pixel of the disc at every position, and one over its norm about its mean."""
+    length = nx * ny
+    total[:length] = 0.0
+    energy[:length] = 0.0
     level = image[y_from, x_from]
     for q in range(len(offset_x)):
+        row = under[q]
         for k in range(ny):
-            source = image[y_from + k + offset_y[q]]
             first = x_from + offset_x[q]
+            source = image[y_from + k + offset_y[q], first : first + nx]
+            part = row[k * nx : (k + 1) * nx]
             for m in range(nx):
-                g = source[first + m] - level
-                total[k, m] += g
-                energy[k, m] += g * g
-    for k in range(ny):
-        for m in range(nx):
-            power = energy[k, m] - total[k, m] * total[k, m] / len(offset_x)
-            # Below one grey level of contrast there is nothing to recognise.
-            energy[k, m] = 1.0 / np.sqrt(power) if power > len(offset_x) else 0.0
+                part[m] = source[m] - level
+        for p in range(length):
+            g = row[p]
+            total[p] += g
+            energy[p] += g * g
+    count = len(offset_x)
+    for p in range(length):
+        power = energy[p] - total[p] * total[p] / count
+        # Below one grey level of contrast there is nothing to recognise.
+        energy[p] = 1.0 / np.sqrt(power) if power > count else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _turn_template(reference, origin_x, origin_y, turn, offset_x, offset_y, template):
-    """The reference turned by an angle, zero mean and unit norm."""
+def correlate(template, under, length, total):
+    """Sum template · what lies under it (count, length) over the pixels, four of them at a time."""
+    total[:length] = 0.0
+    sums = total[:length]
+    count = len(template)
+    whole = count // 4 * 4
+    for q in range(0, whole, 4):
+        # Slices of equal length, indexed from zero: the compiler then adds whole vectors.
+        t0, t1, t2, t3 = template[q], template[q + 1], template[q + 2], template[q + 3]
+        u0, u1 = under[q, :length], under[q + 1, :length]
+        u2, u3 = under[q + 2, :length], under[q + 3, :length]
+        for p in range(length):
+            sums[p] += (t0 * u0[p] + t1 * u1[p]) + (t2 * u2[p] + t3 * u3[p])
+    for q in range(whole, count):
+        t0, u0 = template[q], under[q, :length]
+        for p in range(length):
+            sums[p] += t0 * u0[p]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def turn_template(reference, origin_x, origin_y, turn, offset_x, offset_y, template):
+    """The reference turned by an angle, zero mean and unit norm; zero where it has no texture."""
     height, width = reference.shape
     cos, sin = np.cos(turn), np.sin(turn)
     mean = 0.0
@@ -126,31 +166,52 @@ def _turn_template(reference, origin_x, origin_y, turn, offset_x, offset_y, temp
     for q in range(len(template)):
         template[q] -= np.float32(mean)
         power += template[q] * template[q]
-    if power <= 0.0:
-        return False
-    scale = np.float32(1.0 / np.sqrt(power))
+    scale = np.float32(1.0 / np.sqrt(power)) if power > 0.0 else np.float32(0.0)
     for q in range(len(template)):
         template[q] *= scale
-    return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _collect(peak, steepest, x_from, y_from, nx, ny, spacing, best):
-    """Take the highest peak, strike out its neighbourhood, and again."""
-    for found in range(len(best)):
-        value, at_k, at_m = np.float32(0.0), -1, -1
+def collect(peak, steepest, turn, x_from, y_from, spacing, best):
+    """Gather the local maxima of every sector and take the highest that are distinct from those taken before."""
+    sectors, ny, nx = peak.shape
+    found = 0
+    place = np.empty((sectors * ny * nx, 4), np.float32)
+    for s in range(sectors):
         for k in range(ny):
             for m in range(nx):
-                if peak[k, m] > value:
-                    value, at_k, at_m = peak[k, m], k, m
-        if at_k < 0:
+                value = peak[s, k, m]
+                if value > 0.0 and _is_highest(peak[s], k, m, value):
+                    place[found, 0], place[found, 1] = m, k
+                    place[found, 2], place[found, 3] = turn[steepest[s, k, m]], value
+                    found += 1
+    for taken in range(len(best)):
+        at, value = -1, np.float32(0.0)
+        for p in range(found):
+            if place[p, 3] > value:
+                at, value = p, place[p, 3]
+        if at < 0:
             return
-        best[found, 0] = x_from + at_m
-        best[found, 1] = y_from + at_k
-        best[found, 2] = steepest[at_k, at_m]
-        best[found, 3] = value
-        near = int(np.ceil(spacing))
-        for k in range(max(at_k - near, 0), min(at_k + near + 1, ny)):
-            for m in range(max(at_m - near, 0), min(at_m + near + 1, nx)):
-                if (k - at_k) ** 2 + (m - at_m) ** 2 < spacing * spacing:
-                    peak[k, m] = -1.0
+        x, y, angle = place[at, 0], place[at, 1], place[at, 2]
+        best[taken, 0], best[taken, 1], best[taken, 2], best[taken, 3] = x_from + x, y_from + y, angle, value
+        for p in range(found):
+            near = (place[p, 0] - x) ** 2 + (place[p, 1] - y) ** 2 < spacing * spacing
+            if near and is_same_turn(place[p, 2], angle):
+                place[p, 3] = 0.0
+
+
+@njit(cache=True, nogil=True, inline="always")
+def is_same_turn(one, other):
+    """Whether two angles are of one maximum."""
+    apart = abs(one - other) % (2.0 * np.pi)
+    return min(apart, 2.0 * np.pi - apart) < DISTINCT_TURN
+
+
+@njit(cache=True, nogil=True)
+def _is_highest(peak, k, m, value):
+    height, width = peak.shape
+    for a in range(max(k - 1, 0), min(k + 2, height)):
+        for b in range(max(m - 1, 0), min(m + 2, width)):
+            if peak[a, b] > value:
+                return False
+    return True

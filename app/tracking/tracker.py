@@ -1,26 +1,29 @@
 """Follow every grain of the first photograph through the later ones.
 
-Every photograph is compared with the same reference, the first one, so errors do not add up. A grain
-is fitted from where its own motion leads, else from where its neighbours' leads, else it is searched
-for. What still fits worse than the noise explains is refitted robustly, and what remains doubtful is
-compared with its neighbours. A pose that cannot be vouched for is never handed out as a good one.
+Every photograph is compared with the same reference, the first one, so errors do not add up; only a grain that is
+damaged for good is compared with a later one from then on, and that is recorded. A grain is fitted from where its own
+motion leads, else from where its neighbours' leads, else it is searched for. What still fits worse than the noise
+explains is refitted robustly, and what remains doubtful is compared with its neighbours. A pose that cannot be vouched
+for is never handed out as a good one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.frames import Image
 from app.tracking.corrections import Corrections, apply_corrections
-from app.tracking.correlation import Correlator, Patches
+from app.tracking.correlation import Correlator, Rows
 from app.tracking.detection import Detection
 from app.tracking.findings import Findings
 from app.tracking.neighbours import local_motion, overlaps
 from app.tracking.noise import image_noise
+from app.tracking.patches import Patches
+from app.tracking.poses import FramePoses
+from app.tracking.renewal import find_damaged
 from app.tracking.rescue import leash, refit_hidden, rescue
 from app.tracking.splines import Pyramid
 from app.tracks import TrackStatus
@@ -35,8 +38,7 @@ class TrackingSettings:
     tolerance: float = 1e-2  # [px] a step below which a fit has converged
     step_limit: int = 25  # Gauss-Newton steps
     search_window: float = 60.0  # [px] half width of the widest search
-    candidates: int = 8  # places that a search hands on to the fit
-    margin: float = 0.15  # by which a ZNCC must exceed the greatest accidental one
+    margin: float = 0.15  # by which a ZNCC must exceed the greatest accidental one, and that of the second best place
     robust_excess: float = 4.0  # residual variance / the frame's typical one, above which a fit is repeated robustly
     kept_least: float = 0.4  # share of a patch that a robust fit must rest on
     overlap_allowed: float = 0.2  # overlap / smaller radius that tilt and a wrong radius can explain
@@ -44,37 +46,17 @@ class TrackingSettings:
     def __post_init__(self) -> None:
         if not 0.2 <= self.patch_share <= 1.0:
             raise ValueError(f"patch_share must be in [0.2, 1], not {self.patch_share}")
-        for name in ("tolerance", "step_limit", "search_window", "candidates"):
+        for name in ("tolerance", "step_limit", "search_window"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-
-
-@dataclass(frozen=True, slots=True)
-class FramePoses:
-    """The poses of n grains in one photograph. Grains without a pose have NaN."""
-
-    x: Array  # (n,) [px] column
-    y: Array  # (n,) [px] row, down
-    rotation: Array  # (n,) [rad] from the first photograph, positive from x towards y, continuous
-    sigma: Array  # (n,) [px] standard deviation of a component of the displacement from the first photograph
-    zncc: Array  # (n,) correlation with the reference patch
-    status: NDArray[np.uint8]  # (n,) TrackStatus
-
-    @property
-    def has_pose(self) -> NDArray[np.bool_]:
-        return np.isfinite(self.x)
-
-    @property
-    def pose(self) -> Array:
-        """x, y, rotation (n, 3)."""
-        return np.stack([self.x, self.y, self.rotation], axis=1)
 
 
 class Tracker:
     """Poses of the grains of one reference photograph in other photographs.
 
-    grains: a Detection, or x, y, radius (n,) [px]. The tracker holds no state of the sequence: `follow`
-    reads it from the history it is given, so that a run can be resumed from stored poses.
+    grains: a Detection, or x, y, radius (n,) [px]. The tracker holds no state of the sequence but the references
+    that were renewed: `follow` reads the rest from the history it is given, and `renew` repeats a renewal from stored
+    poses, so that a run can be resumed.
     """
 
     def __init__(
@@ -94,6 +76,8 @@ class Tracker:
         self._correlator = Correlator(
             self.patches, workers=workers, tolerance=self.settings.tolerance, limit=self.settings.step_limit
         )
+        self.reference = np.zeros(len(self.radius), dtype=np.int32)  # (n,) photograph of every grain's patch
+        self._first = self._begin()
 
     @property
     def grain_count(self) -> int:
@@ -110,6 +94,20 @@ class Tracker:
         The displacement is zero by definition; sigma is what the noise of a single photograph amounts to.
         Grains whose patch leaves the photograph or has no texture cannot be followed and have no pose.
         """
+        return self._first
+
+    def find_damaged(self, history: Sequence[FramePoses], first_frame: int, photograph: Callable[[int], Image]) -> Rows:
+        """The grains whose reference is damaged for good by the last frame of the history, see `renewal`."""
+        return find_damaged(self._correlator, history, first_frame, photograph)
+
+    def renew(self, rows: Rows, frame: int, photograph: Image, poses: FramePoses) -> None:
+        """Compare `rows` (m,) from now on with a later photograph, in which they have the poses found in it."""
+        self.patches = self.patches.renew(photograph, rows, poses.pose[rows], poses.sigma[rows])
+        self._correlator = self._correlator.with_patches(self.patches)
+        self.reference = self.reference.copy()
+        self.reference[rows] = frame
+
+    def _begin(self) -> FramePoses:
         n = self.grain_count
         patches = self.patches
         good = patches.usable
@@ -121,7 +119,8 @@ class Tracker:
         sigma = self.noise / patches.norm * np.sqrt(0.5 * (inverse[:, 0, 0] + inverse[:, 1, 1]))
         return FramePoses(
             np.where(good, x, np.nan), np.where(good, y, np.nan), np.where(good, np.zeros(n), np.nan),
-            np.where(good, sigma, np.nan), np.where(good, 1.0, np.nan), status.astype(np.uint8),
+            np.where(good, sigma, np.nan), np.where(good, 1.0, np.nan), np.full(n, np.nan), status.astype(np.uint8),
+            self.reference,
         )  # fmt: skip
 
     def follow(self, image: Image, history: Sequence[FramePoses], corrections: Corrections | None = None) -> FramePoses:
@@ -143,9 +142,9 @@ class Tracker:
         if corrections is not None:
             apply_corrections(self._correlator, photograph, findings, corrections, last, np.sqrt(2.0) * noise)
         _follow_predictions(self._correlator, photograph, findings, last, history)
-        typical = findings.judge_residuals(self.patches, noise)
+        typical = findings.judge_residuals(noise)
         rescue(self._correlator, photograph, findings, last, self.settings, typical)
-        typical = findings.judge_residuals(self.patches, noise)
+        typical = findings.judge_residuals(noise)
         poor = np.flatnonzero(findings.poor & (findings.status != TrackStatus.ROBUST))
         refit_hidden(self._correlator, photograph, findings, poor, findings.pose[poor], typical)
         findings.doubt(np.flatnonzero(findings.poor & (findings.status != TrackStatus.ROBUST)))
@@ -153,7 +152,7 @@ class Tracker:
         return self._poses(findings, last, photograph)
 
     def _judge(self, findings: Findings, last: Array) -> None:
-        """Mark what contradicts its neighbours or overlaps them, unless its correlation is beyond doubt."""
+        """Mark what is not unique, and what contradicts its neighbours or overlaps them unless its ZNCC is high."""
         rows = np.flatnonzero(findings.accepted)
         if len(rows) == 0:
             return
@@ -164,6 +163,8 @@ class Tracker:
         odd = deviation > 6.0 * scatter + 0.25 * self.radius[rows]
         certain = findings.zncc[rows] > np.maximum(self.accepted_zncc[rows], 0.8)
         findings.doubt(rows[odd & ~certain])
+        # A grain that another place resembles nearly as well may be there.
+        findings.doubt(rows[findings.second_zncc[rows] > findings.zncc[rows] - self.settings.margin])
         pairs = rows[overlaps(findings.pose[rows, :2], self.radius[rows], self.settings.overlap_allowed)]
         trust = np.where(findings.status == TrackStatus.GIVEN, np.inf, findings.zncc)
         for i, j in pairs:
@@ -184,7 +185,10 @@ class Tracker:
         pose = np.where(missing[:, None], np.nan, findings.pose)
         rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
         blank = np.where(missing, np.nan, 1.0)
-        return FramePoses(pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank, status)
+        return FramePoses(
+            pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank,
+            findings.second_zncc * blank, status, self.reference,
+        )  # fmt: skip
 
 
 def _last_known(history: Sequence[FramePoses], first: FramePoses) -> Array:

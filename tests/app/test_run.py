@@ -75,7 +75,12 @@ def test_the_results_file_has_the_public_layout(tracked, tmp_path, capsys):
         for path in ("sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust"):
             assert store[f"frames/{path}"].shape == (f,)
         sweeps = store["sweeps/offset"][()]
-        assert store["sweeps/natural_map"].shape == (sweeps[-1],)
+        assert sweeps.shape == (f + 1,)
+        for path in ("number", "force_change", "natural_map", "unbalance"):
+            assert store[f"sweeps/{path}"].shape == (sweeps[-1],)
+        assert np.isfinite(store["sweeps/natural_map"][()]).all()
+        last = store["sweeps/number"][()][sweeps[1:] - 1]
+        assert (last == store["sweeps/count"][()] - 1).all()
         assert store["forces/fn"].attrs["unit"] == "N"
         assert store.attrs["schema_version"] == 1
         assert "friction = 0.25" in store.attrs["configuration"]

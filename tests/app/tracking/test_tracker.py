@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.tracking.tracker import FramePoses, Tracker, TrackingSettings
+from app.tracking.poses import FramePoses
+from app.tracking.tracker import Tracker, TrackingSettings
 from app.tracks import TrackStatus
 from tests.app.tracking.speckled import Rods, grid_of_rods
 
