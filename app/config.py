@@ -162,9 +162,12 @@ class TrackingSection(Section):
 
 
 class CalibrationSection(Section):
-    """Self-calibration of centres, radii and walls from persistent contacts."""
+    """Self-calibration of centres, radii, walls and pixel size from persistent contacts."""
 
     enabled: bool = True
+    pixel_size: NotNegative = 5e-3  # relative standard deviation of the given scale; 0: it is exact
+    lens: bool = True  # look for what is left of the lens's radial distortion
+    radius_class: NotNegative = 1e-3  # relative error that the rods of a known radius may share; 0: none
 
 
 class ContactsSection(Section):
@@ -188,9 +191,17 @@ class SolverSection(Section):
     relaxation: Annotated[float, Field(gt=0, lt=2)] = 1.0
     force_change: Positive | None = None  # the paper's ε_f as a stopping level
     keep_members: bool = False  # store the field of every member of the ensemble
+    precision: Literal["measured", "stated"] = "measured"  # of positions; measured: where the gaps contradict it
+    ensemble_size: Annotated[int, Field(ge=0)] = 0  # sequences solved again for the error bars; 0: the free formula
     reset: Literal["never", "rearrangement"] = "never"  # go back to zero forces
     reset_frames: tuple[Annotated[int, Field(ge=0)], ...] = ()  # do so at these frames, whatever is found
     kept_frames: tuple[Annotated[int, Field(ge=0)], ...] = ()  # never do so at these
+
+
+class SensitivitySection(Section):
+    """Ranges of the robustness study, by factor."""
+
+    ranges: dict[str, tuple[Finite, Finite]] = {}
 
 
 class RecordingSection(Section):
@@ -210,6 +221,7 @@ class ExperimentFile(Section):
     contacts: ContactsSection = ContactsSection()
     solver: SolverSection = SolverSection()
     recording: RecordingSection = RecordingSection()
+    sensitivity: SensitivitySection = SensitivitySection()
     truth: str | None = None  # table frame,i,j,fn,ft
     truth_tracks: str | None = None  # table frame,id,x,y,theta: names grains that were detected as the truth does
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,18 @@ import numpy as np
 from app.config import Photographs
 from app.lens import BrownLens, Lens, OpenCVLens
 from app.units import Scale, pixel_size_between
+from solver.calibration import Calibration
 
 
-def make_scale(section: Photographs, height: int) -> Scale:
-    """The scale of photographs of `height` [px] rows."""
+def make_scale(section: Photographs, height: int, calibration: Calibration | None = None) -> Scale:
+    """The scale of photographs of `height` [px] rows; calibration: what corrects the given pixel size."""
+    given = _given_scale(section, height)
+    correction = 0.0 if calibration is None else calibration.pixel_size
+    pixel_height = None if given.pixel_height is None else (1.0 + correction) * given.pixel_height
+    return replace(given, pixel_size=(1.0 + correction) * given.pixel_size, pixel_height=pixel_height)
+
+
+def _given_scale(section: Photographs, height: int) -> Scale:
     lens = make_lens(section)
     if section.distance is not None:
         start, end = np.array(section.distance.start), np.array(section.distance.end)

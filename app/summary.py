@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.atomic import write_atomically
+from app.calibration_summary import calibration_facts, calibration_lines
 from app.results import Results
 from app.tracks import TrackStatus
 from app.truth import accuracy
@@ -67,6 +68,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "friction": _friction(results),
         "wall_force_error": _wall_force_error(results),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
+        "corrections": calibration_facts(results.calibration, results.walls.name) if results.calibration else None,
         "radius_change": results.radius_tuning.found if results.radius_tuning is not None else None,
         "timings": {stage: round(value, 3) for stage, value in seconds.items()},
     }
@@ -123,8 +125,8 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     if summary["wall_force_error"]:
         told = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
         lines.append(f"Inferred against recorded wall forces, rms difference over settled frames: {told}.")
-    if summary["calibration"] is not None:
-        lines.append(f"Self-calibration {summary['calibration']}.")
+    if summary["corrections"] is not None:
+        lines += calibration_lines(summary["corrections"])
     if summary["radius_change"] is not None:
         lines.append(_curve_line(summary["radius_curve"]))
         lines.append(

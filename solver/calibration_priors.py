@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.calibration_equations import GapEquations, GapRows, MeasuredSequence, find_gap_rows
+from solver.calibration_equations import GapEquations
+from solver.calibration_rows import GapRows, MeasuredSequence, find_gap_rows
 from solver.calibration_weights import contact_width
 from solver.grains import Array
 
@@ -24,11 +25,16 @@ class CalibrationPriors:
     centre: float  # [m] of each component of a centre
     radius: float  # [m] of a radius, independent from grain to grain
     wall: float = 0.0  # [m] of a wall along its normal
+    wall_tilt: float = 0.0  # [rad] of a wall about its middle
     pixel_size: float = 0.0  # relative
+    lens: float = 0.0  # [m] of the displacement by radial distortion at the farthest corner
     radius_class: float = 0.0  # [m] of the error that all grains of a class share
 
     def __post_init__(self) -> None:
-        if not min(self.centre, self.radius, self.wall, self.pixel_size, self.radius_class) >= 0.0:
+        given = (
+            self.centre, self.radius, self.wall, self.wall_tilt, self.pixel_size, self.lens, self.radius_class
+        )  # fmt: skip
+        if not min(given) >= 0.0:
             raise ValueError("a prior standard deviation is negative or not a number")
 
 
@@ -65,8 +71,9 @@ class Candidates:
 def find_candidates(sequence: MeasuredSequence, priors: CalibrationPriors, overlap: float) -> Candidates:
     """List the pairs and frames that the fit looks at. overlap [m]: mean elastic overlap of a touching pair."""
     grain = priors.centre**2 + priors.radius**2 + priors.radius_class**2
-    scale = (2.0 * sequence.radius.mean() * priors.pixel_size) ** 2
-    pair, wall = np.sqrt(2.0 * grain + scale), np.sqrt(grain + priors.wall**2 + scale)
+    half = 0.5 * float(_wall_length(sequence).max(initial=0.0))
+    pair = np.sqrt(2.0 * grain)
+    wall = np.sqrt(grain + priors.wall**2 + (half * priors.wall_tilt) ** 2 + priors.lens**2)
     noise = np.sqrt(2.0) * float(sequence.sigma[sequence.present].max(initial=0.0)) + overlap
     rows = find_gap_rows(
         sequence, REACH * pair + REACH_OF_NOISE * noise, wall_reach=REACH * wall + REACH_OF_NOISE * noise
@@ -117,6 +124,10 @@ def reduce_priors(
     return replace(limits, centre=reduce(layout.offset, limits.centre), radius=reduce(layout.radius, limits.radius))
 
 
+def _wall_length(sequence: MeasuredSequence) -> Array:
+    return np.linalg.norm(sequence.endpoints[:, :, 1] - sequence.endpoints[:, :, 0], axis=2)
+
+
 def prior_vector(equations: GapEquations, priors: CalibrationPriors) -> Array:
     """Prior standard deviation of every unknown (u,)."""
     layout = equations.layout
@@ -125,5 +136,7 @@ def prior_vector(equations: GapEquations, priors: CalibrationPriors) -> Array:
     sd[layout.radius] = priors.radius
     sd[layout.wall] = priors.wall
     sd[layout.radius_class] = priors.radius_class
+    sd[layout.wall_tilt] = priors.wall_tilt
     sd[layout.scale] = priors.pixel_size
+    sd[layout.lens] = priors.lens
     return sd

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
@@ -18,6 +19,7 @@ REFINING_ROUNDS = 6  # at the scale of the noise; noise and priors follow the da
 ROUNDS = ANNEALING_ROUNDS + REFINING_ROUNDS
 ANNEALED_VARIANCE = 0.3  # a row's variance is at least this times s²: while s is large, so is the doubt in the model
 NEGLIGIBLE_WEIGHT = 1e-3  # a row that counts less is left out of its round
+TOUCHING_WEIGHT = 0.5  # a row that counts more is taken for a contact
 OVERLAP_FRAMES = 15  # frames over which the elastic overlap of a contact is one random number, not many
 DOUBT = 0.5  # the typical overlap, between grains and at walls apart, and the bias of the weights: known to this share
 # Which pairs touch is not certain either, which the draws cannot know. Against simulated truths the errors
@@ -37,6 +39,7 @@ class GapFit:
     candidates: Candidates  # with the noise as the data show it
     gap_before: Array  # (m,) [m] of the candidates
     gap_after: Array  # (m,) [m]
+    touching: NDArray[np.bool_]  # (m,) taken for contacts
 
 
 def fit_gaps(
@@ -61,14 +64,15 @@ def fit_gaps(
     step = _LinearStep(equations, candidates, unknowns, end, priors)
     for _ in range(REFINING_ROUNDS - 1):
         unknowns = step.solution()
-        priors = reduce_priors(limits, equations, unknowns, step.draw(PRIOR_SAMPLES, rng))
+        # Overlaps of contacts show in the estimates already: drawn again, they would widen the priors twice.
+        priors = reduce_priors(limits, equations, unknowns, step.draw(PRIOR_SAMPLES, rng, surfaces=False))
         candidates = candidates.judge_noise(equations.measure(rows, unknowns).gap)
         step = _LinearStep(equations, candidates, unknowns, FINAL_SCALE * candidates.noise, priors)
     unknowns = step.solution()
     draws = SD_FACTOR * step.draw(samples, rng)
     sd = np.minimum(np.sqrt(np.mean(draws**2, axis=0)), prior_vector(equations, priors))
     after = equations.measure(rows, unknowns).gap
-    return GapFit(unknowns, sd, step.gap_spread(draws), priors, candidates, before, after)
+    return GapFit(unknowns, sd, step.gap_spread(draws), priors, candidates, before, after, step.touching)
 
 
 class _LinearStep:
@@ -91,8 +95,9 @@ class _LinearStep:
         self._prior_sd = prior_vector(equations, priors)
         self._free = self._prior_sd > 0.0
         self._weight = weight[kept]
+        self.touching = weight > TOUCHING_WEIGHT
         self._precision = self._weight / np.maximum(candidates.noise[kept] ** 2, ANNEALED_VARIANCE * s[kept] ** 2)
-        self._matrix = equations.derive(self._rows, self._geometry, unknowns)[:, self._free]
+        self._matrix = equations.derive(self._rows, self._geometry)[:, self._free]
         self._shift = weighting_bias(s[kept], candidates.position_noise[kept])
         residual = self._geometry.gap + overlap + self._shift
         self._target = self._matrix @ unknowns[self._free] - residual
@@ -118,13 +123,13 @@ class _LinearStep:
 
     def gap_spread(self, errors: Array) -> float:
         """Root mean square [m] of what errors (count, u) of the unknowns do to the gaps of touching pairs."""
-        touching = self._weight > 0.5
+        touching = self._weight > TOUCHING_WEIGHT
         if not np.any(touching):
             return 0.0
         return float(np.sqrt(np.mean((self._matrix[touching] @ errors[:, self._free].T) ** 2)))
 
-    def draw(self, count: int, rng: np.random.Generator) -> Array:
-        """Draw errors of the solution (count, u).
+    def draw(self, count: int, rng: np.random.Generator, *, surfaces: bool = True) -> Array:
+        """Draw errors of the solution (count, u); surfaces: with what is not known of overlaps and of the weights.
 
         Noise of a position enters all gaps of its grain in that frame, the overlap of a contact stays for
         several frames: the errors of the rows are drawn so, not one by one.
@@ -143,8 +148,9 @@ class _LinearStep:
         for row in errors:
             noise = sigma * rng.standard_normal(sequence.position.shape)
             error = np.einsum("mk,mk->m", normal, other * noise[k, grain] - noise[k, i])
-            error += overlap * rng.standard_normal(block.max(initial=-1) + 1)[block]
-            error += DOUBT * (overlap * rng.standard_normal(2)[wall] + self._shift * rng.standard_normal())
+            if surfaces:
+                error += overlap * rng.standard_normal(block.max(initial=-1) + 1)[block]
+                error += DOUBT * (overlap * rng.standard_normal(2)[wall] + self._shift * rng.standard_normal())
             right = self._matrix.T @ (self._precision * error)
             right += rng.standard_normal(len(right)) / self._prior_sd[self._free]
             row[self._free] = self._factor.solve(right)

@@ -8,14 +8,9 @@ import numpy as np
 import pytest
 
 from solver.calibration import calibrate
-from solver.calibration_equations import (
-    GapEquations,
-    MeasuredSequence,
-    find_gap_rows,
-    outward_normals,
-    rotate_offsets,
-)
+from solver.calibration_equations import GapEquations, move_walls, rotate_offsets
 from solver.calibration_priors import CalibrationPriors
+from solver.calibration_rows import MeasuredSequence, find_gap_rows
 from solver.calibration_weights import contact_width
 
 RADIUS = 8e-3  # [m]
@@ -55,17 +50,16 @@ def falsify(
     offset: np.ndarray | float = 0.0,
     radius: np.ndarray | float = 0.0,
     wall: np.ndarray | float = 0.0,
-    pixel_size: float = 0.0,
+    tilt: np.ndarray | float = 0.0,
 ) -> MeasuredSequence:
     """Make the measurement that these corrections turn into the truth."""
     offset = np.broadcast_to(offset, (true.grain_count, 2))
-    outward = outward_normals(true.endpoints)
-    shifted = true.endpoints - (np.broadcast_to(wall, true.wall_count)[:, None] * outward)[:, :, None, :]
+    wall, tilt = np.broadcast_to(wall, true.wall_count), np.broadcast_to(tilt, true.wall_count)
     return replace(
         true,
         radius=true.radius - radius,
-        position=true.position / (1.0 + pixel_size) - rotate_offsets(true, offset),
-        endpoints=shifted / (1.0 + pixel_size),
+        position=true.position - rotate_offsets(true, offset),
+        endpoints=move_walls(true.endpoints, -wall, -tilt),
     )
 
 
@@ -98,17 +92,16 @@ def test_sliding_rows_touch_and_never_overlap(true):
 
 def test_true_corrections_restore_the_true_gaps(true, rng):
     offset, radius = rng.normal(0, 50e-6, (true.grain_count, 2)), rng.normal(0, 10e-6, true.grain_count)
-    wall, pixel_size = np.array([40e-6, -60e-6]), 1e-3
-    measured = falsify(true, offset=offset, radius=radius, wall=wall, pixel_size=pixel_size)
+    wall, tilt = np.array([40e-6, -60e-6]), np.array([-1e-3, 5e-4])
+    measured = falsify(true, offset=offset, radius=radius, wall=wall, tilt=tilt)
     rows = find_gap_rows(true, 0.05 * RADIUS)
     equations = GapEquations(measured)
     layout = equations.layout
     unknowns = np.zeros(layout.count)
     unknowns[layout.offset], unknowns[layout.radius] = offset.ravel(), radius
-    unknowns[layout.wall], unknowns[layout.scale] = wall, pixel_size
+    unknowns[layout.wall], unknowns[layout.wall_tilt] = wall, tilt
     expected = GapEquations(true).measure(rows, np.zeros(layout.count)).gap
-    # Offsets are measured lengths: the pixel size scales them, which falsify leaves out (50 µm × 1e-3).
-    second_order = 1e-6
+    second_order = 1e-6  # [m] of a tilt: 1e-6 of a length that is less than a metre
     np.testing.assert_allclose(equations.measure(rows, unknowns).gap, expected, atol=second_order)
 
 
@@ -118,11 +111,12 @@ def test_derivatives_match_finite_differences(true, rng):
     rows = find_gap_rows(true, 0.05 * RADIUS)
     rows = rows.select(np.sort(rng.choice(rows.count, 200, replace=False)))
     unknowns = rng.normal(0.0, 50e-6, equations.layout.count)
+    unknowns[equations.layout.wall_tilt] = 0.0  # a tilted wall's normal turns: seen in the second order alone
     direction = rng.normal(0.0, 1.0, equations.layout.count)
     step = 1e-6  # truncation ~ step² / RADIUS, rounding ~ 1e-16 / step: both far below the tolerance
     ahead = equations.measure(rows, unknowns + step * direction).gap
     behind = equations.measure(rows, unknowns - step * direction).gap
-    derivative = equations.derive(rows, equations.measure(rows, unknowns), unknowns) @ direction
+    derivative = equations.derive(rows, equations.measure(rows, unknowns)) @ direction
     np.testing.assert_allclose(derivative, (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-6)
 
 
@@ -185,14 +179,24 @@ def test_shifted_wall_is_found_and_named(true, rng):
     assert rms(result.offset) < 1e-6  # centres were right and stay so
 
 
-def test_pixel_size_is_found_where_radii_are_known(true, rng):
-    priors = CalibrationPriors(centre=50e-6, radius=0.0, wall=0.0, pixel_size=1e-3)
-    offset = rng.normal(0, 30e-6, (true.grain_count, 2))
-    measured = add_noise(falsify(true, offset=offset, pixel_size=5e-4), 1e-6, rng)
-    result = calibrate(measured, priors, rng=rng)
-    assert abs(result.pixel_size - 5e-4) < 4 * result.pixel_size_sd
-    assert result.pixel_size_sd < 1e-4
-    np.testing.assert_array_equal(result.radius, np.zeros(true.grain_count))
+def test_turned_wall_is_found_and_named(true, rng):
+    tilt = np.array([1e-3, -2e-4])
+    measured = add_noise(falsify(true, tilt=tilt, wall=np.array([0.0, 30e-6])), 3e-6, rng)
+    result = calibrate(measured, replace(PRIORS, wall_tilt=5e-4), rng=rng)
+    assert result.applied
+    assert "directions of walls" in result.verdict
+    # 4 µm, as for a shifted wall, over half of the 0.12 m that the grains take up
+    np.testing.assert_allclose(result.wall_tilt, tilt, atol=7e-5)
+    np.testing.assert_allclose(result.wall, [0.0, 30e-6], atol=8e-6)
+    ends = result.correct(measured).endpoints
+    beside = 20e-6  # [m] at the ends, which lie as far again beyond the grains
+    np.testing.assert_allclose(ends, true.endpoints, atol=beside)
+
+
+def test_without_a_prior_walls_are_not_turned(true, rng):
+    result = calibrate(falsify(true, wall=60e-6), PRIORS, rng=rng)
+    np.testing.assert_array_equal(result.wall_tilt, [0.0, 0.0])
+    np.testing.assert_array_equal(result.wall_tilt_sd, [0.0, 0.0])
 
 
 def test_radius_error_of_a_class_is_found(true, rng):

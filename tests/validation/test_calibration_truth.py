@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from app.synthetic.packing import prepare_packing
-from solver.calibration import calibrate
-from solver.calibration_equations import MeasuredSequence, outward_normals, rotate_offsets
+from solver.calibration import calibrate, expected_priors
+from solver.calibration_equations import move_walls, rotate_offsets
 from solver.calibration_priors import CalibrationPriors
+from solver.calibration_rows import MeasuredSequence
 from solver.dem import shear_photographs
 from solver.dem_truth import DemSettings, DemTruth
 
@@ -19,6 +20,7 @@ SEEDS = (11, 12)
 # [m] after 24 photographs, 6° of shear. Six other packings gave 10.4 … 12.5 µm and 15.2 … 19.3 µm.
 CENTRE_LEFT = {3e-6: 16e-6, 10e-6: 24e-6}
 HONEST = (0.5, 1.3)  # true errors over standard deviations; the six packings gave 0.69 … 1.16
+DISTANCE_LEFT = 3e-6  # [m] rms of the distances of touching grains: noise over √24 photographs, 1e-4 of a diameter
 WALL_LEFT = 20e-6  # [m]; the six packings gave 3 … 13 µm: a dozen rods at a wall, each with its own centre error
 
 pytestmark = pytest.mark.slow
@@ -63,7 +65,7 @@ def test_centres_radii_and_walls_are_found(truth, rng, noise, told):
         exact,
         radius=exact.radius - radius,
         position=exact.position - rotate_offsets(exact, offset),
-        endpoints=exact.endpoints - (wall[:, None] * outward_normals(exact.endpoints))[:, :, None, :],
+        endpoints=move_walls(exact.endpoints, -wall, np.zeros(4)),
     )
     priors = CalibrationPriors(50e-6, 10e-6, wall=50e-6) if told else None
     result = calibrate(wrong, priors, rng=rng, typical_overlap=typical_overlap(truth))
@@ -82,3 +84,54 @@ def test_exact_centres_are_left_alone(truth, rng, noise):
     corrected = result.correct(exact)
     assert rms(corrected.position - exact.position) < 0.5e-6
     assert rms(corrected.radius - exact.radius) < 0.5e-6
+
+
+def contact_distances(truth: DemTruth, sequence: MeasuredSequence) -> np.ndarray:
+    """Distances less radii of grains that bear force between them, mean over the photographs of each pair [m]."""
+    n = len(truth.radius)
+    frame = np.repeat(np.arange(truth.frame_count), np.diff(truth.offset))
+    rows = np.flatnonzero((truth.j < n) & (truth.fn > 0.1 * truth.fn.mean()))
+    k, i, j = frame[rows], truth.i[rows], truth.j[rows]
+    gap = np.linalg.norm(sequence.position[k, j] - sequence.position[k, i], axis=1) - sequence.radius[i]
+    gap -= sequence.radius[j]
+    pair = np.unique(i.astype(np.int64) * n + j, return_inverse=True)[1]
+    return np.bincount(pair, gap) / np.bincount(pair)
+
+
+@pytest.mark.parametrize("error", [-1e-2, -3e-3, 3e-3, 1e-2])
+@pytest.mark.parametrize("follow", [True, False])
+def test_wrong_pixel_size_is_found_and_walls_go_along_only_if_measured_with_it(truth, rng, error, follow):
+    exact = measure(truth, 10e-6, rng)
+    wrong = replace(
+        exact, position=exact.position / (1.0 + error), endpoints=exact.endpoints / (1.0 + error * follow)
+    )  # fmt: skip
+    priors = expected_priors(wrong, pixel_size=5e-3, radius_class=1e-3)
+    classes = np.unique(truth.radius, return_inverse=True)[1]
+    result = calibrate(wrong, priors, rng=rng, typical_overlap=typical_overlap(truth), radius_class=classes)
+    assert result.applied
+    assert abs(result.pixel_size - error) < 1e-3  # what the known radii may share
+    assert result.walls_follow == follow
+    left = contact_distances(truth, result.correct(wrong)) - contact_distances(truth, exact)
+    assert rms(left) < DISTANCE_LEFT
+
+
+def test_turned_wall_is_found(truth, rng):
+    exact = measure(truth, 10e-6, rng)
+    tilt = np.array([0.0, 0.0, 1e-3, 0.0])
+    wrong = replace(exact, endpoints=move_walls(exact.endpoints, np.zeros(4), -tilt))
+    result = calibrate(wrong, expected_priors(wrong), rng=rng, typical_overlap=typical_overlap(truth))
+    assert result.applied
+    np.testing.assert_allclose(result.wall_tilt, tilt, atol=1.5e-4)  # 20 µm at the ends of 0.3 m
+    np.testing.assert_array_equal(result.offset, np.zeros_like(result.offset))
+
+
+@pytest.mark.parametrize("noise", [0.0, 10e-6, 40e-6])
+def test_exact_scale_walls_and_lens_are_left_alone(truth, rng, noise):
+    exact = measure(truth, noise, rng)
+    priors = expected_priors(exact, pixel_size=5e-3, radius_class=1e-3)
+    classes = np.unique(truth.radius, return_inverse=True)[1]
+    result = calibrate(exact, priors, rng=rng, typical_overlap=typical_overlap(truth), radius_class=classes)
+    assert not result.applied
+    assert result.pixel_size == 0.0
+    assert 0.0 < result.pixel_size_sd < 5e-3
+    assert result.lens == 0.0
