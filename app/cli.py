@@ -15,30 +15,9 @@ import tyro
 from rich.console import Console
 
 from app import __version__
+from app.arguments import Ensemble, ExperimentPath, Frames, FullFrames, MaxSize, Out, Quiet, Settings, Sweeps
+from app.cli_tools import compare, export, import_, sensitivity, share, study, synth
 from app.errors import InputError
-
-ExperimentPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT")]
-Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the results; default runs/<name>")]
-Settings = Annotated[
-    tuple[str, ...],
-    tyro.conf.UseAppendAction,
-    tyro.conf.arg(name="set", metavar="KEY=VALUE", help="lay a setting over experiment.toml, e.g. solver.kappa=0.1"),
-]
-Frames = Annotated[str | None, tyro.conf.arg(metavar="A:B", help="only the frames A … B − 1")]
-Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]
-Sweeps = Annotated[
-    Literal["all", "log", "none"] | None, tyro.conf.arg(help="whose forces the recording holds; default log")
-]
-
-MaxSize = Annotated[
-    float | None, tyro.conf.arg(metavar="MB", help="of the recording: fewer sweeps where it would be larger")
-]
-FullFrames = Annotated[
-    tuple[int, ...],
-    tyro.conf.arg(
-        metavar="FRAME", help="with --sweeps all: every sweep of these frames to a side file, others thinned"
-    ),
-]
 
 
 def run(
@@ -49,6 +28,7 @@ def run(
     sweeps: Sweeps = None,
     max_size: MaxSize = None,
     full_frames: FullFrames = (),
+    ensemble: Ensemble = None,
     frames: Frames = None,
     settings: Settings = (),
     quiet: Quiet = False,
@@ -59,6 +39,7 @@ def run(
     """
     from app import commands
 
+    settings = _with_ensemble(settings, ensemble)
     return commands.run_all(_request(experiment, out, frames, settings, sweeps, quiet, max_size, full_frames), view)
 
 
@@ -97,6 +78,7 @@ def solve(
     /,
     out: Out = None,
     sweeps: Sweeps = None,
+    ensemble: Ensemble = None,
     frames: Frames = None,
     settings: Settings = (),
     quiet: Quiet = False,
@@ -107,6 +89,7 @@ def solve(
     """
     from app import commands
 
+    settings = _with_ensemble(settings, ensemble)
     return commands.solve(_request(experiment, out, frames, settings, sweeps, quiet))
 
 
@@ -134,14 +117,17 @@ def view(
     recording: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING_OR_DIR")],
     /,
     web: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="in a browser")] = False,
+    only_list: Annotated[
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="list", help="of a folder: tell what is in it, no more")
+    ] = False,
 ) -> int:
-    """Open a recording with its blueprint.
+    """Open a recording with its blueprint, or a folder of recordings as a catalogue.
 
     Example: rodsight view runs/shear --web
     """
     from app import commands
 
-    return commands.view(recording, web=web)
+    return commands.view(recording, web=web, only_list=only_list)
 
 
 def score(
@@ -194,149 +180,6 @@ def review(
     )  # fmt: skip
 
 
-def synth(
-    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT", help="folder to make")],
-    /,
-    preset: Literal["small", "paper"] = "small",
-    seed: int = 0,
-    photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
-    noise: Annotated[float, tyro.conf.arg(help="of a tracked position [m], with --no-photographs")] = 0.0,
-    depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
-    jpeg_quality: Annotated[int | None, tyro.conf.arg(help="of 8-bit photographs; default: the preset's")] = None,
-    png: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write PNG, not JPEG")] = False,
-    grains: Annotated[int | None, tyro.conf.arg(help="number of rods")] = None,
-    frame_count: Annotated[int | None, tyro.conf.arg(name="frames", help="number of photographs")] = None,
-    step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs")] = None,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="[m]")] = None,
-    reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="turn back half way")] = False,
-    quiet: Quiet = False,
-) -> int:
-    """Make a synthetic experiment with its truth: explicit DEM, walls, speckle photographs.
-
-    Example: rodsight synth my_test --preset small --seed 3
-    """
-    from app import commands
-
-    return commands.synth(
-        out, quiet=quiet, preset=preset, seed=seed, photographs=photographs, noise=noise, depth=depth,
-        jpeg_quality=jpeg_quality, png=png, grains=grains, frames=frame_count, step_degrees=step_degrees,
-        pixel_size=pixel_size, reversal=reversal,
-    )  # fmt: skip
-
-
-def study(
-    subject: Annotated[
-        Literal["paper", "accuracy", "status"],
-        tyro.conf.Positional,
-        tyro.conf.arg(help="the paper's claims; r against noise; trust, status and error bars refitted"),
-    ],
-    /,
-    seeds: Annotated[tuple[int, ...], tyro.conf.arg(help="of the simulated packings")] = (0, 1, 2),
-    grains: Annotated[int, tyro.conf.arg(help="rods of a packing")] = 1172,
-    estimator: Literal["ensemble", "nlgs"] = "ensemble",
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
-    quiet: Quiet = False,
-) -> int:
-    """Measure the method on simulated truth: minutes for each packing, kept for the next time.
-
-    Example: rodsight study paper --seeds 0 1 --grains 400
-    """
-    from app import commands
-
-    return commands.study(subject, seeds=seeds, grains=grains, estimator=estimator, folder=out, quiet=quiet)
-
-
-def share(
-    source: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING_OR_DIR")] = None,
-    /,
-    frames: Frames = None,
-    scale: Annotated[float, tyro.conf.arg(help="of photographs, 0.5: half as wide and high")] = 1.0,
-    html: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="one page with the viewer in it")] = False,
-    repair: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="mend a damaged recording instead")] = None,
-    out: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="what to write; default: beside the recording")
-    ] = None,
-) -> int:
-    """Make a small recording to send, or one HTML file that any browser opens.
-
-    Example: rodsight share runs/shear --frames 0:12 --scale 0.5 --html
-    """
-    from app import sharing
-
-    return sharing.share(
-        source, frames=frames, scale=scale, page=html, damaged=repair, out=out, console=Console(soft_wrap=True)
-    )
-
-
-def compare(
-    first: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="A", help="folder of a run, or results.h5")],
-    second: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="B")] = None,
-    /,
-    truth: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="compare A with its truth")] = False,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="the recording; default compare-A-B.rrd")] = None,
-) -> int:
-    """Show two results side by side with their difference.
-
-    Example: rodsight compare runs/shear runs/shear-nlgs --out compare.rrd
-    """
-    from app import comparing
-
-    return comparing.compare(first, second, truth=truth, out=out, console=Console(soft_wrap=True))
-
-
-def export(
-    what: Annotated[Literal["pictures", "video", "tables", "vtk", "dic"], tyro.conf.Positional],
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
-    /,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help="default: beside the results")] = None,
-    kind: Annotated[Literal["csv", "parquet"], tyro.conf.arg(help="of tables")] = "csv",
-    frames: Annotated[str | None, tyro.conf.arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
-    timeline: Annotated[Literal["frame", "sweep"], tyro.conf.arg(help="pictures, video")] = "frame",
-    step: Annotated[int, tyro.conf.arg(help="pictures, video: every so many values")] = 1,
-    tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show")] = None,
-    view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
-    size: Annotated[str, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window")] = "1600x1000",
-    rate: Annotated[float, tyro.conf.arg(help="video: pictures a second")] = 6.0,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="dic: [m]; default: the experiment's")] = None,
-    quiet: Quiet = False,
-) -> int:
-    """Write pictures, a video, tidy tables, VTK files or tracker files.
-
-    Example: rodsight export video runs/shear --view "Force network"
-    """
-    from app import exporting
-    from app.commands import progress_of
-
-    with progress_of(quiet) as progress:
-        return exporting.export(
-            what, source, out, console=Console(quiet=quiet), progress=progress, kind=kind, timeline=timeline,
-            times=frames, step=step, tab=tab, view=view, size=size, rate=rate, pixel_size=pixel_size,
-        )  # fmt: skip
-
-
-def import_(
-    form: Annotated[Literal["dic"], tyro.conf.Positional],
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of dic_out_N.txt or CONFNNNN")],
-    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT", help="folder to make")],
-    /,
-    pixel_size: Annotated[float, tyro.conf.arg(help="[m]")],
-    interval: Annotated[float, tyro.conf.arg(help="[s] between photographs")] = 1.0,
-    height: Annotated[int | None, tyro.conf.arg(help="of a photograph [px]; default: what holds all grains")] = None,
-    precision: Annotated[float, tyro.conf.arg(help="of a tracked position [px]")] = 0.05,
-    quiet: Quiet = False,
-) -> int:
-    """Make an experiment of another tracker's files.
-
-    Example: rodsight import dic tracked/ my_test --pixel-size 1.2e-4
-    """
-    from app import importing
-
-    return importing.import_dic(
-        source, out, pixel_size=pixel_size, interval=interval, height=height, precision=precision,
-        console=Console(quiet=quiet),
-    )  # fmt: skip
-
-
 COMMANDS: tuple[Callable[..., int], ...] = (
     run,
     check,
@@ -347,6 +190,7 @@ COMMANDS: tuple[Callable[..., int], ...] = (
     review,
     score,
     synth,
+    sensitivity,
     study,
     share,
     compare,
@@ -375,6 +219,10 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:
         status = 1
     sys.exit(status)
+
+
+def _with_ensemble(settings: tuple[str, ...], ensemble: int | None) -> tuple[str, ...]:
+    return settings if ensemble is None else (*settings, f"solver.ensemble_size={ensemble}")
 
 
 def _request(

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from rich.console import Console
@@ -80,9 +80,10 @@ def track(request: Request, *, report: bool = False) -> int:
         tracks, walls = pipeline.track(run)
         page = pipeline.report_tracking(run, tracks, walls) if report else None
     lost = int((~tracks.present).sum())
+    renewed = f", {tracks.renewal_count} damaged grains with a new reference" if tracks.renewal_count else ""
     where = run.file(pipeline.TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
     request.console.print(
-        f"{tracks.grain_count} grains over {tracks.frame_count} frames, {lost} poses lost; tracks in {where}.",
+        f"{tracks.grain_count} grains over {tracks.frame_count} frames, {lost} poses lost{renewed}; tracks in {where}.",
         highlight=False,
     )
     if page is not None:
@@ -98,6 +99,7 @@ def solve(request: Request) -> int:
     summary = summarize(results, agreement, run.timings.seconds)
     save_summary(run.file(pipeline.SUMMARY), summary)
     print_summary(request.console, summary)
+    _tell_notes(run, request.console)
     return 0
 
 
@@ -109,7 +111,12 @@ def record(request: Request) -> int:
     return _show(recording, "none", request.console)
 
 
-def view(path: Path, *, web: bool) -> int:
+def view(path: Path, *, web: bool, only_list: bool = False) -> int:
+    if path.is_dir() and (only_list or not (path / pipeline.RECORDING).is_file()):
+        from app.viewing import view_folder
+
+        console = Console() if sys.stdout.isatty() else Console(width=WIDE)
+        return view_folder(path, web=web, only_list=only_list, console=console)
     recording = path / pipeline.RECORDING if path.is_dir() else path
     if not recording.is_file():
         raise InputError(recording, "", "there is no such recording")
@@ -185,19 +192,72 @@ def synth(out: Path, *, quiet: bool, **choices: Any) -> int:
     return 0
 
 
-def study(subject: str, *, seeds: tuple[int, ...], grains: int, estimator: str, folder: Path, quiet: bool) -> int:
+def sensitivity(
+    request: Request,
+    *,
+    design: Literal["oat", "sobol"],
+    wanted: tuple[str, ...],
+    samples: int | None,
+    seed: int,
+    workers: int | None,
+    scheduler: str | None,
+    as_json: bool,
+) -> int:
+    from app.sensitivity import design as designs
+    from app.sensitivity import report, study
+    from app.sensitivity.execution import available_cores, reach_scheduler
+
+    if workers is not None and workers < 1:
+        raise InputError("--workers", str(workers), "must be at least one")
+    console = request.console if sys.stdout.isatty() else Console(width=report.WIDTH, quiet=request.quiet)
+    with _run(request) as run:
+        factors, cases = designs.plan(run.experiment, design, wanted, samples, seed)
+        if scheduler is not None:
+            reach_scheduler(scheduler)
+        nominal, fingerprint = pipeline.nominal_run(run)
+        effects = study.run_study(
+            nominal, cases, study.Diary(run.file(study.DIARY), fingerprint),
+            workers=available_cores() if workers is None else workers, scheduler=scheduler, progress=run.progress,
+        )  # fmt: skip
+        own = study.compare(nominal.networks, nominal)
+        findings = report.Findings(run.experiment.name, design, factors, cases, effects, own)
+        report.save_findings(findings, run.folder)
+    if as_json:
+        print(json.dumps(report.as_json(findings), indent=1))
+        return 0
+    report.print_findings(console, findings)
+    console.print(f"Tables in {run.folder}/: {', '.join(report.FILES)}.", highlight=False)
+    return 0
+
+
+def study(
+    subject: str,
+    *,
+    seeds: tuple[int, ...],
+    grains: int,
+    estimator: str,
+    ensemble: int,
+    folder: Path,
+    quiet: bool,
+) -> int:
     from app.study.accuracy import study_accuracy
     from app.study.claims import study_claims
     from app.study.status import refit_status
+    from app.study.uncertainty import study_uncertainty
 
     console = Console() if sys.stdout.isatty() else Console(width=WIDE)
-    if subject == "status" and len(seeds) < 2:
+    if subject in ("status", "uncertainty") and len(seeds) < 2:
         raise InputError("--seeds", " ".join(map(str, seeds)), "must be two or more: to fit on, and to judge on")
+    half = (len(seeds) + 1) // 2
     with progress_of(quiet) as progress:
         if subject == "accuracy":
             study_accuracy(seeds, grains=grains, folder=folder, estimator=estimator, console=console, progress=progress)
+        elif subject == "uncertainty":
+            study_uncertainty(
+                seeds[:half], seeds[half:], members=ensemble, grains=grains, estimator=estimator, folder=folder,
+                console=console, progress=progress,
+            )  # fmt: skip
         elif subject == "status":
-            half = (len(seeds) + 1) // 2
             refit_status(
                 seeds[:half], seeds[half:], grains=(grains,), folder=folder, console=console, progress=progress
             )

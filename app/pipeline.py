@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from app import __version__
 from app.atomic import write_atomically
-from app.calibration import calibrate_tracks
 from app.checkpoint import Checkpoint
 from app.config import as_toml
 from app.corrections import read_corrections
@@ -29,28 +28,31 @@ from app.experiment import (
     Experiment,
     check_inside,
     checksums,
-    make_packing,
     read_grain_guess,
     read_times,
     read_tracks,
     read_walls,
 )
-from app.opinions import friction_of, tuned_radii
+from app.opinions import friction_of
+from app.preparation import Prepared, prepare
 from app.progress import Progress, silent
 from app.results import Results, TruthContacts
-from app.review.decisions import Bodies, decide, fingerprint
+from app.review.decisions import Bodies, Decisions, decide, fingerprint
 from app.review.verdicts import VERDICTS, Flag, VerdictLog
 from app.scaling import make_scale
-from app.solver_input import make_snapshots, sequence_settings, typical_overlap
+from app.sensitivity.execution import available_cores
+from app.sensitivity.inference import Inputs, gather
+from app.sensitivity.spread import calibrated_inputs, solve_members, with_spread
+from app.sensitivity.study import Nominal
+from app.solver_input import make_snapshots, sequence_settings
 from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
 from app.tracking.report import tracking_report
 from app.tracking.stage import DETECTIONS, gather_report, track_photographs, write_tables
 from app.tracks import Tracks, WallTracks
 from app.truth import read_truth, true_names
-from solver.chain import Packing
 from solver.contact_probability import ContactProbabilitySettings
 from solver.frame_forces import FrameForces
-from solver.frame_statistics import FrameStatistics, frame_statistics
+from solver.frame_statistics import FrameStatistics
 from solver.sequence import SequenceState, solve_sequence
 from solver.verdicts import Verdicts
 
@@ -58,6 +60,7 @@ TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd"
 REPORT = "tracking_report.html"
 SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
 UNFINISHED = ".unfinished"  # folder of checkpoints
+ERROR_BARS = {"solver": {"ensemble_size"}}  # settings that leave the forces as they are
 
 
 @dataclass(slots=True)
@@ -175,32 +178,52 @@ def solve(run: Run) -> Results:
     log = VerdictLog(run.file(VERDICTS))
     origin = replace(origin, fingerprint=_with_verdicts(origin.fingerprint, log))
     stored = read_origin(run.file(RESULTS))
+    results = None
     if stored is not None and stored.fingerprint == origin.fingerprint:
-        return load_results(run.file(RESULTS))
+        results = load_results(run.file(RESULTS))
+        if experiment.config.solver.ensemble_size in (0, results.ensemble_size):
+            return results
+        if results.ensemble_size:
+            results = None  # the free formula is part of new error bars, and the former ones took its place
+    if results is None:
+        results = _solve_nominal(run, origin, log)
+    if experiment.config.solver.ensemble_size:
+        results = _add_error_bars(run, origin, log, results)
+    return results
+
+
+def nominal_run(run: Run) -> tuple[Nominal, str]:
+    """What the robustness study varies and compares with: the run as it was given, and its fingerprint."""
+    results = solve(run)
+    stored = read_origin(run.file(RESULTS))
+    tracks, walls = track(run)
+    assert stored is not None
+    assert walls is not None
+    truth = load_truth(run, results)
+    frames = np.arange(tracks.frame_count)
+    decisions = _decisions(run, VerdictLog(run.file(VERDICTS)), tracks, walls)
+    inputs = Inputs(run.experiment, tracks, walls, results.tracks.sigma, frames, decisions.for_solver())
+    nominal = Nominal(
+        inputs,
+        gather(frames, results.frames, results.statistics),
+        None if truth is None else truth.by_frame(results.grains.count + results.walls.count, len(frames)),
+    )
+    return nominal, stored.fingerprint
+
+
+def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
+    """Solve the sequence as it was given, and store it."""
+    experiment = run.experiment
     tracks, walls = track(run)
     assert walls is not None
     since = time.perf_counter()
-    calibration = None
-    overlap = typical_overlap(experiment.config, tracks.radius)
-    if experiment.config.calibration.enabled:
-        tracks, walls, calibration = calibrate_tracks(tracks, walls, overlap)
-    packing = make_packing(experiment, tracks.radius, walls.pressure)
-    tuning = None
-    if experiment.config.contacts.coordination is not None:
-        tuning = tuned_radii(packing, tracks, walls, experiment.config.contacts.coordination)
-        if not tuning.met:
-            low, high = tuning.coordination_number.min(), tuning.coordination_number.max()
-            problem = f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 4 %"
-            raise InputError(experiment.file, f"key contacts.coordination = {tuning.wanted}", problem)
-        tracks = replace(tracks, radius=tracks.radius + tuning.found)
-        packing = make_packing(experiment, tracks.radius, walls.pressure)
+    prepared = prepare(experiment, tracks, walls)
+    tracks, walls, packing = prepared.tracks, prepared.walls, prepared.packing
     checkpoint = Checkpoint(run.folder / UNFINISHED / "solving", origin.fingerprint)
-    decisions = decide(
-        log, Bodies.of(tracks, walls), first_frame=run.frames[0], frame_count=tracks.frame_count
-    )  # fmt: skip
+    decisions = _decisions(run, log, tracks, walls)
     if decisions.flags and all(Flag.IGNORE in decisions.flags.get(k, ()) for k in range(tracks.frame_count)):
         raise InputError(log.file, "flag ignore", "is set on every frame: nothing is left to solve")
-    frames, statistics = _solve_frames(run, packing, tracks, walls, checkpoint, overlap, decisions.for_solver())
+    frames, statistics = _solve_frames(run, prepared, checkpoint, decisions.for_solver())
     results = Results(
         name=experiment.name,
         tracks=tracks,
@@ -210,11 +233,11 @@ def solve(run: Run) -> Results:
         frames=frames,
         statistics=statistics,
         configuration=as_toml(experiment.config),
-        calibration=calibration,
+        calibration=prepared.calibration,
         friction_check=friction_of(
-            packing, make_snapshots(tracks, walls), frames, ContactProbabilitySettings(overlap=overlap)
+            packing, make_snapshots(tracks, walls), frames, ContactProbabilitySettings(overlap=prepared.overlap)
         ),
-        radius_tuning=tuning,
+        radius_tuning=prepared.tuning,
     )
     save_results(run.file(RESULTS), results, origin)
     checkpoint.clear()
@@ -222,15 +245,32 @@ def solve(run: Run) -> Results:
     return results
 
 
+def _decisions(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Decisions:
+    return decide(log, Bodies.of(tracks, walls), first_frame=run.frames[0], frame_count=tracks.frame_count)
+
+
+def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Results) -> Results:
+    """Replace the standard deviations by those of an ensemble of sequences solved again, and store the results so."""
+    since = time.perf_counter()
+    config = run.experiment.config
+    size = config.solver.ensemble_size
+    checkpoint = Checkpoint(run.folder / UNFINISHED / "ensemble", f"{origin.fingerprint} {size}")
+    verdicts = _decisions(run, log, results.tracks, results.walls).for_solver()
+    inputs = calibrated_inputs(run.experiment, results.tracks, results.walls, verdicts)
+    members = solve_members(inputs, size, checkpoint, workers=available_cores(), progress=run.progress)
+    frames = with_spread(results.frames, members, sequence_settings(config, 0.0).estimator)
+    results = replace(results, frames=frames, ensemble_size=size, configuration=as_toml(config))
+    save_results(run.file(RESULTS), results, origin)
+    checkpoint.clear()
+    run.timings.add("ensemble", since)
+    run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")
+    return results
+
+
 def _solve_frames(
-    run: Run,
-    packing: Packing,
-    tracks: Tracks,
-    walls: WallTracks,
-    checkpoint: Checkpoint,
-    overlap: float,
-    verdicts: Mapping[int, Verdicts],
+    run: Run, prepared: Prepared, checkpoint: Checkpoint, verdicts: Mapping[int, Verdicts]
 ) -> tuple[list[FrameForces], list[FrameStatistics]]:
+    packing, tracks, walls = prepared.packing, prepared.tracks, prepared.walls
     snapshots = make_snapshots(tracks, walls)
     frames: list[FrameForces] = []
     statistics: list[FrameStatistics] = []
@@ -245,16 +285,11 @@ def _solve_frames(
         statistics.append(kept)
         if run.watch is not None:
             run.watch.frame(forces, kept)
-    settings = sequence_settings(run.experiment.config, overlap)
+    settings = sequence_settings(run.experiment.config, prepared.overlap)
     done = len(frames)
     run.progress("solving", done, len(snapshots))
     for forces, state in solve_sequence(packing, snapshots, settings, state=kept_state, first=done, verdicts=verdicts):
-        snapshot = snapshots[forces.frame]
-        summary = frame_statistics(
-            forces.contacts, forces.fn, forces.ft, forces.state,
-            snapshot.position, snapshot.present, packing.walls(snapshot.endpoints), packing.length,
-            grains=packing.grains, material=packing.material,
-        )  # fmt: skip
+        summary = prepared.statistics(forces, snapshots[forces.frame])
         checkpoint.save(forces.frame, forces, summary, state)
         frames.append(forces)
         statistics.append(summary)
@@ -283,7 +318,9 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
         results,
         file,
         photograph=photograph if photographs is not None else None,
-        scale=make_scale(section, photographs.shape[0]) if section and photographs is not None else None,
+        scale=make_scale(section, photographs.shape[0], results.calibration)
+        if section and photographs is not None
+        else None,
         sweeps="log" if run.full_frames else run.experiment.config.recording.sweeps,
         max_size=run.max_size,
         truth=truth,
@@ -340,7 +377,7 @@ def _with_verdicts(digest: str, log: VerdictLog) -> str:
 
 
 def _origin(run: Run, sections: tuple[str, ...]) -> Provenance:
-    config = run.experiment.config.model_dump(mode="json", include=set(sections))
+    config = run.experiment.config.model_dump(mode="json", include=set(sections), exclude=ERROR_BARS)
     sums = checksums(run.experiment)
     told = json.dumps([__version__, config, sums, run.frames], sort_keys=True)
     digest = hashlib.sha256(told.encode()).hexdigest()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,12 @@ class TruthContacts:
     fn: Array  # (t,) [N]
     ft: Array  # (t,) [N]
 
+    def by_frame(self, bodies: int, frame_count: int) -> tuple[tuple[NDArray[np.int64], Array], ...]:
+        """Keys (c,) of the pairs and forces (c, 2) [N] of every frame; bodies: grains and walls together."""
+        key, force = self.i * bodies + self.j, np.column_stack([self.fn, self.ft])
+        bounds = np.searchsorted(self.frame, np.arange(frame_count + 1))
+        return tuple((key[a:b], force[a:b]) for a, b in pairwise(bounds))
+
 
 @dataclass(frozen=True, slots=True)
 class Results:
@@ -43,3 +50,4 @@ class Results:
     calibration: Calibration | None = None  # None: not tried
     friction_check: FrictionCheck | None = None
     radius_tuning: RadiusTuning | None = None  # None: not asked for
+    ensemble_size: int = 0  # sequences solved again for the standard deviations of the forces; 0: free formula

@@ -88,15 +88,12 @@ def true_names(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64
 
 def score(results: Results, truth: TruthContacts) -> list[Agreement]:
     """Agreement with the truth in every frame."""
-    n, w = results.grains.count, results.walls.count
-    key, force = truth.i * (n + w) + truth.j, np.column_stack([truth.fn, truth.ft])
-    bounds = np.searchsorted(truth.frame, np.arange(len(results.frames) + 1))
+    true = truth.by_frame(results.grains.count + results.walls.count, len(results.frames))
     return [
         compare_forces(
             frame.contacts.key[(listed := frame.source != ContactSource.FORBIDDEN_BY_REVIEWER)],
             np.column_stack([frame.fn, frame.ft])[listed],
-            key[bounds[k] : bounds[k + 1]],
-            force[bounds[k] : bounds[k + 1]],
+            *true[k],
         )
         for k, frame in enumerate(results.frames)
     ]

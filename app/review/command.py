@@ -70,7 +70,7 @@ def open_session(reviewed: Reviewed) -> ReviewSession:
     section = reviewed.experiment.config.photographs
     if section is not None:
         photographs = reviewed.experiment.photographs()
-        scale = make_scale(section, photographs.shape[0])
+        scale = make_scale(section, photographs.shape[0], reviewed.results.calibration)
         photograph = partial(_grey, photographs, reviewed.first_frame)
     picture = Picture(reviewed.results, photograph, scale)
     return ReviewSession(

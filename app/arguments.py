@@ -1,0 +1,35 @@
+"""Arguments that several commands share: their names on the command line, and their help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+ExperimentPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT")]
+Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the results; default runs/<name>")]
+Settings = Annotated[
+    tuple[str, ...],
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(name="set", metavar="KEY=VALUE", help="lay a setting over experiment.toml, e.g. solver.kappa=0.1"),
+]
+Frames = Annotated[str | None, tyro.conf.arg(metavar="A:B", help="only the frames A … B − 1")]
+Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]
+Sweeps = Annotated[
+    Literal["all", "log", "none"] | None, tyro.conf.arg(help="whose forces the recording holds; default log")
+]
+
+Ensemble = Annotated[
+    int | None,
+    tyro.conf.arg(metavar="K", help="error bars from K sequences solved again with resampled inputs; 8 are enough"),
+]
+MaxSize = Annotated[
+    float | None, tyro.conf.arg(metavar="MB", help="of the recording: fewer sweeps where it would be larger")
+]
+FullFrames = Annotated[
+    tuple[int, ...],
+    tyro.conf.arg(
+        metavar="FRAME", help="with --sweeps all: every sweep of these frames to a side file, others thinned"
+    ),
+]

@@ -1,0 +1,164 @@
+"""The robustness study: runs with varied inputs, compared with the nominal run and with the truth where there is one.
+
+Every finished run is written down at once; a study that is started again goes on with those that are missing.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InputError
+from app.progress import Progress, silent
+from app.sensitivity.design import Case, vary
+from app.sensitivity.execution import run_all
+from app.sensitivity.factors import EVALUATED
+from app.sensitivity.inference import Inputs, Networks, infer
+from solver.agreement import Agreement, compare_forces
+from solver.grains import Array
+
+Forces = tuple[NDArray[np.int64], Array]  # keys (c,) and forces (c, 2) [N]
+
+
+@dataclass(frozen=True, slots=True)
+class Nominal:
+    """The run that others are compared with."""
+
+    inputs: Inputs
+    networks: Networks
+    truth: tuple[Forces, ...] | None  # of every photograph; None: not known
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What a run's change does to the forces: means over the photographs compared. NaN where there is no value."""
+
+    frames: int  # photographs compared
+    r_fn: float  # correlation with the nominal normal forces
+    r_ft: float
+    relative_l2: float  # ‖f − f_nominal‖ / ‖f_nominal‖
+    scale: float  # Σ f_n / Σ f_n,nominal
+    friction_angle_change: float  # [°]
+    principal_direction_change: float  # [°]
+    pressure: float  # [Pa]
+    contacts: float  # carrying force
+    trust: float
+    true_r_fn: float  # against the truth
+    true_r_ft: float
+    true_relative_l2: float
+    true_scale: float
+    failure: str = ""  # why there was no run
+
+
+DIARY = "sensitivity_runs.jsonl"
+AGREEMENTS = ("r_fn", "r_ft", "relative_l2", "scale")
+
+
+def measure_case(nominal: Nominal, case: Case) -> Effect:
+    """Run one case and compare it."""
+    try:
+        return compare(infer(vary(nominal.inputs, case)), nominal)
+    except InputError as error:
+        nothing: dict[str, Any] = {each.name: math.nan for each in fields(Effect)}
+        return Effect(**(nothing | {"frames": 0, "failure": str(error)}))
+
+
+def compare(run: Networks, nominal: Nominal) -> Effect:
+    """Compare the photographs of a run, from its own and the nominal run's fifth on, else the last alone."""
+    base = nominal.networks
+    _, rows, base_rows = np.intersect1d(run.frame, base.frame, assume_unique=True, return_indices=True)
+    late = (rows >= EVALUATED) & (base_rows >= EVALUATED)
+    if not late.any():
+        late[-1:] = True
+    rows, base_rows = rows[late], base_rows[late]
+    own = [compare_forces(*run.at(k), *base.at(n)) for k, n in zip(rows, base_rows, strict=True)]
+    true: list[Agreement] = []
+    if nominal.truth is not None:
+        true = [compare_forces(*run.at(k), *nominal.truth[n]) for k, n in zip(rows, base_rows, strict=True)]
+    turned = run.principal_direction[rows] - base.principal_direction[base_rows]
+    angle = run.friction_angle[rows] - base.friction_angle[base_rows]
+    return Effect(
+        frames=int(late.sum()),
+        **_means(own, ""),
+        friction_angle_change=_mean(np.degrees(angle)),
+        principal_direction_change=_mean(np.degrees(0.5 * np.angle(np.exp(2j * turned)))),  # an axis, not an arrow
+        pressure=_mean(run.pressure[rows]),
+        contacts=_mean(run.contact_count[rows].astype(np.float64)),
+        trust=_mean(run.trust[rows]),
+        **_means(true, "true_"),
+    )
+
+
+def run_study(
+    nominal: Nominal,
+    cases: Sequence[Case],
+    diary: Diary,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+) -> list[Effect]:
+    """The effect of every case, in their order; those in the diary are not run again."""
+    effects = diary.read()
+    missing = [case for case in cases if case.key not in effects]
+    done, total = len(cases) - len(missing), len(cases)
+    progress("varying", done, total)
+    with closing(run_all(measure_case, nominal, missing, workers=workers, scheduler=scheduler)) as results:
+        for number, effect in results:
+            diary.write(missing[number], effect)
+            effects[missing[number].key] = effect
+            done += 1
+            progress("varying", done, total)
+    return [effects[case.key] for case in cases]
+
+
+class Diary:
+    """Finished runs, a line each: fingerprint of the nominal run, the case, its effect.
+
+    Lines are only added. Those of another nominal run, and one that was cut short, are passed over.
+    """
+
+    def __init__(self, file: Path, fingerprint: str) -> None:
+        self.file, self.fingerprint = file, fingerprint
+
+    def read(self) -> dict[str, Effect]:
+        """Effects by the key of their case."""
+        if not self.file.exists():
+            return {}
+        found: dict[str, Effect] = {}
+        for line in self.file.read_text(encoding="utf-8").splitlines():
+            try:
+                entry = json.loads(line)
+                if entry["of"] == self.fingerprint:
+                    found[entry["case"]] = Effect(**entry["effect"])
+            except (ValueError, KeyError, TypeError):
+                continue  # cut short, or of another version
+        return found
+
+    def write(self, case: Case, effect: Effect) -> None:
+        """Add a line; it is on the disk when this returns."""
+        line = json.dumps({"of": self.fingerprint, "case": case.key, "effect": asdict(effect)})
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with self.file.open("a+b") as stream:
+            # A line that was cut short must not swallow this one.
+            stream.seek(max(stream.seek(0, 2) - 1, 0))
+            if stream.read(1) not in (b"", b"\n"):
+                stream.write(b"\n")
+            stream.write(line.encode() + b"\n")
+
+
+def _means(agreement: Sequence[Agreement], prefix: str) -> dict[str, Any]:
+    return {prefix + name: _mean(np.array([getattr(each, name) for each in agreement])) for name in AGREEMENTS}
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan

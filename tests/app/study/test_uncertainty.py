@@ -1,0 +1,60 @@
+"""Error bars counted against the truth: the counting itself, and (slow) that they cover what they promise."""
+
+from io import StringIO
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from app.sensitivity.spread import DEVIATION, deviation
+from app.study.truths import simulate
+from app.study.uncertainty import ErrorBars, coverage, fit_deviation, measure_error_bars, study_uncertainty
+
+
+def test_coverage_of_a_normal_error_is_that_of_the_normal_law():
+    error = np.random.default_rng(0).standard_normal(20_000)
+    assert coverage(error, np.ones(20_000)) == pytest.approx((0.683, 0.954), abs=0.01)
+
+
+def test_the_fit_finds_how_the_errors_were_made():
+    rng = np.random.default_rng(1)
+    n = 20_000
+    spread, free = rng.uniform(0.01, 0.5, (n, 1)), rng.uniform(0.01, 0.5, (n, 1))
+    error = np.hypot(0.5 * spread, 0.8 * free) * rng.standard_normal((n, 1))
+    a, b = fit_deviation(ErrorBars(np.zeros(n), error, spread, free), 0)
+    assert (a, b) == pytest.approx((0.5, 0.8), rel=0.1)
+
+
+def test_a_study_prints_coverages_and_constants(tmp_path, monkeypatch):
+    truth = simulate(0, grains=30, folder=tmp_path, turn=3.0)
+    monkeypatch.setattr("app.study.uncertainty.simulate", lambda *_, **__: truth)
+    monkeypatch.setattr("app.study.uncertainty.WINDOW", 4)
+    monkeypatch.setattr("app.study.uncertainty.available_cores", lambda: 1)
+    monkeypatch.setattr("app.study.uncertainty.NOISES", (1e-5,))
+    told = StringIO()
+    fit = study_uncertainty(
+        [0], [1], members=2, grains=30, estimator="nlgs", folder=tmp_path, console=Console(file=told, width=150)
+    )
+    assert np.all(np.array(fit) >= 0.0)
+    assert "packings held out" in told.getvalue()
+    assert "in use" in told.getvalue()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ["ensemble", "nlgs"])
+def test_error_bars_of_an_ensemble_cover_the_truth(estimator, tmp_path):
+    truth = simulate(31, grains=250, folder=tmp_path)  # no packing of the fit
+    noises = (2e-5, 4e-5)  # [m]
+    bars = measure_error_bars([truth], 8, estimator, noises=noises)
+    for component, constants in enumerate(DEVIATION[estimator]):
+        sigma = deviation(bars.spread[:, component], bars.free[:, component], constants)
+        for noise in noises:
+            here = bars.noise == noise
+            one, two = coverage(bars.error[here, component], sigma[here])
+            # Fitted over noises and packings together: one of them may be off by so much.
+            assert 0.58 < one < 0.82, (estimator, component, noise)
+            assert 0.86 < two < 0.99, (estimator, component, noise)
+    if estimator == "nlgs":  # the free formula of a single chain does not know the noise
+        for component in (0, 1):
+            here = bars.noise == 4e-5
+            assert coverage(bars.error[here, component], bars.free[here, component])[1] < 0.8
