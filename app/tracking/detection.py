@@ -10,7 +10,7 @@ an outline seen only on one side does not pull the centre.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,27 @@ from solver.grains import Array
 
 # Rings leave the centre uncertain by this much [px], besides the difference of two classes' radii.
 RING_UNCERTAINTY = 3.0
+# Of a small circle they leave less, in parts of its radius.
+SMALL_SHARE = 0.2
+
+# Up to this radius [px] an outline between neighbours may be too short for its rays to be fitted one by one.
+SMALL = 12.0
+
+# Standard deviation of what a narrow gap makes of the steepest points' centre [px].
+ROUGH_SIGMA = 0.15
+
+# A centre less certain than this [px], and than this share of the radius, is none.
+SIGMA_MOST = 1.0
+SIGMA_SHARE = 0.05
+# Looked at closely, this part of the outline asked for must still be seen: noise has none of it.
+CLOSE_SHARE = 1.0 / 3.0
+
+# Radii looked for when nothing is said about them [px], and the share of the picture's shorter side that is the most.
+RADIUS_RANGE = (8.0, 160.0)
+LARGEST_SHARE = 0.3
+
+# Circles of unknown radius are known no better than the steps in which they were looked for.
+SCAN_STEP = 1.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +51,14 @@ class DetectionSettings:
     """What is known of the grains. Lengths in pixels."""
 
     radii: tuple[float, ...] = ()  # [px] the radius classes; empty: unknown
-    radius_range: tuple[float, float] = (8.0, 60.0)  # [px] searched when the classes are unknown
+    radius_range: tuple[float, float] | None = None  # [px] searched when the classes are unknown; None: RADIUS_RANGE
     score_least: float = 0.15  # slope along a ring, as a share of a full edge, of a circle worth a look
     quality_least: float = 0.3  # share of a grain's outline that must be seen as an edge in its place
 
     def __post_init__(self) -> None:
         if any(not radius > 3.0 for radius in self.radii):
             raise ValueError(f"radii must exceed 3 px, not {self.radii}")
-        if not 3.0 < self.radius_range[0] < self.radius_range[1]:
+        if self.radius_range is not None and not 3.0 < self.radius_range[0] < self.radius_range[1]:
             raise ValueError(f"radius_range must ascend and exceed 3 px, not {self.radius_range}")
 
 
@@ -60,7 +81,7 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     """Find the grains of a photograph (H, W)."""
     settings = settings if settings is not None else DetectionSettings()
     known = bool(settings.radii)
-    radii = np.array(sorted(set(settings.radii))) if known else _scan(settings.radius_range)
+    radii = np.array(sorted(set(settings.radii))) if known else _scan(settings.radius_range or _usual_range(image))
     rough = find_circles(image, radii, score_least=settings.score_least)
     outliner = Outliner(image, float(radii.max()))
     table = np.empty((0, 4))
@@ -81,7 +102,9 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
         table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
     found = refine_grains(image, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
-    good = np.isfinite(found.sigma)  # what cannot be measured closely is not a grain
+    # What cannot be measured closely is not a grain, or too little of it is in view.
+    good = found.sigma < np.maximum(SIGMA_MOST, SIGMA_SHARE * found.radius)
+    good &= found.quality > CLOSE_SHARE * settings.quality_least
     if not known:
         good &= (found.radius > 0.9 * radii[0]) & (found.radius < 1.1 * radii[-1])
     order = order[good[order]]
@@ -100,15 +123,27 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
     outliner = Outliner(image, float(radius.max()))
     first = _each(len(x), lambda k: outliner.measure(x[k], y[k], radius[k], 2.0, 0.0, np.inf))
     width = outliner.estimate_blur(first)
-    free = _each(len(x), lambda k: outliner.measure_closely(*first[k].circle, width, 0.0, np.inf))
+    free = _each(len(x), lambda k: _closer(first[k], outliner.measure_closely(*first[k].circle, width, 0.0, np.inf)))
     if not fixed_radius:
         return _detection(free, np.array([one.radius for one in free]))
     excess = np.array([one.radius for one in free]) - radius
     shift = float(np.median(excess))
     # The rims' shading differs from grain to grain: their radii scatter about the common shift.
     scatter = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
-    tied = _each(len(x), lambda k: outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter))
+    tied = _each(
+        len(x),
+        lambda k: _closer(
+            free[k], outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter)
+        ),
+    )  # fmt: skip
     return _detection(tied, radius)
+
+
+def _closer(rough: Measured, close: Measured) -> Measured:
+    """The close measurement; where a small outline is too short for one, the rough with what it leaves open."""
+    if np.isfinite(close.sigma) or not np.isfinite(rough.sigma) or rough.radius > SMALL:
+        return close
+    return replace(rough, sigma=float(np.hypot(rough.sigma, ROUGH_SIGMA)))
 
 
 def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], known: bool) -> Array:
@@ -127,17 +162,22 @@ def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp
         _, first = np.unique(rough.radius[near], return_index=True)
         for m in near[np.sort(first)] if known else [k]:
             scatter = 0.3 if known else np.inf
-            one = outliner.measure(
-                float(rough.x[m]), float(rough.y[m]), float(rough.radius[m]), RING_UNCERTAINTY, 0.0, scatter
-            )
+            size = float(rough.radius[m])
+            one = outliner.measure(float(rough.x[m]), float(rough.y[m]), size, _window(size, known), 0.0, scatter)
             quality = one.quality
             if known and quality > 0.0:
                 # Now that it is centred, a narrower view keeps paint near the rim out of it. Alone it is
                 # too easily satisfied.
-                one = outliner.measure(one.x, one.y, float(rough.radius[m]), 0.5 * RING_UNCERTAINTY, 0.0, scatter)
+                one = outliner.measure(one.x, one.y, size, 0.5 * RING_UNCERTAINTY, 0.0, scatter)
                 quality = min(one.quality, 2.0 * quality)
             rows.append((one.x, one.y, rough.radius[m] if known else one.radius, quality))
     return np.array(rows).reshape(-1, 4)
+
+
+def _window(radius: float, known: bool) -> float:
+    """How far from a rough circle its edges are looked for [px]: a small grain's neighbours are never far."""
+    window = min(RING_UNCERTAINTY, max(SMALL_SHARE * radius, 0.5 * RING_UNCERTAINTY))
+    return window if known else max(window, 0.6 * (SCAN_STEP - 1.0) * radius)
 
 
 def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -> NDArray[np.bool_]:
@@ -162,6 +202,11 @@ def _detection(measured: list[Measured], radius: Array) -> Detection:
     return Detection(column("x"), column("y"), radius, column("sigma"), column("quality"))
 
 
+def _usual_range(image: Image) -> tuple[float, float]:
+    low, high = RADIUS_RANGE
+    return low, max(min(high, LARGEST_SHARE * min(image.shape)), 1.5 * low)
+
+
 def _scan(limits: tuple[float, float]) -> Array:
-    steps = int(np.ceil(np.log(limits[1] / limits[0]) / np.log(1.06)))
+    steps = int(np.ceil(np.log(limits[1] / limits[0]) / np.log(SCAN_STEP)))
     return np.geomspace(limits[0], limits[1], steps + 1)

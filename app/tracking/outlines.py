@@ -12,7 +12,7 @@ from app.frames import Image
 from app.tracking.edges import DENSITY, Circle, Outline, fit_circle, trace_outline
 from app.tracking.noise import image_noise
 from app.tracking.rim_profile import locate_edges
-from app.tracking.rings import local_contrast
+from app.tracking.rings import local_contrast, tile_size
 from app.tracking.splines import spline_coefficients
 from solver.grains import Array
 
@@ -22,6 +22,8 @@ EDGE_SLOPE = 0.08
 # touch, the gap's dark is not reached, which shifts an edge but does not make it less of one.
 DARK_EXCESS = 0.12
 DARK_EXCESS_JUDGED = 0.3
+# What is brighter than this share of the way from the dark about a grain to its light is paint, not a gap.
+DARK_HALF = 0.5
 # Contrast below this many standard deviations of the noise [1] is none.
 NOISE_CONTRAST = 12.0
 # A circle that has left the window in which its points were looked for, by this many times, is none of theirs.
@@ -32,8 +34,16 @@ ON_CIRCLE = 0.7
 LEAST_POINTS = 12
 LEAST_VIEW = 0.35
 
+# Widths of the blur that are tried [px], and the one assumed where no outline tells.
+BLUR_WIDTHS = np.arange(0.3, 2.2, 0.3)
+BLUR_STEPS = np.array([-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])
+TYPICAL_BLUR = 0.7
+# The estimate begins with what a blur of this width [px] would show of a ray, and is repeated with its own.
+BLUR_EXTENT = 1.0
+BLUR_ROUNDS = 2
+
 # What the model of the rim leaves of its shading's effect on the centre, in parts of what it takes out.
-SHADING_LEFT = 0.8
+SHADING_LEFT = 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +68,8 @@ class Outliner:
         """radius [px]: of the largest grain, for the size of what counts as local."""
         self._coefficients = spline_coefficients(image)
         # An edge must stand out from the noise too, or a photograph of nothing is full of edges.
-        self._contrast = np.maximum(local_contrast(image, int(4 * radius))[1], NOISE_CONTRAST * image_noise(image))
+        self._dark, contrast = local_contrast(image, tile_size(radius))
+        self._contrast = np.maximum(contrast, NOISE_CONTRAST * image_noise(image))
 
     def measure(self, x: float, y: float, radius: float, window: float, shift: float, scatter: float) -> Measured:
         """The circle through the steepest points within `window` [px] of radius + shift [px].
@@ -90,11 +101,12 @@ class Outliner:
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
             np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2, radius_scatter=np.inf, scale_least=0.1,
         )  # fmt: skip
-        edge, level, _ = _fit_profiles(outline, seen, width)
+        edge, level, _, dark = _fit_profiles(outline, seen, width, width)
         good = np.isfinite(edge)
         if good.sum() < LEAST_POINTS:
             return Measured(x, y, radius, np.nan, 0.0)
-        weight = np.minimum(level[good] / (0.6 * local), 1.0) ** 2
+        excess = (dark[good] - np.percentile(dark[good], 10.0)) / (DARK_EXCESS * local)
+        weight = (np.minimum(level[good] / (0.6 * local), 1.0) * np.clip(1.0 - excess, 0.05, 1.0)) ** 2
         circle = fit_circle(
             x, y, radius + shift, outline.angle[good], edge[good], weight, radius_scatter=scatter, scale_least=0.05
         )
@@ -111,25 +123,20 @@ class Outliner:
         for one in good:
             outline = trace_outline(self._coefficients, *one.circle, 2.0)
             outlines.append((outline, self._edges(outline, one.x, one.y, DARK_EXCESS)[0]))
-        widths = np.arange(0.4, 1.65, 0.1)
-        if not outlines:
-            return 0.7
-        total = np.array(
-            [
-                np.nanmedian(np.concatenate([_fit_profiles(o, seen, width)[2] for o, seen in outlines]))
-                for width in widths
-            ]
-        )
-        best = int(np.clip(np.argmin(total), 1, len(widths) - 2))
-        before, at, after = total[best - 1 : best + 2]
-        bend = before - 2.0 * at + after
-        return float(widths[best] + (0.05 * (before - after) / bend if bend > 0.0 else 0.0))
+        if sum(int(seen.sum()) for _, seen in outlines) < LEAST_POINTS:
+            return TYPICAL_BLUR
+        width = _best_width(outlines, BLUR_WIDTHS, BLUR_EXTENT)
+        for _ in range(BLUR_ROUNDS):
+            width = _best_width(outlines, width + BLUR_STEPS, width)
+        return width
 
     def _edges(self, outline: Outline, x: float, y: float, excess: float) -> tuple[NDArray[np.bool_], float]:
         """Which rays meet an edge, and the local contrast [grey]."""
         height, width = self._contrast.shape
-        local = float(self._contrast[min(max(int(y), 0), height - 1), min(max(int(x), 0), width - 1)])
+        place = min(max(int(y), 0), height - 1), min(max(int(x), 0), width - 1)
+        local = float(self._contrast[place])
         seen = np.isfinite(outline.distance) & (outline.strength > EDGE_SLOPE * local)
+        seen &= outline.beyond < float(self._dark[place]) + DARK_HALF * local
         if seen.any():
             # The tenth-darkest part, not the single darkest ray: noise makes that one.
             dark = float(np.percentile(outline.beyond[seen], 10.0))
@@ -137,11 +144,29 @@ class Outliner:
         return seen, local
 
 
-def _fit_profiles(outline: Outline, seen: NDArray[np.bool_], width: float) -> tuple[Array, Array, Array]:
-    return locate_edges(
-        outline.rays, outline.first, 1.0 / DENSITY, np.where(seen, outline.distance, np.nan),
-        np.nan_to_num(outline.beyond).astype(np.float64), outline.angle, width,
-    )  # fmt: skip
+def _best_width(outlines: list[tuple[Outline, NDArray[np.bool_]]], widths: Array, extent: float) -> float:
+    # A ray that cannot be fitted at all speaks against a width, or the widest would win with the few it fits.
+    total = np.full(len(widths), np.inf)
+    for k, width in enumerate(widths):
+        if not width > 0.2:
+            continue
+        misfits = [_fit_profiles(outline, seen, width, extent)[2][seen] for outline, seen in outlines]
+        total[k] = np.median(np.nan_to_num(np.concatenate(misfits), nan=np.inf))
+    best = int(np.argmin(total))
+    if not np.isfinite(total[best]):
+        return TYPICAL_BLUR
+    if not 0 < best < len(widths) - 1 or not np.isfinite(total[best - 1 : best + 2]).all():
+        return float(widths[best])
+    before, at, after = total[best - 1 : best + 2]
+    step, bend = float(widths[1] - widths[0]), before - 2.0 * at + after
+    return float(widths[best] + (0.5 * step * (before - after) / bend if bend > 0.0 else 0.0))
+
+
+def _fit_profiles(
+    outline: Outline, seen: NDArray[np.bool_], width: float, extent: float
+) -> tuple[Array, Array, Array, Array]:
+    start = np.where(seen, outline.distance, np.nan)
+    return locate_edges(outline.rays, outline.first, 1.0 / DENSITY, start, outline.angle, width, extent=extent)
 
 
 def _measured(circle: Circle, outline: Outline, shift: float) -> Measured:

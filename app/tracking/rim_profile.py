@@ -23,9 +23,12 @@ from numba import njit
 from app.frames import Image
 from solver.grains import Array
 
-# What is fitted of a ray [px from the edge].
-INSIDE = 1.0
-OUTSIDE = 2.5
+# What is fitted of a ray, and where its dark is read [px from the edge], and the same in widths of the blur where that
+# is more: a soft edge is still falling where a sharp one has ended, and a dark that is read there moves the edge.
+INSIDE, INSIDE_WIDTHS = 1.0, 1.5
+OUTSIDE, OUTSIDE_WIDTHS = 2.5, 3.75
+DARK, DARK_WIDTHS = 2.0, 3.0
+NEAREST_DARK = 1.0
 
 # Scatter of C/A that paint makes [1/px], and misfit of the model [grey] against which it is weighed.
 PAINT_SLOPE = 0.25
@@ -33,27 +36,42 @@ MISFIT = 3.0
 
 
 def locate_edges(
-    rays: Image, first: float, step: float, start: Array, dark: Array, angle: Array, width: float, rounds: int = 3
-) -> tuple[Array, Array, Array]:
+    rays: Image, first: float, step: float, start: Array, angle: Array, width: float, *, extent: float, rounds: int = 3
+) -> tuple[Array, Array, Array, Array]:
     """Fit the profile to every ray.
 
-    rays (p, s): grey values at first + step · k [px]; start (p,): rough edges [px]; dark (p,) [grey]; angle
-    (p,) [rad]; width: of the blur [px]. Returns edge [px] (NaN where none fits), level A [grey] and misfit
-    [grey], all (p,).
+    rays (p, s): grey values at first + step · k [px]; start (p,): rough edges [px], NaN where there is none; angle
+    (p,) [rad]; width: of the blur [px]; extent: the width [px] for which the fitted part of a ray is chosen. Returns
+    edge [px] (NaN where none fits), level A [grey], misfit [grey] and dark B [grey], all (p,).
     """
     count = len(start)
+    dark, end = _darks(rays, first, step, start, max(DARK, DARK_WIDTHS * extent))
+    inside, outside = max(INSIDE, INSIDE_WIDTHS * extent), max(OUTSIDE, OUTSIDE_WIDTHS * extent)
     fitted = np.empty((count, 4))
     harmonics = np.stack([np.ones(count), np.cos(angle), np.sin(angle)], axis=1)
     expected = np.zeros(count)
     for k in range(rounds):
         # The first round knows nothing of the shading, only that paint scatters about some slope.
-        _fit_rays(rays, first, step, start, dark, width, expected, 3.0 * PAINT_SLOPE if k == 0 else PAINT_SLOPE, fitted)
+        scatter = 3.0 * PAINT_SLOPE if k == 0 else PAINT_SLOPE
+        _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expected, scatter, fitted)
         good = np.isfinite(fitted[:, 0])
         if k == rounds - 1 or good.sum() < 12:
             break
         slope = fitted[good, 2]
         expected = harmonics @ _robust_regression(harmonics[good], slope, fitted[good, 1])
-    return fitted[:, 0], fitted[:, 1], fitted[:, 3]
+    return fitted[:, 0], fitted[:, 1], fitted[:, 3], dark
+
+
+def _darks(rays: Image, first: float, step: float, start: Array, beyond: float) -> tuple[Array, Array]:
+    """The lowest grey level of every ray up to `beyond` [px] outside its edge (p,), and where it is met (p,) [px].
+
+    Farther out is the light of the next grain.
+    """
+    where = first + step * np.arange(rays.shape[1])
+    outside = where - np.nan_to_num(start)[:, None]
+    between = (outside >= NEAREST_DARK) & (outside <= beyond + 0.5 * step) & np.isfinite(rays)
+    ray = np.where(between, rays, np.inf)
+    return ray.min(axis=1).astype(np.float64), where[np.argmin(ray, axis=1)]
 
 
 def _robust_regression(design: Array, value: Array, strength: Array) -> Array:
@@ -72,16 +90,16 @@ def _robust_regression(design: Array, value: Array, strength: Array) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fit_rays(rays, first, step, start, dark, width, expected, slope_scatter, fitted):
+def _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expected, slope_scatter, fitted):
     """Gauss-Newton for edge, A, C of every ray; fitted (p, 4): edge, A, C/A, misfit."""
     samples = rays.shape[1]
     for p in range(len(start)):
         fitted[p, :] = np.nan
-        if not np.isfinite(start[p]):
+        if not (np.isfinite(start[p]) and np.isfinite(dark[p])):
             continue
         edge = start[p]
-        low = max(int(np.ceil((edge - INSIDE - first) / step)), 0)
-        high = min(int(np.floor((edge + OUTSIDE - first) / step)), samples - 1)
+        low = max(int(np.ceil((edge - inside - first) / step)), 0)
+        high = min(int(np.floor((min(edge + outside, end[p]) - first) / step)), samples - 1)
         if high - low < 8:
             continue
         level = 0.0

@@ -12,8 +12,13 @@ from app.frames import Image
 from app.tracking.splines import shrink
 from solver.grains import Array
 
-# The smallest circle has at least this radius on the shrunk photograph on which circles are looked for.
+# Circles are looked for on shrunk photographs, where the smallest has at least this radius [px], and each about that of
+# COARSE_RADIUS.
 LEAST_RADIUS = 10.0
+COARSE_RADIUS = 20.0
+
+# Light differs over distances that do not grow with the grains: above this radius [px] they no longer set them.
+LARGEST_LOCAL = 80.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,20 +37,21 @@ def find_circles(image: Image, radii: Array, *, score_least: float) -> Candidate
     Slopes are measured against the local contrast and cut off at that of a full edge, so neither uneven
     light nor a single strong edge decides; paint inside a grain slopes every way and cancels.
     """
-    factor = max(int(radii.min() / LEAST_RADIUS), 1)
-    small = shrink(image, factor)
-    slope_x, slope_y = _slopes(small, int(4 * radii.max() / factor))
+    least = max(int(radii.min() / LEAST_RADIUS), 1)
+    factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
     found = []
-    for radius in radii:
-        score = _ring_response(slope_x, slope_y, radius / factor)
-        peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > score_least)
-        row, column = np.nonzero(peak)
-        found.append(np.stack([column, row, np.full(len(row), radius / factor), score[peak]], axis=1))
+    for factor in np.unique(factors):
+        slope_x, slope_y = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))
+        for radius in radii[factors == factor]:
+            score = _ring_response(slope_x, slope_y, radius / factor)
+            peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > score_least)
+            row, column = np.nonzero(peak)
+            place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
+            found.append(np.stack([*place, np.full(len(row), radius), score[peak]], axis=1))
     table = np.concatenate(found)
     # A mean over a longer circle is the more significant at the same value.
     table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-    table[:, :2] = table[:, :2] * factor + 0.5 * (factor - 1)
-    return Candidates(table[:, 0], table[:, 1], table[:, 2] * factor, table[:, 3])
+    return Candidates(table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
 
 def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.ndarray:
@@ -68,6 +74,11 @@ def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.
         limit = radius[near] + radius[k] - allowed * np.minimum(radius[near], radius[k])
         alive[near[distance < limit]] = False
     return np.flatnonzero(alive)
+
+
+def tile_size(radius: float) -> int:
+    """Side of what counts as local [px] where the largest grain has `radius` [px]."""
+    return int(4 * min(radius, LARGEST_LOCAL))
 
 
 def local_contrast(image: Image, tile: int) -> tuple[Image, Image]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ def track_photographs(
                 source=experiment.folder / (experiment.config.walls.file if experiment.config.walls else ""),
                 workers=tuning.workers, checkpoint=Checkpoint(checkpoint / "walls", fingerprint), progress=progress,
             )  # fmt: skip
-            walls = followed.walls
+            walls = replace(followed.walls, sigma=np.sqrt((followed.sigma**2).mean(axis=2)))
             tables[WALLS] = _walls_table(followed)
     tracks = follow_photographs(
         photographs, detection, ids, radius, time, scale,
@@ -114,9 +115,10 @@ def _detect(
         # Its own radius is what the user measured on this photograph, so the lens bent it too.
         return guess.id, detection, detection.radius * scale.size_at(centres)
     classes = np.array(section.radii)
-    low, high = tuning.radius_range
+    # What the user did not set is left to detection, which knows the size of the photograph.
+    limits = tuning.radius_range if "radius_range" in tuning.model_fields_set else None
     try:
-        settings = DetectionSettings(tuple(classes / scale.mean_size), (low, high))
+        settings = DetectionSettings(tuple(classes / scale.mean_size), limits)
     except ValueError as error:
         raise InputError(experiment.file, f"key photographs.radii = {list(section.radii)}", str(error)) from None
     detection = detect_grains(first, settings)

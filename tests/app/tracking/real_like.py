@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
@@ -28,6 +29,10 @@ class Laboratory:
     light: float = 0.3  # ± across the picture
     blur: float = 1.1  # [px]
     noise: float = 2.0  # [grey]
+    lathe: float = 0.0  # [grey] amplitude of rings about nearly the centre, as turning leaves them
+    highlight: float = 0.0  # [grey] of a soft reflex that stays on its side while the rod turns
+    shadow: float = 0.0  # share of the light that the rim on the lower right has lost
+    jpeg: int = 0  # quality; 0: not compressed
 
 
 def brown_photograph(
@@ -44,7 +49,11 @@ def brown_photograph(
     across = np.linspace(-1.0, 1.0, width)[None, :] + 0.5 * np.linspace(-1.0, 1.0, height)[:, None]
     grey = grey * (1.0 + laboratory.light * across / 1.5)
     noise = np.random.default_rng(noise_seed).normal(0.0, laboratory.noise, (height, width, 3))
-    return np.clip(np.rint(grey[:, :, None] * BROWN + noise), 0, 255).astype(np.uint8)
+    image = np.clip(np.rint(grey[:, :, None] * BROWN + noise), 0, 255).astype(np.uint8)
+    if laboratory.jpeg:
+        _, content = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, laboratory.jpeg])
+        image = np.asarray(cv2.imdecode(content, cv2.IMREAD_COLOR), dtype=np.uint8)
+    return image
 
 
 def _draw(
@@ -69,6 +78,10 @@ def _draw(
         )
         line = np.abs(u * np.sin(angle) - v * np.cos(angle) - off) < breadth
         skin[line] += paint.choice([-25.0, 18.0])
+    if laboratory.lathe:
+        ex, ey = paint.normal(0.0, 0.04, 2) * r * FINE
+        pitch, phase = paint.uniform(2.2, 4.5) * FINE, paint.uniform(0.0, 2.0 * np.pi)
+        skin += laboratory.lathe * np.sin(2.0 * np.pi * np.hypot(u - ex, v - ey) / pitch + phase)
     cx, cy = x * FINE + 1.0, y * FINE + 1.0  # of the sub-pixel grid
     top, left = int(np.floor(cy)) - side, int(np.floor(cx)) - side
     rows = np.arange(max(top, 0), min(top + size + 1, fine.shape[0]))
@@ -84,6 +97,13 @@ def _draw(
         (1 - fv) * ((1 - fu) * skin[iv, iu] + fu * skin[iv, iu + 1])
         + fv * ((1 - fu) * skin[iv + 1, iu] + fu * skin[iv + 1, iu + 1])
     )  # fmt: skip
-    share = np.clip(r * FINE - np.hypot(dx, dy) + 0.5, 0.0, 1.0)
+    distance = np.hypot(dx, dy)
+    # The light does not turn with the rod.
+    reflex = (dx + 0.3 * r * FINE) ** 2 + (dy + 0.35 * r * FINE) ** 2
+    value = value + laboratory.highlight * np.exp(-reflex / (2.0 * (0.25 * r * FINE) ** 2))
+    lower_right = np.clip((dx + dy) / np.sqrt(2.0) / np.maximum(distance, 1.0), 0.0, 1.0)
+    depth = np.maximum(r - distance / FINE, 0.0)  # [px] inside the rim
+    value = value * (1.0 - laboratory.shadow * lower_right * np.exp(-depth / 2.0))
+    share = np.clip(r * FINE - distance + 0.5, 0.0, 1.0)
     part = fine[np.ix_(rows, columns)]
     fine[np.ix_(rows, columns)] = (1 - share) * part + share * value
