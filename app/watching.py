@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -53,6 +55,19 @@ class LiveWatch:
 
 
 @contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """Let a termination from outside end the run as an interrupt does: else the page's server would live on."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    former = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, former)
+
+
+@contextmanager
 def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, LiveWatch | None]]:
     """Give the run with somebody who watches it, or as it is with the viewer `none`.
 
@@ -63,7 +78,8 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
         return
     watch = LiveWatch(run, viewer, console)
     try:
-        yield replace(run, watch=watch), watch
+        with _terminated_like_interrupted():
+            yield replace(run, watch=watch), watch
         watch.recording.finish()
         watch.recording.close()
         watch.recording.path.unlink(missing_ok=True)

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import rerun.blueprint as rrb
 
 from app.recording import entities
 from app.recording.canvas import Canvas
-from app.recording.colours import BACKGROUND
-from app.recording.plots import HEIGHT, WIDTH
+from app.recording.headroom import Extremes
+from app.recording.plots import PLOT_BOUNDS
+from app.recording.radius_curve import RADIUS_BOUNDS
+from app.recording.stack import STACK_HEIGHT_SHARE
 from app.recording.stress_and_fabric import ROSE_REACH, STRESS_REACH
+from app.recording.views import (
+    curve_view,
+    drawn_view,
+    flags_view,
+    lanes_view,
+    packing_view,
+    polar_view,
+    solid_view,
+)
 
 
 class Tab(StrEnum):
@@ -21,8 +32,10 @@ class Tab(StrEnum):
     CONVERGENCE = "Convergence"
     SETTLING = "Settling"
     STATISTICS = "Statistics"
+    LOADS = "Stress and walls"
     CONTACTS = "Contacts"
     RODS = "3D"
+    STACK = "Stack"
     TRUTH = "Truth"
     SUMMARY = "Summary"
 
@@ -34,14 +47,18 @@ class Layout:
     canvas: Canvas
     rod_length: float  # [m]
     frame_count: int
-    sweeps_per_frame: int
     photographs: bool
     truth: bool
+    wall_count: int = 4
+    radius_curve: bool = False
+    extremes: Extremes = field(default_factory=dict)  # of curves whose values are known beforehand
 
 
 _PACKING = [entities.WALLS, f"{entities.GRAINS}/**"]
 _LOW, _HIGH = rrb.Corner2D.LeftBottom, rrb.Corner2D.LeftTop
 _FORCES = [entities.FORCES, entities.SLIDING, f"{entities.FORCE_LEGEND}/**"]
+_SHARE = (-0.04, 1.05)  # of an axis for shares and correlations
+_RESIDUALS = (-6.4, 3.0)  # log10; room for a legend above
 
 
 def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: bool = False) -> rrb.Blueprint:
@@ -52,10 +69,12 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: b
     tabs: dict[Tab, rrb.Container | rrb.View] = {
         Tab.EXPERIMENT: _experiment(layout),
         Tab.CONVERGENCE: _convergence(layout),
-        Tab.SETTLING: _settling(),
-        Tab.STATISTICS: _statistics(),
+        Tab.SETTLING: _settling(layout),
+        Tab.STATISTICS: _statistics(layout),
+        Tab.LOADS: _loads(layout),
         Tab.CONTACTS: _contacts(layout),
         Tab.RODS: _rods(layout),
+        Tab.STACK: _stack(layout),
     }
     if layout.truth:
         tabs[Tab.TRUTH] = _truth(layout)
@@ -80,16 +99,15 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: b
 
 def _experiment(layout: Layout) -> rrb.Container:
     photograph = [entities.PHOTOGRAPH] if layout.photographs else []
+    angles = [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE]
     return rrb.Horizontal(
         packing_view("Force network", layout.canvas, [*photograph, *_PACKING, *_FORCES]),
         rrb.Vertical(
-            _lanes(),
-            curve_view(
-                "Friction angle [°]", [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE], corner=rrb.Corner2D.LeftTop
-            ),
-            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=(0.0, 1.05), corner=_LOW),
-            _flags(),
-            row_shares=[1.1, 2.0, 2.0, 1.5],
+            lanes_view(),
+            curve_view("Friction angle [°]", angles, layout.extremes, height=200.0, corner=_HIGH),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
+            flags_view(),
+            row_shares=[1.15, 2.0, 2.0, 1.5],
         ),
         column_shares=[1.75, 1.0],
         name=Tab.EXPERIMENT,
@@ -97,214 +115,157 @@ def _experiment(layout: Layout) -> rrb.Container:
 
 
 def _convergence(layout: Layout) -> rrb.Container:
-    near = max(layout.sweeps_per_frame, 1)
+    maps = [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"]
+    residuals = [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE]
     return rrb.Horizontal(
-        packing_view(
-            "Network as it forms; the last row of a frame is the reported field", layout.canvas, [*_PACKING, *_FORCES]
-        ),
-        packing_view(
-            "Not converged: grains by unbalance, contacts by change",
-            layout.canvas,
-            [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"],
-        ),
+        packing_view("Network as it forms", layout.canvas, [*_PACKING, *_FORCES]),
+        packing_view("Unbalance of grains, change since the last row", layout.canvas, maps),
         rrb.Vertical(
+            drawn_view("Residuals of this frame over its sweeps", "/solve/plot", *PLOT_BOUNDS),
             curve_view(
-                "log₁₀ residuals, every sweep (choose the timeline: sweep)",
-                [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE, entities.TOLERANCE],
-                near=near,
+                "log₁₀ residuals: every sweep, or the last of a frame", [*residuals, entities.TOLERANCE],
+                y_range=(-6.4, 2.6), entries=0,
             ),
-            curve_view("log₁₀ residuals reached per frame", [entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]),
-            curve_view("Sweeps per frame", [entities.SWEEP_COUNT]),
-            row_shares=[2.2, 1.2, 1.0],
+            curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes),
+            row_shares=[2.0, 1.5, 0.8],
         ),
-        column_shares=[1.0, 1.0, 0.95],
+        column_shares=[1.0, 1.0, 1.05],
         name=Tab.CONVERGENCE,
-    )
+    )  # fmt: skip
 
 
-def _settling() -> rrb.Container:
+def _settling(layout: Layout) -> rrb.Container:
+    starts = [entities.COLD_RESIDUAL, entities.WARM_RESIDUAL, entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]
+    doubts = [entities.CORRECTION, entities.OLD_UNBALANCE]
     return rrb.Vertical(
-        _lanes(),
+        lanes_view(),
         rrb.Horizontal(
-            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=(0.0, 1.05), corner=_LOW),
-            curve_view("Correction ε and old unbalance ū", [entities.CORRECTION, entities.OLD_UNBALANCE]),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
+            curve_view("log₁₀ residuals: cold start, warm start, reached", starts, y_range=_RESIDUALS),
         ),
-        rrb.Horizontal(curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET]), _flags()),
-        row_shares=[1.0, 2.4, 1.6],
+        rrb.Horizontal(
+            curve_view("Correction ε and old unbalance ū", doubts, layout.extremes, height=190.0),
+            curve_view("Sweeps saved", [entities.SAVED_SWEEPS]),
+            curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes),
+            flags_view(),
+            column_shares=[1.0, 0.8, 0.8, 1.4],
+        ),
+        row_shares=[1.0, 2.0, 1.8],
         name=Tab.SETTLING,
     )
 
 
-def _statistics() -> rrb.Container:
-    density = rrb.Spatial2DView(
-        origin="/statistics/force_density",
-        contents="$origin/**",
-        name="P(f_n / mean f_n), logarithmic",
-        background=BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(x_range=[-60.0, WIDTH + 25.0], y_range=[-15.0, HEIGHT + 45.0]),
-    )
+def _statistics(layout: Layout) -> rrb.Container:
+    density = drawn_view("P(f_n / mean f_n), logarithmic", "/statistics/force_density", *PLOT_BOUNDS)
+    coordination = [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS]
+    strong = [entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE]
+    plots: list[tuple[str, list[str]]] = [
+        ("Coordination number", coordination),
+        ("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
+        ("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
+        ("Strong network, force chains", [*strong, entities.CHAIN_GRAIN_SHARE]),
+    ]
+    below: list[rrb.View] = [curve_view(name, paths, layout.extremes, height=330.0) for name, paths in plots]
+    if layout.radius_curve:
+        below.insert(0, drawn_view("z over a change of all radii", "/statistics/radius_curve", *RADIUS_BOUNDS))
     return rrb.Vertical(
         rrb.Horizontal(
             density,
-            _polar_view("Stress / pressure", "stress", STRESS_REACH),
-            _polar_view("Fabric", "rose", ROSE_REACH),
-            column_shares=[1.5, 1.0, 1.0],
+            polar_view("Stress / pressure", "/statistics/stress", STRESS_REACH),
+            polar_view("Fabric: contacts, forces", "/statistics/rose", ROSE_REACH),
+            column_shares=[1.45, 1.0, 1.0],
         ),
-        rrb.Horizontal(
-            curve_view(
-                "Coordination number",
-                [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS],
-            ),
-            curve_view(
-                "Friction angle [°]",
-                [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE, entities.ANISOTROPY_ANGLE],
-                corner=_HIGH,
-            ),
-            curve_view("Stress [kPa]", [entities.SIGMA_1, entities.PRESSURE, entities.SIGMA_2]),
-            curve_view(
-                "Anisotropies",
-                [
-                    entities.CONTACT_ANISOTROPY, entities.BRANCH_ANISOTROPY, entities.NORMAL_FORCE_ANISOTROPY,
-                    entities.TANGENTIAL_FORCE_ANISOTROPY,
-                ],
-            ),
-        ),
-        rrb.Horizontal(
-            curve_view("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
-            curve_view("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
-            curve_view(
-                "Strong network and force chains",
-                [
-                    entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE,
-                    entities.CHAIN_GRAIN_SHARE,
-                ],
-            ),
-            curve_view("Normal forces on the walls [N]", [entities.WALL_NORMAL_FORCE], legend=True),
-            curve_view("… along the walls [N]", [entities.WALL_TANGENTIAL_FORCE], legend=True),
-        ),
-        row_shares=[1.5, 1.0, 1.0],
+        rrb.Horizontal(*below),
+        row_shares=[1.0, 1.0],
         name=Tab.STATISTICS,
-    )  # fmt: skip
+    )
+
+
+def _loads(layout: Layout) -> rrb.Container:
+    angles = [entities.FRICTION_ANGLE, entities.ANISOTROPY_ANGLE, entities.WALL_RATIO_ANGLE]
+    anisotropies = [
+        entities.CONTACT_ANISOTROPY, entities.BRANCH_ANISOTROPY, entities.NORMAL_FORCE_ANISOTROPY,
+        entities.TANGENTIAL_FORCE_ANISOTROPY,
+    ]  # fmt: skip
+    stresses = [entities.SIGMA_1, entities.PRESSURE, entities.SIGMA_2]
+
+    def plot(name: str, paths: list[str], entries: int | None = None) -> rrb.View:
+        return curve_view(name, paths, layout.extremes, height=340.0, entries=entries)
+
+    return rrb.Vertical(
+        rrb.Horizontal(
+            plot("Friction angle [°]", angles),
+            plot("Principal stresses [kPa]", stresses),
+            plot("Direction of σ₁ [°]", [entities.PRINCIPAL_DIRECTION]),
+        ),
+        rrb.Horizontal(
+            plot("Anisotropies", anisotropies),
+            plot("Forces on the walls, normal [N]", [entities.WALL_NORMAL_FORCE], layout.wall_count),
+            plot("Forces on the walls, tangential [N]", [entities.WALL_TANGENTIAL_FORCE], layout.wall_count),
+        ),
+        name=Tab.LOADS,
+    )
 
 
 def _contacts(layout: Layout) -> rrb.Container:
-    shown = [*_PACKING, entities.GAPS, entities.GAINED, entities.PARTED, f"{entities.GAP_LEGEND}/**"]
+    changes = [entities.GAPS, entities.GAINED, entities.PARTED, entities.VERDICTS]
+    touching = [entities.WALLS, entities.GRAINS, entities.PROBABILITY, entities.SLIDING]
+    counts = [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]
+    plots = [
+        curve_view("Contacts", counts, layout.extremes, height=220.0),
+        curve_view("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
+        curve_view("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
+    ]
+    if layout.extremes and entities.EXPECTED_COUNT not in layout.extremes:
+        del plots[1]  # probabilities were not computed
     return rrb.Horizontal(
-        packing_view("Gaps; gained green, lost red", layout.canvas, shown),
+        packing_view("Gaps, changes, verdicts", layout.canvas, [*_PACKING, *changes, f"{entities.GAP_LEGEND}/**"]),
         packing_view(
-            "Probability that they touch",
-            layout.canvas,
-            [entities.WALLS, entities.GRAINS, entities.PROBABILITY, f"{entities.PROBABILITY_LEGEND}/**"],
+            "Probability that they touch; sliding", layout.canvas, [*touching, f"{entities.PROBABILITY_LEGEND}/**"]
         ),
-        rrb.Vertical(
-            curve_view("Contacts", [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]),
-            curve_view("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
-            curve_view("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
-        ),
+        rrb.Vertical(*plots),
         column_shares=[1.0, 1.0, 0.8],
         name=Tab.CONTACTS,
     )
 
 
 def _rods(layout: Layout) -> rrb.View:
-    canvas = layout.canvas
-    metre = canvas.scale.pixel_size * canvas.shrink
-    middle = (0.5 * (canvas.left + canvas.right) - 0.5 * metre, 0.5 * (canvas.top + canvas.bottom))
-    x = middle[0] * metre
-    y = (canvas.scale.height - 1) * canvas.scale.pixel_size - (middle[1] - 0.5) * metre
-    size = metre * max(canvas.width, canvas.height)
-    return rrb.Spatial3DView(
-        origin="/rods",
-        name=Tab.RODS,
-        background=BACKGROUND,
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            position=(x + 0.36 * size, y - 0.16 * size, 0.97 * size),
-            look_target=(x, y, -0.3 * layout.rod_length),
-            eye_up=(0.0, 1.0, 0.0),
-        ),
-        spatial_information=rrb.SpatialInformation(target_frame="tf#/", show_axes=False, show_bounding_box=False),
+    x, y, size = _middle(layout.canvas)
+    eye = (x + 0.36 * size, y - 0.16 * size, 0.97 * size)
+    return solid_view(Tab.RODS, "/rods", eye, (x, y, -0.3 * layout.rod_length))
+
+
+def _stack(layout: Layout) -> rrb.Container:
+    x, y, size = _middle(layout.canvas)
+    middle = 0.5 * STACK_HEIGHT_SHARE * size
+    eye, target = (x + 1.2 * size, y + 0.5 * size, middle + size), (x, y - 0.1 * size, middle)
+    return rrb.Horizontal(
+        solid_view("Frames, the later the nearer", "/stack/frames", eye, target),
+        solid_view("Sweeps of this frame, the later the nearer", "/stack/sweeps", eye, target),
+        name=Tab.STACK,
     )
+
+
+def _middle(canvas: Canvas) -> tuple[float, float, float]:
+    """Middle of the packing [m] in the world, and its greater side [m]."""
+    metre = canvas.scale.pixel_size * canvas.shrink
+    across, down = 0.5 * (canvas.left + canvas.right), 0.5 * (canvas.top + canvas.bottom)
+    x = (across - 0.5) * metre
+    y = (canvas.scale.height - 1) * canvas.scale.pixel_size - (down - 0.5) * metre
+    return x, y, metre * max(canvas.width, canvas.height)
 
 
 def _truth(layout: Layout) -> rrb.Container:
-    scatter = rrb.Spatial2DView(
-        origin="/truth/scatter",
-        contents="$origin/**",
-        name="f_n: inferred over true",
-        background=BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(x_range=[-60.0, 425.0], y_range=[-15.0, 455.0]),
-    )
+    agreement = [entities.TRUTH_R_FN, entities.TRUTH_R_FT, entities.TRUTH_ERROR]
     return rrb.Vertical(
         rrb.Horizontal(
             packing_view("Inferred", layout.canvas, [*_PACKING, *_FORCES]),
             packing_view("True", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]),
         ),
         rrb.Horizontal(
-            scatter,
-            curve_view(
-                "Correlation, error", [entities.TRUTH_R_FN, entities.TRUTH_R_FT, entities.TRUTH_ERROR],
-                y_range=(0.0, 1.05), corner=_LOW,
-            ),
+            drawn_view("f_n: inferred over true", "/truth/scatter", (-60.0, 425.0), (-15.0, 455.0)),
+            curve_view("Correlation, relative L2", agreement, y_range=(-0.45, 1.05), corner=_LOW),
         ),
         row_shares=[1.7, 1.0],
         name=Tab.TRUTH,
-    )  # fmt: skip
-
-
-def packing_view(name: str, canvas: Canvas, contents: list[str]) -> rrb.View:
-    """A view of the packing, with room for a legend below it."""
-    return rrb.Spatial2DView(
-        origin="/",
-        contents=contents,
-        name=name,
-        background=BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=[canvas.left, canvas.right], y_range=[canvas.top, canvas.bottom + canvas.legend_height]
-        ),
-    )
-
-
-def _polar_view(name: str, part: str, circles: float) -> rrb.View:
-    reach = 100.0 * circles
-    return rrb.Spatial2DView(
-        origin=f"/statistics/{part}",
-        contents="$origin/**",
-        name=name,
-        background=BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(x_range=[-reach, reach], y_range=[-reach, reach]),
-    )
-
-
-def _lanes() -> rrb.View:
-    return rrb.StateTimelineView(
-        origin="/frames", contents=[entities.STATUS_LANE, entities.TRACKING_LANE], name="Status of the frames"
-    )
-
-
-def _flags() -> rrb.View:
-    columns = rrb.TextLogColumns(timeline_columns=[entities.FRAME], text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin=entities.FLAGS, name="Flags", columns=columns)
-
-
-def curve_view(
-    name: str,
-    contents: list[str],
-    *,
-    y_range: tuple[float, float] | None = None,
-    near: int | None = None,
-    legend: bool | None = None,
-    corner: rrb.Corner2D = rrb.Corner2D.RightTop,
-) -> rrb.View:
-    """A plot of curves; `near` shows only that many values on either side of the time cursor."""
-    ends = [rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.infinite()]
-    if near is not None:
-        ends = [rrb.TimeRangeBoundary.cursor_relative(seq=reach) for reach in (-near, near)]
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=contents,
-        name=name,
-        axis_x=rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(start=ends[0], end=ends[1])),
-        axis_y=rrb.ScalarAxis(range=y_range) if y_range else None,
-        plot_legend=rrb.PlotLegend(corner, visible=len(contents) > 1 if legend is None else legend),
     )

@@ -68,7 +68,7 @@ class Canvas:
     @property
     def legend_height(self) -> float:
         """Height [px] of the strip below the grains that legends use."""
-        return 0.11 * max(self.height, 0.6 * self.width)
+        return 0.15 * max(self.height, 0.6 * self.width)
 
     @property
     def quantum(self) -> float:

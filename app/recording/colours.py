@@ -37,6 +37,8 @@ SLIDING: Rgba = (64, 214, 222, 255)  # the second colour, used for the tangentia
 SUSPECT: Rgba = (255, 186, 73, 255)
 LOST: Rgba = (255, 82, 122, 255)
 GAINED: Rgba = (112, 214, 134, 255)
+ADDED: Rgba = (196, 130, 255, 255)  # by a reviewer
+FORBIDDEN: Rgba = (255, 214, 92, 255)  # by a reviewer
 SERIES: tuple[Rgba, ...] = ((255, 176, 84, 255), (110, 190, 255, 255), (176, 222, 128, 255), (214, 150, 240, 255))
 
 # Lightness, chroma, hue [°] along the way: deep red, vermilion, orange, yellow, cream.

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from app.comparison import Comparison, FieldFrame
 from app.recording import entities
-from app.recording.blueprint import curve_view, packing_view
 from app.recording.canvas import Canvas
-from app.recording.colours import BACKGROUND, OPEN, SERIES, make_ramp, packed, packed_one
+from app.recording.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
 from app.recording.force_style import ForceRange, ForceStyle
 from app.recording.legends import PIECES, log_force_legend, log_ramp_legend
 from app.recording.network import body_values
@@ -27,6 +26,7 @@ from app.recording.plots import Axes, round_step
 from app.recording.scene import Clock, Scene
 from app.recording.texts import printable
 from app.recording.values import known, log_scalar
+from app.recording.views import curve_view, drawn_view, packing_view
 from app.units import Scale
 from solver.contacts import Contacts, measure_contacts
 from solver.grains import Array
@@ -116,10 +116,7 @@ def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blu
             packing_view(second, canvas, [*packing, SECOND, legend]),
         ),
         rrb.Horizontal(
-            rrb.Spatial2DView(
-                origin="/compare/scatter", contents="$origin/**", name=f"f_n: {first} over {second}",
-                background=BACKGROUND, visual_bounds=rrb.VisualBounds2D(x_range=[-60.0, 425.0], y_range=[-15.0, 455.0]),
-            ),
+            drawn_view(f"f_n: {first} over {second}", "/compare/scatter", (-60.0, 425.0), (-15.0, 455.0)),
             curve_view("Correlation, error", [R_FN, R_FT, ERROR, SUM_RATIO], corner=rrb.Corner2D.LeftBottom),
             curve_view("Friction angle φ, wall ratio [°]", list(ANGLES), corner=rrb.Corner2D.LeftBottom),
             column_shares=[0.8, 1.0, 1.0],
@@ -178,7 +175,10 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
     ticks = [(step * k, f"{step * k:g}") for k in range(int(reach / step) + 1)]
     axes.log(
         stream, SCATTER_AXES, SCATTER_TICKS, x_ticks=ticks, y_ticks=ticks,
-        notes=[(0.8 * reach, 0.1 * reach, f"across: {second} [N]"), (0.22 * reach, 0.97 * reach, f"up: {first} [N]")],
+        notes=[
+            (0.8 * reach, 0.1 * reach, f"across: {second} [N]", INK),
+            (0.22 * reach, 0.97 * reach, f"up: {first} [N]", INK),
+        ],
         guides=[axes.points(np.array([0.0, reach]), np.array([0.0, reach]))],
     )  # fmt: skip
     return axes

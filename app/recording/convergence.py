@@ -34,14 +34,19 @@ def log_tolerance_style(stream: rr.RecordingStream) -> None:
 
 
 def log_residuals(clock: Clock, history: SweepHistory) -> None:
-    """Log one frame's residuals of every sweep (at least one)."""
-    when = rr.TimeColumn(entities.SWEEP, sequence=clock.first + np.arange(history.count))
+    """Log one frame's residuals of every sweep measured (at least one sweep); on `frame`, those of the last."""
     for path, residual in (
         (entities.SWEEP_NATURAL_MAP, history.natural_map),
         (entities.SWEEP_UNBALANCE, history.unbalance),
         (entities.SWEEP_FORCE_CHANGE, history.force_change),
     ):
-        send_scalars(clock.stream, path, when, power_of_ten(residual))
+        powers = power_of_ten(residual)
+        known = np.flatnonzero(np.isfinite(powers))  # no gaps between, which would break the curve
+        if len(known):
+            when = rr.TimeColumn(entities.SWEEP, sequence=clock.first + known)
+            send_scalars(clock.stream, path, when, powers[known])
+        clock.frame_only()
+        log_scalar(clock, path, float(powers[-1]))
 
 
 def power_of_ten(residual: Array) -> Array:

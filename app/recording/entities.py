@@ -14,7 +14,8 @@ Gauss-Seidel chain, its own last one included; the row after it shows the report
 Lengths in the 2D views are pixels of the photograph as recorded (y down; a photograph above 4 megapixels
 is recorded at half size), or nominal pixels of 1/30 mean radius without photographs. The 3D view is in metres.
 
-The recording's property `experiment` holds name, frames, grains, friction and configuration (TOML).
+The recording's property `experiment` holds what a run was given (name, frames, grains, friction, pressure, …), its
+property `outcome` what came of it, `settings` the configuration as TOML: in a catalogue each is a column.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ GAPS = "/contacts/gap"
 GAINED = "/contacts/gained"
 PARTED = "/contacts/parted"
 PROBABILITY = "/contacts/probability"
+VERDICTS = "/contacts/verdict"
 FORCE_LEGEND = "/legend/force"
 FORCE_LEGEND_TICKS = "/legend/force/ticks"
 GAP_LEGEND = "/legend/gap"
@@ -51,6 +53,10 @@ SWEEP_FORCE_CHANGE = "/solve/force_change"
 SWEEP_NATURAL_MAP = "/solve/natural_map"
 SWEEP_UNBALANCE = "/solve/unbalance"
 TOLERANCE = "/solve/tolerance"
+RESIDUAL_CURVES = "/solve/plot/curves"
+RESIDUAL_MARKS = "/solve/plot/marks"
+RESIDUAL_AXES = "/solve/plot/axes"
+RESIDUAL_TICKS = "/solve/plot/axes/ticks"
 UNBALANCE_MAP = "/solve/map/unbalance"
 CHANGE_MAP = "/solve/map/change"
 
@@ -61,6 +67,9 @@ SIMILARITY = "/frames/similarity"
 CORRECTION = "/frames/correction"
 OLD_UNBALANCE = "/frames/old_unbalance"
 FRAMES_SINCE_RESET = "/frames/frames_since_reset"
+WARM_RESIDUAL = "/frames/residual/warm"
+COLD_RESIDUAL = "/frames/residual/cold"
+SAVED_SWEEPS = "/frames/sweeps_saved"
 SWEEP_COUNT = "/frames/sweeps"
 FINAL_NATURAL_MAP = "/frames/natural_map"
 FINAL_UNBALANCE = "/frames/unbalance"
@@ -100,6 +109,8 @@ CHAIN_GRAIN_SHARE = "/statistics/chain_grain_share"
 WALL_NORMAL_FORCE = "/statistics/wall_normal_force"
 WALL_TANGENTIAL_FORCE = "/statistics/wall_tangential_force"
 FORCE_DENSITY = "/statistics/force_density/frame"
+FORCE_DENSITY_TAIL = "/statistics/force_density/tail"
+FORCE_DENSITY_TAIL_VALUE = "/statistics/force_density/tail/value"
 FORCE_DENSITY_POOLED = "/statistics/force_density/pooled"
 FORCE_DENSITY_AXES = "/statistics/force_density/axes"
 FORCE_DENSITY_TICKS = "/statistics/force_density/axes/ticks"
@@ -111,9 +122,16 @@ ROSE = "/statistics/rose/contacts"
 ROSE_OF_FORCES = "/statistics/rose/forces"
 ROSE_AXES = "/statistics/rose/axes"
 ROSE_TICKS = "/statistics/rose/axes/ticks"
+RADIUS_CURVE = "/statistics/radius_curve/curve"
+RADIUS_FOUND = "/statistics/radius_curve/found"
+RADIUS_AXES = "/statistics/radius_curve/axes"
+RADIUS_TICKS = "/statistics/radius_curve/axes/ticks"
 
 RODS = "/rods/bodies"
 ROD_CHAINS = "/rods/chains"
+STACK_LAYERS = "/stack/frames/layer"  # and the number of the frame below it
+STACK_PLACE = "/stack/frames/place"
+STACK_SWEEPS = "/stack/sweeps/layers"
 
 TRUTH_FORCES = "/truth/force"
 TRUTH_SCATTER = "/truth/scatter/contacts"
@@ -133,7 +151,7 @@ class When(Enum):
     START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on both timelines"
     START_AND_END = "cleared at the first sweep of every frame, set at its last row, on both timelines"
     END = "last row of every frame, on both timelines"
-    SWEEPS = "every sweep, on `sweep` only"
+    SWEEPS = "every sweep on `sweep`, the last one of every frame on `frame`"
     FOUND = "when there is something to say, on both timelines"
     STATIC = "once, without a time"
 
@@ -141,7 +159,7 @@ class When(Enum):
     def timelines(self) -> frozenset[str]:
         if self is When.STATIC:
             return frozenset()
-        return frozenset({SWEEP}) if self is When.SWEEPS else frozenset({FRAME, SWEEP})
+        return frozenset({FRAME, SWEEP})
 
 
 class Condition(Enum):
@@ -152,6 +170,7 @@ class Condition(Enum):
     SWEPT = "where frames were swept"
     TOLERANCE = "where a stopping level was given"
     TRUTH = "with a truth"
+    RADII = "where radii were tuned by the coordination number"
     FLAGS = "where something was flagged"
 
 
@@ -164,6 +183,7 @@ class Entity:
     components: frozenset[str]
     when: When
     condition: Condition = Condition.ALWAYS
+    per_frame: bool = False  # an entity for some frames, whose number ends the path
 
 
 def _of(archetype: str, *names: str) -> frozenset[str]:
@@ -173,6 +193,8 @@ def _of(archetype: str, *names: str) -> frozenset[str]:
 _STRIPS = _of("LineStrips2D", "strips", "radii", "colors", "draw_order")
 _POINTS = _of("Points2D", "positions", "radii", "colors", "draw_order")
 _TICKS = _of("Points2D", "positions", "radii", "colors", "labels", "show_labels")
+_LINES_3D = _of("LineStrips3D", "strips", "radii", "colors")
+_LABELS_3D = _of("Points3D", "positions", "radii", "colors", "labels", "show_labels")
 _SCALAR = _of("Scalars", "scalars")
 _LINE = _of("SeriesLines", "colors", "names", "widths")
 _LANE = _of("StateChange", "state") | _of("StateConfiguration", "values", "labels", "colors")
@@ -209,6 +231,9 @@ SCHEMA: tuple[Entity, ...] = (
         PROBABILITY, "contacts, colour by the probability that they touch; grey where it was not computed",
         _STRIPS | {"probability", "grain_a", "body_b"}, When.START,
     ),
+    Entity(
+        VERDICTS, "contacts that a reviewer added or forbade", _STRIPS | {"source", "grain_a", "body_b"}, When.START,
+    ),
     Entity(FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
     Entity(FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
     Entity(GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
@@ -221,6 +246,11 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(SWEEP_NATURAL_MAP, "log10 of the natural-map residual", When.SWEEPS, Condition.SWEPT),
     _scalar(SWEEP_UNBALANCE, "log10 of the worst grain unbalance over the mean f_n", When.SWEEPS, Condition.SWEPT),
     _scalar(TOLERANCE, "log10 of the stopping level", When.START, Condition.TOLERANCE),
+    Entity(RESIDUAL_CURVES, "residuals of the frame over its sweeps, both logarithmic, and those of a cold start",
+           _STRIPS, When.START, Condition.SWEPT),
+    Entity(RESIDUAL_MARKS, "the recorded sweep on these curves", _POINTS, When.START_AND_SWEEPS, Condition.SWEPT),
+    Entity(RESIDUAL_AXES, "axes and the stopping level", _STRIPS, When.STATIC, Condition.SWEPT),
+    Entity(RESIDUAL_TICKS, "their values", _TICKS, When.STATIC, Condition.SWEPT),
     Entity(
         UNBALANCE_MAP, "grains, colour by |ΣF| of the recorded forces over the mean f_n", _POINTS,
         When.START_AND_SWEEPS,
@@ -238,6 +268,9 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(CORRECTION, "ε, how much the forces must correct the measured motion"),
     _scalar(OLD_UNBALANCE, "ū, unbalance of the former forces on this network"),
     _scalar(FRAMES_SINCE_RESET, "frames since the last reset"),
+    _scalar(WARM_RESIDUAL, "log10 of the natural-map residual after one sweep from the former forces"),
+    _scalar(COLD_RESIDUAL, "… after one sweep from zero forces"),
+    _scalar(SAVED_SWEEPS, "sweeps that zero forces need to come as far as the former ones in one"),
     _scalar(SWEEP_COUNT, "sweeps of the frame"),
     _scalar(FINAL_NATURAL_MAP, "log10 of the natural-map residual reached"),
     _scalar(FINAL_UNBALANCE, "log10 of the worst grain unbalance of the reported field"),
@@ -278,6 +311,8 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
     _scalar(WALL_TANGENTIAL_FORCE, "… along the wall [N]"),
     Entity(FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
+    Entity(FORCE_DENSITY_TAIL, "exponential tail above the mean, this frame", _STRIPS, When.END),
+    Entity(FORCE_DENSITY_TAIL_VALUE, "its exponent", _TICKS, When.END),
     Entity(FORCE_DENSITY_POOLED, "the same, all frames so far", _STRIPS, When.END),
     Entity(FORCE_DENSITY_AXES, "axes", _STRIPS, When.STATIC),
     Entity(FORCE_DENSITY_TICKS, "their values", _TICKS, When.STATIC),
@@ -289,6 +324,11 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(ROSE_OF_FORCES, "the same, weighted by f_n", _STRIPS, When.END),
     Entity(ROSE_AXES, "circle of an isotropic packing, axes", _STRIPS, When.STATIC),
     Entity(ROSE_TICKS, "names of the curves", _TICKS, When.STATIC),
+    Entity(RADIUS_CURVE, "coordination number over a common change of all radii", _STRIPS, When.STATIC,
+           Condition.RADII),
+    Entity(RADIUS_FOUND, "the change that was taken", _POINTS, When.STATIC, Condition.RADII),
+    Entity(RADIUS_AXES, "axes and the wanted number", _STRIPS, When.STATIC, Condition.RADII),
+    Entity(RADIUS_TICKS, "their values", _TICKS, When.STATIC, Condition.RADII),
     Entity(
         RODS, "rods as cylinders [m]",
         _of("Cylinders3D", "lengths", "radii", "centers", "colors", "fill_mode"), When.END,
@@ -297,6 +337,12 @@ SCHEMA: tuple[Entity, ...] = (
         ROD_CHAINS, "forces above the mean as capsules before the rods [m]",
         _of("Capsules3D", "lengths", "radii", "translations", "quaternions", "colors", "fill_mode"), When.END,
     ),
+    Entity(
+        STACK_LAYERS, "strong forces of at most twelve frames, one above the other, an entity each below this one [m]",
+        _LINES_3D | _LABELS_3D, When.STATIC, per_frame=True,
+    ),
+    Entity(STACK_PLACE, "where the frame lies among them", _LINES_3D, When.START),
+    Entity(STACK_SWEEPS, "strong forces of some sweeps, one above the other [m]", _LINES_3D | _LABELS_3D, When.START),
     Entity(TRUTH_FORCES, "true contact forces, same widths and colours", _STRIPS | _FORCE_VALUES, When.START,
            Condition.TRUTH),
     Entity(TRUTH_SCATTER, "inferred over true f_n", _POINTS, When.END, Condition.TRUTH),
@@ -304,7 +350,7 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(TRUTH_TICKS, "their values [N]", _TICKS, When.STATIC, Condition.TRUTH),
     _scalar(TRUTH_R_FN, "correlation of f_n with the truth", When.END, Condition.TRUTH),
     _scalar(TRUTH_R_FT, "correlation of f_t with the truth", When.END, Condition.TRUTH),
-    _scalar(TRUTH_ERROR, "relative L2 error of f_n", When.END, Condition.TRUTH),
+    _scalar(TRUTH_ERROR, "relative L2 error of (f_n, f_t)", When.END, Condition.TRUTH),
     Entity(SUMMARY, "settings, trust, legend", _of("TextDocument", "text", "media_type"), When.STATIC),
 )  # fmt: skip
 

@@ -123,6 +123,10 @@ class HeadlessViewer:
         """Move the cursor of a timeline and stop there."""
         self._running().set_time(timeline, sequence=value, play_state="paused")
 
+    def draw(self) -> None:
+        """Draw the window once, as it is."""
+        self._running().take_screenshot()
+
     def picture(self, view: str | None = None) -> bytes:
         """A picture (PNG) of the window, or of one view, whose tab comes to the front, taken once it stands still."""
         client = self._running()

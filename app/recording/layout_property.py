@@ -13,7 +13,7 @@ from app.recording.blueprint import Layout
 from app.recording.canvas import Canvas
 from app.units import Scale
 
-PROPERTY = "layout"
+PROPERTY = "tabs"
 
 
 def send_layout(stream: rr.RecordingStream, layout: Layout) -> None:
@@ -31,5 +31,8 @@ def read_layout(path: Path | str) -> Layout:
             if row.get("json"):
                 stored = json.loads(row["json"][0])
                 canvas = stored.pop("canvas")
-                return Layout(Canvas(Scale(**canvas.pop("scale")), **canvas), **stored)
+                try:
+                    return Layout(Canvas(Scale(**canvas.pop("scale")), **canvas), **stored)
+                except TypeError:  # it says more, or less, than this version knows
+                    break
     raise ValueError(f"{path} does not say how it is laid out: it is not a recording of this version")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from app.recording import entities
 from app.recording.canvas import Canvas
 from app.recording.changes import gap_colours, gap_range
+from app.recording.colours import ADDED, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
 from app.recording.plots import log_texts
 from app.recording.scene import Scene
 from app.recording.touching import probability_colours
@@ -16,6 +19,7 @@ from app.recording.unconverged import DECADES, doubt_colours
 from solver.grains import Array
 
 PIECES = 48
+TICKS_BELOW, NOTES_BELOW = 0.10, 0.42  # of the legend's height, from its line to the texts
 _POWERS = ("10⁻⁴", "0.001", "0.01", "0.1")  # texts of the decades of the maps
 
 
@@ -28,11 +32,13 @@ def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     log_ramp_legend(
         stream, scene.canvas, entities.MAP_LEGEND, entities.MAP_LEGEND_TICKS, doubt_colours(10.0**power),
         [(k / decades, _POWERS[k]) for k in range(decades)] + [(1.0, "1 × mean f_n")],
+        [(0.5, "grains: force missing to balance; lines: |Δf|", INK)],
     )  # fmt: skip
     share = np.linspace(0.0, 1.0, PIECES)
     log_ramp_legend(
         stream, scene.canvas, entities.PROBABILITY_LEGEND, entities.PROBABILITY_LEGEND_TICKS,
         probability_colours(share), [(0.0, "P(touch) 0"), (0.5, "0.5"), (1.0, "1")],
+        [(0.5, "point: sliding", SLIDING)],
     )  # fmt: skip
 
 
@@ -48,7 +54,9 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     mean = style.range.mean
     values = [(0.0, "0"), (mean, f"mean {mean:.3g} N"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
     values.append((top, f"≥ {top:.3g} N"))
-    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, [(value / top, text) for value, text in values])
+    notes = [(0.5, "point: sliding contact", SLIDING)]
+    places = [(value / top, text) for value, text in values]
+    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places, notes)
 
 
 def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
@@ -66,7 +74,11 @@ def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     )
     micrometres = 1e6 * reach
     texts = [(0.0, f"overlap {micrometres:g} µm"), (0.5, "touching"), (1.0, f"open {micrometres:g} µm")]
-    _log_ticks(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts)
+    notes = [
+        (0.02, "gained", GAINED), (0.2, "lost", LOST), (0.48, "added by a reviewer", ADDED),
+        (0.88, "forbidden by one", FORBIDDEN),
+    ]  # fmt: skip
+    _log_ticks(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts, notes)
 
 
 def log_ramp_legend(
@@ -76,13 +88,14 @@ def log_ramp_legend(
     ticks: str,
     colours: NDArray[np.uint32],
     texts: list[tuple[float, str]],
+    notes: Sequence[tuple[float, str, Rgba]] = (),
 ) -> None:
-    """A line of colours (PIECES,) with texts at shares of its length."""
+    """A line of colours (PIECES,) with texts at shares of its length, and coloured notes below."""
     strips = rr.LineStrips2D(
         _pieces(canvas), radii=np.float32(0.22 * canvas.grain_radius), colors=colours, draw_order=50.0
     )
     stream.log(path, strips, static=True)
-    _log_ticks(stream, canvas, ticks, texts)
+    _log_ticks(stream, canvas, ticks, texts, notes)
 
 
 def _span(canvas: Canvas) -> tuple[float, float, float]:
@@ -99,7 +112,18 @@ def _pieces(canvas: Canvas) -> NDArray[np.float32]:
     return np.stack([ends, np.full_like(ends, y)], axis=2).astype(np.float32)
 
 
-def _log_ticks(stream: rr.RecordingStream, canvas: Canvas, path: str, texts: list[tuple[float, str]]) -> None:
+def _log_ticks(
+    stream: rr.RecordingStream,
+    canvas: Canvas,
+    path: str,
+    texts: list[tuple[float, str]],
+    notes: Sequence[tuple[float, str, Rgba]] = (),
+) -> None:
     left, right, y = _span(canvas)
-    below = y + 0.12 * canvas.legend_height
-    log_texts(stream, path, [(np.array([left + share * (right - left), below]), text) for share, text in texts])
+    lines = [(share, TICKS_BELOW, text, INK) for share, text in texts]
+    lines += [(share, NOTES_BELOW, text, colour) for share, text, colour in notes]
+    placed = [
+        (np.array([left + share * (right - left), y + below * canvas.legend_height]), text, colour)
+        for share, below, text, colour in lines
+    ]
+    log_texts(stream, path, placed)

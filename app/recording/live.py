@@ -2,7 +2,8 @@
 
 The server answers on 127.0.0.1 only and keeps at most MEMORY_LIMIT of what was logged; a viewer that opens late sees
 what it still has. The file has everything, and every finished frame reaches it before the next one begins, so that a
-run that is interrupted, or killed, leaves a recording that opens.
+run that is interrupted, or killed, leaves a recording that opens. So as not to slow the solve it keeps fewer sweeps
+than the full recording, which takes its place at the end, and measures no warm and cold starts.
 
 To watch a run on another machine, forward both ports, under the same numbers, and open the printed address here:
 
@@ -40,6 +41,7 @@ from solver.frame_statistics import FrameStatistics
 MEMORY_LIMIT = "512MiB"  # of what the server keeps for viewers that open late; the oldest goes first
 DATA_PORT, PAGE_PORT = 9876, 9090  # where they are free
 FLUSH_SECONDS = 5.0  # for one frame to reach the file
+SWEEPS_KEPT = 20  # per frame: the solve must not wait for its pictures
 HEADROOM = 1.3  # of the drawn range over the greatest forces of the first frame: those of the run are not known yet
 
 Photograph = Callable[[int], NDArray[np.uint8] | None]
@@ -120,7 +122,7 @@ class LiveRecording:
         seen = ForceRange.of([forces])
         style = ForceStyle.on(self._canvas, ForceRange(seen.mean, HEADROOM * seen.top))
         scene = Scene(run.name, run.tracks, run.walls, run.grains, run.friction, run.configuration, self._canvas, style)
-        recorder = Recorder(self._running(), sweeps=self._sweeps, flush_every=1)
+        recorder = Recorder(self._running(), sweeps=self._sweeps, kept=SWEEPS_KEPT, flush_every=1, starts=False)
         recorder.start(scene)
         send_layout(self._running(), self._layout(run, self._canvas))
         return recorder
@@ -128,8 +130,8 @@ class LiveRecording:
     def _layout(self, run: Results, canvas: Canvas) -> Layout:
         style = ForceStyle.on(canvas, ForceRange(1.0, 4.0))
         scene = Scene(run.name, run.tracks, run.walls, run.grains, run.friction, run.configuration, canvas, style)
-        sweeps = 5000  # a usual number: it only frames one plot
-        return Layout(canvas, scene.rod_length, run.tracks.frame_count, sweeps, self._photograph is not None, False)
+        photographs = self._photograph is not None
+        return Layout(canvas, scene.rod_length, run.tracks.frame_count, photographs, False, run.walls.count)
 
     def _open_viewer(self, data: str) -> None:
         """Start the viewer or the page; where there is no display, only say how to look."""

@@ -9,10 +9,11 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from app.recording.colours import FAINT, INK, packed, packed_one
+from app.recording.colours import FAINT, INK, Rgba, packed, packed_one
 from solver.grains import Array
 
 WIDTH, HEIGHT = 600.0, 380.0  # of a plot, in the units of its view
+PLOT_BOUNDS = ((-60.0, WIDTH + 25.0), (-15.0, HEIGHT + 45.0))  # of a view with its labels
 CIRCLE = 100.0  # radius of the unit circle of a polar plot
 
 
@@ -40,10 +41,10 @@ class Axes:
         *,
         x_ticks: Sequence[tuple[float, str]],
         y_ticks: Sequence[tuple[float, str]],
-        notes: Sequence[tuple[float, float, str]] = (),
+        notes: Sequence[tuple[float, float, str, Rgba]] = (),
         guides: Sequence[NDArray[np.float32]] = (),
     ) -> None:
-        """Log grid lines and labels, static; notes are texts at data points, guides further lines in view units."""
+        """Log grid lines and labels, static; notes: coloured texts at points; guides: further lines."""
         x0, x1, y0, y1 = *self.x_range, *self.y_range
         grid = [self.points(np.array([x, x]), np.array([y0, y1])) for x, _ in x_ticks]
         grid += [self.points(np.array([x0, x1]), np.array([y, y])) for y, _ in y_ticks]
@@ -54,21 +55,23 @@ class Axes:
             lines, rr.LineStrips2D(strips, radii=np.float32(0.6), colors=packed(shades), draw_order=0.0), static=True
         )
         raised, left = 16.0 * (y1 - y0) / self.height, 22.0 * (x1 - x0) / self.width  # the viewer writes below a point
-        texts = [(x, y0, text) for x, text in x_ticks] + [(x0 - left, y + raised, text) for y, text in y_ticks]
-        log_texts(stream, ticks, [(self.points(np.array(x), np.array(y)), text) for x, y, text in [*texts, *notes]])
+        texts = [(x, y0, text, INK) for x, text in x_ticks]
+        texts += [(x0 - left, y + raised, text, INK) for y, text in y_ticks]
+        placed = [(self.points(np.array(x), np.array(y)), text, colour) for x, y, text, colour in [*texts, *notes]]
+        log_texts(stream, ticks, placed)
 
 
 def log_texts(
-    stream: rr.RecordingStream, path: str, texts: Sequence[tuple[NDArray, str]], *, static: bool = True
+    stream: rr.RecordingStream, path: str, texts: Sequence[tuple[NDArray, str, Rgba]], *, static: bool = True
 ) -> None:
-    """Log texts at points of a view."""
+    """Log coloured texts at points of a view."""
     stream.log(
         path,
         rr.Points2D(
-            np.array([point for point, _ in texts], np.float32),
+            np.array([point for point, _, _ in texts], np.float32).reshape(-1, 2),
             radii=np.float32(0.01),
-            colors=packed_one(INK),
-            labels=[text for _, text in texts],
+            colors=packed(np.array([colour for _, _, colour in texts], np.uint8).reshape(-1, 4)),
+            labels=[text for _, text, _ in texts],
             show_labels=True,
         ),
         static=static,

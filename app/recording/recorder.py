@@ -21,14 +21,21 @@ from app.recording.changes import log_changes
 from app.recording.convergence import log_residual_styles, log_residuals, log_tolerance, log_tolerance_style
 from app.recording.force_density import ForceDensity
 from app.recording.force_style import ForceRange, ForceStyle
+from app.recording.headroom import find_extremes
 from app.recording.layout_property import send_layout
 from app.recording.legends import log_legends
-from app.recording.network import SweepChoice, log_network
+from app.recording.network import SweepChoice, chosen_sweeps, log_network
 from app.recording.packing import log_packing
 from app.recording.photographs import log_photograph
+from app.recording.properties import send_experiment, send_outcome
+from app.recording.radius_curve import log_radius_curve
+from app.recording.residual_plot import ResidualPlot
+from app.recording.reviewed import log_reviewed
 from app.recording.rods import log_rods
 from app.recording.scene import Clock, Scene
 from app.recording.settling import log_settling, log_settling_styles
+from app.recording.stack import StackWriter
+from app.recording.starts import UNKNOWN, StartGauge, Starts, log_start_styles, log_starts
 from app.recording.statistics import log_statistics, log_statistics_styles
 from app.recording.stress_and_fabric import log_polar_axes, log_rose, log_stress
 from app.recording.summary import FrameFacts, log_summary
@@ -74,7 +81,8 @@ class RecordingReport:
 class Recorder:
     """Writes a run into a stream, one frame at a time. The stream is the caller's: file, socket or memory.
 
-    Call start once, frame for the frames in their order, finish once.
+    Call start once, frame for the frames in their order, finish once. starts: whether warm and cold starts are
+    measured, which takes sweeps of its own.
     """
 
     def __init__(
@@ -84,12 +92,17 @@ class Recorder:
         sweeps: SweepChoice = SweepChoice.LOG,
         kept: int = SWEEPS_KEPT,
         flush_every: int = FLUSHED_FRAMES,
+        starts: bool = True,
     ) -> None:
         rr.set_strict_mode(True)  # else the SDK warns and leaves out what it could not write
         self._stream = stream
         self._sweeps, self._kept, self._flush_every = sweeps, kept, flush_every
+        self._starts = starts
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
+        self._gauge: StartGauge | None = None
+        self._stack: StackWriter | None = None
+        self._plot: ResidualPlot | None = None
         self._former: FrameForces | None = None
         self._density = ForceDensity()
         self._facts: list[FrameFacts] = []
@@ -109,17 +122,12 @@ class Recorder:
         stream.set_log_time_enabled(False)
         self._scene = scene
         stream.send_recording_name(printable(scene.name))
-        stream.send_property(
-            "experiment",
-            rr.AnyValues(
-                name=printable(scene.name),
-                frames=scene.tracks.frame_count,
-                grains=scene.grains.count,
-                friction=scene.friction,
-                configuration=printable(scene.configuration),
-            ),
-        )
+        send_experiment(stream, scene)
+        self._gauge = StartGauge(scene) if self._starts else None
+        self._stack = StackWriter(scene)
+        self._plot = ResidualPlot(scene.tolerance)
         log_settling_styles(stream)
+        log_start_styles(stream)
         log_statistics_styles(stream, scene)
         log_touching_styles(stream)
         log_polar_axes(stream)
@@ -127,6 +135,8 @@ class Recorder:
         self._density.log_axes(stream)
         if scene.tolerance is not None:
             log_tolerance_style(stream)
+        if scene.radius_tuning is not None:
+            log_radius_curve(stream, scene.radius_tuning)
         if scene.truth is not None:
             self._truth = TruthWriter(scene, scene.truth)
             self._truth.log_axes(stream)
@@ -141,16 +151,21 @@ class Recorder:
             log_photograph(clock, scene.canvas, photograph)
         log_packing(clock, scene, forces)
         self.network_rows += log_network(clock, scene, forces, self._sweeps, self._kept)
-        self._log_solve(clock, scene, forces)
+        starts = self._gauge.measure(forces) if self._gauge else UNKNOWN
+        log_starts(clock, starts)
+        self._log_solve(clock, scene, forces, starts)
         log_unconverged(clock, scene, forces, self._sweeps, self._kept)
         log_touching(clock, scene, forces)
+        log_reviewed(clock, scene, forces)
         changes = log_changes(clock, scene, forces, self._former)
         log_settling(clock, scene, forces, changes)
         log_statistics(clock, scene, statistics)
         log_stress(clock, statistics)
         log_rose(clock, forces)
-        self._density.log(clock, forces.fn)
+        self._density.log(clock, forces.fn, statistics.tail_exponent)
         log_rods(clock, scene, forces)
+        if self._stack is not None:
+            self._stack.log(clock, forces)
         agreement = self._truth.log(clock, forces) if self._truth else None
         self._former = forces
         self._clipped += scene.style.clipped(forces.fn)
@@ -165,9 +180,10 @@ class Recorder:
     def finish(self, notes: tuple[str, ...] = ()) -> None:
         """Write the summary."""
         self._stream.reset_time()
+        send_outcome(self._stream, self._facts)
         log_summary(self._stream, self._running(), self._facts, self._clipped, self._drawn, list(notes))
 
-    def _log_solve(self, clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    def _log_solve(self, clock: Clock, scene: Scene, forces: FrameForces, starts: Starts) -> None:
         if scene.tolerance is not None:
             log_tolerance(clock, scene.tolerance)
         if forces.history.count == 0:
@@ -175,7 +191,11 @@ class Recorder:
         if not self._swept:
             log_residual_styles(self._stream)
             self._swept = True
-        log_residuals(clock, forces.history)
+        history = forces.history
+        log_residuals(clock, history)
+        if self._plot is not None:
+            few = chosen_sweeps(history, SweepChoice.LOG, self._kept)
+            self._plot.log(clock, history, starts, history.recorded[few])
 
     def _running(self) -> Scene:
         if self._scene is None:
@@ -209,7 +229,7 @@ def record(
     canvas = Canvas.around(results.tracks, scale, None if first is None else (first.shape[0], first.shape[1]))
     scene = Scene(
         results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
-        ForceStyle.on(canvas, ForceRange.of(results.frames)), truth, tolerance,
+        ForceStyle.on(canvas, ForceRange.of(results.frames)), truth, tolerance, results.radius_tuning,
     )  # fmt: skip
     part = path.with_name(path.name + ".part")
     notes: tuple[str, ...] = ()
@@ -240,10 +260,9 @@ def record(
 
 def layout_of(results: Results, scene: Scene, *, photographs: bool) -> Layout:
     """What the blueprint must know of a finished run."""
-    spans = [frame.history.count for frame in results.frames]
     return Layout(
-        scene.canvas, scene.rod_length, len(spans), int(np.median(spans)) if spans else 1, photographs,
-        scene.truth is not None,
+        scene.canvas, scene.rod_length, len(results.frames), photographs, scene.truth is not None, scene.walls.count,
+        scene.radius_tuning is not None, find_extremes(results),
     )  # fmt: skip
 
 

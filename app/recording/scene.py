@@ -18,6 +18,7 @@ from app.tracks import Tracks, WallTracks
 from solver.boundaries import Walls
 from solver.contacts import Contacts
 from solver.grains import Array, Grains
+from solver.radius_tuning import RadiusTuning
 
 USUAL_ROD_LENGTH = 0.06  # [m] drawn where the configuration does not say
 
@@ -36,6 +37,7 @@ class Scene:
     style: ForceStyle
     truth: TruthContacts | None = None
     tolerance: float | None = None  # stopping level of the residual that the solver watches
+    radius_tuning: RadiusTuning | None = None
 
     @property
     def rod_length(self) -> float:
@@ -80,6 +82,11 @@ class Clock:
     def end(self) -> None:
         """What is logged next belongs to the frame's last row."""
         self._set(self.last)
+
+    def frame_only(self) -> None:
+        """What is logged next belongs to the frame on `frame`, and to nothing on `sweep`."""
+        self.stream.reset_time()
+        self.stream.set_time(entities.FRAME, sequence=self.frame)
 
     def _set(self, sweep: int) -> None:
         self.stream.reset_time()

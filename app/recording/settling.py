@@ -58,9 +58,10 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         (entities.CORRECTION, "correction ε", SERIES[0]),
         (entities.OLD_UNBALANCE, "old unbalance ū", SERIES[3]),
         (entities.FRAMES_SINCE_RESET, "frames since reset", SERIES[1]),
+        (entities.SAVED_SWEEPS, "sweeps saved", SERIES[1]),
         (entities.SWEEP_COUNT, "sweeps", SERIES[1]),
-        (entities.FINAL_NATURAL_MAP, "natural map reached", SERIES[0]),
-        (entities.FINAL_UNBALANCE, "worst unbalance reported / mean f_n", SERIES[1]),
+        (entities.FINAL_NATURAL_MAP, "natural map reached", SERIES[2]),
+        (entities.FINAL_UNBALANCE, "worst unbalance of the reported field", SERIES[3]),
         (entities.GAINED_COUNT, "gained", (112, 214, 134, 255)),
         (entities.PARTED_COUNT, "lost", (255, 82, 122, 255)),
     ):

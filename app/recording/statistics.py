@@ -12,7 +12,9 @@ from app.recording.colours import SERIES
 from app.recording.scene import Clock, Scene
 from app.recording.texts import printable
 from app.recording.values import log_scalar, log_scalars
+from solver.boundaries import Walls
 from solver.frame_statistics import FrameStatistics
+from solver.grains import Array
 
 
 def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
@@ -56,7 +58,15 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
 def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> None:
     """Log one frame's macroscopic quantities."""
     clock.end()
-    for path, value in (
+    for path, value in statistic_values(statistics):
+        log_scalar(clock, path, float(value))
+    for path, values in wall_values(scene.walls.endpoints[clock.frame], statistics):
+        log_scalars(clock, path, values)
+
+
+def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ...]:
+    """Entity and value of every curve of one frame."""
+    return (
         (entities.FRICTION_ANGLE, math.degrees(statistics.friction_angle)),
         (entities.WALL_RATIO_ANGLE, math.degrees(statistics.wall_ratio_angle)),
         (entities.PRINCIPAL_DIRECTION, math.degrees(statistics.principal_direction)),
@@ -84,9 +94,14 @@ def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> N
         (entities.STRONG_DEVIATOR_SHARE, statistics.strong_deviator_share),
         (entities.CHAIN_COUNT, statistics.chain_count),
         (entities.CHAIN_GRAIN_SHARE, statistics.chain_grain_share),
-    ):
-        log_scalar(clock, path, float(value))
-    walls = scene.walls_at(clock.frame)
+    )
+
+
+def wall_values(endpoints: Array, statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
+    """Entity and values (w,) [N] of the curves of the walls; endpoints (w, 2, 2) [m] of the frame."""
+    walls = Walls(endpoints, np.zeros_like(endpoints), np.full(len(endpoints), np.nan))
     force = np.broadcast_to(statistics.wall_force, (walls.count, 2))
-    log_scalars(clock, entities.WALL_NORMAL_FORCE, np.einsum("wk,wk->w", force, walls.outward))
-    log_scalars(clock, entities.WALL_TANGENTIAL_FORCE, np.einsum("wk,wk->w", force, walls.direction))
+    return (
+        (entities.WALL_NORMAL_FORCE, np.einsum("wk,wk->w", force, walls.outward)),
+        (entities.WALL_TANGENTIAL_FORCE, np.einsum("wk,wk->w", force, walls.direction)),
+    )

@@ -25,7 +25,7 @@ def log_polar_axes(stream: rr.RecordingStream) -> None:
     log_texts(
         stream,
         entities.ROSE_TICKS,
-        [(_corner(ROSE_REACH, 0), "blue: contacts"), (_corner(ROSE_REACH, 1), "orange: forces")],
+        [(_corner(ROSE_REACH, 0), "contacts", SERIES[1]), (_corner(ROSE_REACH, 1), "forces", SERIES[0])],
     )
 
 
@@ -51,9 +51,12 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
             draw_order=20.0,
         ),
     )
-    texts = [f"orange: σ₁ {1e-3 * value[0]:.1f} kPa", f"blue: σ₂ {1e-3 * value[1]:.1f} kPa"]
-    corners = [_corner(STRESS_REACH, line) for line in range(2)]
-    log_texts(clock.stream, entities.STRESS_VALUES, list(zip(corners, texts, strict=True)), static=False)
+    angle = np.degrees(statistics.principal_direction)
+    texts = [
+        (_corner(STRESS_REACH, 0), f"σ₁ {1e-3 * value[0]:.1f} kPa at {f'{angle:.0f}'.replace('-', '−')}°", SERIES[0]),
+        (_corner(STRESS_REACH, 1), f"σ₂ {1e-3 * value[1]:.1f} kPa", SERIES[1]),
+    ]
+    log_texts(clock.stream, entities.STRESS_VALUES, texts, static=False)
     angle = np.linspace(0.0, 2.0 * np.pi, 97)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     radius = np.einsum("ka,ab,kb->k", normal, stress, normal) / statistics.pressure

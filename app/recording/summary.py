@@ -12,8 +12,9 @@ import rerun as rr
 
 from app.recording import entities
 from app.recording.scene import Scene, setting
+from app.recording.stack import STRONG, STRONG_SWEEPS
 from app.recording.texts import printable
-from app.recording.truth import Agreement
+from solver.agreement import Agreement
 from solver.frame_forces import FrameForces, FrameStatus
 from solver.frame_statistics import FrameStatistics
 from solver.grains import Array
@@ -126,7 +127,7 @@ def _accuracy(facts: list[FrameFacts]) -> str:
         "## Against the truth\n\n| | median | worst |\n|---|---|---|\n"
         f"| r(f_n) | {_pair([a.r_fn for a in known], np.nanmin)} |\n"
         f"| r(f_t) | {_pair([a.r_ft for a in known], np.nanmin)} |\n"
-        f"| relative L2 of f_n | {_pair([a.relative_l2 for a in known], np.nanmax)} |\n\n"
+        f"| relative L2 of (f_n, f_t) | {_pair([a.relative_l2 for a in known], np.nanmax)} |\n\n"
         "Over all contacts that are true or detected; absent counts as 0."
     )
 
@@ -159,9 +160,14 @@ def _legend(scene: Scene, clipped: int, drawn: int) -> str:
         "switch to it for the tab *Convergence*. After the last sweep of a frame one more value shows the "
         "reported field: the estimator *ensemble* makes it of several chains and convex members, so that the "
         "forces may step there.\n"
-        "- **Not converged**: grains glow by the force that is missing to their balance, contacts by how much they "
-        "changed since the recorded sweep before (in a frame's last row: from the chain to the reported field), both "
-        "over the mean f_n."
+        "- **Unbalance and change**: grains glow by the force that is missing to their balance, contacts by how much "
+        "they changed since the recorded row before, which may be many sweeps back (in a frame's last row: from the "
+        "chain to the reported field), both over the mean f_n.\n"
+        "- **Warm and cold start**: the residual after one sweep from the former forces, and after one from zero "
+        "forces, on the problem of the frame's last sub-step. The sweeps saved are those that zero forces need to "
+        "come as far.\n"
+        f"- **Stack**: forces above {STRONG:g} times the mean of some frames, and above {STRONG_SWEEPS:g} times the "
+        "mean of some sweeps of this frame, the later the nearer. The bright outline is this frame."
     )
 
 

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import rerun as rr
 
 from app.recording import entities
-from app.recording.changes import correlate
-from app.recording.colours import SERIES, packed_one
+from app.recording.colours import INK, SERIES, packed_one
 from app.recording.network import body_values
 from app.recording.plots import Axes, round_step
 from app.recording.scene import Clock, Scene
 from app.recording.values import known, log_scalar
 from app.results import TruthContacts
-from solver.agreement import align_forces
+from solver.agreement import Agreement, align_forces, compare_forces
 from solver.contacts import measure_contacts
-from solver.frame_forces import FrameForces
-from solver.grains import Array
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """Inferred against true forces of one frame, over all true or detected contacts; absent is 0."""
-
-    r_fn: float
-    r_ft: float
-    relative_l2: float  # of f_n
+from solver.frame_forces import ContactSource, FrameForces
 
 
 class TruthWriter:
@@ -50,13 +37,16 @@ class TruthWriter:
             entities.TRUTH_TICKS,
             x_ticks=ticks,
             y_ticks=ticks,
-            notes=[(0.82 * top, 0.1 * top, "across: true f_n [N]"), (0.22 * top, 0.97 * top, "up: inferred f_n [N]")],
+            notes=[
+                (0.8 * top, 0.1 * top, "across: true f_n [N]", INK),
+                (0.26 * top, 0.97 * top, "up: inferred f_n [N]", INK),
+            ],
             guides=[self._axes.points(np.array([0.0, top]), np.array([0.0, top]))],
         )
         for path, name, colour in (
             (entities.TRUTH_R_FN, "r(f_n)", SERIES[0]),
             (entities.TRUTH_R_FT, "r(f_t)", SERIES[1]),
-            (entities.TRUTH_ERROR, "relative L2 of f_n", SERIES[3]),
+            (entities.TRUTH_ERROR, "relative L2", SERIES[3]),
         ):
             stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
 
@@ -88,9 +78,10 @@ class TruthWriter:
             rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
         )
         clock.end()
-        ours = forces.contacts.key
-        true_fn, inferred_fn = align_forces(key, truth.fn[rows], ours, np.nan_to_num(forces.fn))
-        true_ft, inferred_ft = align_forces(key, truth.ft[rows], ours, np.nan_to_num(forces.ft))
+        listed = forces.source != ContactSource.FORBIDDEN_BY_REVIEWER
+        ours, inferred = forces.contacts.key[listed], np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed])
+        true = np.column_stack([truth.fn[rows], truth.ft[rows]])
+        (true_fn, _), (inferred_fn, _) = (each.T for each in align_forces(key, true, ours, inferred))
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,
@@ -101,9 +92,7 @@ class TruthWriter:
                 draw_order=20.0,
             ),
         )
-        agreement = Agreement(
-            correlate(true_fn, inferred_fn), correlate(true_ft, inferred_ft), relative_error(true_fn, inferred_fn)
-        )
+        agreement = compare_forces(ours, inferred, key, true)
         log_scalar(clock, entities.TRUTH_R_FN, agreement.r_fn)
         log_scalar(clock, entities.TRUTH_R_FT, agreement.r_ft)
         log_scalar(clock, entities.TRUTH_ERROR, agreement.relative_l2)
@@ -114,9 +103,3 @@ class TruthWriter:
         n, present = self._scene.grains.count, self._scene.tracks.present[frame]
         i, j = self._truth.i[rows], self._truth.j[rows]
         return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])
-
-
-def relative_error(true: Array, inferred: Array) -> float:
-    """L2 norm of the difference over that of the truth; NaN where the truth is zero."""
-    norm = np.linalg.norm(true)
-    return float(np.linalg.norm(inferred - true) / norm) if norm > 0.0 else float("nan")

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rerun as rr
 
 from app.experiment import load_experiment, make_packing, read_tracks, read_walls
 from app.recording import Canvas, ForceRange, ForceStyle, Layout, Recorder, Scene, SweepChoice, make_blueprint
-from app.recording.headless import HeadlessViewer, vulkan_drivers
+from app.recording.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
 from app.recording.layout_property import send_layout
 from app.recording.recorder import BATCHES
 from app.solver_input import make_snapshots, sequence_settings
@@ -32,7 +33,10 @@ pytestmark = pytest.mark.slow
 FRAMES, SWEEPS = 60, 1000
 LARGEST = 160e6  # [bytes] with every visible sweep, without photographs
 SECONDS = 10.0  # of processor time for logging all of it
-SEEK_SECONDS = 5.0  # for a still picture of another sweep: two drawn in software, on a busy machine
+# What a still picture of another sweep may take, in single drawings of the same tab: the software draws it several
+# times (data fetched on demand, then twice the same), and how long that takes depends on the machine and its load.
+SEEK_DRAWINGS = 10.0
+SEEK_TABS = ("Experiment", "Convergence", "Settling")
 
 
 @pytest.fixture(scope="module")
@@ -59,17 +63,31 @@ def test_every_sweep_fits_into_a_file_that_can_be_sent(experiment: Path, tmp_pat
         return
     begin = time.perf_counter()
     with HeadlessViewer(path, width=1000, height=700) as viewer:
+        print(f"open after {time.perf_counter() - begin:.1f} s", end="")
         last = viewer.timeline("sweep")[1]
-        viewer.picture("Force network")
-        print(f"first still picture after {time.perf_counter() - begin:.1f} s")
-        took = []
-        for sweep in (last // 2, last // 2 + 1, 17, last - 5, last // 3):
-            begin = time.perf_counter()
+        viewer.picture()
+        print(f", first still picture after {time.perf_counter() - begin:.1f} s (9 s of them for notices to go)")
+        for tab in SEEK_TABS:
+            viewer.show_tab(tab)
+            seek = seconds_of(viewer, (last // 3, 17, last - 5, last // 2, last // 5))
+            step = seconds_of(viewer, (last // 5 + k for k in range(1, 6)))
+            drawing = seconds_of(viewer, (None, None, None))
+            print(f"{tab}: seek {seek:.2f} s, next sweep {step:.2f} s, one drawing {drawing:.2f} s (medians)")
+            assert seek <= SEEK_DRAWINGS * drawing + STILL_SECONDS
+
+
+def seconds_of(viewer: HeadlessViewer, sweeps: Iterable[int | None]) -> float:
+    """Median seconds until the tab in front stands still at another sweep; None: of drawing it once as it is."""
+    took = []
+    for sweep in sweeps:
+        begin = time.perf_counter()
+        if sweep is None:
+            viewer.draw()
+        else:
             viewer.set_time("sweep", sweep)
-            viewer.picture("Force network")
-            took.append(time.perf_counter() - begin)
-    print("seek to a still picture [s]:", ", ".join(f"{each:.2f}" for each in took))
-    assert sorted(took)[len(took) // 2] <= SEEK_SECONDS
+            viewer.picture()
+        took.append(time.perf_counter() - begin)
+    return float(np.median(took))
 
 
 def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[float, float, int]:
@@ -81,7 +99,7 @@ def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[flo
     packing = make_packing(experiment, tracks.radius, walls.pressure)
     canvas = Canvas.around(tracks, None)
     stream = rr.RecordingStream("rodsight", batcher_config=BATCHES)
-    layout = Layout(canvas, packing.length, tracks.frame_count, SWEEPS, False, False)
+    layout = Layout(canvas, packing.length, tracks.frame_count, photographs=False, truth=False, wall_count=walls.count)
     stream.save(path, default_blueprint=make_blueprint(layout))
     recorder, seconds, contacts = Recorder(stream, sweeps=choice), 0.0, 0
     for forces, statistics in _solved(experiment, tracks, walls, packing):

@@ -144,9 +144,18 @@ class Browser:
         return json.loads(message)
 
 
+DRAWN = 0.003  # least share of a page that strong forces cover
+LEGEND_FROM = 0.8  # of the page's height: the legend of the forces, which is always drawn, lies below
+
+
 def warm_share(picture: np.ndarray) -> float:
     """Share of the picture in the colours of strong forces: red to yellow."""
     return float((picture[..., 0].astype(int) - picture[..., 2] > 80).mean())
+
+
+def forces_drawn(picture: np.ndarray) -> bool:
+    """Whether a page with the force network in front shows forces, and not their legend alone."""
+    return warm_share(picture[: int(LEGEND_FROM * len(picture))]) > DRAWN
 
 
 def _above(descriptor: int) -> int:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rerun as rr
 from fake_photographs import PIXEL, SHAPE, photograph
-from fake_results import make_results, make_truth
+from fake_results import make_results, make_truth, make_tuning
 
 from app.recording import RecordingReport, record
 from app.results import Results, TruthContacts
@@ -37,4 +38,5 @@ def recording(results, truth, tmp_path_factory) -> RecordingReport:
     """Everything that a recording can hold."""
     path: Path = tmp_path_factory.mktemp("recording") / "run.rrd"
     scale = Scale(PIXEL, SHAPE[0])
-    return record(results, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)
+    tuned = replace(results, radius_tuning=make_tuning())
+    return record(tuned, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)

@@ -13,6 +13,7 @@ from solver.contacts import Contacts, detect_contacts
 from solver.frame_forces import ContactState, FrameForces, FrameStatus, SweepHistory
 from solver.frame_statistics import FrameStatistics
 from solver.grains import Grains
+from solver.radius_tuning import RadiusTuning
 
 RADIUS = 0.008  # [m]
 FRICTION = 0.25
@@ -55,6 +56,13 @@ def contacts_at(tracks: Tracks, walls: WallTracks, grains: Grains, frame: int) -
     endpoints = walls.endpoints[frame]
     still = Walls(endpoints, np.zeros_like(endpoints), np.full(walls.count, np.nan))
     return detect_contacts(grains, tracks.position[frame], tracks.present[frame], still, 0.03 * RADIUS)
+
+
+def make_tuning() -> RadiusTuning:
+    """A curve z(δR) that meets 3.5 at 12 µm."""
+    change = np.linspace(-1e-4, 1e-4, 21)
+    number = 3.5 + 0.4 * np.tanh((change - 1.2e-5) / 4e-5)
+    return RadiusTuning(change, number, number[:, None], 3.5, 1.2e-5, 3.5)
 
 
 def make_truth(results: Results, rng: np.random.Generator) -> TruthContacts:

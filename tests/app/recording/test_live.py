@@ -9,15 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser import Browser, warm_share
+from browser import Browser, forces_drawn
 from fake_results import make_results
 
 from app.cli import main
 from app.recording import read_forces
 from app.recording.live import LiveRecording
 from app.recording.repair import repair_recording
-
-DRAWN = 0.005  # least share of a page that strong forces and their legend cover
 
 
 def before(results):
@@ -95,7 +93,7 @@ def test_a_watched_run_ends_with_the_full_recording_alone(tracked, tmp_path, cap
 def test_an_interrupted_run_leaves_a_recording_that_opens(tracked, tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-c", "from app.cli import main; main()", "run", str(tracked), "--out", str(out)]
-    command += ["--view", "web", "--set", "solver.sweeps=6000"]
+    command += ["--view", "web", "--set", "solver.sweeps=20000"]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     kept, end = out / ".unfinished" / "solving", time.monotonic() + 60
     while not (kept / "000002.npz").exists() and run.poll() is None and time.monotonic() < end:
@@ -115,9 +113,9 @@ def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path):
     try:
         with Browser() as browser:
             browser.open(f"{live.address}&renderer=webgl")
-            assert not browser.shows(lambda picture: warm_share(picture) > DRAWN, seconds=8.0)  # nothing solved yet
+            assert not browser.shows(forces_drawn, seconds=8.0)  # nothing solved yet
             for forces, statistics in zip(results.frames, results.statistics, strict=True):
                 live.frame(forces, statistics)
-            assert browser.shows(lambda picture: warm_share(picture) > DRAWN)
+            assert browser.shows(forces_drawn)
     finally:
         live.close()

@@ -21,7 +21,16 @@ def expected(*absent: Condition) -> dict[str, tuple[set[str], set[str]]]:
 
 
 def written(path) -> dict[str, tuple[set[str], set[str]]]:
-    return {entity: parts for entity, parts in components(path).items() if not entity.startswith("/__properties")}
+    """What is in the file; the entities of single frames as one."""
+    per_frame = {entity.path for entity in SCHEMA if entity.per_frame}
+    found = {}
+    for path_of, parts in components(path).items():
+        head, _, frame = path_of.rpartition("/")
+        if head in per_frame and frame.isdecimal():
+            path_of = head
+        if not path_of.startswith("/__properties"):
+            found[path_of] = parts
+    return found
 
 
 def test_a_full_recording_holds_exactly_what_the_schema_says(recording):
@@ -31,7 +40,7 @@ def test_a_full_recording_holds_exactly_what_the_schema_says(recording):
 def test_a_bare_recording_holds_the_unconditional_part_of_the_schema(tmp_path):
     report = record(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
     # The only frame is a reset, so that something is flagged.
-    absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT)
+    absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
     assert written(report.path) == expected(*absent)
 
 
@@ -80,7 +89,8 @@ def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path)
 def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
     results = make_results(3, sweeps=50, recorded=np.array([0, 10, 49]))
     path = record(results, tmp_path / "run.rrd", sweeps="none").path
-    found = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
+    logged = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
+    found = [row for row in logged if "sweep" in row]
     assert [row["sweep"] for row in found] == [
         *range(50),
         *range(51, 101),
@@ -88,6 +98,9 @@ def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
     ]  # none for the reported field
     expected_values = np.concatenate([np.log10(frame.history.natural_map) for frame in results.frames])
     assert np.array_equal([row["Scalars:scalars"][0] for row in found], expected_values)
+    of_frames = [row for row in logged if "sweep" not in row]  # on the timeline of frames the last sweep of each
+    assert [row["frame"] for row in of_frames] == [0, 1, 2]
+    assert np.array_equal([row["Scalars:scalars"][0] for row in of_frames], expected_values[49::50])
 
 
 def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, results):

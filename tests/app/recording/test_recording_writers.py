@@ -9,15 +9,16 @@ from rows import latest
 from app.recording import Canvas, ForceRange, ForceStyle, Scene, entities
 from app.recording.changes import correlate, correlate_common, gap_colours
 from app.recording.convergence import SMALLEST, power_of_ten
-from app.recording.force_density import CENTRES, EDGES, density_points
+from app.recording.force_density import BINS as DENSITY_BINS
+from app.recording.force_density import EDGES, density_points, merged
 from app.recording.packing import _spin_marks, grain_unbalance, last_seen
 from app.recording.rods import turns_from_axis
 from app.recording.scene import Clock
 from app.recording.stress_and_fabric import BINS, direction_shares, rose_outline
 from app.recording.texts import printable
-from app.recording.truth import TruthWriter, relative_error
+from app.recording.truth import TruthWriter
 from app.results import TruthContacts
-from solver.agreement import align_forces
+from app.truth import score
 from solver.contacts import Contacts
 
 ROUNDING = 1e-12
@@ -73,14 +74,21 @@ def test_residuals_become_powers_of_ten_with_a_floor():
 
 
 def test_densities_are_drawn_at_their_value():
-    counts = np.zeros(len(CENTRES))
-    counts[[2, 5]] = 30.0, 10.0
-    points = density_points(counts, 40)
-    assert len(points) == 2
     width = EDGES[1] - EDGES[0]
+    points = density_points(np.array([0.6, 1.2]), np.array([30.0, 10.0]), np.full(2, width), 40)
+    assert len(points) == 2
     drop = points[1, 1] - points[0, 1]  # y down: 30 to 10 of 40 is log10 3 on an axis of 4.5 decades over 380
     assert drop == pytest.approx(np.log10(3.0) / 4.5 * 380.0, rel=1e-5)  # float32
-    assert 40 * width > 0
+
+
+def test_thin_bins_of_the_tail_are_thrown_together_without_losing_a_force():
+    counts = np.zeros(DENSITY_BINS)
+    counts[:4], counts[4:16] = 50.0, 1.0
+    centre, count, width = merged(counts, 4)
+    assert count[:4].tolist() == [50.0] * 4  # below the mean every bin stands alone
+    assert count[4:].tolist() == [4.0, 4.0, 4.0]
+    assert width[4:] == pytest.approx(4 * (EDGES[1] - EDGES[0]))
+    assert centre[4] == pytest.approx(EDGES[4] + 2 * (EDGES[1] - EDGES[0]))
 
 
 def test_a_rose_of_isotropic_directions_is_the_unit_circle():
@@ -106,11 +114,14 @@ def test_capsules_turn_onto_their_branches():
     assert np.allclose(turned, np.column_stack([way, np.zeros(50)]), atol=FLOAT32)
 
 
-def test_absent_contacts_count_as_zero_against_the_truth():
-    true, inferred = align_forces(np.array([2, 5]), np.array([1.0, 2.0]), np.array([5, 9]), np.array([4.0, 3.0]))
-    assert true.tolist() == [1.0, 2.0, 0.0]
-    assert inferred.tolist() == [0.0, 4.0, 3.0]
-    assert relative_error(true, inferred) == pytest.approx(np.sqrt((1 + 4 + 9) / 5))
+def test_the_truth_tab_and_the_summary_file_tell_the_same_figures(recording, results, truth):
+    for frame, agreement in enumerate(score(results, truth)):
+        for path, value in (
+            (entities.TRUTH_R_FN, agreement.r_fn), (entities.TRUTH_R_FT, agreement.r_ft),
+            (entities.TRUTH_ERROR, agreement.relative_l2),
+        ):  # fmt: skip
+            shown = latest(recording.path, path, entities.FRAME, frame)["Scalars:scalars"]
+            assert shown == pytest.approx([value], rel=ROUNDING)
 
 
 def test_texts_keep_what_the_font_has_and_replace_the_rest():

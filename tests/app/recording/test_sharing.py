@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser import Browser, warm_share
+from browser import Browser, forces_drawn
 from fake_photographs import PIXEL, SHAPE, photograph
 from fake_results import make_results
 from rows import latest, rows
@@ -18,8 +18,6 @@ from app.recording.share import share_recording
 from app.recording.single_page import write_single_page
 from app.recording.viewer import viewer_binary
 from app.units import Scale
-
-DRAWN = 0.005  # least share of a page that strong forces and their legend cover
 
 
 def verify(path) -> None:
@@ -119,7 +117,7 @@ def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_pa
         browser.open(f"file://{page}?renderer=webgl")
         browser.wait_for("!!window.rodsight || document.title == 'failed'")
         assert browser.evaluate("document.title") == "<shear> & test", browser.evaluate("document.body.innerText")
-        assert browser.shows(lambda picture: warm_share(picture) > DRAWN)
+        assert browser.shows(forces_drawn)
 
 
 @pytest.mark.slow
@@ -131,4 +129,4 @@ def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording):
     with Browser() as browser:
         browser.open(f"file://{page}?renderer=webgl")
         browser.wait_for("!!window.rodsight || document.title == 'failed'")
-        assert not browser.shows(lambda picture: warm_share(picture) > DRAWN, seconds=4.0)
+        assert not browser.shows(forces_drawn, seconds=4.0)
