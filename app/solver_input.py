@@ -53,6 +53,8 @@ def sequence_settings(config: ExperimentFile, overlap: float) -> SequenceSetting
         chain=chain,
         ensemble=EnsembleSettings(probability=ContactProbabilitySettings(overlap=overlap)),
         keep_members=solver.keep_members,
+        measure_precision=solver.precision == "measured" and not paper,
+        measure_overlap=contacts.overlap is None,
         overlap=overlap,
         threshold_sigmas=contacts.threshold_sigmas,
         threshold=contacts.threshold,

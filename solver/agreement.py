@@ -49,6 +49,13 @@ def align_forces(
     return one, other
 
 
+def relative_change(key: NDArray[np.int64], force: Array, other_key: NDArray[np.int64], other_force: Array) -> float:
+    """‖f_other − f‖ / ‖f‖ of forces (c, …) and (t, …) [N], named by key, absent ones zero; 0 where f is none."""
+    one, other = align_forces(key, force, other_key, other_force)
+    size = float(np.linalg.norm(one))
+    return float(np.linalg.norm(other - one)) / size if size > 0 else 0.0
+
+
 def pearson(a: Array, b: Array) -> float:
     """Pearson correlation; NaN where either does not vary."""
     if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:

@@ -14,7 +14,7 @@ from solver.motion import FrameMotion
 from solver.network import Network
 from solver.nlgs import NlgsSettings, Solution, solve, unbalance_of
 from solver.problem import ContactProblem, Material, assemble, inertial_impedance, kinematic_impedance
-from solver.sweep_record import Keep, SweepRecorder
+from solver.sweep_record import MEASURED_EVERY, Keep, SweepRecorder
 from solver.warm_start import ForceMemory
 
 
@@ -89,16 +89,20 @@ def advance_chain(
         problem = assemble(packing.grains, state, walls, contacts, packing.material, impedance, closing=closing)
         return problem, contacts, walls
 
+    def solve_step(problem: ContactProblem, contacts: Contacts, guess: Array) -> Solution:
+        recorder.begin(problem, contacts)
+        # Where a stopping level is looked at, every sweep is measured.
+        every = recorder.strides() if nlgs.force_change is None else 1
+        return solve(problem, nlgs, guess=guess, observer=recorder.hear, every=every, between=MEASURED_EVERY)
+
     former, done = memory, 0
     for step in range(1, steps):
         problem, contacts, _ = contacts_at(step / steps)
-        recorder.begin(problem, contacts)
-        solution = solve(problem, nlgs, guess=memory.recall(contacts), observer=recorder.hear)
+        solution = solve_step(problem, contacts, memory.recall(contacts))
         memory = memory.renew(contacts, solution.force, motion.grains.present)
         done += solution.sweeps
     problem, contacts, walls = contacts_at(1.0)
-    recorder.begin(problem, contacts)
-    solution = solve(problem, nlgs, guess=memory.recall(contacts), observer=recorder.hear)
+    solution = solve_step(problem, contacts, memory.recall(contacts))
     return ChainStep(
         contacts=contacts,
         walls=walls,

@@ -37,7 +37,7 @@ class ContactProbabilitySettings:
 
     overlap: float = 0.0  # [m] typical elastic overlap of a contact that bears force
     radius_sd: float = 0.0  # [m] standard deviation of a grain's radius
-    margin: float = 20e-6  # [m] a pair beyond margin + reach · σ (+ 3 radius_sd) in every frame is no candidate
+    margin: float = 20e-6  # [m] a pair beyond margin + reach · σ (overlap, 3 radius_sd) in every frame is out
     reach: float = 6.0  # [σ]
     least: float = 3e-3  # a pair with less probability is dropped
 
@@ -58,6 +58,15 @@ class Candidates:
     @property
     def count(self) -> int:
         return len(self.i)
+
+
+@dataclass(frozen=True, slots=True)
+class SmoothedGaps:
+    """What a window of photographs makes of its candidates."""
+
+    touch: Array  # (f, c) P(touch)
+    mean: Array  # (f, c) [m] of the true gap; NaN where nothing is known
+    variance: Array  # (f, c) [m²] of the true gap
 
 
 def window_of(frame: int, frame_count: int) -> range:
@@ -141,6 +150,14 @@ def touch_probability(
     gap or a scale is not positive.
     """
     settings = settings or ContactProbabilitySettings()
+    return smooth_gaps(gap, sigma, scale, settings).touch
+
+
+def smooth_gaps(gap: Array, sigma: Array, scale: Array, settings: ContactProbabilitySettings) -> SmoothedGaps:
+    """Weigh all photographs of a window together: P(touch), and what they make of the true gaps.
+
+    Arguments and errors as of `touch_probability`.
+    """
     frames, candidates = gap.shape
     known = np.isfinite(gap)
     if scale.shape != (frames - 1,):
@@ -148,8 +165,9 @@ def touch_probability(
     if not np.all(sigma[known] > 0) or not np.all(scale > 0):
         raise ValueError("every sigma and every scale must be positive")
     touch = np.full((frames, candidates), FIRST_TOUCH)
+    mean, variance = np.full((2, frames, candidates), np.nan)
     if not known.any():
-        return touch
+        return SmoothedGaps(touch, mean, variance)
     widest = max(6.0 * float(scale.max(initial=0.0)), 12.0 * float(np.median(sigma[known])))
     state_gap, width = _states(widest)
     transition = np.stack([_transition(state_gap, width, s) for s in scale]) if frames > 1 else np.empty((0, 1, 1))
@@ -159,8 +177,10 @@ def touch_probability(
         gap + 0.5 * settings.overlap, sigma, LOWEST_GAP, state_gap, start,
         transition, np.ascontiguousarray(transition.transpose(0, 2, 1)), LIKELIHOOD_FLOOR,
         np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), touch,
+        settings.overlap**2 + width**2 / 12.0, np.maximum(sigma**2 - settings.overlap**2, (1e-3 * sigma) ** 2),
+        mean, variance,
     )  # fmt: skip
-    return touch
+    return SmoothedGaps(touch, mean - 0.5 * settings.overlap, variance)
 
 
 def _unloaded(endpoints: Array) -> Walls:
@@ -169,7 +189,10 @@ def _unloaded(endpoints: Array) -> Walls:
 
 def _reach(sigma: Array, settings: ContactProbabilitySettings) -> float:
     widest = float(np.max(sigma, initial=0.0))
-    return settings.reach * widest + settings.margin + 3.0 * settings.radius_sd
+    # Part of what is measured as overlap are errors of radii, which leave gaps as often.
+    return settings.reach * float(np.hypot(widest, settings.overlap / np.sqrt(2.0))) + (
+        settings.margin + 3.0 * settings.radius_sd
+    )
 
 
 def _states(widest: float) -> tuple[Array, Array]:

@@ -22,6 +22,10 @@ def smooth_candidates(
     alpha: Array,  # (f, q) scratch
     beta: Array,  # (2, q) scratch
     touch: Array,  # (f, c) out: probability that the pair touches
+    width: Array,  # (q,) [m²] variance of the true gap within a state
+    error: Array,  # (f, c) [m²] variance of the measured gap about the true one
+    mean: Array,  # (f, c) [m] out: of the true gap, all photographs considered
+    variance: Array,  # (f, c) [m²] out: of the true gap
 ) -> None:
     frames, candidates = gap.shape
     states = len(state_gap)
@@ -62,6 +66,9 @@ def smooth_candidates(
         for q in range(states):
             beta[0, q] = 1.0
         touch[frames - 1, c] = alpha[frames - 1, 0]
+        mean[frames - 1, c], variance[frames - 1, c] = _moments(
+            alpha[frames - 1], beta[0], gap[frames - 1, c], error[frames - 1, c], state_gap, width
+        )
         for f in range(frames - 2, -1, -1):
             for q in range(states):
                 beta[1, q] = 0.0
@@ -77,3 +84,21 @@ def smooth_candidates(
             for q in range(states):
                 beta[0, q] = beta[1, q] / total
             touch[f, c] = alpha[f, 0] * beta[1, 0] / share
+            mean[f, c], variance[f, c] = _moments(alpha[f], beta[0], gap[f, c], error[f, c], state_gap, width)
+
+
+@njit(cache=True)
+def _moments(
+    alpha: Array, beta: Array, measured: float, error: float, state_gap: Array, width: Array
+) -> tuple[float, float]:
+    """Mean and variance of the true gap, a mixture of one normal law per state."""
+    total, first, second = 0.0, 0.0, 0.0
+    for q in range(len(state_gap)):
+        share = alpha[q] * beta[q]
+        gain = 0.0 if np.isnan(measured) else width[q] / (width[q] + error)
+        middle = state_gap[q] if gain == 0.0 else state_gap[q] + gain * (measured - state_gap[q])
+        total += share
+        first += share * middle
+        second += share * (middle * middle + width[q] * (1.0 - gain))
+    first /= total
+    return first, max(second / total - first * first, 0.0)

@@ -23,6 +23,14 @@ class Slip:
     worth: float  # s² / (s² + noise²), from 0 (noise alone) to 1
 
 
+@dataclass(frozen=True, slots=True)
+class RefinedMotion:
+    """An interval's motion as refined by the contacts."""
+
+    position: tuple[Array, Array]  # (n, 2) [m] at its beginning and its end, NaN where a grain is missing
+    deviation: Array  # (c,) [m] standard deviation of the sliding at each contact
+
+
 def advance_member(
     balance: Balance,
     contacts: Contacts,
@@ -58,19 +66,23 @@ def read_slip(
     walls: Walls,
     interval: tuple[Snapshot, Snapshot],
     settings: ConvexSettings | None = None,
+    refined: RefinedMotion | None = None,
 ) -> Slip:
     """Read the sliding of an interval; zero, that is no evidence, at contacts of a grain missing at either end.
 
-    contacts and walls are those of the frame whose forces are sought; interval: the earlier and the later snapshot.
+    contacts and walls are those of the frame whose forces are sought; interval: the earlier and the later snapshot;
+    refined: what is known better than the photographs themselves say.
     """
     earlier, later = (np.where(s.present[:, None], s.position, np.nan) for s in interval)
     sigma = float(np.hypot(interval[0].sigma, interval[1].sigma) / np.sqrt(2.0))
     scale = displacement_scale(earlier, later, np.full(grains.count, sigma))
+    deviation = np.full(contacts.count, SLIP_SIGMAS * sigma) if refined is None else refined.deviation
     _, ut = contact_displacement(
-        contacts, grains.radius, (earlier, later), (interval[0].rotation, interval[1].rotation),
-        walls, (interval[0].endpoints, interval[1].endpoints),
+        contacts, grains.radius, (earlier, later) if refined is None else refined.position,
+        (interval[0].rotation, interval[1].rotation), walls, (interval[0].endpoints, interval[1].endpoints),
     )  # fmt: skip
-    return Slip(soft_slip(ut, scale, sigma, settings), scale**2 / (scale**2 + (SLIP_SIGMAS * sigma) ** 2))
+    noise = float(np.mean(deviation**2)) if contacts.count else 0.0
+    return Slip(soft_slip(ut, scale, deviation / SLIP_SIGMAS, settings), scale**2 / (scale**2 + noise))
 
 
 def steady_slip(before: Slip, after: Slip) -> Slip:

@@ -14,16 +14,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.agreement import relative_change
 from solver.boundaries import Walls
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain, force_scale
-from solver.contact_probability import ContactProbabilitySettings, probable_contacts, window_of
+from solver.contact_probability import ContactProbabilitySettings
 from solver.contacts import Contacts
 from solver.convex import ConvexSettings, assemble_balance, polish
-from solver.convex_members import Slip, advance_member, read_slip, steady_slip
+from solver.convex_members import RefinedMotion, Slip, advance_member, read_slip, steady_slip
 from solver.displacement import find_reversals, member_intervals
 from solver.grains import Array
 from solver.motion import FrameMotion, Snapshot
 from solver.network import PairProbability, ProbablePairs
+from solver.refinement import RefinedBlock
 from solver.verdicts import NO_VERDICTS, Verdicts, apply_verdicts
 from solver.warm_start import ForceMemory
 
@@ -41,6 +43,7 @@ class EnsembleState:
 
     soft: ForceMemory  # the chain whose sweeps are recorded
     stiff: ForceMemory
+    other: ForceMemory  # the first chain once more, from another start; it tells how much of the start is left
     last: ForceMemory  # convex, interval (k − 1, k)
     ahead: ForceMemory  # convex, (k, k + 1)
     around: ForceMemory  # convex, (k − 1, k + 1)
@@ -51,7 +54,7 @@ class EnsembleState:
     @classmethod
     def first(cls) -> EnsembleState:
         memory = ForceMemory.empty()
-        return cls(memory, memory, memory, memory, memory, memory, memory, PairProbability.none())
+        return cls(memory, memory, memory, memory, memory, memory, memory, memory, PairProbability.none())
 
 
 MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programs
@@ -70,6 +73,7 @@ class EnsembleForces:
     worth: Array  # (m,) weight of each member in the mean, at most 1
     place: NDArray[np.intp]  # (m,) of each member in MEMBERS
     state: EnsembleState
+    start_difference: float  # H, NaN where no motion leads to the frame
     remark: str  # what went otherwise than it should, or empty
     forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
@@ -108,19 +112,17 @@ def solve_ensemble(
     settings: EnsembleSettings,
     *,
     snapshot: Snapshot,
+    refined: RefinedBlock,
     verdicts: Verdicts = NO_VERDICTS,
 ) -> EnsembleForces:
     """Solve frame k of a sequence with all members.
 
-    motion leads to frame k; snapshot is that of frame k, with stand-ins for lost grains; verdicts are on frame k.
+    motion leads to frame k; snapshot is that of frame k, with stand-ins for lost grains; refined: the block that
+    frame k belongs to; verdicts are on frame k.
     """
-    window = window_of(k, len(snapshots))
-    detected, touch = probable_contacts(
-        packing.grains, [snapshots[f] for f in window], k - window.start, settings.probability, frame=snapshot
-    )
-    contacts, before = apply_verdicts(
-        detected, verdicts, packing.grains, snapshot.position, snapshot.present, packing.walls(snapshot.endpoints)
-    )
+    walls = packing.walls(snapshot.endpoints)
+    detected, touch = refined.contacts_at(snapshot, k, packing.grains, walls, settings.probability.least)
+    contacts, before = apply_verdicts(detected, verdicts, packing.grains, snapshot.position, snapshot.present, walls)
     # A pair that people saw touch is certain, whatever its measured gaps say.
     told = np.where(before >= 0, touch[before], 0.0) if len(touch) else np.zeros(contacts.count)
     probability = np.where(np.isin(contacts.key, verdicts.forced), 1.0, told)
@@ -131,7 +133,14 @@ def solve_ensemble(
     assert chain.kappa is not None
     stiff_chain = replace(chain, kappa=chain.kappa * settings.stiffer, keep="none")
     stiff = advance_chain(packing, motion, state.stiff, stiff_chain, network)
-    walls = packing.walls(snapshot.endpoints)
+    other, start_difference = state.other, np.nan
+    if motion.spans:
+        if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
+            uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
+            other = other.renew(contacts, uniform, snapshot.present)
+        again = advance_chain(packing, motion, other, replace(chain, keep="none"), network)
+        start_difference = relative_change(contacts.key, soft.solution.force, contacts.key, again.solution.force)
+        other = again.memory
 
     friction = np.where(contacts.with_wall, packing.material.wall_friction, packing.material.friction)
     wall_total = None
@@ -141,7 +150,7 @@ def solve_ensemble(
         contacts, packing.grains, walls, present=snapshot.present, friction=friction,
         force_unit=force_scale(packing, chain), gravity=packing.material.gravity, wall_normal_total=wall_total,
     )  # fmt: skip
-    slips = _slips(contacts, packing, walls, snapshots, k, settings)
+    slips = _slips(contacts, packing, walls, snapshots, k, settings, refined)
     former = (state.last, state.ahead, state.around, state.wide, state.steady)
     fields = [soft.solution.force, stiff.solution.force]
     worth, place = [1.0, 1.0], [0, 1]
@@ -171,7 +180,7 @@ def solve_ensemble(
     last, ahead, around, wide, steady = (reported if memory is None else memory for memory in memories)
     return EnsembleForces(
         soft, fn, ft, told, members[:, :, 0], members[:, :, 1], np.array(worth), np.array(place),
-        EnsembleState(*chains, last, ahead, around, wide, steady, pairs),
+        EnsembleState(*chains, other, last, ahead, around, wide, steady, pairs), start_difference,
         "; ".join(remarks), detected.select(forbidden), touch[forbidden],
     )  # fmt: skip
 
@@ -188,14 +197,17 @@ def _slips(
     snapshots: Sequence[Snapshot],
     k: int,
     settings: EnsembleSettings,
+    refined: RefinedBlock,
 ) -> tuple[Slip | None, ...]:
     """What the convex members read at frame k: the intervals of `member_intervals`, then what outlasts the frame."""
-    slips = [
-        None if interval is None else read_slip(
-            contacts, packing.grains, walls, (snapshots[interval[0]], snapshots[interval[1]]), settings.convex
-        )
-        for interval in _intervals(snapshots, k)
-    ]  # fmt: skip
+
+    def slip(interval: tuple[int, int]) -> Slip:
+        ends = snapshots[interval[0]], snapshots[interval[1]]
+        deviation = refined.slide_deviation(contacts, interval, (ends[0].sigma, ends[1].sigma))
+        motion = RefinedMotion((refined.position_at(interval[0]), refined.position_at(interval[1])), deviation)
+        return read_slip(contacts, packing.grains, walls, ends, settings.convex, motion)
+
+    slips = [None if interval is None else slip(interval) for interval in _intervals(snapshots, k)]
     before, after = slips[:2]
     return (*slips, None if before is None or after is None else steady_slip(before, after))
 

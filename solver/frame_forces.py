@@ -35,7 +35,7 @@ class FrameStatus(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SweepHistory:
-    """What one frame's sweeps did: residuals of every sweep, forces of some."""
+    """What one frame's sweeps did: a row of residuals for every sweep, NaN where not measured; forces of some."""
 
     force_change: Array  # (s,) greatest |Δf| / |f| of a contact, the paper's ε_f
     natural_map: Array  # (s,) relative natural-map residual
@@ -79,3 +79,6 @@ class FrameForces:
     frames_since_reset: int
     history: SweepHistory
     member_force: Array | None = None  # (c, m, 2) [N] (f_n, f_t) of every member of the ensemble, where asked for
+    start_difference: float = float("nan")  # H: of two chains started differently, over the rms; NaN: not computed
+    unseen_grains: int = 0  # holes inside the walls that a rod would fit into
+    hidden_share: float = 0.0  # 1 − correlation of the field with what is left when bridged grains are dropped

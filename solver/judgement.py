@@ -17,9 +17,11 @@ from solver.frame_forces import FrameStatus
 from solver.grains import Array
 
 # 1 − T = a D^p + b ε^q, a bound on 1 − r that one frame in fifteen passes: (a, p) and (b, q).
-TRUST_DISAGREEMENT = (0.54, 1.85)
-TRUST_CORRECTION = (0.84, 1.2)
-CHAIN_CORRECTION = (0.97, 0.81)  # the same for a single chain, which has no members to disagree
+TRUST_DISAGREEMENT = (0.83, 2.65)
+TRUST_CORRECTION = (0.42, 0.73)
+HOLE_DOUBT = 6.0  # share of T lost for each hole per grain: neighbours of an unseen grain push into nothing
+CHAIN_CORRECTION = (0.95, 0.8)  # the same for a single chain, which has no members to disagree
+CHAIN_REACH = 4.45  # share of T lost per mean diameter of its gap threshold
 NORMAL_DEVIATION = (0.003, 0.088, 0.985)  # of σ²/⟨f⟩² = a² + b² f/⟨f⟩ + (c s/⟨f⟩)², s the members' spread
 TANGENT_DEVIATION = (0.001, 0.008, 1.206)
 CHAIN_DEVIATION = (0.071, 0.239)  # a, b without members
@@ -31,6 +33,7 @@ CHAIN_UNBALANCED = 0.15  # the same of a single chain, which leaves the motion s
 # Mean stress over the stress of the loads: (1 + 1/K)/2 to (1 + K)/2 with K = 4, beyond what granular matter withstands.
 LOAD_SHARES = (0.62, 2.5)
 SETTLED_CORRECTION = 0.15  # ε below which a frame can count as settled
+SETTLED_DIFFERENCE = 0.04  # H below which a frame can count as settled
 SETTLING_FRAMES = 2  # after which the mean correlation is within .005 of that of later frames, at 0 to 40 µm of noise
 REARRANGING_UNBALANCE = 0.037  # ū at a shear of 0.25° between photographs: a fifth of the force pattern is new
 REFERENCE_SHEAR = math.radians(0.25)
@@ -49,6 +52,10 @@ class Evidence:
     unbalance: float  # worst |ΣF| of a grain over the mean f_n, of the reported field
     shear: float  # [rad] of the packing since the last frame
     frames_since_event: int  # since a reset, a suspect or a rearranging frame
+    start_difference: float = math.nan  # H: of two chains started differently, over the rms; NaN: not computed
+    holes: int = 0  # places that a rod would fit into
+    grains: int = 0  # that take part
+    reach: float = 0.0  # gap threshold of a single chain over the mean diameter: it lets false contacts in
 
 
 def trust(evidence: Evidence) -> float:
@@ -57,13 +64,14 @@ def trust(evidence: Evidence) -> float:
         return math.nan
     correction, disagreement = max(evidence.correction, 0.0), evidence.disagreement
     if math.isnan(disagreement):
-        doubt = CHAIN_CORRECTION[0] * correction ** CHAIN_CORRECTION[1]
+        doubt = CHAIN_CORRECTION[0] * correction ** CHAIN_CORRECTION[1] + CHAIN_REACH * evidence.reach
     else:
         doubt = (
             TRUST_DISAGREEMENT[0] * disagreement ** TRUST_DISAGREEMENT[1]
             + TRUST_CORRECTION[0] * correction ** TRUST_CORRECTION[1]
         )
-    return float(np.clip(1.0 - doubt, 0.0, 1.0))
+    unseen = HOLE_DOUBT * evidence.holes / max(evidence.grains, 1)
+    return float(np.clip(1.0 - doubt, 0.0, 1.0) * max(1.0 - unseen, 0.0))
 
 
 def free_standard_deviation(fn: Array, spread: Array | None = None) -> Array:
@@ -99,6 +107,14 @@ def is_suspect(evidence: Evidence) -> bool:
 
 def judge(evidence: Evidence) -> tuple[FrameStatus, str]:
     """Give a frame its status and say why in a sentence."""
+    status, why = _judge(evidence)
+    if evidence.holes:
+        places = "1 hole" if evidence.holes == 1 else f"{evidence.holes} holes"
+        why += f"; {places} would fit a rod: grains may be unseen, and the trust is lowered for it"
+    return status, why
+
+
+def _judge(evidence: Evidence) -> tuple[FrameStatus, str]:
     faults = _faults(evidence)
     if evidence.reset:
         return FrameStatus.RESET, "; ".join(["there were no former forces to start from", *faults])
@@ -117,6 +133,11 @@ def judge(evidence: Evidence) -> tuple[FrameStatus, str]:
         )
     if evidence.correction > SETTLED_CORRECTION:
         return FrameStatus.SETTLING, f"the correction ε = {evidence.correction:.3f} is above {SETTLED_CORRECTION}"
+    if evidence.start_difference > SETTLED_DIFFERENCE:
+        return (
+            FrameStatus.SETTLING,
+            f"two different starts still differ by H = {evidence.start_difference:.3f} (> {SETTLED_DIFFERENCE})",
+        )
     return FrameStatus.SETTLED, "history, motion and load agree"
 
 

@@ -8,12 +8,14 @@ and its forces are dropped afterwards.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from solver.agreement import pearson
+from solver.frame_forces import FrameForces
 from solver.grains import Array
 from solver.motion import Snapshot
 
@@ -45,6 +47,30 @@ def bridge_lost(window: Sequence[Snapshot], row: int) -> tuple[Snapshot, NDArray
         whole[grain] = True
     bridged = whole & ~here.present
     return replace(here, position=position, rotation=rotation, present=whole), bridged
+
+
+def without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
+    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them.
+
+    The trust is lowered by what is hidden that way.
+    """
+    contacts, history = frame.contacts, frame.history
+    stand_in = np.concatenate([bridged, np.zeros(contacts.wall_count, np.bool_)])
+    keep = ~(stand_in[contacts.i] | stand_in[contacts.j])
+    columns = {
+        each.name: value[keep] for each in fields(frame) if isinstance(value := getattr(frame, each.name), np.ndarray)
+    }
+    # What is left out counts as zero for whoever compares the whole network.
+    hidden = 1.0 - pearson(np.where(keep, frame.fn, 0.0), frame.fn)
+    return replace(
+        frame,
+        trust=frame.trust * (1.0 - hidden),
+        hidden_share=hidden,
+        contacts=contacts.select(keep),
+        history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
+        reason=f"{bridged.sum()} lost grains were bridged, and nothing is shown of their contacts; {frame.reason}",
+        **columns,
+    )
 
 
 def _carried(then: Snapshot, here: Snapshot, place: Array) -> Array:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.admissibility import worst_unbalance
-from solver.agreement import align_forces
+from solver.agreement import relative_change
 from solver.chain import ChainSettings, ChainStep, Packing, advance_chain
 from solver.contact_probability import window_of
 from solver.contacts import Contacts, detect_contacts
 from solver.ensemble import EnsembleSettings, EnsembleState, solve_ensemble
 from solver.frame_forces import ContactState, FrameForces, FrameStatus
 from solver.grains import Array
+from solver.holes import find_holes
 from solver.judgement import (
     Evidence,
     free_standard_deviation,
@@ -26,9 +27,11 @@ from solver.judgement import (
     trust,
 )
 from solver.kinematics import relative_motion
-from solver.lost_grains import bridge_lost
+from solver.lost_grains import bridge_lost, without_bridged
 from solver.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
 from solver.network import NearPairs
+from solver.precision import believed_precision, measure_precision, with_precision
+from solver.refinement import RefinedBlock, block_of, refine
 from solver.stress import love_weber_stress, packing_area
 from solver.verdicts import NO_VERDICTS, Verdicts, show_forbidden, sources, without_ignored
 from solver.warm_start import ForceMemory
@@ -45,6 +48,8 @@ class SequenceSettings:
     chain: ChainSettings = field(default_factory=ChainSettings)  # nlgs: the estimator; ensemble: its first member
     ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
     keep_members: bool = False  # ensemble: keep the field of every member
+    measure_precision: bool = True  # from the gaps, where they contradict what is stated
+    measure_overlap: bool = True  # likewise
     overlap: float = 0.0  # [m] typical overlap or roughness of touching surfaces
     threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
@@ -64,6 +69,7 @@ class SequenceState:
     time: float  # [s] of the last frame
     endpoints: Array  # (w, 2, 2) [m] of the last frame
     pressure: float  # [Pa] mean stress of the last frame, NaN: none
+    sound_pressure: float  # [Pa] of the last frame that was not suspect
     evidence: Evidence  # what the last frame was judged by
     frames_since_reset: int
     frames_since_event: int
@@ -73,7 +79,7 @@ class SequenceState:
         walls = len(packing.pressure)
         return cls(
             EnsembleState.first(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
-            np.nan, np.full((walls, 2, 2), np.nan), np.nan, NOTHING_KNOWN, 0, 0,
+            np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NOTHING_KNOWN, 0, 0,
         )  # fmt: skip
 
 
@@ -92,6 +98,11 @@ class _Estimate:
     spread_fn: Array | None = None  # (c,) [N] among the members, None of a single chain
     spread_ft: Array | None = None  # (c,) [N]
     member_force: Array | None = None  # (c, m, 2) [N]
+    start_difference: float = np.nan  # H
+
+    @property
+    def force(self) -> Array:
+        return np.column_stack([self.fn, self.ft])
 
 
 def solve_sequence(
@@ -112,9 +123,38 @@ def solve_sequence(
     state = SequenceState.first(packing) if state is None else state
     verdicts = {} if verdicts is None else verdicts
     snapshots = without_ignored(snapshots, verdicts)
+    snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
+    refined, number = None, -1
     for k in range(first, len(snapshots)):
-        frame, state = solve_frame(packing, snapshots, k, state, settings, verdicts.get(k, NO_VERDICTS))
+        if settings.estimator == "ensemble" and len(snapshots) > 1 and block_of(k, len(snapshots))[0] != number:
+            number, start, end = block_of(k, len(snapshots))
+            refined = refine(packing.grains, snapshots[start:end], settings.ensemble.probability, start=start)
+        frame, state = solve_frame(packing, snapshots, k, state, settings, refined, verdicts.get(k, NO_VERDICTS))
+        if remark and k == 0:
+            frame = replace(frame, reason=f"{remark}; {frame.reason}")
         yield frame, state
+
+
+def _with_measured_precision(
+    packing: Packing, snapshots: Sequence[Snapshot], settings: SequenceSettings
+) -> tuple[Sequence[Snapshot], SequenceSettings, str]:
+    """Put what the gaps say of the precision in the place of what is stated, and say so."""
+    found = measure_precision(packing.grains, snapshots) if settings.measure_precision else None
+    if found is None:
+        return snapshots, settings, ""
+    factor, overlap = believed_precision(found, [each.sigma for each in snapshots], settings.overlap)
+    if settings.estimator == "nlgs":  # its threshold is all that it has against errors that stay
+        factor = max(factor, 1.0)
+    remark = ""
+    if factor != 1.0:
+        told = f"{1e6 * found.sigma:.2g} µm from photograph to photograph, {factor:.2g} times the stated precision"
+        remark = f"positions scatter by {told}, as the gaps of touching rods show"
+        snapshots = with_precision(snapshots, factor)
+    if settings.measure_overlap:
+        ensemble = settings.ensemble
+        probability = replace(ensemble.probability, overlap=overlap)
+        settings = replace(settings, ensemble=replace(ensemble, probability=probability))
+    return snapshots, settings, remark
 
 
 def solve_frame(
@@ -123,9 +163,13 @@ def solve_frame(
     k: int,
     state: SequenceState,
     settings: SequenceSettings,
+    refined: RefinedBlock | None = None,
     verdicts: Verdicts = NO_VERDICTS,
 ) -> tuple[FrameForces, SequenceState]:
-    """Solve frame k from the state that the frame before it left behind."""
+    """Solve frame k from the state that the frame before it left behind.
+
+    refined: the block that frame k belongs to; the ensemble needs it, None: a single chain.
+    """
     asked = verdicts.reset or k in settings.reset_frames
     if asked:
         state = replace(state, members=EnsembleState.first())
@@ -137,8 +181,8 @@ def solve_frame(
         motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
 
     def estimate_from(former: SequenceState) -> tuple[_Estimate, Evidence]:
-        if settings.estimator == "ensemble" and len(snapshots) > 1:
-            return _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, former, settings, verdicts)
+        if refined is not None:
+            return _estimate_by_ensemble(packing, snapshots, k, snapshot, motion, former, settings, refined, verdicts)
         return _estimate_by_chain(packing, snapshot, motion, former, settings, verdicts)
 
     estimate, evidence = estimate_from(state)
@@ -154,7 +198,9 @@ def solve_frame(
         carried = estimate
         estimate, renewed = estimate_from(replace(state, members=EnsembleState.first()))
         evidence = replace(renewed, old_unbalance=evidence.old_unbalance)
-        change = 100.0 * _relative_change(carried, estimate)
+        change = 100.0 * relative_change(
+            carried.step.contacts.key, carried.force, estimate.step.contacts.key, estimate.force
+        )
         asked_for = f"reset to zero forces, as asked for at a rearrangement, which changed the forces by {change:.0f} %"
         status, why = FrameStatus.RESET, f"{asked_for}: {why}"
     eventful = status in (FrameStatus.RESET, FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED)
@@ -167,7 +213,8 @@ def solve_frame(
     frame = _describe(packing, k, motion, estimate, evidence, status, reason, since_reset, age)
     frame = _with_verdicts(frame, packing, motion, estimate, verdicts)
     if bridged.any():
-        frame = _without(frame, bridged)
+        frame = without_bridged(frame, bridged)
+    pressure = _pressure(packing, motion, estimate.step, estimate.fn, estimate.ft) if motion.spans else np.nan
     return frame, SequenceState(
         members=estimate.members,
         age_key=estimate.step.contacts.key,
@@ -175,7 +222,8 @@ def solve_frame(
         seen=state.seen.renewed(snapshot),
         time=snapshot.time,
         endpoints=snapshot.endpoints,
-        pressure=_pressure(packing, motion, estimate.step, estimate.fn, estimate.ft) if motion.spans else np.nan,
+        pressure=pressure,
+        sound_pressure=state.sound_pressure if status is FrameStatus.SUSPECT else pressure,
         evidence=evidence,
         frames_since_reset=since_reset,
         frames_since_event=0 if eventful else state.frames_since_event + 1,
@@ -195,10 +243,12 @@ def _estimate_by_chain(
         threshold = settings.threshold_sigmas * float(np.hypot(snapshot.sigma, settings.overlap / np.sqrt(2.0)))
     memory, remark = state.members.soft, ""
     step = advance_chain(packing, motion, memory, settings.chain, NearPairs(threshold, verdicts))
-    evidence = _evidence(packing, motion, step, step.solution.fn, step.solution.ft, state)
+    evidence = _evidence(packing, motion, step, step.solution.fn, step.solution.ft, state, threshold=threshold)
     if is_suspect(evidence):
         wider = advance_chain(packing, motion, memory, settings.chain, NearPairs(WIDER * threshold, verdicts))
-        wider_evidence = _evidence(packing, motion, wider, wider.solution.fn, wider.solution.ft, state)
+        wider_evidence = _evidence(
+            packing, motion, wider, wider.solution.fn, wider.solution.ft, state, threshold=WIDER * threshold
+        )
         if wider_evidence.correction < evidence.correction:
             step, evidence = wider, wider_evidence
             remark = f"solved again with a gap threshold {WIDER} times as wide"
@@ -220,41 +270,32 @@ def _estimate_by_ensemble(
     motion: FrameMotion,
     state: SequenceState,
     settings: SequenceSettings,
+    refined: RefinedBlock,
     verdicts: Verdicts,
 ) -> tuple[_Estimate, Evidence]:
     found = solve_ensemble(
         packing, snapshots, k, motion, state.members, settings.chain, settings.ensemble,
-        snapshot=snapshot, verdicts=verdicts,
+        snapshot=snapshot, refined=refined, verdicts=verdicts,
     )  # fmt: skip
-    evidence = _evidence(packing, motion, found.step, found.fn, found.ft, state, found.disagreement)
+    evidence = _evidence(
+        packing, motion, found.step, found.fn, found.ft, state, found.disagreement, found.start_difference
+    )
     return _Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
         found.remark, found.spread_fn, found.spread_ft, found.member_force if settings.keep_members else None,
+        found.start_difference,
     ), evidence  # fmt: skip
 
 
-def _relative_change(before: _Estimate, after: _Estimate) -> float:
-    """‖f_after − f_before‖ / ‖f_before‖ of the reported fields, absent contacts at zero."""
-    a, b = align_forces(
-        before.step.contacts.key, np.column_stack([before.fn, before.ft]),
-        after.step.contacts.key, np.column_stack([after.fn, after.ft]),
-    )  # fmt: skip
-    size = float(np.linalg.norm(a))
-    return float(np.linalg.norm(b - a)) / size if size > 0 else 0.0
-
-
 def _evidence(
-    packing: Packing,
-    motion: FrameMotion,
-    step: ChainStep,
-    fn: Array,
-    ft: Array,
-    state: SequenceState,
-    disagreement: float = np.nan,
-) -> Evidence:
+    packing: Packing, motion: FrameMotion, step: ChainStep, fn: Array, ft: Array, state: SequenceState,
+    disagreement: float = np.nan, start_difference: float = np.nan, threshold: float = 0.0,
+) -> Evidence:  # fmt: skip
     """Evidence on the reported field fn, ft (c,) [N]; ε and ū are the chain's."""
     pressure = _pressure(packing, motion, step, fn, ft)
-    jump = abs(pressure - state.pressure) / state.pressure if state.pressure > 0 else np.nan
+    # Back from a faulty frame is no jump.
+    former = [p for p in (state.pressure, state.sound_pressure) if p > 0]
+    jump = min((abs(pressure - p) / p for p in former), default=np.nan)
     plates = np.isfinite(packing.pressure)
     load = float(packing.pressure[plates].mean()) if plates.any() else 0.0
     return Evidence(
@@ -268,6 +309,10 @@ def _evidence(
         unbalance=worst_unbalance(packing, step.contacts, fn, ft, motion.grains.present),
         shear=shear_over(motion),
         frames_since_event=state.frames_since_event + 1,
+        start_difference=start_difference,
+        holes=len(find_holes(packing.grains, motion.grains.position, motion.grains.present, step.walls)),
+        grains=int(motion.grains.present.sum()),
+        reach=threshold / (2.0 * float(packing.grains.radius.mean())),
     )
 
 
@@ -297,23 +342,6 @@ def _with_verdicts(
         estimate.forbidden, packing.grains.radius, grains.velocity, grains.spin, estimate.step.walls
     )
     return show_forbidden(frame, estimate.forbidden, estimate.forbidden_probability, un, ut)
-
-
-def _without(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
-    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them."""
-    contacts, history = frame.contacts, frame.history
-    stand_in = np.concatenate([bridged, np.zeros(contacts.wall_count, np.bool_)])
-    keep = ~(stand_in[contacts.i] | stand_in[contacts.j])
-    columns = {
-        each.name: value[keep] for each in fields(frame) if isinstance(value := getattr(frame, each.name), np.ndarray)
-    }
-    return replace(
-        frame,
-        contacts=contacts.select(keep),
-        history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
-        reason=f"{bridged.sum()} lost grains were bridged; {frame.reason}",
-        **columns,
-    )
 
 
 def contact_state(packing: Packing, contacts: Contacts, fn: Array, ft: Array) -> NDArray[np.uint8]:
@@ -363,6 +391,8 @@ def _describe(
         correction=evidence.correction,
         old_unbalance=evidence.old_unbalance,
         trust=trust(evidence) if motion.spans else np.nan,
+        start_difference=evidence.start_difference,
+        unseen_grains=evidence.holes,
         frames_since_reset=since_reset,
         history=step.history,
         member_force=estimate.member_force,

@@ -300,7 +300,8 @@ def _print_performance(console: Console, name: str, sample: StatusSample, fit: S
     disagreement, correction = _predictors(sample)
     used = np.array([trust(each) for each in sample.evidence])
     (a, p), (b, q) = fit.disagreement, fit.correction
-    fitted = np.clip(1.0 - a * disagreement**p - b * correction**q, 0.0, 1.0)
+    seen = np.array([1.0 - judgement.HOLE_DOUBT * e.holes / max(e.grains, 1) for e in sample.evidence])
+    fitted = np.clip(1.0 - a * disagreement**p - b * correction**q, 0.0, 1.0) * np.maximum(seen, 0.0)
     table = Table(title=f"{name}: {np.sum(~fault)} sound frames, {np.sum(fault)} faulty ones", box=None)
     for heading in ("frames", "r", "T in use", "r < T", "r < T − .03", "T fitted", "r < T", "r < T − .03", "status"):
         table.add_column(heading, justify="right", overflow="fold")
@@ -348,7 +349,14 @@ def _print_rearrangement(console: Console, sample: StatusSample, sound: NDArray[
         f"{sample.change[told & known].mean() if np.any(told & known) else float('nan'):.2f} there, "
         f"{sample.change[~told & known].mean():.2f} elsewhere"
     )
+    difference = np.array([each.start_difference for each in sample.evidence])
+    apart = difference > judgement.SETTLED_DIFFERENCE
+    for label, rows in (("above", sound & apart), ("at most", sound & ~apart)):
+        if rows.any():
+            mean = f"mean r {sample.r[rows].mean():.4f} in {np.sum(rows)} frames"
+            console.print(f"  two starts differ by H {label} {judgement.SETTLED_DIFFERENCE}: {mean}")
     levels = {
+        "H": difference,
         "ε": [each.correction for each in sample.evidence],
         "D": [each.disagreement for each in sample.evidence],
         "ū": unbalance,

@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 
 from solver.boundaries import Walls
-from solver.contact_probability import ContactProbabilitySettings, find_candidates, touch_probability
+from solver.contact_probability import (
+    ContactProbabilitySettings,
+    find_candidates,
+    smooth_gaps,
+    touch_probability,
+)
 from solver.grains import Grains
 
 SIGMA = 14e-6  # m, of a gap
@@ -120,9 +125,28 @@ def test_smoother_agrees_with_summing_over_all_paths():
         gap, np.full(gap.shape, SIGMA), module.LOWEST_GAP, state_gap, start, forward,
         np.ascontiguousarray(forward.transpose(0, 2, 1)), 1e-12,
         np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), touch,
+        np.zeros(states), np.full(gap.shape, SIGMA**2), np.empty(gap.shape), np.empty(gap.shape),
     )  # fmt: skip
     expected = np.stack([enumerate_paths(gap[:, c], state_gap, start, step) for c in range(5)], axis=1)
     np.testing.assert_allclose(touch, expected, atol=EXACT)
+
+
+def test_the_gap_of_a_lasting_contact_is_known_better_than_any_photograph_shows_it():
+    gap = np.random.default_rng(3).normal(0.0, SIGMA, (FRAMES, 200))
+    sigma, scale = np.full(gap.shape, SIGMA), np.full(FRAMES - 1, SCALE)
+    found = smooth_gaps(gap, sigma, scale, ContactProbabilitySettings())
+    sure = found.touch > 0.9
+    assert sure.mean() > 0.5
+    assert np.sqrt(found.variance[sure]).max() < SIGMA
+    assert np.abs(found.mean[sure]).mean() < 0.5 * np.abs(gap[sure]).mean()
+
+
+def test_an_unknown_gap_is_what_its_neighbours_in_time_make_of_it():
+    gap = np.zeros((FRAMES, 1))
+    gap[FRAMES // 2] = np.nan
+    found = smooth_gaps(gap, np.full(gap.shape, SIGMA), np.full(FRAMES - 1, SCALE), ContactProbabilitySettings())
+    assert np.isfinite(found.mean).all()
+    assert found.variance[FRAMES // 2, 0] > found.variance[0, 0]
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e-4, 1e-1])

@@ -9,6 +9,7 @@ from solver.judgement import (
     CHAIN_UNBALANCED,
     LOAD_SHARES,
     SETTLED_CORRECTION,
+    SETTLED_DIFFERENCE,
     SETTLING_FRAMES,
     SUSPECT_CORRECTION,
     SUSPECT_PRESSURE_JUMP,
@@ -111,3 +112,22 @@ def test_a_single_chain_has_error_bars_too():
     fn = np.array([5.0, 20.0])
     assert np.all(free_standard_deviation(fn) > 0)
     np.testing.assert_allclose(tangential_standard_deviation(fn, 0.25), 0.25 * free_standard_deviation(fn))
+
+
+def test_a_frame_whose_start_is_not_forgotten_is_still_settling():
+    status, why = judge(replace(SOUND, start_difference=1.01 * SETTLED_DIFFERENCE))
+    assert status is FrameStatus.SETTLING
+    assert "H = " in why
+    assert judge(replace(SOUND, start_difference=0.99 * SETTLED_DIFFERENCE))[0] is FrameStatus.SETTLED
+
+
+def test_holes_lower_the_trust_and_are_named():
+    holed = replace(SOUND, holes=3, grains=600)
+    assert trust(holed) < trust(SOUND)
+    assert "3 holes" in judge(holed)[1]
+    assert "hole" not in judge(SOUND)[1]
+
+
+def test_a_single_chain_is_trusted_less_the_farther_its_threshold_reaches():
+    chain = replace(SOUND, disagreement=math.nan)
+    assert trust(replace(chain, reach=0.015)) < trust(replace(chain, reach=0.004)) < trust(chain)

@@ -6,6 +6,7 @@ import pytest
 from solver.chain import ChainSettings, Packing
 from solver.frame_forces import FrameStatus
 from solver.grains import Grains
+from solver.judgement import trust
 from solver.motion import LastSeen, Snapshot, motion_to
 from solver.problem import Material
 from solver.sequence import SequenceSettings, SequenceState, solve_sequence
@@ -226,3 +227,34 @@ def test_a_reset_at_a_rearrangement_says_what_it_changed_and_can_be_forbidden(mo
     assert "changed the forces by" in frames[2].reason
     carried = [frame for frame, _ in run(packing, snapshots)]
     assert not np.array_equal(frames[2].fn, carried[2].fn)
+
+
+def test_only_the_ensemble_compares_two_starts():
+    packing, snapshots = sheared_frames(4)
+    chain = [frame.start_difference for frame, _ in run(packing, snapshots)]
+    ensemble = [frame.start_difference for frame, _ in run(packing, snapshots, ENSEMBLE)]
+    assert np.isnan(chain).all()
+    assert np.isnan(ensemble[0])
+    assert np.isfinite(ensemble[1:]).all()
+    assert ensemble[3] < ensemble[1]
+
+
+def test_what_a_lost_grain_hides_lowers_the_trust():
+    packing, snapshots = sheared_frames(5, lost=[(2, 14)])
+    (seen, _), (holed, state) = run(packing, snapshots)[1:3]
+    assert seen.hidden_share == 0.0
+    assert 0.0 < holed.hidden_share < 1.0
+    assert holed.trust == pytest.approx(trust(state.evidence) * (1.0 - holed.hidden_share))
+
+
+def test_coming_back_from_a_faulty_frame_is_no_jump_of_the_stress():
+    packing, snapshots = sheared_frames(5)
+    state = run(packing, snapshots)[2][1]
+    state = replace(state, sound_pressure=state.pressure)
+    faulty = replace(state, pressure=3.0 * state.pressure)
+    (_, after), *_ = run(packing, snapshots, state=faulty, first=3)
+    (_, sound), *_ = run(packing, snapshots, state=state, first=3)
+    assert after.evidence.pressure_jump == sound.evidence.pressure_jump
+    never_sound = replace(faulty, sound_pressure=np.nan)
+    (_, jumped), *_ = run(packing, snapshots, state=never_sound, first=3)
+    assert jumped.evidence.pressure_jump > after.evidence.pressure_jump
