@@ -136,7 +136,7 @@ def _convergence(layout: Layout) -> rrb.Container:
 
 def _settling(layout: Layout) -> rrb.Container:
     starts = [entities.COLD_RESIDUAL, entities.WARM_RESIDUAL, entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]
-    doubts = [entities.CORRECTION, entities.OLD_UNBALANCE]
+    doubts = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
     return rrb.Vertical(
         lanes_view(),
         rrb.Horizontal(
@@ -144,7 +144,7 @@ def _settling(layout: Layout) -> rrb.Container:
             curve_view("log₁₀ residuals: cold start, warm start, reached", starts, y_range=_RESIDUALS),
         ),
         rrb.Horizontal(
-            curve_view("Correction ε and old unbalance ū", doubts, layout.extremes, height=190.0),
+            curve_view("Doubts: ε, ū and H", doubts, layout.extremes, height=190.0),
             curve_view("Sweeps saved", [entities.SAVED_SWEEPS]),
             curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes),
             flags_view(),

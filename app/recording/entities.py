@@ -66,6 +66,7 @@ TRUST = "/frames/trust"
 SIMILARITY = "/frames/similarity"
 CORRECTION = "/frames/correction"
 OLD_UNBALANCE = "/frames/old_unbalance"
+START_DIFFERENCE = "/frames/start_difference"
 FRAMES_SINCE_RESET = "/frames/frames_since_reset"
 WARM_RESIDUAL = "/frames/residual/warm"
 COLD_RESIDUAL = "/frames/residual/cold"
@@ -267,6 +268,7 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(SIMILARITY, "correlation of f_n with the frame before, common contacts"),
     _scalar(CORRECTION, "ε, how much the forces must correct the measured motion"),
     _scalar(OLD_UNBALANCE, "ū, unbalance of the former forces on this network"),
+    _scalar(START_DIFFERENCE, "H, what is left of the difference between two starts"),
     _scalar(FRAMES_SINCE_RESET, "frames since the last reset"),
     _scalar(WARM_RESIDUAL, "log10 of the natural-map residual after one sweep from the former forces"),
     _scalar(COLD_RESIDUAL, "… after one sweep from zero forces"),

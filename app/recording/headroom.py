@@ -23,7 +23,7 @@ def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
     found: dict[str, list[float]] = {}
     for frame, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
         values = [*statistic_values(statistics), (entities.CORRECTION, forces.correction)]
-        values += [(entities.OLD_UNBALANCE, forces.old_unbalance)]
+        values += [(entities.OLD_UNBALANCE, forces.old_unbalance), (entities.START_DIFFERENCE, forces.start_difference)]
         values += [(entities.FRAMES_SINCE_RESET, float(forces.frames_since_reset))]
         values += [(entities.SWEEP_COUNT, float(forces.sweeps))]
         if np.isfinite(forces.probability).any():
