@@ -104,10 +104,12 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     ]
     if events:
         lines.append("Events: " + "; ".join(events) + ".")
+    lost = f"{summary['lost_poses']} poses of {summary['lost_grains']} grains lost" if summary["lost_poses"] else ""
+    doubtful = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
+    tracked = ", ".join(part for part in (lost, doubtful) if part) or "every grain has a pose in every frame"
     lines.append(
         f"Worst grain unbalance {summary['worst_unbalance']:.3f} of the mean force (frame "
-        f"{summary['worst_unbalance_frame']}); lost poses {summary['lost_poses']} of {summary['lost_grains']} grains, "
-        f"suspect poses {summary['suspect_poses']}."
+        f"{summary['worst_unbalance_frame']}); {tracked}."
     )
     trusted = [t for t, s in zip(summary["trust"], summary["status"], strict=True) if s == "settled" and t is not None]
     if trusted:
@@ -148,7 +150,7 @@ def _frame_table(summary: dict[str, Any]) -> Table:
     table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("frame", justify="right")
     table.add_column("status")
-    for heading in ("contacts", "z", "φ [°]", "⟨f_n⟩ [N]", "residual", "ε", "trust"):
+    for heading in ("contacts", "z", "φ/°", "⟨f_n⟩/N", "residual", "ε", "trust"):
         table.add_column(heading, justify="right", no_wrap=True)
     truth = summary.get("accuracy")
     if truth:
