@@ -33,6 +33,7 @@ class AccuracyRow:
     relative_l2: tuple[float, ...]
     late: float  # mean r(f_n) from frame 5 on
     least: float  # least r(f_n) of a frame from 5 on
+    last: float  # mean r(f_n) of the last frame, which has no successor to look at
     scale: float  # mean from frame 5 on
     cpu: float  # [s] per frame
 
@@ -71,6 +72,7 @@ def measure_accuracy(
         *(tuple(float(mean[k, q]) for k in shown) for q in range(3)),
         late=float(values[:, 5:, 0].mean()),
         least=float(values[:, 5:, 0].min()),
+        last=float(mean[-1, 0]),
         scale=float(values[:, 5:, 3].mean()),
         cpu=(time.process_time() - began) / done,
     )
@@ -89,6 +91,7 @@ def study_accuracy(
         *(f"r(f_n) {k}" for k in SHOWN),
         "from 5",
         "least",
+        "last",
         "r(f_t) 5",
         "L2 5",
         "scale",
@@ -98,7 +101,7 @@ def study_accuracy(
     for row in rows:
         table.add_row(
             f"{row.noise * 1e6:.0f}", *(f"{r:.3f}" for r in row.r_fn), f"{row.late:.3f}", f"{row.least:.3f}",
-            f"{row.r_ft[2]:.3f}", f"{row.relative_l2[2]:.2f}", f"{row.scale:.2f}", f"{row.cpu:.2f}",
+            f"{row.last:.3f}", f"{row.r_ft[2]:.3f}", f"{row.relative_l2[2]:.2f}", f"{row.scale:.2f}", f"{row.cpu:.2f}",
         )  # fmt: skip
     console.print(table)
     return rows

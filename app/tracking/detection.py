@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from app.frames import Image
+from app.tracking.discs import find_discs
 from app.tracking.outlines import Measured, Outliner
 from app.tracking.rings import Candidates, find_circles, without_overlap
 from solver.grains import Array
@@ -41,6 +42,14 @@ CLOSE_SHARE = 1.0 / 3.0
 # Radii looked for when nothing is said about them [px], and the share of the picture's shorter side that is the most.
 RADIUS_RANGE = (8.0, 160.0)
 LARGEST_SHARE = 0.3
+
+# Of bright discs, smaller ones are told apart from paint and noise, too [px].
+SMALLEST = 4.0
+# Discs that cover this share of a photograph's bright are its grains, and nothing else needs to be looked for;
+CLEAN = 0.93
+# of the bright that found grains leave, this share: in a rest there is always some of no shape.
+CLEAN_REST = 0.8
+DISC_PASSES = 4
 
 # Circles of unknown radius are known no better than the steps in which they were looked for.
 SCAN_STEP = 1.06
@@ -82,31 +91,28 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     settings = settings if settings is not None else DetectionSettings()
     known = bool(settings.radii)
     radii = np.array(sorted(set(settings.radii))) if known else _scan(settings.radius_range or _usual_range(image))
-    rough = find_circles(image, radii, score_least=settings.score_least)
+    smallest = SMALLEST if settings.radius_range is None else settings.radius_range[0]
     outliner = Outliner(image, float(radii.max()))
     table = np.empty((0, 4))
-    unjudged = np.ones(len(rough.x), dtype=np.bool_)
-    while True:
-        left = np.flatnonzero(unjudged)
-        left = left[_apart(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
-        if len(left) == 0:
-            break
-        # What has struck out a true circle and then proved none itself makes room for another pass; so does
-        # what a better circle strikes out later.
-        chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
-        unjudged[chosen] = False
-        judged = _alternatives(outliner, rough, chosen, known)
-        table = np.concatenate([table, judged[judged[:, 3] > settings.quality_least]])
-        # A longer outline is the more significant at the same share.
-        table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-        table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
+    if not known:
+        table = _judge_discs(outliner, table, smallest, CLEAN, settings.quality_least)
+    if len(table) == 0:
+        rough = find_circles(image, radii, score_least=settings.score_least)
+        table = _judge(outliner, rough, table, known, settings.quality_least)
+        if not known:
+            # What is lost among rings of its neighbours' outlines, or smaller than was looked for.
+            count = len(table)
+            table = _judge_discs(outliner, table, smallest, CLEAN_REST, settings.quality_least)
+            if len(table) > count and smallest < radii[0]:
+                rough = find_circles(image, _scan((smallest, radii[0])), score_least=settings.score_least)
+                table = _judge(outliner, rough, table, known, settings.quality_least)
     found = refine_grains(image, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
     # What cannot be measured closely is not a grain, or too little of it is in view.
     good = found.sigma < np.maximum(SIGMA_MOST, SIGMA_SHARE * found.radius)
     good &= found.quality > CLOSE_SHARE * settings.quality_least
     if not known:
-        good &= (found.radius > 0.9 * radii[0]) & (found.radius < 1.1 * radii[-1])
+        good &= (found.radius > 0.9 * smallest) & (found.radius < 1.1 * radii[-1])
     order = order[good[order]]
     return Detection(found.x[order], found.y[order], found.radius[order], found.sigma[order], found.quality[order])
 
@@ -146,21 +152,54 @@ def _closer(rough: Measured, close: Measured) -> Measured:
     return replace(rough, sigma=float(np.hypot(rough.sigma, ROUGH_SIGMA)))
 
 
-def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], known: bool) -> Array:
+def _judge_discs(outliner: Outliner, table: Array, smallest: float, clean: float, quality_least: float) -> Array:
+    """The table x, y, radius, quality (c, 4) with the discs that prove grains, in passes over what each leaves.
+
+    clean: the share of the bright that discs must cover, or they are not taken for grains.
+    """
+    level = outliner.level()
+    for _ in range(DISC_PASSES):
+        rough, covered = find_discs(level, table, smallest)
+        if len(rough.x) == 0 or covered < clean:
+            break
+        count = len(table)
+        table = _judge(outliner, rough, table, False, quality_least)
+        clean = min(clean, CLEAN_REST)
+        if len(table) <= count:
+            break
+    return table
+
+
+def _judge(outliner: Outliner, rough: Candidates, table: Array, known: bool, quality_least: float) -> Array:
+    """The table x, y, radius, quality (c, 4) with those candidates that prove grains and overlap no better one."""
+    unjudged = np.ones(len(rough.x), dtype=np.bool_)
+    tree = KDTree(np.stack([rough.x, rough.y], axis=1)) if known and len(rough.x) else None
+    while True:
+        left = np.flatnonzero(unjudged)
+        left = left[_apart(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
+        if len(left) == 0:
+            return table
+        # What has struck out a true circle and then proved none itself makes room for another pass; so does
+        # what a better circle strikes out later.
+        chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
+        unjudged[chosen] = False
+        judged = _alternatives(outliner, rough, chosen, tree)
+        table = np.concatenate([table, judged[judged[:, 3] > quality_least]])
+        # A longer outline is the more significant at the same share.
+        table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
+        table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
+
+
+def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], tree: KDTree | None) -> Array:
     """x, y, radius, quality (c, 4) of every chosen circle, and of the circles of other known radii around it.
 
-    Which of them is the grain is told by those about it: the better one may lie over another grain.
+    tree: of all rough centres where radii are known, else None. Which of the circles is the grain is told by those
+    about it: the better one may lie over another grain.
     """
-    tree = KDTree(np.stack([rough.x, rough.y], axis=1))
-    widest = float(rough.radius.max() - rough.radius.min()) if len(rough.radius) else 0.0
+    known = tree is not None
     rows = []
     for k in chosen:
-        near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + RING_UNCERTAINTY)))
-        distance = np.hypot(rough.x[near] - rough.x[k], rough.y[near] - rough.y[k])
-        near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + RING_UNCERTAINTY]
-        # They are in the order of their score: the first of every radius is its best.
-        _, first = np.unique(rough.radius[near], return_index=True)
-        for m in near[np.sort(first)] if known else [k]:
+        for m in [k] if tree is None else _around(rough, tree, k):
             scatter = 0.3 if known else np.inf
             size = float(rough.radius[m])
             one = outliner.measure(float(rough.x[m]), float(rough.y[m]), size, _window(size, known), 0.0, scatter)
@@ -172,6 +211,17 @@ def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp
                 quality = min(one.quality, 2.0 * quality)
             rows.append((one.x, one.y, rough.radius[m] if known else one.radius, quality))
     return np.array(rows).reshape(-1, 4)
+
+
+def _around(rough: Candidates, tree: KDTree, k: int) -> NDArray[np.intp]:
+    """The most convincing circle of every radius about circle k."""
+    widest = float(rough.radius.max() - rough.radius.min())
+    near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + RING_UNCERTAINTY)))
+    distance = np.hypot(rough.x[near] - rough.x[k], rough.y[near] - rough.y[k])
+    near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + RING_UNCERTAINTY]
+    # They are in the order of their score: the first of every radius is its best.
+    _, first = np.unique(rough.radius[near], return_index=True)
+    return near[np.sort(first)]
 
 
 def _window(radius: float, known: bool) -> float:

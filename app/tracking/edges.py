@@ -26,7 +26,7 @@ class Outline:
     angle: Array  # (p,) [rad] from the rough centre
     distance: Array  # (p,) [px] of the edge from the rough centre, NaN where there is none
     strength: Image  # (p,) [grey/px] slope of the edge
-    beyond: Image  # (p,) [grey] two pixels outside the edge
+    beyond: Image  # (p,) [grey] darkest within two pixels outside the edge: narrow gaps end sooner
     in_view: NDArray[np.bool_]  # (p,) whether the photograph reaches there
     rays: Image  # (p, s) [grey] the rays themselves, at distances first + k / DENSITY
     first: float  # [px]
@@ -72,8 +72,18 @@ def trace_outline(coefficients: Image, x: float, y: float, radius: float, window
     # A maximum at the window's end is not one.
     peaked = in_view & (at >= before) & (at >= after) & (np.abs(shift) <= 1.0) & (at > 0.0)
     distance = np.where(peaked, where[top] + shift / DENSITY, np.nan)
-    outside = np.clip(top + half + int(2.0 * DENSITY), 0, count - 1)
-    return Outline(angle, distance, np.where(peaked, at, 0.0), ray[rows, outside], in_view, ray, first)
+    beyond = np.empty(len(angle), np.float32)
+    _darkest_beyond(ray, top + half, int(2.0 * DENSITY), beyond)
+    return Outline(angle, distance, np.where(peaked, at, 0.0), beyond, in_view, ray, first)
+
+
+@njit(cache=True, nogil=True)
+def _darkest_beyond(ray, edge, reach, beyond):
+    for p in range(len(edge)):
+        darkest = ray[p, edge[p]]
+        for k in range(edge[p] + 1, min(edge[p] + reach, ray.shape[1] - 1) + 1):
+            darkest = min(darkest, ray[p, k])
+        beyond[p] = darkest
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,39 +115,65 @@ def fit_circle(
     comes from the scores summed over stretches of the outline, because one dot of paint spoils several
     points at once.
     """
-    px, py = distance * np.cos(angle), distance * np.sin(angle)
-    shift = np.zeros(3)  # of the centre, of the radius
-    design = np.ones((len(angle), 3))
-    prior = np.zeros(3)
     # Start from the radius that the points themselves have, lest a common shift make outliers of them.
-    shift[2] = _weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
-    residual, w, inverse, scale = np.zeros_like(weight), weight, np.eye(3), scale_least
-    for _ in range(30):
-        ex, ey = px - shift[0], py - shift[1]
-        length = np.hypot(ex, ey)
-        residual = length - radius - shift[2]
-        design[:, 0], design[:, 1] = ex / length, ey / length
-        scale = max(_weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
-        w = weight * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
-        prior[2] = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
-        normal = (design * w[:, None]).T @ design + np.diag(prior + 1e-9)
-        inverse = np.linalg.inv(normal)
-        step = inverse @ (design.T @ (w * residual) - prior * shift)
-        shift += step
-        if np.abs(step).max() < 1e-4:
-            break
-    stretch = np.floor(angle * radius / POINTS_OF_A_STRETCH).astype(np.intp)
-    score = np.zeros((int(stretch.max()) + 1, 3))
-    np.add.at(score, stretch, design * (w * residual)[:, None])
-    score = score[np.bincount(stretch, weights=w, minlength=len(score)) > 0.0]
+    start = _weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
+    residual, w = np.empty_like(distance), np.empty_like(distance)
+    shift, scale, inverse, score = _fit(
+        angle, distance, np.asarray(weight, dtype=np.float64), radius, start, radius_scatter, scale_least, residual, w
+    )
+    score = score[np.bincount((angle * radius / POINTS_OF_A_STRETCH).astype(np.intp), w, len(score)) > 0.0]
     spread = inverse @ (score.T @ score) @ inverse * len(score) / max(len(score) - 3, 1)
     # What the radius' prior leaves open counts too.
-    spread += inverse @ np.diag(prior) @ inverse * scale**2 * POINTS_OF_A_STRETCH
+    prior = np.diag([0.0, 0.0, (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH])
+    spread += inverse @ prior @ inverse * scale**2 * POINTS_OF_A_STRETCH
     sigma = float(np.sqrt(0.5 * (spread[0, 0] + spread[1, 1])))
     return Circle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
 
 
-def _weighted_median(value: Array, weight: Array) -> float:
+@njit(cache=True, nogil=True)
+def _fit(angle, distance, weight, radius, start, radius_scatter, scale_least, residual, w):
+    """Shift (3,) of centre and radius, scale, inverse normal matrix (3, 3) and the scores (s, 3) of the stretches.
+
+    residual, w (p,): filled with the last residuals and weights.
+    """
+    count = len(angle)
+    px, py = distance * np.cos(angle), distance * np.sin(angle)
+    design = np.ones((count, 3))
+    shift, step = np.zeros(3), np.zeros(3)
+    shift[2] = start
+    scale, inverse = scale_least, np.eye(3)
+    for _ in range(30):
+        for p in range(count):
+            ex, ey = px[p] - shift[0], py[p] - shift[1]
+            length = np.hypot(ex, ey)
+            residual[p] = length - radius - shift[2]
+            design[p, 0], design[p, 1] = ex / length, ey / length
+        scale = max(_weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
+        prior = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
+        normal, right = np.zeros((3, 3)), np.zeros(3)
+        for p in range(count):
+            w[p] = weight[p] * max(1.0 - (residual[p] / (4.685 * scale)) ** 2, 0.0) ** 2
+            for i in range(3):
+                right[i] += w[p] * residual[p] * design[p, i]
+                for j in range(3):
+                    normal[i, j] += w[p] * design[p, i] * design[p, j]
+        normal[2, 2] += prior
+        right[2] -= prior * shift[2]
+        inverse = np.linalg.inv(normal + 1e-9 * np.eye(3))
+        step = inverse @ right
+        shift += step
+        if np.abs(step).max() < 1e-4:
+            break
+    score = np.zeros((int(angle.max() * radius / POINTS_OF_A_STRETCH) + 1, 3))
+    for p in range(count):
+        row = int(angle[p] * radius / POINTS_OF_A_STRETCH)
+        for i in range(3):
+            score[row, i] += design[p, i] * w[p] * residual[p]
+    return shift, scale, inverse, score
+
+
+@njit(cache=True, nogil=True)
+def _weighted_median(value, weight):
     order = np.argsort(value)
     total = np.cumsum(weight[order])
-    return float(value[order][min(np.searchsorted(total, 0.5 * total[-1]), len(value) - 1)])
+    return value[order[min(np.searchsorted(total, 0.5 * total[-1]), len(value) - 1)]]

@@ -30,8 +30,10 @@ NOISE_CONTRAST = 12.0
 ASTRAY = 2.5
 # Points this close to the circle [px] count as its outline.
 ON_CIRCLE = 0.7
-# Fewer points do not make a circle; less of the outline in view does not make a grain.
+# Fewer points do not make a circle (of a small one this share of its rays is enough, and never fewer than that); less
+# of the outline in view does not make a grain.
 LEAST_POINTS = 12
+LEAST_SHARE, FEWEST_POINTS = 0.3, 8
 LEAST_VIEW = 0.35
 
 # Widths of the blur that are tried [px], and the one assumed where no outline tells.
@@ -66,10 +68,15 @@ class Outliner:
 
     def __init__(self, image: Image, radius: float) -> None:
         """radius [px]: of the largest grain, for the size of what counts as local."""
+        self._image = image
         self._coefficients = spline_coefficients(image)
         # An edge must stand out from the noise too, or a photograph of nothing is full of edges.
         self._dark, contrast = local_contrast(image, tile_size(radius))
         self._contrast = np.maximum(contrast, NOISE_CONTRAST * image_noise(image))
+
+    def level(self) -> Image:
+        """Light of every pixel (H, W): 0 where it is the dark about it, 1 where it is the bright."""
+        return (self._image - self._dark) / self._contrast
 
     def measure(self, x: float, y: float, radius: float, window: float, shift: float, scatter: float) -> Measured:
         """The circle through the steepest points within `window` [px] of radius + shift [px].
@@ -78,7 +85,7 @@ class Outliner:
         """
         outline = trace_outline(self._coefficients, x, y, radius + shift, window)
         seen, local = self._edges(outline, x, y, DARK_EXCESS_JUDGED)
-        if seen.sum() < LEAST_POINTS or outline.in_view.mean() < LEAST_VIEW:
+        if seen.sum() < _least_points(outline) or outline.in_view.mean() < LEAST_VIEW:
             return Measured(x, y, radius, np.nan, 0.0)
         circle = fit_circle(
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
@@ -95,7 +102,7 @@ class Outliner:
         """The circle through edges from the fitted profile of the rim, blurred by `width` [px]."""
         outline = trace_outline(self._coefficients, x, y, radius + shift, 2.0)
         seen, local = self._edges(outline, x, y, DARK_EXCESS)
-        if seen.sum() < LEAST_POINTS or outline.in_view.mean() < LEAST_VIEW:
+        if seen.sum() < _least_points(outline) or outline.in_view.mean() < LEAST_VIEW:
             return Measured(x, y, radius, np.nan, 0.0)
         steepest = fit_circle(
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
@@ -103,7 +110,7 @@ class Outliner:
         )  # fmt: skip
         edge, level, _, dark = _fit_profiles(outline, seen, width, width)
         good = np.isfinite(edge)
-        if good.sum() < LEAST_POINTS:
+        if good.sum() < _least_points(outline):
             return Measured(x, y, radius, np.nan, 0.0)
         excess = (dark[good] - np.percentile(dark[good], 10.0)) / (DARK_EXCESS * local)
         weight = (np.minimum(level[good] / (0.6 * local), 1.0) * np.clip(1.0 - excess, 0.05, 1.0)) ** 2
@@ -142,6 +149,10 @@ class Outliner:
             dark = float(np.percentile(outline.beyond[seen], 10.0))
             seen &= outline.beyond < dark + excess * local
         return seen, local
+
+
+def _least_points(outline: Outline) -> int:
+    return max(min(LEAST_POINTS, round(LEAST_SHARE * len(outline.angle))), FEWEST_POINTS)
 
 
 def _best_width(outlines: list[tuple[Outline, NDArray[np.bool_]]], widths: Array, extent: float) -> float:
