@@ -2,8 +2,9 @@
 
 The server answers on 127.0.0.1 only and keeps at most MEMORY_LIMIT of what was logged; a viewer that opens late sees
 what it still has. The file has everything, and every finished frame reaches it before the next one begins, so that a
-run that is interrupted, or killed, leaves a recording that opens. So as not to slow the solve it keeps fewer sweeps
-than the full recording, which takes its place at the end, and measures no warm and cold starts.
+run that is interrupted, or killed, leaves a recording that opens. So as to keep up with the solve it keeps fewer
+sweeps than the full recording, which takes its place at the end, and measures no warm and cold starts. It runs in a
+process of its own (live_process), which the solve does not wait for.
 
 To watch a run on another machine, forward both ports, under the same numbers, and open the printed address here:
 
@@ -41,7 +42,7 @@ from solver.frame_statistics import FrameStatistics
 MEMORY_LIMIT = "512MiB"  # of what the server keeps for viewers that open late; the oldest goes first
 DATA_PORT, PAGE_PORT = 9876, 9090  # where they are free
 FLUSH_SECONDS = 5.0  # for one frame to reach the file
-SWEEPS_KEPT = 20  # per frame: the solve must not wait for its pictures
+SWEEPS_KEPT = 20  # per frame: the pictures must keep up with the solve
 HEADROOM = 1.3  # of the drawn range over the greatest forces of the first frame: those of the run are not known yet
 
 Photograph = Callable[[int], NDArray[np.uint8] | None]

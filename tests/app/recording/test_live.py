@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+import re
 import signal
 import socket
 import subprocess
@@ -15,6 +17,7 @@ from fake_results import make_results
 from app.cli import main
 from app.recording import read_forces
 from app.recording.live import LiveRecording
+from app.recording.live_process import LiveProcess
 from app.recording.repair import repair_recording
 
 
@@ -90,20 +93,92 @@ def test_a_watched_run_ends_with_the_full_recording_alone(tracked, tmp_path, cap
     assert len(read_forces(out / "recording.rrd")) == 5
 
 
-def test_an_interrupted_run_leaves_a_recording_that_opens(tracked, tmp_path):
+def test_what_another_process_records_is_complete(results, tmp_path):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append, viewer="web")
+    live.start(before(results))
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        live.frame(forces, statistics)
+    live.close(whole=True)
+    found = read_forces(live.path)
+    assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
+    assert ["Watch it at" in sentence for sentence in told] == [True]
+    assert not any(answers(port) for port in ports_of(told[0]))
+
+
+def test_a_process_that_breaks_off_does_no_harm_to_the_run(results, tmp_path):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append)
+    live.start(before(results))
+    live._process.kill()
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        live.frame(forces, statistics)
+    live.close(whole=True)
+    assert told == ["The live view broke off, without harm to the run."]
+
+
+def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append, viewer="web")
+    live.close(whole=True)
+    assert live._process.returncode is not None
+    assert told == []
+    assert not live.path.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
+def test_a_run_that_is_stopped_leaves_a_recording_that_opens_and_no_server(tracked, tmp_path, number):
     out = tmp_path / "out"
-    command = [sys.executable, "-c", "from app.cli import main; main()", "run", str(tracked), "--out", str(out)]
+    command = [sys.executable, "-u", "-c", "from app.cli import main; main()", "run", str(tracked), "--out", str(out)]
     command += ["--view", "web", "--set", "solver.sweeps=20000"]
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert run.stdout is not None
+    hint = run.stdout.readline()
+    ports = ports_of(hint)
     kept, end = out / ".unfinished" / "solving", time.monotonic() + 60
     while not (kept / "000002.npz").exists() and run.poll() is None and time.monotonic() < end:
         time.sleep(0.005)
-    run.send_signal(signal.SIGINT)
+    if number == signal.SIGKILL:  # what is under way to the recording is lost
+        recording = out / "recording-live.rrd"
+        wait_until(lambda: recording.exists() and recorded_frames(recording, tmp_path) >= 2)
+    os.killpg(run.pid, number)  # as a terminal does: to all of its processes
     told, said = run.communicate(timeout=60)
-    assert run.returncode == 130, said
-    assert "What was solved so far" in told
+    wait_until(lambda: not any(answers(port) for port in ports))
     assert len(read_forces(out / "recording-live.rrd")) >= 2
     assert not (out / "recording.rrd").exists()
+    if number == signal.SIGKILL:
+        assert run.returncode == -signal.SIGKILL, said
+    else:
+        assert run.returncode == 130, said
+        assert "What was solved so far" in told
+
+
+def ports_of(hint: str) -> list[int]:
+    return [int(port) for port in re.findall(r"-L (\d+):", hint)]
+
+
+def answers(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=5).close()
+    except OSError:
+        return False
+    return True
+
+
+def recorded_frames(recording, folder) -> int:
+    copy = folder / "copy.rrd"  # of a file that is still written
+    copy.write_bytes(recording.read_bytes())
+    try:
+        return repair_recording(copy, folder / "mended.rrd").frames
+    except (OSError, RuntimeError):  # nothing is in it yet
+        return 0
+
+
+def wait_until(condition, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)
 
 
 @pytest.mark.slow
