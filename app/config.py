@@ -151,7 +151,8 @@ class TrackingSection(Section):
     """Tuning of the tracker."""
 
     workers: Annotated[int, Field(ge=1)] = 2
-    radius_range: tuple[Positive, Positive] = (8.0, 60.0)  # [px] of grains looked for when radii are not known
+    # [px] of grains looked for when radii are not known; unset: any size, from 4 px where small discs are seen
+    radius_range: tuple[Positive, Positive] = (8.0, 60.0)
     search_window: Positive = 60.0  # [px] half width of the widest search for a grain that has jumped
 
     @model_validator(mode="after")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from app.frames import Image
-from app.tracking.discs import find_discs
+from app.tracking.discs import OVERLAP, find_discs
 from app.tracking.outlines import Measured, Outliner
 from app.tracking.rings import Candidates, find_circles, without_overlap
 from solver.grains import Array
@@ -27,15 +27,14 @@ RING_UNCERTAINTY = 3.0
 # Of a small circle they leave less, in parts of its radius.
 SMALL_SHARE = 0.2
 
-# Up to this radius [px] an outline between neighbours may be too short for its rays to be fitted one by one.
-SMALL = 12.0
-
 # Standard deviation of what a narrow gap makes of the steepest points' centre [px].
 ROUGH_SIGMA = 0.15
 
-# A centre less certain than this [px], and than this share of the radius, is none.
+# A centre less certain than this [px], and than this share of the radius, is none; nor is one of a small circle that is
+# less certain than the other share.
 SIGMA_MOST = 1.0
 SIGMA_SHARE = 0.05
+SIGMA_SHARE_SMALL = 0.1
 # Looked at closely, this part of the outline asked for must still be seen: noise has none of it.
 CLOSE_SHARE = 1.0 / 3.0
 
@@ -45,11 +44,16 @@ LARGEST_SHARE = 0.3
 
 # Of bright discs, smaller ones are told apart from paint and noise, too [px].
 SMALLEST = 4.0
-# Discs that cover this share of a photograph's bright are its grains, and nothing else needs to be looked for;
-CLEAN = 0.93
-# of the bright that found grains leave, this share: in a rest there is always some of no shape.
+# Discs that cover this share of a photograph's bright are its grains, each where this part of the outline asked for of
+# others is seen;
+CLEAN, CLEAN_QUALITY = 0.93, 0.6
+# they must be lit as evenly as this, as a share of the contrast, or there is texture on them.
+EVEN = 0.2
+# Of the bright that found grains leave, this share: in a rest there is always some of no shape.
 CLEAN_REST = 0.8
 DISC_PASSES = 4
+# When grains have taken all but this share of the bright, all are found.
+BRIGHT_LEFT = 0.01
 
 # Circles of unknown radius are known no better than the steps in which they were looked for.
 SCAN_STEP = 1.06
@@ -93,23 +97,27 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     radii = np.array(sorted(set(settings.radii))) if known else _scan(settings.radius_range or _usual_range(image))
     smallest = SMALLEST if settings.radius_range is None else settings.radius_range[0]
     outliner = Outliner(image, float(radii.max()))
-    table = np.empty((0, 4))
-    if not known:
-        table = _judge_discs(outliner, table, smallest, CLEAN, settings.quality_least)
-    if len(table) == 0:
+    table, complete = np.empty((0, 4)), False
+    whole = find_discs(outliner.level(), table, min(smallest, SMALLEST)) if not known else None
+    if whole is not None and whole.covered > CLEAN and whole.spread < EVEN:
+        # Nothing is painted on the grains, so a little of an outline tells, and gaps may be as narrow as they like.
+        outliner.plain = True
+        table, complete = _judge_discs(outliner, table, smallest, CLEAN_QUALITY * settings.quality_least)
+    if not complete:
         rough = find_circles(image, radii, score_least=settings.score_least)
         table = _judge(outliner, rough, table, known, settings.quality_least)
+        count = len(table)
         if not known:
             # What is lost among rings of its neighbours' outlines, or smaller than was looked for.
-            count = len(table)
-            table = _judge_discs(outliner, table, smallest, CLEAN_REST, settings.quality_least)
-            if len(table) > count and smallest < radii[0]:
-                rough = find_circles(image, _scan((smallest, radii[0])), score_least=settings.score_least)
-                table = _judge(outliner, rough, table, known, settings.quality_least)
-    found = refine_grains(image, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
+            table, _ = _judge_discs(outliner, table, smallest, settings.quality_least)
+        if len(table) > count and smallest < radii[0]:
+            rough = find_circles(image, _scan((smallest, radii[0])), score_least=settings.score_least)
+            table = _judge(outliner, rough, table, known, settings.quality_least)
+    found = _refine(outliner, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
     # What cannot be measured closely is not a grain, or too little of it is in view.
-    good = found.sigma < np.maximum(SIGMA_MOST, SIGMA_SHARE * found.radius)
+    most = np.minimum(SIGMA_MOST, SIGMA_SHARE_SMALL * found.radius)
+    good = found.sigma < np.maximum(most, SIGMA_SHARE * found.radius)
     good &= found.quality > CLOSE_SHARE * settings.quality_least
     if not known:
         good &= (found.radius > 0.9 * smallest) & (found.radius < 1.1 * radii[-1])
@@ -126,10 +134,19 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
     x, y, radius = (np.asarray(value, dtype=np.float64) for value in (x, y, radius))
     if len(x) == 0:
         return Detection(x, y, radius, np.empty(0), np.empty(0))
-    outliner = Outliner(image, float(radius.max()))
-    first = _each(len(x), lambda k: outliner.measure(x[k], y[k], radius[k], 2.0, 0.0, np.inf))
+    return _refine(Outliner(image, float(radius.max())), x, y, radius, fixed_radius=fixed_radius)
+
+
+def _refine(outliner: Outliner, x: Array, y: Array, radius: Array, *, fixed_radius: bool) -> Detection:
+    if len(x) == 0:
+        return Detection(x, y, radius, np.empty(0), np.empty(0))
+    first = _each(
+        len(x), lambda k: outliner.measure(x[k], y[k], radius[k], min(_window(radius[k], True), 2.0), 0.0, np.inf)
+    )
     width = outliner.estimate_blur(first)
-    free = _each(len(x), lambda k: _closer(first[k], outliner.measure_closely(*first[k].circle, width, 0.0, np.inf)))
+    free = _each(
+        len(x), lambda k: _closer(outliner, first[k], outliner.measure_closely(*first[k].circle, width, 0.0, np.inf))
+    )
     if not fixed_radius:
         return _detection(free, np.array([one.radius for one in free]))
     excess = np.array([one.radius for one in free]) - radius
@@ -139,39 +156,47 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
     tied = _each(
         len(x),
         lambda k: _closer(
-            free[k], outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter)
+            outliner, free[k], outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter)
         ),
     )  # fmt: skip
     return _detection(tied, radius)
 
 
-def _closer(rough: Measured, close: Measured) -> Measured:
-    """The close measurement; where a small outline is too short for one, the rough with what it leaves open."""
-    if np.isfinite(close.sigma) or not np.isfinite(rough.sigma) or rough.radius > SMALL:
+def _closer(outliner: Outliner, rough: Measured, close: Measured) -> Measured:
+    """The close measurement; where narrow gaps leave too little for it, the rough one with what that leaves open."""
+    if not np.isfinite(rough.sigma) or not outliner.narrow(rough.radius):
         return close
-    return replace(rough, sigma=float(np.hypot(rough.sigma, ROUGH_SIGMA)))
+    sigma = float(np.hypot(rough.sigma, ROUGH_SIGMA))
+    return close if close.sigma < sigma else replace(rough, sigma=sigma)
 
 
-def _judge_discs(outliner: Outliner, table: Array, smallest: float, clean: float, quality_least: float) -> Array:
+def _judge_discs(outliner: Outliner, table: Array, smallest: float, quality_least: float) -> tuple[Array, bool]:
     """The table x, y, radius, quality (c, 4) with the discs that prove grains, in passes over what each leaves.
 
-    clean: the share of the bright that discs must cover, or they are not taken for grains.
+    Discs that leave much of the bright uncovered are not taken for grains. Returns also whether next to nothing of the
+    bright is left.
     """
     level = outliner.level()
-    for _ in range(DISC_PASSES):
-        rough, covered = find_discs(level, table, smallest)
-        if len(rough.x) == 0 or covered < clean:
+    whole, left = 0.0, np.inf
+    for k in range(DISC_PASSES + 1):
+        discs = find_discs(level, table, smallest)
+        whole, left = max(whole, discs.area), discs.area
+        if k == DISC_PASSES or len(discs.candidates.x) == 0 or discs.covered < CLEAN_REST:
             break
         count = len(table)
-        table = _judge(outliner, rough, table, False, quality_least)
-        clean = min(clean, CLEAN_REST)
+        table = _judge(outliner, discs.candidates, table, False, quality_least, OVERLAP)
         if len(table) <= count:
             break
-    return table
+    return table, left < BRIGHT_LEFT * whole
 
 
-def _judge(outliner: Outliner, rough: Candidates, table: Array, known: bool, quality_least: float) -> Array:
-    """The table x, y, radius, quality (c, 4) with those candidates that prove grains and overlap no better one."""
+def _judge(
+    outliner: Outliner, rough: Candidates, table: Array, known: bool, quality_least: float, overlap: float = 0.15
+) -> Array:
+    """The table x, y, radius, quality (c, 4) with those candidates that prove grains and overlap no better one.
+
+    overlap: the share of the smaller radius that is let pass.
+    """
     unjudged = np.ones(len(rough.x), dtype=np.bool_)
     tree = KDTree(np.stack([rough.x, rough.y], axis=1)) if known and len(rough.x) else None
     while True:
@@ -187,7 +212,7 @@ def _judge(outliner: Outliner, rough: Candidates, table: Array, known: bool, qua
         table = np.concatenate([table, judged[judged[:, 3] > quality_least]])
         # A longer outline is the more significant at the same share.
         table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-        table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=0.15)]
+        table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=overlap)]
 
 
 def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], tree: KDTree | None) -> Array:

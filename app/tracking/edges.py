@@ -26,7 +26,7 @@ class Outline:
     angle: Array  # (p,) [rad] from the rough centre
     distance: Array  # (p,) [px] of the edge from the rough centre, NaN where there is none
     strength: Image  # (p,) [grey/px] slope of the edge
-    beyond: Image  # (p,) [grey] darkest within two pixels outside the edge: narrow gaps end sooner
+    beyond: Image  # (p,) [grey] two pixels outside the edge, or the darkest up to there
     in_view: NDArray[np.bool_]  # (p,) whether the photograph reaches there
     rays: Image  # (p, s) [grey] the rays themselves, at distances first + k / DENSITY
     first: float  # [px]
@@ -48,8 +48,13 @@ def sample_rays(coefficients, cx, cy, angles, first, step, out):
             out[p, k] = interpolate(coefficients, ix, iy, np.float32(x - ix), np.float32(y - iy))
 
 
-def trace_outline(coefficients: Image, x: float, y: float, radius: float, window: float) -> Outline:
-    """Look along every ray for the steepest descent outwards within `window` [px] of the radius [px]."""
+def trace_outline(
+    coefficients: Image, x: float, y: float, radius: float, window: float, *, narrow: bool = False
+) -> Outline:
+    """Look along every ray for the steepest descent outwards within `window` [px] of the radius [px].
+
+    narrow: gaps may end before the two pixels outside the edge where their dark is read.
+    """
     angle = np.arange(0.0, 2.0 * np.pi, 1.0 / radius)
     margin = 3.0
     first = radius - window - margin
@@ -72,18 +77,18 @@ def trace_outline(coefficients: Image, x: float, y: float, radius: float, window
     # A maximum at the window's end is not one.
     peaked = in_view & (at >= before) & (at >= after) & (np.abs(shift) <= 1.0) & (at > 0.0)
     distance = np.where(peaked, where[top] + shift / DENSITY, np.nan)
-    beyond = np.empty(len(angle), np.float32)
-    _darkest_beyond(ray, top + half, int(2.0 * DENSITY), beyond)
+    outside = np.clip(top + half + int(2.0 * DENSITY), 0, count - 1)
+    beyond = ray[rows, outside]
+    if narrow:
+        _take_darkest(ray, top + half, outside, beyond)
     return Outline(angle, distance, np.where(peaked, at, 0.0), beyond, in_view, ray, first)
 
 
 @njit(cache=True, nogil=True)
-def _darkest_beyond(ray, edge, reach, beyond):
-    for p in range(len(edge)):
-        darkest = ray[p, edge[p]]
-        for k in range(edge[p] + 1, min(edge[p] + reach, ray.shape[1] - 1) + 1):
-            darkest = min(darkest, ray[p, k])
-        beyond[p] = darkest
+def _take_darkest(ray, start, end, beyond):
+    for p in range(len(beyond)):
+        for k in range(start[p], end[p]):
+            beyond[p] = min(beyond[p], ray[p, k])
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +131,9 @@ def fit_circle(
     # What the radius' prior leaves open counts too.
     prior = np.diag([0.0, 0.0, (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH])
     spread += inverse @ prior @ inverse * scale**2 * POINTS_OF_A_STRETCH
-    sigma = float(np.sqrt(0.5 * (spread[0, 0] + spread[1, 1])))
+    variance = 0.5 * (spread[0, 0] + spread[1, 1])
+    # Where too few points are left to fix a circle, nothing but rounding errors is.
+    sigma = float(np.sqrt(variance)) if variance >= 0.0 else np.inf
     return Circle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
 
 

@@ -30,11 +30,20 @@ NOISE_CONTRAST = 12.0
 ASTRAY = 2.5
 # Points this close to the circle [px] count as its outline.
 ON_CIRCLE = 0.7
-# Fewer points do not make a circle (of a small one this share of its rays is enough, and never fewer than that); less
+# Fewer points do not make a circle (of a small one this share of its rays will do, but no fewer than that;
+# the other two where grains are plain); less
 # of the outline in view does not make a grain.
 LEAST_POINTS = 12
 LEAST_SHARE, FEWEST_POINTS = 0.3, 8
+PLAIN_SHARE, PLAIN_FEWEST = 0.2, 6
 LEAST_VIEW = 0.35
+# A small circle is none if its points lie on one side: a chipped rim has as many. Half a circle's have 0.64.
+ONE_SIDED = 0.55
+# And more of it must be in view: the light part of something larger looks like one where the picture ends.
+LEAST_VIEW_SMALL = 0.75
+
+# The radius [px] of a small circle.
+SMALL = 12.0
 
 # Widths of the blur that are tried [px], and the one assumed where no outline tells.
 BLUR_WIDTHS = np.arange(0.3, 2.2, 0.3)
@@ -68,6 +77,8 @@ class Outliner:
 
     def __init__(self, image: Image, radius: float) -> None:
         """radius [px]: of the largest grain, for the size of what counts as local."""
+        # Whether the grains are plain bright discs: nothing painted on them can then be mistaken for an edge.
+        self.plain = False
         self._image = image
         self._coefficients = spline_coefficients(image)
         # An edge must stand out from the noise too, or a photograph of nothing is full of edges.
@@ -76,16 +87,23 @@ class Outliner:
 
     def level(self) -> Image:
         """Light of every pixel (H, W): 0 where it is the dark about it, 1 where it is the bright."""
-        return (self._image - self._dark) / self._contrast
+        return np.asarray((self._image - self._dark) / self._contrast, dtype=np.float32)
+
+    def narrow(self, radius: float) -> bool:
+        """Whether gaps about a circle of that radius [px] may be narrower than two pixels.
+
+        An outline between neighbours may then be too short for its rays to be fitted one by one.
+        """
+        return self.plain or radius <= SMALL
 
     def measure(self, x: float, y: float, radius: float, window: float, shift: float, scatter: float) -> Measured:
         """The circle through the steepest points within `window` [px] of radius + shift [px].
 
         scatter [px]: by how much the radius may differ; infinite: it is free.
         """
-        outline = trace_outline(self._coefficients, x, y, radius + shift, window)
-        seen, local = self._edges(outline, x, y, DARK_EXCESS_JUDGED)
-        if seen.sum() < _least_points(outline) or outline.in_view.mean() < LEAST_VIEW:
+        outline = trace_outline(self._coefficients, x, y, radius + shift, window, narrow=self.narrow(radius))
+        seen, local = self._edges(outline, x, y, DARK_HALF if self.plain else DARK_EXCESS_JUDGED)
+        if seen.sum() < self._least_points(outline) or outline.in_view.mean() < self._least_view(radius):
             return Measured(x, y, radius, np.nan, 0.0)
         circle = fit_circle(
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
@@ -94,15 +112,17 @@ class Outliner:
         moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
         if not moved < ASTRAY * window:
             return Measured(x, y, radius, np.nan, 0.0)
+        if radius <= SMALL and _one_sidedness(circle, outline.angle[seen]) > ONE_SIDED:
+            return Measured(x, y, radius, np.nan, 0.0)
         return _measured(circle, outline, shift)
 
     def measure_closely(
         self, x: float, y: float, radius: float, width: float, shift: float, scatter: float
     ) -> Measured:
         """The circle through edges from the fitted profile of the rim, blurred by `width` [px]."""
-        outline = trace_outline(self._coefficients, x, y, radius + shift, 2.0)
+        outline = trace_outline(self._coefficients, x, y, radius + shift, 2.0, narrow=self.narrow(radius))
         seen, local = self._edges(outline, x, y, DARK_EXCESS)
-        if seen.sum() < _least_points(outline) or outline.in_view.mean() < LEAST_VIEW:
+        if seen.sum() < self._least_points(outline) or outline.in_view.mean() < self._least_view(radius):
             return Measured(x, y, radius, np.nan, 0.0)
         steepest = fit_circle(
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
@@ -110,7 +130,7 @@ class Outliner:
         )  # fmt: skip
         edge, level, _, dark = _fit_profiles(outline, seen, width, width)
         good = np.isfinite(edge)
-        if good.sum() < _least_points(outline):
+        if good.sum() < self._least_points(outline):
             return Measured(x, y, radius, np.nan, 0.0)
         excess = (dark[good] - np.percentile(dark[good], 10.0)) / (DARK_EXCESS * local)
         weight = (np.minimum(level[good] / (0.6 * local), 1.0) * np.clip(1.0 - excess, 0.05, 1.0)) ** 2
@@ -128,7 +148,7 @@ class Outliner:
         good = good[:: max(len(good) // most, 1)]
         outlines = []
         for one in good:
-            outline = trace_outline(self._coefficients, *one.circle, 2.0)
+            outline = trace_outline(self._coefficients, *one.circle, 2.0, narrow=self.narrow(one.radius))
             outlines.append((outline, self._edges(outline, one.x, one.y, DARK_EXCESS)[0]))
         if sum(int(seen.sum()) for _, seen in outlines) < LEAST_POINTS:
             return TYPICAL_BLUR
@@ -150,9 +170,12 @@ class Outliner:
             seen &= outline.beyond < dark + excess * local
         return seen, local
 
+    def _least_view(self, radius: float) -> float:
+        return LEAST_VIEW if self.plain or radius > SMALL else LEAST_VIEW_SMALL
 
-def _least_points(outline: Outline) -> int:
-    return max(min(LEAST_POINTS, round(LEAST_SHARE * len(outline.angle))), FEWEST_POINTS)
+    def _least_points(self, outline: Outline) -> int:
+        share, fewest = (PLAIN_SHARE, PLAIN_FEWEST) if self.plain else (LEAST_SHARE, FEWEST_POINTS)
+        return max(min(LEAST_POINTS, round(share * len(outline.angle))), fewest)
 
 
 def _best_width(outlines: list[tuple[Outline, NDArray[np.bool_]]], widths: Array, extent: float) -> float:
@@ -178,6 +201,12 @@ def _fit_profiles(
 ) -> tuple[Array, Array, Array, Array]:
     start = np.where(seen, outline.distance, np.nan)
     return locate_edges(outline.rays, outline.first, 1.0 / DENSITY, start, outline.angle, width, extent=extent)
+
+
+def _one_sidedness(circle: Circle, angle: Array) -> float:
+    """How much the points on the circle lie on one side of it: 0 all about, 1 in one place."""
+    on = angle[np.abs(circle.residual) < ON_CIRCLE]
+    return float(np.hypot(np.cos(on).mean(), np.sin(on).mean())) if len(on) else 1.0
 
 
 def _measured(circle: Circle, outline: Outline, shift: float) -> Measured:

@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 
 from app.frames import LUMA
 from app.tracking.detection import Detection, DetectionSettings, detect_grains
+from tests.app.tracking.polydisperse import draw_discs, lay_discs
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import grid_of_rods
 from tests.app.tracking.test_detection import HEIGHT, WIDTH, packing
@@ -94,6 +95,25 @@ def test_brown_packings_of_unknown_radius(benchmark: Benchmark, name: str) -> No
             report(f"brown, {name}: {score(found, rods.x, rods.y, rods.radius, (HEIGHT, WIDTH))}")
 
     benchmark.pedantic(run, rounds=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("painted", [False, True], ids=["plain", "brown"])
+def test_thousands_of_discs_of_sizes_one_to_ten(painted: bool) -> None:
+    width, height = 2300, 2000
+    x, y, radius = lay_discs(width, height, 5.0, 50.0, 11000, np.random.default_rng(7))
+    if painted:
+        colour = brown_photograph(Laboratory(), width, height, x, y, radius, 0.0 * x, pattern_seed=1, noise_seed=1)
+        image = np.ascontiguousarray(colour.astype(np.float32) @ LUMA, dtype=np.float32)
+    else:
+        image = draw_discs(width, height, x, y, radius, blur=0.6, noise=4.0, noise_seed=1)
+    since = time.process_time()
+    found = detect_grains(image)
+    report(
+        f"{'brown' if painted else 'plain'}, {len(x)} discs of 5 to 50 px: "
+        f"{score(found, x, y, radius, (height, width))}, {time.process_time() - since:.0f} s"
+    )
+    assert found.count > 0.9 * len(x)
 
 
 @pytest.mark.slow
