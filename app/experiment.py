@@ -206,26 +206,6 @@ def _read_wall_forces(experiment: Experiment, names: tuple[str, ...], frame_coun
     return force
 
 
-def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> None:
-    """No centre may lie beyond a wall by more than the grain's radius: a mistaken unit, origin or direction."""
-    section = experiment.config.walls
-    assert section is not None
-    start = walls.endpoints[:, :, 0]
-    along = walls.endpoints[:, :, 1] - start
-    outward = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=-1, keepdims=True)
-    for w, name in enumerate(walls.name):
-        beyond = np.einsum("fnk,fk->fn", tracks.position - start[:, None, w], outward[:, w])
-        outside = np.argwhere(beyond > tracks.radius)  # NaN of lost grains compares false
-        if len(outside):
-            k, row = (int(v) for v in outside[0])
-            raise InputError(
-                experiment.folder / section.file,
-                f"frame {k}, wall {name!r}",
-                f"grain {tracks.id[row]} lies {beyond[k, row] * 1e3:.4g} mm beyond it; "
-                "the packing must lie to the left of the line from (x1, y1) to (x2, y2), all in metres",
-            )
-
-
 def make_packing(experiment: Experiment, radius: Array, pressure: Array) -> Packing:
     """The mechanics of the experiment's rods: radius (n,) [m], pressure (w,) [Pa] NaN where motion is imposed."""
     material = experiment.config.material

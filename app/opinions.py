@@ -16,6 +16,9 @@ from solver.radius_tuning import RadiusTuning, tune_radii
 
 REACH = 0.04  # radii are changed by this share of the mean radius at most, either way
 CURVE_POINTS = 81
+ENOUGH_CONTACTS = 8000  # of all frames together, to measure friction on: more frames of a large packing add only time
+FEWEST_FRAMES = 4  # whose scatter gives the interval
+TOLERATED_LOSS = 0.005  # share of grains: the forces of lost ones are missing from the balance that friction closes
 
 
 def friction_of(
@@ -24,13 +27,22 @@ def friction_of(
     frames: Sequence[FrameForces],
     settings: ContactProbabilitySettings,
 ) -> FrictionCheck | None:
-    """Check the friction on the quietest consecutive frames; None where there are too few, or no friction to check."""
+    """Check the friction on the quietest consecutive frames.
+
+    None where there are too few, where there is no friction to check, or where too many grains are lost.
+    """
     if len(snapshots) < 4 or packing.material.friction <= 0 or packing.material.wall_friction <= 0:
         return None
     calm = np.array([frame.status in (FrameStatus.SETTLED, FrameStatus.SETTLING) for frame in frames])
-    count = min(FRAMES, len(snapshots) - 2)
+    lost = np.array([1.0 - snapshot.present.mean() for snapshot in snapshots])
+    contacts = max(int(np.median([frame.contacts.count for frame in frames])), 1)
+    wanted = int(np.clip(-(-ENOUGH_CONTACTS // contacts), FEWEST_FRAMES, FRAMES))
+    count = min(wanted, len(snapshots) - 2)
     starts = np.arange(1, len(snapshots) - count)
-    first = int(starts[np.argmax([calm[s : s + count].sum() for s in starts])])
+    quiet = calm & (lost <= TOLERATED_LOSS)
+    first = int(starts[np.argmax([quiet[s : s + count].sum() for s in starts])])
+    if lost[first - 1 : first + count + 1].mean() > TOLERATED_LOSS:
+        return None
     return check_friction(packing, snapshots, first, first + count - 1, force_scale(packing, ChainSettings()), settings)
 
 

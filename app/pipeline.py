@@ -26,7 +26,6 @@ from app.corrections import read_corrections
 from app.errors import InputError
 from app.experiment import (
     Experiment,
-    check_inside,
     checksums,
     read_grain_guess,
     read_times,
@@ -34,6 +33,7 @@ from app.experiment import (
     read_walls,
 )
 from app.opinions import friction_of
+from app.plausibility import check_inside, check_radii
 from app.preparation import Prepared, prepare
 from app.progress import Progress, silent
 from app.results import Results, TruthContacts
@@ -109,6 +109,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         walls = read_walls(experiment, tracks.frame_count)
         if walls is not None:
             check_inside(experiment, tracks, walls)
+            check_radii(experiment, tracks)
         ids, count = tracks.id, tracks.frame_count
     else:
         photographs = experiment.photographs()
@@ -147,6 +148,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     tracks, walls, tables = track_photographs(experiment, stop, unfinished, origin.fingerprint, run.progress)
     if walls is not None:
         check_inside(experiment, tracks, walls)
+        check_radii(experiment, tracks)
         walls = walls.frames(start, stop)
     tracks = tracks.frames(start, stop)
     write_tables(run.folder, tables)

@@ -43,6 +43,9 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "name": results.name,
         "frame_count": len(frames),
         "grain_count": results.grains.count,
+        "loaded_walls": [
+            name for name, load in zip(results.walls.name, results.walls.pressure, strict=True) if np.isfinite(load)
+        ],
         "wall_count": results.walls.count,
         "contact_count": [frame.contacts.count for frame in frames],
         "status": [frame.status.name.lower() for frame in frames],
@@ -116,6 +119,10 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         lines.append(
             f"Trust (expected correlation with the true forces, given these inputs): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
+        )
+    if not summary["loaded_walls"]:
+        lines.append(
+            "[bold]No wall carries a given pressure:[/] forces are known up to a scale, which differs between frames."
         )
     friction = summary["friction"]
     if friction is not None and friction["enclosed"]:
@@ -224,7 +231,7 @@ def _friction(results: Results) -> dict[str, Any] | None:
         "high": _plain([check.high])[0],
         "frames": [check.first, check.last],
         "enclosed": check.enclosed,
-        "agrees": check.agrees,
+        "agrees": check.agrees if check.enclosed else None,  # None: nothing can be said
     }
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from app.recording import entities
 from app.recording.colours import GAINED, GAP_RAMP, LOST, packed, packed_one
 from app.recording.scene import Clock, Scene
+from app.recording.values import known
 from solver.contacts import Contacts, measure_contacts
 from solver.frame_forces import FrameForces
 from solver.grains import Array
@@ -98,7 +99,8 @@ def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
             draw_order=28.0,
         ),
         rr.AnyValues(
-            gap_um=(1e6 * contacts.gap).astype(np.float32),
+            # With a type of its own: without contacts nothing else here would have one.
+            gap_um=known((1e6 * contacts.gap).astype(np.float32)),
             grain_a=scene.tracks.id[contacts.i],
             body_b=scene.body_names(contacts.j),
         ),

@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
@@ -93,22 +94,25 @@ def contact_values(scene: Scene, forces: FrameForces) -> rr.AnyValues:
         **body_values(scene, forces.contacts),
         fn=known(forces.fn),
         ft=known(forces.ft),
-        gap_um=(1e6 * forces.contacts.gap).astype(np.float32),
+        gap_um=known((1e6 * forces.contacts.gap).astype(np.float32)),
         fn_sd=known(forces.fn_sd.astype(np.float32)),
         mobilisation=known(np.where(forces.fn > 0.0, mobilisation, np.nan).astype(np.float32)),
-        state=[ContactState(s).name.lower() for s in forces.state.tolist()],
-        age=forces.age.astype(np.int32),
+        state=pa.array([ContactState(s).name.lower() for s in forces.state.tolist()], pa.string()),
+        age=pa.array(forces.age.astype(np.int32)),
         probability=known(forces.probability.astype(np.float32)),
     )
 
 
 def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:
-    """Who touches whom: rows i, j, the id of grain i and the name of body j."""
+    """Who touches whom: rows i, j, the id of grain i and the name of body j.
+
+    With types of their own: where a recording's first frame has no contacts, empty lists would have none.
+    """
     return {
-        "i": contacts.i,
-        "j": contacts.j,
-        "grain_a": scene.tracks.id[contacts.i],
-        "body_b": scene.body_names(contacts.j),
+        "i": pa.array(contacts.i),
+        "j": pa.array(contacts.j),
+        "grain_a": pa.array(scene.tracks.id[contacts.i]),
+        "body_b": pa.array(scene.body_names(contacts.j), pa.string()),
     }
 
 

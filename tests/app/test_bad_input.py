@@ -35,6 +35,13 @@ def refuse(capsys, out: Path, *arguments: str) -> str:
     return told.err
 
 
+def scale_radii(file: Path, factor: float) -> None:
+    """Multiply every radius, the last column."""
+    head, *rows = file.read_text().splitlines()
+    cells = [row.rsplit(",", 1) for row in rows]
+    file.write_text("\n".join([head, *(f"{first},{float(last) * factor}" for first, last in cells)]) + "\n")
+
+
 TOML, TRACKS, WALLS, GRAINS, TIMES = "experiment.toml", "tracks.csv", "walls.csv", "grains.csv", "times.csv"
 
 MISTAKES = {
@@ -53,6 +60,9 @@ MISTAKES = {
         ["formal_weight", "0.7"],
     ),
     "missing column": (TRACKS, lambda f: edit(f, "theta", "angle"), ["column theta"]),
+    "diameters": (GRAINS, lambda f: scale_radii(f, 2.0), ["grains.csv", "radius", "overlap", "0.50"]),
+    "small radii": (GRAINS, lambda f: scale_radii(f, 0.5), ["grains.csv", "radius", "stand apart", "2.00"]),
+    "millimetres": (GRAINS, lambda f: scale_radii(f, 1e3), ["grains.csv", "radius", "in metres"]),
     "nan": (TRACKS, lambda f: swap_row(f, 8, {2: "nan"}), ["row 8", "x = 'nan'"]),
     "not a number": (TRACKS, lambda f: swap_row(f, 9, {3: "left"}), ["row 9", "y = 'left'"]),
     "twice": (TRACKS, lambda f: swap_row(f, 4, {1: "1"}), ["row 4", "id = '1'", "twice"]),

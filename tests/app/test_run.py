@@ -212,9 +212,10 @@ def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys
     out = tmp_path / "out"
     text = (tracked / "experiment.toml").read_text()
     (tracked / "experiment.toml").write_text(text.replace("[walls.top]\npressure = 50000.0\n", ""))
-    assert rodsight("run", str(tracked), "--out", str(out), "--quiet") == 0
-    capsys.readouterr()
+    assert rodsight("run", str(tracked), "--out", str(out)) == 0
+    assert "up to a scale" in capsys.readouterr().out
     summary = json.loads((out / "summary.json").read_text())
+    assert summary["loaded_walls"] == []
     assert summary["accuracy"]["r_fn"][-1] > 0.7
 
 
