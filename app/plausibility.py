@@ -40,7 +40,7 @@ def neighbour_spacing(position: Array, radius: Array) -> Array:
     count = min(NEIGHBOURS + 1, len(radius))
     if count < 2:
         return np.empty(0)
-    distance, other = KDTree(position).query(position, count)
+    distance, other = (np.asarray(found) for found in KDTree(position).query(position, count))
     return (distance[:, 1:] / (radius[:, None] + radius[other[:, 1:]])).min(axis=1)
 
 
