@@ -70,6 +70,7 @@ def check(request: Request) -> int:
         what = f"{len(run.experiment.photographs())} photographs"
     what += f", {walls.count} walls" if walls is not None else ", no walls: it can be tracked but not solved"
     request.console.print(f"{config.name}: the input is good: {what}.", highlight=False)
+    _tell_notes(run, request.console)
     return 0
 
 

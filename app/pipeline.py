@@ -33,7 +33,7 @@ from app.experiment import (
     read_walls,
 )
 from app.opinions import friction_of
-from app.plausibility import check_inside, check_radii
+from app.plausibility import check_inside, check_radii, rods_beyond_ends
 from app.preparation import Prepared, prepare
 from app.progress import Progress, silent
 from app.results import Results, TruthContacts
@@ -108,8 +108,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         tracks = read_tracks(experiment)
         walls = read_walls(experiment, tracks.frame_count)
         if walls is not None:
-            check_inside(experiment, tracks, walls)
-            check_radii(experiment, tracks)
+            _check_packing(run, tracks, walls)
         ids, count = tracks.id, tracks.frame_count
     else:
         photographs = experiment.photographs()
@@ -147,8 +146,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     unfinished = run.folder / UNFINISHED
     tracks, walls, tables = track_photographs(experiment, stop, unfinished, origin.fingerprint, run.progress)
     if walls is not None:
-        check_inside(experiment, tracks, walls)
-        check_radii(experiment, tracks)
+        _check_packing(run, tracks, walls)
         walls = walls.frames(start, stop)
     tracks = tracks.frames(start, stop)
     write_tables(run.folder, tables)
@@ -362,6 +360,12 @@ def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthCon
         first_frame=first,
         frame_count=len(results.frames),
     )
+
+
+def _check_packing(run: Run, tracks: Tracks, walls: WallTracks) -> None:
+    check_inside(run.experiment, tracks, walls)
+    check_radii(run.experiment, tracks)
+    run.notes.extend(rods_beyond_ends(tracks, walls))
 
 
 def _frame_range(run: Run, count: int) -> tuple[int, int]:

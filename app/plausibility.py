@@ -13,6 +13,8 @@ from solver.grains import Array
 NEIGHBOURS = 8  # of a grain, among which is the one it is closest to in radii
 SPACING = (0.93, 1.15)  # of neighbours over their radii, median: packed rods touch, whatever the noise
 GREATEST_RADIUS = 0.5  # [m] of a rod
+NEAR = 0.05  # radii from a wall's line: a rod as near as that may bear on it
+BEYOND = 0.5  # radii past a wall's end
 
 
 def check_radii(experiment: Experiment, tracks: Tracks) -> None:
@@ -33,6 +35,31 @@ def check_radii(experiment: Experiment, tracks: Tracks) -> None:
             file, key, f"does not fit the positions: neighbours {state}, their distance is {found:.2f} times "
             "the sum of their radii (median of frame 0); radii, not diameters, in metres",
         )  # fmt: skip
+
+
+def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:
+    """A sentence for every wall on whose line rods bear beyond its ends: walls are taken as endless lines.
+
+    Such a wall was perhaps measured too short, which does no harm; or these rods bear on nothing, and forces are wrong.
+    """
+    start = walls.endpoints[:, :, 0]
+    along = walls.endpoints[:, :, 1] - start
+    length = np.linalg.norm(along, axis=-1)  # (f, w)
+    unit = along / length[..., None]
+    sentences = []
+    for w, name in enumerate(walls.name):
+        place = tracks.position - start[:, None, w]
+        ahead = np.einsum("fnk,fk->fn", place, unit[:, w])
+        inside = place[..., 1] * unit[:, None, w, 0] - place[..., 0] * unit[:, None, w, 1]
+        near = np.abs(inside - tracks.radius) < NEAR * tracks.radius  # NaN of lost grains compares false
+        past = np.maximum(-ahead, ahead - length[:, None, w]) > BEYOND * tracks.radius
+        rods = int((near & past).any(axis=0).sum())
+        if rods:
+            sentences.append(
+                f"{rods} rod{'s' if rods > 1 else ''} may bear on the line of wall {name!r} beyond its end, and will "
+                "be taken to: is the wall longer than its two points tell?"
+            )
+    return sentences
 
 
 def neighbour_spacing(position: Array, radius: Array) -> Array:
