@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,6 +12,7 @@ from rich.console import Console
 
 from app.pipeline import Run
 from app.scaling import make_scale
+from app.signals import answering
 
 if TYPE_CHECKING:
     from app.recording.live_process import LiveProcess
@@ -35,7 +35,8 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
 
     watch = _watch(run, viewer, tell)
     try:
-        with _terminated_like_interrupted():
+        # A termination from outside ends the run as an interrupt does, so that it says what it leaves.
+        with answering(signal.SIGTERM, signal.default_int_handler):
             yield replace(run, watch=watch), watch
             watch.close(whole=True)
         watch.path.unlink(missing_ok=True)
@@ -57,16 +58,3 @@ def _watch(run: Run, viewer: str, tell: Callable[[str], None]) -> LiveProcess:
         scale = make_scale(config.photographs, photographs.shape[0])
     sweeps = "none" if config.recording.sweeps == "none" else "log"
     return LiveProcess(run.file(LIVE), tell, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)
-
-
-@contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """Let a termination from outside end the run as an interrupt does, so that it says what it leaves."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    former = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, former)

@@ -9,13 +9,12 @@ import asyncio
 import multiprocessing
 import os
 import signal
-import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from app.errors import InputError
+from app.signals import answering
 
 Common = TypeVar("Common")
 Item = TypeVar("Item")
@@ -77,7 +76,8 @@ def _in_processes(
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin, (work, common))
     finished = False
     try:
-        with _deaf():
+        # Workers that start meanwhile ignore Ctrl-C from their first moment on: it is for this process alone.
+        with answering(signal.SIGINT, signal.SIG_IGN):
             numbers = {pool.submit(_do, item): number for number, item in enumerate(items)}
         for each in as_completed(numbers):
             yield numbers[each], each.result()
@@ -88,19 +88,6 @@ def _in_processes(
             for process in set(multiprocessing.active_children()) - before:
                 process.terminate()
         pool.shutdown()
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Have workers that start meanwhile ignore Ctrl-C from their first moment on: it is for this process alone."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _begin(work: Callable[[Any, Any], Any], common: Any) -> None:

@@ -38,25 +38,17 @@ def search_patch(reference, image, origin_x, origin_y, reach, x, y, angle, windo
     spacing [px]: how far apart two places of one angle must be; best (k, 4): x, y, angle, ZNCC, best first,
     −1 where there are fewer. All pixels are of this level.
     """
-    height, width = image.shape
-    side = int(reach)
-    # The window is cut where the disc would leave the image.
-    x_from, x_to = max(int(np.floor(x - window)), side), min(int(np.ceil(x + window)), width - 1 - side)
-    y_from, y_to = max(int(np.floor(y - window)), side), min(int(np.ceil(y + window)), height - 1 - side)
+    x_from, y_from, nx, ny = cut_window(image, reach, x, y, window)
     best[:, :] = 0.0
     best[:, 3] = -1.0
-    nx, ny = x_to - x_from + 1, y_to - y_from + 1
     if nx < 1 or ny < 1:
         return
     offset_x, offset_y, _ = disc(reach)
     count = len(offset_x)
-    steps = angle_steps(reach, sweep)
-    trials = 2 * steps if sweep >= np.pi - 1e-6 else 2 * steps + 1
-    sectors = max(int(np.ceil(2.0 * sweep / SECTOR - 1e-6)), 1)
-    turn = np.empty(trials)
+    turn, sectors = turns_to_try(angle, reach, sweep)
+    trials = len(turn)
     template = np.empty((trials, count), np.float32)
     for trial in range(trials):
-        turn[trial] = angle + sweep * (trial - steps) / steps
         turn_template(reference, origin_x, origin_y, turn[trial], offset_x, offset_y, template[trial])
 
     peak = np.full((sectors, ny, nx), np.float32(-1.0))
@@ -78,6 +70,27 @@ def search_patch(reference, image, origin_x, origin_y, reach, x, y, angle, windo
                         peak[sector, first + k, m] = value
                         steepest[sector, first + k, m] = trial
     collect(peak, steepest, turn, x_from, y_from, spacing, best)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cut_window(image, reach, x, y, window):
+    """First column and row of the positions to try, and how many of either; none where the disc leaves the image."""
+    height, width = image.shape
+    side = int(reach)
+    x_from, x_to = max(int(np.floor(x - window)), side), min(int(np.ceil(x + window)), width - 1 - side)
+    y_from, y_to = max(int(np.floor(y - window)), side), min(int(np.ceil(y + window)), height - 1 - side)
+    return x_from, y_from, x_to - x_from + 1, y_to - y_from + 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def turns_to_try(angle, reach, sweep):
+    """Angles to try [rad], ascending, and the number of parts of the range of which each keeps its best."""
+    steps = angle_steps(reach, sweep)
+    trials = 2 * steps if sweep >= np.pi - 1e-6 else 2 * steps + 1
+    turn = np.empty(trials)
+    for trial in range(trials):
+        turn[trial] = angle + sweep * (trial - steps) / steps
+    return turn, max(int(np.ceil(2.0 * sweep / SECTOR - 1e-6)), 1)
 
 
 @njit(cache=True, nogil=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.tracking.search import BLOCK, SECTOR, angle_steps, collect, correlate, disc, lay_out, turn_template
+from app.tracking.search import BLOCK, collect, correlate, cut_window, disc, lay_out, turn_template, turns_to_try
 
 # A half has half the pixels, so accidental correlations are greater by this factor.
 HALF_ACCIDENT = np.sqrt(2.0)
@@ -18,26 +18,19 @@ HALF_ACCIDENT = np.sqrt(2.0)
 @njit(cache=True, nogil=True, error_model="numpy")
 def search_parts(reference, image, origin_x, origin_y, reach, x, y, angle, window, sweep, spacing, best):
     """As `search_patch`; the ZNCC of a place is that of the whole, or that of a half over √2 where this is more."""
-    height, width = image.shape
-    side = int(reach)
-    x_from, x_to = max(int(np.floor(x - window)), side), min(int(np.ceil(x + window)), width - 1 - side)
-    y_from, y_to = max(int(np.floor(y - window)), side), min(int(np.ceil(y + window)), height - 1 - side)
+    x_from, y_from, nx, ny = cut_window(image, reach, x, y, window)
     best[:, :] = 0.0
     best[:, 3] = -1.0
-    nx, ny = x_to - x_from + 1, y_to - y_from + 1
     if nx < 1 or ny < 1:
         return
     offset_x, offset_y, start = disc(reach)
     count = len(offset_x)
-    steps = angle_steps(reach, sweep)
-    trials = 2 * steps if sweep >= np.pi - 1e-6 else 2 * steps + 1
-    sectors = max(int(np.ceil(2.0 * sweep / SECTOR - 1e-6)), 1)
-    turn = np.empty(trials)
+    turn, sectors = turns_to_try(angle, reach, sweep)
+    trials = len(turn)
     template = np.empty((trials, count), np.float32)
     mean = np.empty((trials, 4), np.float32)
     scale = np.empty((trials, 4), np.float32)
     for trial in range(trials):
-        turn[trial] = angle + sweep * (trial - steps) / steps
         turn_template(reference, origin_x, origin_y, turn[trial], offset_x, offset_y, template[trial])
         _weigh_halves(template[trial], start, mean[trial], scale[trial])
 
