@@ -18,13 +18,18 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app import __version__
-from app.atomic import write_atomically
-from app.checkpoint import Checkpoint
-from app.config import as_toml
-from app.corrections import read_corrections
-from app.errors import InputError
-from app.experiment import (
+from solver.contacts.verdicts import Verdicts
+from solver.detection.touch_probability import ContactProbabilitySettings
+from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frames import SequenceState, solve_sequence
+from solver.statistics.frame_statistics import FrameStatistics
+
+from . import __version__
+from .atomic import write_atomically
+from .errors import InputError
+from .experiment.config import as_toml
+from .experiment.corrections import read_corrections
+from .experiment.experiment import (
     Experiment,
     checksums,
     read_grain_guess,
@@ -32,29 +37,25 @@ from app.experiment import (
     read_tracks,
     read_walls,
 )
-from app.opinions import friction_of
-from app.plausibility import check_inside, check_radii, rods_beyond_ends
-from app.preparation import Prepared, prepare
-from app.progress import Progress, silent
-from app.results import Results, TruthContacts
-from app.review.decisions import Bodies, Decisions, decide, fingerprint
-from app.review.verdicts import VERDICTS, Flag, VerdictLog
-from app.scaling import make_scale
-from app.sensitivity.execution import available_cores
-from app.sensitivity.inference import Inputs, gather
-from app.sensitivity.spread import calibrated_inputs, solve_members, with_spread
-from app.sensitivity.study import Nominal
-from app.solver_input import make_snapshots, sequence_settings
-from app.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
-from app.tracking.report import tracking_report
-from app.tracking.stage import DETECTIONS, gather_report, track_photographs, write_tables
-from app.tracks import Tracks, WallTracks
-from app.truth import read_truth, true_names
-from solver.contact_probability import ContactProbabilitySettings
-from solver.frame_forces import FrameForces
-from solver.frame_statistics import FrameStatistics
-from solver.sequence import SequenceState, solve_sequence
-from solver.verdicts import Verdicts
+from .experiment.plausibility import check_inside, check_radii, rods_beyond_ends
+from .experiment.scaling import make_scale
+from .inference.friction_and_radii import friction_of
+from .inference.inference import Inputs, gather
+from .inference.preparation import Prepared, prepare
+from .inference.solver_input import make_snapshots, sequence_settings
+from .progress import Progress, silent
+from .results.checkpoint import Checkpoint
+from .results.results import Results, TruthContacts
+from .results.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
+from .results.truth import read_truth, true_names
+from .sensitivity.execution import available_cores
+from .sensitivity.spread import calibrated_inputs, solve_members, with_spread
+from .sensitivity.study import Nominal
+from .tracking.report.page import tracking_report
+from .tracking.stage import DETECTIONS, gather_report, track_photographs, write_tables
+from .tracks import Tracks, WallTracks
+from .verdicts.decisions import Bodies, Decisions, decide, fingerprint
+from .verdicts.log import VERDICTS, Flag, VerdictLog
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 REPORT = "tracking_report.html"
@@ -301,8 +302,8 @@ def _solve_frames(
 
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     """Write the recording of finished results, the truth beside them where there is one."""
-    from app.recording.recorder import record as write_recording
-    from app.recording.side_file import write_side_file
+    from .recording.files.recorder import record as write_recording
+    from .recording.files.side_file import write_side_file
 
     since = time.perf_counter()
     section = run.experiment.config.photographs

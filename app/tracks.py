@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 
 class TrackStatus(IntEnum):

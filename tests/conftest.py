@@ -6,8 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-
-from app.synthetic.experiment import synthesize
+from rodsight.synthetic.experiment import synthesize
 
 
 @pytest.fixture(scope="session")

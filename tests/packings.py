@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.boundaries import Walls
-from solver.contacts import Contacts, detect_contacts
-from solver.grains import Array, GrainMotion, Grains
-from solver.problem import ContactProblem, Material, assemble
+from solver.bodies.grains import Array, GrainMotion, Grains
+from solver.bodies.packing import Material
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, detect_contacts
+from solver.nlgs.problem import ContactProblem, assemble
 
 LENGTH = 0.06  # [m]
 

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.atomic import write_atomically
-from app.errors import InputError
-from app.tracks import Tracks
-from app.units import Scale
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..atomic import write_atomically
+from ..errors import InputError
+from ..experiment.units import Scale
+from ..tracks import Tracks
 
 COLUMNS = 13
 MARKERS = (1.0, 2.0)  # radii of rows that are no grains

@@ -12,11 +12,12 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from app.atomic import replacing
-from app.results import Results
-from app.tracks import TrackStatus
-from solver.frame_forces import ContactSource, ContactState
-from solver.frame_statistics import FrameStatistics
+from solver.contacts.contacts import ContactSource, ContactState
+from solver.statistics.frame_statistics import FrameStatistics
+
+from ..atomic import replacing
+from ..results.results import Results
+from ..tracks import TrackStatus
 
 Kind = Literal["csv", "parquet"]
 

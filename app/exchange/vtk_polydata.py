@@ -12,10 +12,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from app.atomic import write_atomically
-from app.results import Results
-from solver.contacts import Contacts
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts
+
+from ..atomic import write_atomically
+from ..results.results import Results
 
 UNKNOWN = -1.0  # a probability that was not computed: readers of ASCII files stumble over NaN
 

@@ -14,22 +14,23 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from app.comparison import Comparison, FieldFrame
-from app.recording import entities
-from app.recording.canvas import Canvas
-from app.recording.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
-from app.recording.force_style import ForceRange, ForceStyle
-from app.recording.legends import PIECES, log_force_legend, log_ramp_legend
-from app.recording.network import body_values
-from app.recording.packing import log_packing
-from app.recording.plots import Axes, round_step
-from app.recording.scene import Clock, Scene
-from app.recording.texts import printable
-from app.recording.values import known, log_scalar
-from app.recording.views import curve_view, drawn_view, packing_view
-from app.units import Scale
-from solver.contacts import Contacts, measure_contacts
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts, measure_contacts
+
+from ..experiment.units import Scale
+from ..results.comparison import Comparison, FieldFrame
+from .look import entities
+from .look.axes import Axes, round_step
+from .look.canvas import Canvas
+from .look.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
+from .look.force_style import ForceRange, ForceStyle
+from .look.legends import PIECES, log_force_legend, log_ramp_legend
+from .look.scene import Clock, Scene
+from .look.texts import printable
+from .look.values import known, log_scalar
+from .packing_layers.network import body_values
+from .packing_layers.packing import log_packing
+from .tabs.views import curve_view, drawn_view, packing_view
 
 APPLICATION_ID = "rodsight-compare"  # its own, so that a user's layout of runs is not used for comparisons
 FIRST, SECOND = "/compare/first", "/compare/second"

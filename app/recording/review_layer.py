@@ -17,9 +17,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from app.recording.canvas import Canvas
-from app.recording.colours import packed_one
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from .look.canvas import Canvas
+from .look.colours import packed_one
 
 APPLICATION_ID = "rodsight_review"
 PHOTOGRAPH, GRAINS, WALLS = "/photograph", "/grains", "/walls"

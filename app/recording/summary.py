@@ -10,14 +10,15 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import rerun as rr
 
-from app.recording import entities
-from app.recording.scene import Scene, setting
-from app.recording.stack import STRONG, STRONG_SWEEPS
-from app.recording.texts import printable
-from solver.agreement import Agreement
-from solver.frame_forces import FrameForces, FrameStatus
-from solver.frame_statistics import FrameStatistics
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.statistics.agreement import Agreement
+from solver.statistics.frame_statistics import FrameStatistics
+
+from .look import entities
+from .look.scene import Scene, setting
+from .look.texts import printable
+from .packing_layers.stack import STRONG, STRONG_SWEEPS
 
 PACKAGES = ("rodsight", "numpy", "numba", "scipy", "rerun-sdk")
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from app.results import Results
-from solver.boundaries import Walls
-from solver.contacts import Contacts, detect_contacts, measure_contacts
-from solver.frame_forces import ContactSource
-from solver.grains import Array
-from solver.verdicts import DETECTED
+from solver.bodies.grains import Array
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, ContactSource, detect_contacts, measure_contacts
+from solver.contacts.verdicts import DETECTED
+
+from ..results.results import Results
 
 REACH = 4.0  # [σ of a gap] beyond the threshold
 UNLISTED = 3e-3  # P(touch) that a pair which the detector left out has at most

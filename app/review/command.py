@@ -12,19 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from app.errors import InputError
-from app.experiment import CONFIG_NAME, Experiment, load_experiment
-from app.frames import Photographs
-from app.results import Results
-from app.review.candidates import find_candidates
-from app.review.decisions import Bodies
-from app.review.picture import Picture
-from app.review.server import ReviewServer
-from app.review.session import ReviewSession
-from app.review.verdict_table import export_verdicts, import_verdicts
-from app.review.verdicts import VERDICTS, VerdictLog
-from app.scaling import make_scale
-from app.store import load_results, read_origin
+from ..errors import InputError
+from ..experiment.experiment import CONFIG_NAME, Experiment, load_experiment
+from ..experiment.photographs import Photographs
+from ..experiment.scaling import make_scale
+from ..results.results import Results
+from ..results.store import load_results, read_origin
+from ..verdicts.decisions import Bodies
+from ..verdicts.log import VERDICTS, VerdictLog
+from ..verdicts.table import export_verdicts, import_verdicts
+from .candidates import find_candidates
+from .picture import Picture
+from .server import ReviewServer
+from .session import ReviewSession
 
 RESULTS = "results.h5"
 

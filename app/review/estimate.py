@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 DRAWS = 4000
 CREDIBLE = 0.95

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.results import Results
-from app.review.candidates import Candidates, walls_at
-from solver.contacts import Contacts, detect_contacts
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts, detect_contacts
+
+from ..results.results import Results
+from .candidates import Candidates, walls_at
 
 NEAR = 0.45  # [mean radius] how far from a candidate's point a click may be
 WIDEST_GAP = 0.25  # [mean radius] between two bodies that a click can join

@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.recording.canvas import Canvas
-from app.recording.review_layer import Backdrop, Chosen, Marked, ReviewLayer
-from app.results import Results
-from app.units import Scale
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..experiment.units import Scale
+from ..recording.look.canvas import Canvas
+from ..recording.review_layer import Backdrop, Chosen, Marked, ReviewLayer
+from ..results.results import Results
 
 Photograph = NDArray[np.uint8]  # (H, W) grey
 PhotographSource = Callable[[int], Photograph]

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.review.candidates import Candidates
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from .candidates import Candidates
 
 DOUBT_EDGES = np.array([0.002, 0.02, 0.1, 0.3, 0.6])  # between strata
 STRATUM_COUNT = 2 * (len(DOUBT_EDGES) + 1)

@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from app.errors import InputError
-from app.review.candidates import Candidates, find_candidates, walls_at
-from app.review.command import Reviewed
-from app.review.decisions import Decisions, decide
-from app.review.estimate import NO, UNJUDGED, YES, Estimate, estimate
-from app.review.queue import strata
-from app.review.threshold import ThresholdCurve, ThresholdFit, even_thresholds, fit_threshold, threshold_curve
-from solver.contacts import measure_contacts
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.contacts.contacts import measure_contacts
+
+from ..errors import InputError
+from ..verdicts.decisions import Decisions, decide
+from .candidates import Candidates, find_candidates, walls_at
+from .command import Reviewed
+from .estimate import NO, UNJUDGED, YES, Estimate, estimate
+from .queue import strata
+from .threshold import ThresholdCurve, ThresholdFit, even_thresholds, fit_threshold, threshold_curve
 
 _SEED = 11  # of the bootstrap
 _ENOUGH = 5  # verdicts of a stratum that speak for the rest of it

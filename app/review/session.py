@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from app import __version__
-from app.recording.review_layer import (
+from solver.contacts.contacts import Contacts, measure_contacts
+
+from .. import __version__
+from ..recording.review_layer import (
     CONTACT,
     DETECTED,
     HIDDEN,
@@ -18,16 +20,15 @@ from app.recording.review_layer import (
     UNSURE,
     Marked,
 )
-from app.results import Results
-from app.review.agreement import agreements
-from app.review.candidates import Candidates, find_candidates, gap_sigma, walls_at
-from app.review.decisions import Bodies
-from app.review.estimate import NO, UNJUDGED, YES, estimate
-from app.review.picking import gap_at, nearest_candidate
-from app.review.picture import Picture
-from app.review.queue import Queue, frame_queue, sampled_queue
-from app.review.verdicts import Entry, Flag, Origin, Pair, Verdict, VerdictLog, canonical
-from solver.contacts import Contacts, measure_contacts
+from ..results.results import Results
+from ..verdicts.decisions import Bodies
+from ..verdicts.log import Entry, Flag, Origin, Pair, Verdict, VerdictLog, canonical
+from ..verdicts.reviewers import agreements
+from .candidates import Candidates, find_candidates, gap_sigma, walls_at
+from .estimate import NO, UNJUDGED, YES, estimate
+from .picking import gap_at, nearest_candidate
+from .picture import Picture
+from .queue import Queue, frame_queue, sampled_queue
 
 _KINDS = {Verdict.CONTACT: CONTACT, Verdict.NO_CONTACT: NO_CONTACT, Verdict.UNSURE: UNSURE}
 _OUTCOMES = {Verdict.CONTACT: YES, Verdict.NO_CONTACT: NO, Verdict.UNSURE: UNJUDGED}

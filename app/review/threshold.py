@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 RECALL_WEIGHT = 2.0  # β of F_β: a contact that is missed costs the forces more than a false one, which bears little
 POINTS = 81  # of the curve

@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 from scipy.stats import qmc
 
-from app.errors import InputError
-from app.experiment import Experiment
-from app.sensitivity.factors import FACTORS, Factor, Scale
-from app.sensitivity.inference import Inputs
+from ..errors import InputError
+from ..experiment.experiment import Experiment
+from ..inference.inference import Inputs
+from .factors import FACTORS, Factor, Scale
 
 Design = Literal["oat", "sobol"]
 SAMPLES = 64  # runs of a space-filling design, unless told otherwise

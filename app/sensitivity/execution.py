@@ -13,8 +13,8 @@ from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any, TypeVar
 
-from app.errors import InputError
-from app.signals import answering
+from ..errors import InputError
+from ..signals import answering
 
 Common = TypeVar("Common")
 Item = TypeVar("Item")

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from app.config import ExperimentFile
-from app.sensitivity.inference import Inputs
-from app.solver_input import typical_overlap
+from ..experiment.config import ExperimentFile
+from ..inference.inference import Inputs
+from ..inference.solver_input import typical_overlap
 
 EVALUATED = 5  # photographs from which on forces are compared: those before still settle
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,13 +15,13 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.table import Table
 
-from app.atomic import replacing, write_atomically
-from app.errors import InputError
-from app.sensitivity.design import Case, Design
-from app.sensitivity.factors import Factor
-from app.sensitivity.indices import MainEffects, main_effects
-from app.sensitivity.study import Effect
-from app.tables import write_table
+from ..atomic import replacing, write_atomically
+from ..errors import InputError
+from ..experiment.tables import write_table
+from .design import Case, Design
+from .factors import Factor
+from .indices import MainEffects, main_effects
+from .study import Effect
 
 FILES = ("sensitivity.csv", "sensitivity.json", "sensitivity.parquet")
 WIDTH = 150  # columns of a table that goes to a file

@@ -18,18 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from app.checkpoint import Checkpoint
-from app.experiment import Experiment
-from app.progress import Progress, silent
-from app.sensitivity.design import Case, vary
-from app.sensitivity.execution import run_all
-from app.sensitivity.factors import FACTORS
-from app.sensitivity.inference import Inputs, Networks, infer
-from app.tracks import Tracks, WallTracks
-from solver.agreement import align_forces
-from solver.frame_forces import FrameForces
-from solver.grains import Array
-from solver.verdicts import Verdicts
+from solver.bodies.grains import Array
+from solver.contacts.verdicts import Verdicts
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.agreement import align_forces
+
+from ..experiment.experiment import Experiment
+from ..inference.inference import Inputs, Networks, infer
+from ..progress import Progress, silent
+from ..results.checkpoint import Checkpoint
+from ..tracks import Tracks, WallTracks
+from .design import Case, vary
+from .execution import run_all
+from .factors import FACTORS
 
 # a and b of f_n, and of f_t
 DEVIATION = {"ensemble": ((0.72, 0.76), (0.83, 0.68)), "nlgs": ((1.4, 1.18), (1.43, 0.92))}

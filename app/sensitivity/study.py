@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import InputError
-from app.progress import Progress, silent
-from app.sensitivity.design import Case, vary
-from app.sensitivity.execution import run_all
-from app.sensitivity.factors import EVALUATED
-from app.sensitivity.inference import Inputs, Networks, infer
-from solver.agreement import Agreement, compare_forces
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.statistics.agreement import Agreement, compare_forces
+
+from ..errors import InputError
+from ..inference.inference import Inputs, Networks, infer
+from ..progress import Progress, silent
+from .design import Case, vary
+from .execution import run_all
+from .factors import EVALUATED
 
 Forces = tuple[NDArray[np.int64], Array]  # keys (c,) and forces (c, 2) [N]
 

@@ -11,12 +11,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from app.config import ExperimentFile
-from app.progress import Progress, silent
-from app.solver_input import sequence_settings, typical_overlap
-from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of
-from solver.dem import DemTruth
-from solver.sequence import SequenceSettings, solve_sequence
+from solver.dem.simulation import DemTruth
+from solver.sequence.frames import SequenceSettings, solve_sequence
+
+from ..experiment.config import ExperimentFile
+from ..inference.solver_input import sequence_settings, typical_overlap
+from ..progress import Progress, silent
+from .truths import agreement_of, observe, packing_of, simulate, starts_of
 
 WINDOW = 12  # photographs of one sequence
 SHOWN = (1, 3, 5, 10)  # frames of the table

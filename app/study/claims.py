@@ -10,18 +10,19 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from app.progress import Progress, silent
-from app.study.accuracy import default_settings
-from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
-from solver.agreement import align_forces, pearson
-from solver.chain import ChainSettings
-from solver.contacts import measure_contacts
-from solver.dem import DemTruth
-from solver.force_statistics import plateau_ratio, tail_exponent
-from solver.frame_forces import FrameForces
-from solver.grains import Array
-from solver.sequence import SequenceSettings, solve_sequence
-from solver.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
+from solver.bodies.grains import Array
+from solver.contacts.contacts import measure_contacts
+from solver.dem.simulation import DemTruth
+from solver.nlgs.chain import ChainSettings
+from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frames import SequenceSettings, solve_sequence
+from solver.statistics.agreement import align_forces, pearson
+from solver.statistics.force_statistics import plateau_ratio, tail_exponent
+from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
+
+from ..progress import Progress, silent
+from .accuracy import default_settings
+from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
 
 WINDOW = 14  # photographs of one sequence
 SETTLED_WITHIN = 0.01  # of the level of the last frames

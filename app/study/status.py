@@ -17,18 +17,19 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import minimize
 
-from app.progress import Progress, silent
-from app.study.accuracy import default_settings
-from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
-from solver import judgement
-from solver.agreement import compare_forces
-from solver.chain import Packing
-from solver.dem import DemTruth
-from solver.frame_forces import FrameForces, FrameStatus
-from solver.grains import Array, Grains
-from solver.judgement import Evidence, trust
-from solver.motion import Snapshot
-from solver.sequence import solve_sequence
+from solver.bodies.grains import Array, Grains
+from solver.bodies.motion import Snapshot
+from solver.bodies.packing import Packing
+from solver.dem.simulation import DemTruth
+from solver.sequence import judgement
+from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.frames import solve_sequence
+from solver.sequence.judgement import Evidence, trust
+from solver.statistics.agreement import compare_forces
+
+from ..progress import Progress, silent
+from .accuracy import default_settings
+from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
 
 Keys = NDArray[np.int64]
 

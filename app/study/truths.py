@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atomic import replacing
-from app.progress import Progress, silent
-from app.synthetic.packing import prepare_packing
-from solver.agreement import Agreement, compare_forces
-from solver.chain import Packing
-from solver.dem import DemSettings, DemTruth, shear_photographs
-from solver.frame_forces import FrameForces
-from solver.grains import Array, Grains
-from solver.motion import Snapshot
-from solver.problem import Material
+from solver.bodies.grains import Array, Grains
+from solver.bodies.motion import Snapshot
+from solver.bodies.packing import Material, Packing
+from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.agreement import Agreement, compare_forces
+
+from ..atomic import replacing
+from ..progress import Progress, silent
+from ..synthetic.packing import prepare_packing
 
 STEP = 0.25  # [°] of shear between photographs
 TURN = 15.0  # [°] at which the shear turns back

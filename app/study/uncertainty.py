@@ -16,23 +16,24 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import minimize
 
-from app.config import ExperimentFile
-from app.experiment import Experiment
-from app.progress import Progress, silent
-from app.sensitivity.execution import available_cores
-from app.sensitivity.inference import infer_frames
-from app.sensitivity.spread import (
+from solver.bodies.grains import Array
+from solver.dem.simulation import DemTruth
+from solver.statistics.agreement import align_forces
+
+from ..experiment.config import ExperimentFile
+from ..experiment.experiment import Experiment
+from ..inference.inference import infer_frames
+from ..progress import Progress, silent
+from ..sensitivity.execution import available_cores
+from ..sensitivity.spread import (
     DEVIATION,
     calibrated_inputs,
     deviation,
     solve_members,
     spread_around,
 )
-from app.study.truths import observe, packing_of, simulate, starts_of, true_forces
-from app.tracks import Tracks, TrackStatus, WallTracks
-from solver.agreement import align_forces
-from solver.dem import DemTruth
-from solver.grains import Array
+from ..tracks import Tracks, TrackStatus, WallTracks
+from .truths import observe, packing_of, simulate, starts_of, true_forces
 
 WINDOW = 12  # photographs of one sequence
 NOISES = (1e-5, 2e-5, 4e-5)  # [m]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.synthetic.speckle_kernels import FINE, SMOOTHING, collect
+from .speckle_kernels import FINE, SMOOTHING, collect
 
 TILE = 192  # [px], the largest square drawn at once: its sub-pixels fit in a processor's cache
 TAIL = 4.0  # the blur is cut off at this many standard deviations

@@ -10,14 +10,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.errors import InputError
-from app.synthetic import tables
-from app.synthetic.packing import prepare_packing
-from app.synthetic.rearrangement import choose_window, measure_old_unbalance
-from app.synthetic.speckle import SpeckleSettings, render_photograph
-from app.units import Scale
-from solver.dem import DemSettings, DemTruth, shear_photographs
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
+
+from ..errors import InputError
+from ..experiment.units import Scale
+from . import tables
+from .packing import prepare_packing
+from .rearrangement import choose_window, measure_old_unbalance
+from .speckle import SpeckleSettings, render_photograph
 
 Progress = Callable[[str, int, int], None]
 

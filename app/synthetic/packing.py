@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.dem import DemSettings, ShearCell, UnbalancedError
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.dem.simulation import DemSettings, ShearCell, UnbalancedError
 
 RADIUS_CLASSES = (0.007, 0.008, 0.011)  # [m], rods of 14, 16 and 22 mm
 CLASS_SHARES = (0.40, 0.41, 0.19)  # by number: 1172 rods then fill 0.5 × 0.6 m

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 STRENGTH = (0.85, 1.0)  # weakest and strongest dot, of full black
 RIM_SCATTER = (0.5, 1.5)  # darkness of a rod's rim against the mean

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.boundaries import Walls
-from solver.contacts import measure_contacts
-from solver.dem import DemTruth
-from solver.grains import Array, Grains
+from solver.bodies.grains import Array, Grains
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import measure_contacts
+from solver.dem.simulation import DemTruth
 
 
 def measure_old_unbalance(truth: DemTruth) -> Array:

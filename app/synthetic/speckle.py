@@ -2,7 +2,7 @@
 
 Everything painted is an analytic function in its body's own frame, the union of soft-edged dots, and is evaluated anew
 for every pose: nothing is interpolated, so a motion by any part of a pixel, or a turn by any angle, is as exact as the
-camera that sees it (`app.synthetic.camera`).
+camera that sees it (`synthetic.camera`).
 
 Three things stay where they are while the bodies move, as in a laboratory: the light's unevenness, the side on which a
 tilted rod's rim darkens, and the backing behind the gaps.
@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.synthetic.camera import Camera
-from app.synthetic.paint import Paint, paint_backing, paint_bars, paint_rods
-from app.synthetic.speckle_kernels import FINE, add_backing, draw_bar, draw_rod
-from app.units import Scale
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..experiment.units import Scale
+from .camera import Camera
+from .paint import Paint, paint_backing, paint_bars, paint_rods
+from .speckle_kernels import FINE, add_backing, draw_bar, draw_rod
 
 Photograph = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -89,9 +90,10 @@ def render_photograph(
 ) -> Photograph:
     """Photograph n rods and w bars: (height, width), uint8 or uint16 as the depth asks.
 
-    radius (n,) [m]; position (n, 2) [m] and rotation (n,) [rad], counter-clockwise, in the world of `app.units`; bars
-    (w, 2, 2) [m], segments whose body lies on the right of endpoint 0 → 1 and the packing on the left. `pattern_seed`
-    fixes the paint of every row over all photographs: a row must mean the same rod, of the same radius, in each.
+    radius (n,) [m]; position (n, 2) [m] and rotation (n,) [rad], counter-clockwise, in the world of
+    `experiment.units`; bars (w, 2, 2) [m], segments whose body lies on the right of endpoint 0 → 1 and the packing on
+    the left. `pattern_seed` fixes the paint of every row over all photographs: a row must mean the same rod, of the
+    same radius, in each.
     `noise_seed` fixes this photograph's noise. Bodies may leave the picture. Raises ValueError for wrong shapes,
     values that are not finite and radii that are not positive.
     """

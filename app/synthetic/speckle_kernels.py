@@ -10,7 +10,7 @@ import math
 
 from numba import njit
 
-from app.synthetic.paint import BACKING_PITCH
+from .paint import BACKING_PITCH
 
 FINE = 3  # sub-pixels per pixel, along a side
 SMOOTHING = 0.6  # [sub-pixel], standard deviation of a sub-pixel's own soft edge

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.dem import DemTruth
-from solver.grains import Array
+from solver.bodies.grains import Array
+from solver.dem.simulation import DemTruth
 
 
 def write_walls(path: Path, names: Sequence[str], endpoints: Array) -> None:

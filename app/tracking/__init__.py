@@ -1,0 +1,1 @@
+"""From photographs to tracks. Stands on experiment and results; knows no forces."""

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.tracking.correlation import Correlator, Rows
-from app.tracking.findings import Findings
-from app.tracking.rescue import leash, refit_hidden
-from app.tracking.splines import Pyramid
-from app.tracks import TrackStatus
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..tracks import TrackStatus
+from .correlation.correlator import Correlator, Rows
+from .correlation.splines import Pyramid
+from .findings import Findings
+from .rescue import leash, refit_hidden
 
 # What a hand and an eye are trusted with [px], where correlation finds nothing there.
 HAND_SIGMA = 1.0

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from app.tracking.correlation import Fits, Rows
-from app.tracking.neighbours import local_motion, nearby_median
-from app.tracking.patches import Patches
-from app.tracks import TrackStatus
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..tracks import TrackStatus
+from .correlation.correlator import Fits, Rows
+from .correlation.patches import Patches
+from .neighbours import local_motion, nearby_median
 
 if TYPE_CHECKING:
-    from app.tracking.tracker import TrackingSettings
+    from .settings import TrackingSettings
 
 
 class Findings:

@@ -9,19 +9,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.checkpoint import Checkpoint
-from app.errors import InputError
-from app.frames import Photographs
-from app.progress import Progress, silent
-from app.tracking.corrections import Corrections
-from app.tracking.correlation import Rows
-from app.tracking.detection import Detection
-from app.tracking.poses import FramePoses
-from app.tracking.tracker import Tracker, TrackingSettings
-from app.tracking.walls import WallPoses, WallTracker
-from app.tracks import Tracks, WallTracks
-from app.units import Scale
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..errors import InputError
+from ..experiment.photographs import Photographs
+from ..experiment.units import Scale
+from ..progress import Progress, silent
+from ..results.checkpoint import Checkpoint
+from ..tracks import Tracks, WallTracks
+from .corrections import Corrections
+from .correlation.correlator import Rows
+from .detection.grains import Detection
+from .poses import FramePoses
+from .settings import TrackingSettings
+from .tracker import Tracker
+from .walls.tracker import WallPoses, WallTracker
 
 HISTORY = 8  # frames that the tracker looks back upon
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 NEIGHBOUR_COUNT = 12
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 
 @dataclass(frozen=True, slots=True)

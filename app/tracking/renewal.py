@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from app.frames import Image
-from app.tracking.correlation import Correlator, Rows
-from app.tracking.patches import Patches
-from app.tracking.poses import FramePoses
-from app.tracking.splines import Pyramid
-from app.tracks import TrackStatus
+from ..experiment.photographs import Image
+from ..tracks import TrackStatus
+from .correlation.correlator import Correlator, Rows
+from .correlation.patches import Patches
+from .correlation.splines import Pyramid
+from .poses import FramePoses
 
 # Photographs in a row in which a part of a grain had to be disregarded before its reference is doubted.
 DAMAGED_FRAMES = 3

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from app.tracking.correlation import PROMISING, Correlator, Rows
-from app.tracking.findings import Findings
-from app.tracking.search import DISTINCT_TURN
-from app.tracking.splines import Pyramid
-from app.tracks import TrackStatus
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..tracks import TrackStatus
+from .correlation.correlator import PROMISING, Correlator, Rows
+from .correlation.search import DISTINCT_TURN
+from .correlation.splines import Pyramid
+from .findings import Findings
 
 if TYPE_CHECKING:
-    from app.tracking.tracker import TrackingSettings
+    from .settings import TrackingSettings
 
 # A grain is searched for again only when what its neighbours say has moved by this share of the window.
 NEWS = 0.25

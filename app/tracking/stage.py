@@ -9,24 +9,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.atomic import replacing
-from app.checkpoint import Checkpoint
-from app.corrections import read_corrections
-from app.errors import InputError
-from app.experiment import Experiment, read_grain_guess, read_times, read_walls
-from app.frames import Image
-from app.progress import Progress
-from app.scaling import make_scale
-from app.tables import read_table, write_table
-from app.tracking.bar_depth import visible_depth
-from app.tracking.corrections import Corrections
-from app.tracking.detection import Detection, DetectionSettings, detect_grains, refine_grains
-from app.tracking.follow import FollowedWalls, follow_photographs, follow_walls
-from app.tracking.report import Tracked
-from app.tracking.tracker import TrackingSettings
-from app.tracks import Tracks, WallTracks
-from app.units import Scale
-from solver.grains import Array
+from solver.bodies.grains import Array
+
+from ..atomic import replacing
+from ..errors import InputError
+from ..experiment.corrections import read_corrections
+from ..experiment.experiment import Experiment, read_grain_guess, read_times, read_walls
+from ..experiment.photographs import Image
+from ..experiment.scaling import make_scale
+from ..experiment.tables import read_table, write_table
+from ..experiment.units import Scale
+from ..progress import Progress
+from ..results.checkpoint import Checkpoint
+from ..tracks import Tracks, WallTracks
+from .corrections import Corrections
+from .detection.grains import Detection, DetectionSettings, detect_grains, refine_grains
+from .follow import FollowedWalls, follow_photographs, follow_walls
+from .report.page import Tracked
+from .settings import TrackingSettings
+from .walls.bar_depth import visible_depth
 
 # A bar's body beside its face is looked at over no more than this many mean radii of the grains.
 BAR_DEPTH = 3.0

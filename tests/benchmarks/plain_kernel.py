@@ -12,10 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.boundaries import Walls
-from solver.contacts import Contacts
-from solver.grains import Array, GrainMotion, Grains
-from solver.problem import PLATE_IMPEDANCE
+from solver.bodies.grains import Array, GrainMotion, Grains
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts
+from solver.nlgs.problem import PLATE_IMPEDANCE
 
 
 class PlainProblem(NamedTuple):

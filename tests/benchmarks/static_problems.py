@@ -13,10 +13,11 @@ import numpy as np
 from numba import njit
 from scipy.spatial import KDTree
 
-from solver.boundaries import Walls
-from solver.contacts import Contacts, detect_contacts
-from solver.grains import Array, GrainMotion, Grains
-from solver.problem import ContactProblem, Material, assemble
+from solver.bodies.grains import Array, GrainMotion, Grains
+from solver.bodies.packing import Material
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, detect_contacts
+from solver.nlgs.problem import ContactProblem, assemble
 
 RADII, SHARES = (0.007, 0.008, 0.011), (0.40, 0.41, 0.19)  # [m], by number
 SOLID_FRACTION = 0.86  # above the .842 at which frictionless discs jam

@@ -17,14 +17,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from rodsight.experiment.photographs import LUMA
+from rodsight.tracking.detection.grains import Detection, DetectionSettings, detect_grains
 from scipy.spatial import KDTree
 
-from app.frames import LUMA
-from app.tracking.detection import Detection, DetectionSettings, detect_grains
-from tests.app.tracking.polydisperse import draw_discs, lay_discs
+from tests.app.tracking.detection.polydisperse import draw_discs, lay_discs
+from tests.app.tracking.detection.test_grains import HEIGHT, WIDTH, packing
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import grid_of_rods
-from tests.app.tracking.test_detection import HEIGHT, WIDTH, packing
 
 Benchmark = Any
 
@@ -135,7 +135,7 @@ def test_a_long_sequence_of_twenty_megapixels_fits_into_two_gigabytes(tmp_path: 
         'grains = "grains.csv"\n[material]\ndensity = 2700.0\nlength = 0.06\nfriction = 0.3\n'
     )
     code = (
-        "import resource, sys; from app.cli import main\n"
+        "import resource, sys; from rodsight.cli.main import main\n"
         f"try: main(['track', {str(tmp_path)!r}, '--out', {str(tmp_path / 'out')!r}, '--quiet'])\n"
         "except SystemExit as end: assert end.code == 0, end.code\n"
         "print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"

@@ -19,20 +19,24 @@ import numpy as np
 import pytest
 import rerun as rr
 from rich.console import Console
+from rodsight import pipeline
+from rodsight.cli.watching import watching
+from rodsight.experiment.experiment import load_experiment, make_packing, read_tracks, read_walls
+from rodsight.inference.solver_input import make_snapshots, sequence_settings
+from rodsight.recording.files.recorder import BATCHES, Recorder
+from rodsight.recording.look.canvas import Canvas
+from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.scene import Scene
+from rodsight.recording.packing_layers.network import SweepChoice
+from rodsight.recording.tabs.blueprint import Layout, make_blueprint
+from rodsight.recording.tabs.layout_property import send_layout
+from rodsight.recording.viewing.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
+from rodsight.sensitivity.execution import available_cores
+from rodsight.synthetic.experiment import synthesize
 
-from app import pipeline
-from app.experiment import load_experiment, make_packing, read_tracks, read_walls
-from app.recording import Canvas, ForceRange, ForceStyle, Layout, Recorder, Scene, SweepChoice, make_blueprint
-from app.recording.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
-from app.recording.layout_property import send_layout
-from app.recording.recorder import BATCHES
-from app.sensitivity.execution import available_cores
-from app.solver_input import make_snapshots, sequence_settings
-from app.synthetic.experiment import synthesize
-from app.watching import watching
-from solver.frame_forces import FrameForces
-from solver.frame_statistics import FrameStatistics, frame_statistics
-from solver.sequence import solve_sequence
+from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frames import solve_sequence
+from solver.statistics.frame_statistics import FrameStatistics, frame_statistics
 
 pytestmark = pytest.mark.slow
 

@@ -20,12 +20,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.frame_forces import SweepHistory
-from solver.grains import Array
-from solver.nlgs import NlgsSettings, Solution, Stop, solve
-from solver.nlgs_kernels import advance, apply_forces
-from solver.problem import ContactProblem, aligned_zeros
-from solver.sweep_record import MEASURED_EVERY, SweepRecorder
+from solver.bodies.grains import Array
+from solver.nlgs.kernels import advance, apply_forces
+from solver.nlgs.problem import ContactProblem, aligned_zeros
+from solver.nlgs.solve import NlgsSettings, Solution, Stop, solve
+from solver.nlgs.sweep_record import MEASURED_EVERY, SweepHistory, SweepRecorder
 from tests.benchmarks.plain_kernel import plain_problem, plain_state, plain_sweeps
 from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, StaticPacking, jammed_packing, static_problem
 

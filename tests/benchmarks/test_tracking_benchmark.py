@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rodsight.experiment.experiment import load_experiment, read_walls
+from rodsight.experiment.photographs import LUMA
+from rodsight.experiment.scaling import make_scale
+from rodsight.tracking.poses import FramePoses
+from rodsight.tracking.tracker import Tracker
+from rodsight.tracking.walls.bar_depth import visible_depth
+from rodsight.tracking.walls.tracker import WallTracker
+from rodsight.tracks import TrackStatus
 
-from app.experiment import load_experiment, read_walls
-from app.frames import LUMA
-from app.scaling import make_scale
-from app.tracking.bar_depth import visible_depth
-from app.tracking.poses import FramePoses
-from app.tracking.tracker import Tracker
-from app.tracking.walls import WallTracker
-from app.tracks import TrackStatus
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import Rods, grid_of_rods
 from tests.app.tracking.test_tracker import cover

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.synthetic.packing import prepare_packing
 
-from app.synthetic.packing import prepare_packing
-from solver.calibration import calibrate, expected_priors
-from solver.calibration_equations import move_walls, rotate_offsets
-from solver.calibration_priors import CalibrationPriors
-from solver.calibration_rows import MeasuredSequence
-from solver.dem import shear_photographs
-from solver.dem_truth import DemSettings, DemTruth
+from solver.calibration.calibrate import calibrate, expected_priors
+from solver.calibration.equations import move_walls, rotate_offsets
+from solver.calibration.gaps import MeasuredSequence
+from solver.calibration.priors import CalibrationPriors
+from solver.dem.simulation import shear_photographs
+from solver.dem.truth import DemSettings, DemTruth
 
 GRAINS, FRAMES, STEP = 250, 24, np.deg2rad(0.25)
 SEEDS = (11, 12)

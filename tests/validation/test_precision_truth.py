@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.study.accuracy import default_settings
+from rodsight.study.truths import agreement_of, observe, packing_of, simulate, starts_of
 
-from app.study.accuracy import default_settings
-from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of
-from solver.dem import DemTruth
-from solver.sequence import solve_sequence
+from solver.dem.simulation import DemTruth
+from solver.sequence.frames import solve_sequence
 
 GRAINS, SEED, TURN, WINDOW = 250, 41, 5.0, 8
 NOISE = 4e-5  # [m]

@@ -4,8 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-
-from app.cli import main
+from rodsight.cli.main import main
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "shear"
 TRUE_FRICTION = 0.25

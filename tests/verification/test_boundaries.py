@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from solver.boundaries import Walls
-from solver.chain import ChainSettings, Packing, advance_chain
-from solver.contacts import detect_contacts
-from solver.convex import assemble_balance, polish
-from solver.motion import Snapshot, no_motion
-from solver.network import NearPairs
-from solver.nlgs import NlgsSettings, solve
-from solver.problem import Material, assemble
-from solver.stress import wall_forces
-from solver.warm_start import ForceMemory
+from solver.bodies.motion import Snapshot, no_motion
+from solver.bodies.packing import Material, Packing
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import detect_contacts
+from solver.convex.program import assemble_balance, polish
+from solver.detection.networks import NearPairs
+from solver.nlgs.chain import ChainSettings, advance_chain
+from solver.nlgs.problem import assemble
+from solver.nlgs.solve import NlgsSettings, solve
+from solver.nlgs.warm_start import ForceMemory
+from solver.statistics.stress import wall_forces
 from tests.packings import LENGTH, box, motion, rods
 
 CONVERGED = 1e-6  # relative, of an iteration run far beyond its need

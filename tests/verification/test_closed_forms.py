@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.nlgs import NlgsSettings, Stop, solve
+from solver.nlgs.solve import NlgsSettings, Stop, solve
 from tests.packings import box, motion, problem_of, rods
 
 EXACT = 1e-12  # relative: a handful of floating-point operations

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from solver.boundaries import Walls
-from solver.contacts import detect_contacts
-from solver.grains import GrainMotion, Grains
-from solver.nlgs import NlgsSettings, solve
-from solver.problem import Material, assemble
+from solver.bodies.grains import GrainMotion, Grains
+from solver.bodies.packing import Material
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import detect_contacts
+from solver.nlgs.problem import assemble
+from solver.nlgs.solve import NlgsSettings, solve
 from tests.packings import squeezed_heap
 
 # Without friction the normal forces of this heap are unique, so different visiting orders must meet; the iteration

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app import pipeline
-from app.experiment import load_experiment
-from app.results import Results
-from app.tracks import TrackStatus
+from rodsight import pipeline
+from rodsight.experiment.experiment import load_experiment
+from rodsight.results.results import Results
+from rodsight.tracks import TrackStatus
 
 
 @pytest.fixture(scope="session")

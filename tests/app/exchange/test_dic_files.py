@@ -2,12 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.cli import main
-from app.errors import InputError
-from app.exchange.dic_files import read_sequence, write_sequence
-from app.experiment import load_experiment, read_tracks
-from app.units import Scale
+from rodsight.cli.main import main
+from rodsight.errors import InputError
+from rodsight.exchange.dic_files import read_sequence, write_sequence
+from rodsight.experiment.experiment import load_experiment, read_tracks
+from rodsight.experiment.units import Scale
 
 SCALE = Scale(1.2e-4, 4000)
 ROUNDING = 1e-9  # px

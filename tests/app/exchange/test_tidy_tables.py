@@ -4,9 +4,8 @@ import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
-
-from app.cli import main
-from app.exchange.tidy_tables import make_tables, write_tables
+from rodsight.cli.main import main
+from rodsight.exchange.tidy_tables import make_tables, write_tables
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])

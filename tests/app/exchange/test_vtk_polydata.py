@@ -4,8 +4,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
-
-from app.exchange.vtk_polydata import write_polydata
+from rodsight.exchange.vtk_polydata import write_polydata
 
 
 def arrays(file: Path, place: str) -> dict[str, np.ndarray]:

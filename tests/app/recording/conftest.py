@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
-from fake_photographs import PIXEL, SHAPE, photograph
-from fake_results import make_results, make_truth, make_tuning
+from rodsight.experiment.units import Scale
+from rodsight.recording.files.recorder import RecordingReport, record
+from rodsight.results.results import Results, TruthContacts
 
-from app.recording import RecordingReport, record
-from app.results import Results, TruthContacts
-from app.units import Scale
+from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
+from tests.app.recording.fake_results import make_results, make_truth, make_tuning
 
 LOST = (20, 2)  # grain and the frame it is lost from
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from fake_results import RADIUS
+
+from tests.app.recording.fake_results import RADIUS
 
 PIXEL = RADIUS / 12.0  # [m]
 SHAPE = (240, 300)

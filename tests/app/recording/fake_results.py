@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
+from rodsight.results.results import Results, TruthContacts
+from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
-from app.results import Results, TruthContacts
-from app.tracks import Tracks, TrackStatus, WallTracks
-from solver.boundaries import Walls
-from solver.contacts import Contacts, detect_contacts
-from solver.frame_forces import ContactState, FrameForces, FrameStatus, SweepHistory
-from solver.frame_statistics import FrameStatistics
-from solver.grains import Grains
-from solver.radius_tuning import RadiusTuning
+from solver.bodies.grains import Grains
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, ContactState, detect_contacts
+from solver.contacts.radius_tuning import RadiusTuning
+from solver.nlgs.sweep_record import SweepHistory
+from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.statistics.frame_statistics import FrameStatistics
 
 RADIUS = 0.008  # [m]
 FRICTION = 0.25

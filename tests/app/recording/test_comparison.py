@@ -4,13 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_results import make_results, make_truth
-from rows import latest, rows
-
-from app.cli import main
-from app.comparison import DifferentPackingError, compare_runs, compare_with_truth
-from app.recording import entities
-from app.recording.comparison import (
+from rodsight.cli.main import main
+from rodsight.recording.comparison import (
     DIFFERENCE,
     FIRST,
     R_FN,
@@ -19,7 +14,12 @@ from app.recording.comparison import (
     difference_colours,
     record_comparison,
 )
-from app.results import TruthContacts
+from rodsight.recording.look import entities
+from rodsight.results.comparison import DifferentPackingError, compare_runs, compare_with_truth
+from rodsight.results.results import TruthContacts
+
+from tests.app.recording.fake_results import make_results, make_truth
+from tests.app.recording.rows import latest, rows
 
 ROUNDING = 1e-9
 
@@ -93,7 +93,7 @@ def test_the_truth_of_its_own_forces_gives_the_run_s_own_friction_angle(results)
     columns += [np.concatenate([getattr(f, k) for f in results.frames]) for k in ("fn", "ft")]
     found = compare_with_truth(results, TruthContacts(frame.astype(np.int64), *columns), name="run")
     assert [each.r_ft for each in found.agreement] == pytest.approx([1.0] * 4)
-    from solver.stress import friction_angle, love_weber_stress
+    from solver.statistics.stress import friction_angle, love_weber_stress
 
     first = results.frames[0]
     stress = love_weber_stress(first.contacts, first.fn, first.ft, results.tracks.position[0], 1.0, 1.0)

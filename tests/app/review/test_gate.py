@@ -5,11 +5,10 @@ import json
 import threading
 
 import pytest
-
-from app.cli import main
-from app.review.command import open_reviewed, open_session
-from app.review.server import ReviewServer
-from app.review.verdicts import VERDICTS
+from rodsight.cli.main import main
+from rodsight.review.command import open_reviewed, open_session
+from rodsight.review.server import ReviewServer
+from rodsight.verdicts.log import VERDICTS
 
 
 @pytest.fixture(scope="module")

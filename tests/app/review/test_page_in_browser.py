@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rodsight.cli.main import main
+from rodsight.results.store import load_results
+from rodsight.review.command import open_reviewed, open_session
+from rodsight.review.server import ReviewServer
+from rodsight.verdicts.decisions import Bodies
+from rodsight.verdicts.log import VERDICTS
 
-from app.cli import main
-from app.review.command import open_reviewed, open_session
-from app.review.decisions import Bodies
-from app.review.server import ReviewServer
-from app.review.verdicts import VERDICTS
-from app.store import load_results
-from solver.frame_forces import ContactSource
+from solver.contacts.contacts import ContactSource
 from tests.app.review.browser import chromium, open_browser
 
 pytest.importorskip("websockets", reason="websockets, which drives chromium, is not installed")
@@ -96,7 +96,7 @@ def lines(out):
 
 def missed_gap(session, frame):
     """Two neighbours that are no candidate, close enough for a click, far from every candidate."""
-    from app.review.picking import NEAR, WIDEST_GAP, near_pairs
+    from rodsight.review.picking import NEAR, WIDEST_GAP, near_pairs
 
     mean = float(session.results.grains.radius.mean())
     pairs = near_pairs(session.results, frame, WIDEST_GAP * mean)

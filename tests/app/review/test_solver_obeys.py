@@ -3,18 +3,19 @@
 import json
 import signal
 import subprocess
-import sys
 import urllib.request
 
 import h5py
 import numpy as np
 import pytest
+from rodsight.cli.main import main
+from rodsight.results.store import load_results
+from rodsight.verdicts.decisions import Bodies, decide
+from rodsight.verdicts.log import VERDICTS, Entry, Flag, Verdict, VerdictLog
 
-from app.cli import main
-from app.review.decisions import Bodies, decide
-from app.review.verdicts import VERDICTS, Entry, Flag, Verdict, VerdictLog
-from app.store import load_results
-from solver.frame_forces import ContactSource, FrameStatus
+from solver.contacts.contacts import ContactSource
+from solver.sequence.frame_forces import FrameStatus
+from tests.program import RODSIGHT
 
 FEW = ("--set", "solver.sweeps=50", "--quiet")
 
@@ -186,8 +187,7 @@ def test_the_source_of_contacts_is_stored_by_name(solved):
 
 def test_review_serves_until_it_is_interrupted(solved):
     out, _ = solved
-    start = "from app.cli import main; main()"
-    command = [sys.executable, "-uc", start, "review", str(out), "--no-browser", "--reviewer", "anna"]
+    command = [*RODSIGHT, "review", str(out), "--no-browser", "--reviewer", "anna"]
     page = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         told = page.stdout.readline()

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from rodsight.review.candidates import Candidates
+from rodsight.review.estimate import NO, UNJUDGED, YES, estimate
+from rodsight.review.queue import STRATUM_COUNT, frame_queue, sampled_queue, strata
+from rodsight.review.threshold import fit_threshold, threshold_curve
+from rodsight.verdicts.log import Entry, Verdict, VerdictLog
+from rodsight.verdicts.reviewers import DETECTOR, agreements, cohen_kappa
 
-from app.review.agreement import DETECTOR, agreements, cohen_kappa
-from app.review.candidates import Candidates
-from app.review.estimate import NO, UNJUDGED, YES, estimate
-from app.review.queue import STRATUM_COUNT, frame_queue, sampled_queue, strata
-from app.review.threshold import fit_threshold, threshold_curve
-from app.review.verdicts import Entry, Verdict, VerdictLog
-from solver.contacts import Contacts
+from solver.contacts.contacts import Contacts
 
 
 def candidates(frame, probability):

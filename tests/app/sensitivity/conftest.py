@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from app import pipeline
-from app.experiment import load_experiment
-from app.sensitivity.study import Nominal
+from rodsight import pipeline
+from rodsight.experiment.experiment import load_experiment
+from rodsight.sensitivity.study import Nominal
 
 FEW = ("solver.sweeps=50", 'recording.sweeps="none"')
 

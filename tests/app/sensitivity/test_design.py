@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.cli_tools import sensitivity
-from app.errors import InputError
-from app.sensitivity.design import Case, choose_factors, one_at_a_time, plan, space_filling, vary
-from app.sensitivity.factors import FACTORS, Scale
-from app.sensitivity.inference import Inputs
+from rodsight.cli.cli_tools import sensitivity
+from rodsight.errors import InputError
+from rodsight.inference.inference import Inputs
+from rodsight.sensitivity.design import Case, choose_factors, one_at_a_time, plan, space_filling, vary
+from rodsight.sensitivity.factors import FACTORS, Scale
 
 FILE = Path("experiment.toml")
 KNOWN = {each.name: each for each in FACTORS}

@@ -5,13 +5,13 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from rodsight.cli.main import main
+from rodsight.results.checkpoint import Checkpoint
+from rodsight.results.store import load_results
+from rodsight.sensitivity import spread
+from rodsight.sensitivity.design import Case
+from rodsight.sensitivity.spread import DEVIATION, RANGES, make_members, solve_member, solve_members, spread_around
 
-from app.checkpoint import Checkpoint
-from app.cli import main
-from app.sensitivity import spread
-from app.sensitivity.design import Case
-from app.sensitivity.spread import DEVIATION, RANGES, make_members, solve_member, solve_members, spread_around
-from app.store import load_results
 from tests.app.sensitivity.conftest import FEW
 
 SET = tuple(part for setting in FEW for part in ("--set", setting))
@@ -52,7 +52,7 @@ def test_members_vary_everything_that_is_not_known():
 
 
 def test_an_ensemble_changes_the_error_bars_and_never_the_forces(made_tracks, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("app.pipeline.available_cores", lambda: 1)
+    monkeypatch.setattr("rodsight.pipeline.available_cores", lambda: 1)
     out, free = tmp_path / "out", tmp_path / "free"
     assert rodsight("solve", made_tracks, "--out", free, *SET) == 0
     assert rodsight("solve", made_tracks, "--out", out, *SET, "--ensemble", 2) == 0

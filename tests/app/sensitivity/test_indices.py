@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
+from rodsight.sensitivity.indices import main_effects
 from scipy.stats import qmc
-
-from app.sensitivity.indices import main_effects
 
 SAMPLES = 128
 NEAR = 0.03  # of an index, by 128 Sobol points

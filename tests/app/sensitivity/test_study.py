@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from rodsight.cli.main import main
+from rodsight.inference.inference import infer
+from rodsight.sensitivity.design import Case
+from rodsight.sensitivity.study import Diary, compare, measure_case, run_study
 
-from app.cli import main
-from app.sensitivity.design import Case
-from app.sensitivity.inference import infer
-from app.sensitivity.study import Diary, compare, measure_case, run_study
 from tests.app.sensitivity.conftest import FEW
+from tests.program import RODSIGHT
 
 KAPPA = Case((("kappa", 2.0),))
 FRICTION = Case((("friction", 0.8),))
@@ -81,7 +82,7 @@ def test_a_finished_run_is_not_run_again(nominal, tmp_path, monkeypatch):
         asked.append(case)
         return first[0]
 
-    monkeypatch.setattr("app.sensitivity.study.measure_case", measure)
+    monkeypatch.setattr("rodsight.sensitivity.study.measure_case", measure)
     again = run_study(nominal, [KAPPA, FRICTION], diary)
     assert asked == [FRICTION]
     assert again[0] == first[0]
@@ -153,7 +154,7 @@ def test_ctrl_c_ends_the_study_and_the_same_command_goes_on(made_tracks, tmp_pat
     out = tmp_path / "out"
     command = ("sensitivity", made_tracks, "--out", out, *SET, "--factors", "kappa=0.5:2", "sweeps=0.1:2000")
     study = subprocess.Popen(
-        [sys.executable, "-c", "from app.cli import main; main()", *(str(each) for each in command), "--workers", "2"],
+        [*RODSIGHT, *(str(each) for each in command), "--workers", "2"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     diary = out / "sensitivity_runs.jsonl"
@@ -193,7 +194,7 @@ def test_ctrl_c_ends_the_study_and_the_same_command_goes_on(made_tracks, tmp_pat
 def test_a_mistake_is_named_in_one_line_and_nothing_is_written(
     arguments, named, made_tracks, tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("app.sensitivity.execution.ANSWER", 0.2)  # [s]
+    monkeypatch.setattr("rodsight.sensitivity.execution.ANSWER", 0.2)  # [s]
     out = tmp_path / "out"
     assert rodsight("sensitivity", made_tracks, "--out", out, "--quiet", *arguments) == 2
     told = capsys.readouterr()

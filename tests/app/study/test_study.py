@@ -5,11 +5,11 @@ from io import StringIO
 import numpy as np
 import pytest
 from rich.console import Console
+from rodsight.study.accuracy import default_settings, measure_accuracy
+from rodsight.study.claims import study_claims
+from rodsight.study.truths import agreement_of, observe, packing_of, simulate, starts_of
 
-from app.study.accuracy import default_settings, measure_accuracy
-from app.study.claims import study_claims
-from app.study.truths import agreement_of, observe, packing_of, simulate, starts_of
-from solver.sequence import solve_sequence
+from solver.sequence.frames import solve_sequence
 
 GRAINS, TURN, WINDOW = 30, 3.0, 7
 
@@ -30,7 +30,7 @@ def test_a_truth_is_simulated_once_and_read_back_the_same(truth, folder, monkeyp
     def never(*_args, **_kwargs):
         raise AssertionError("simulated again")
 
-    monkeypatch.setattr("app.study.truths.prepare_packing", never)
+    monkeypatch.setattr("rodsight.study.truths.prepare_packing", never)
     again = simulate(0, grains=GRAINS, folder=folder, turn=TURN)
     assert np.array_equal(truth.fn, again.fn)
     assert again.wall_names == truth.wall_names
@@ -62,7 +62,7 @@ def test_the_accuracy_of_exact_tracks_is_measured(truth):
 
 
 def test_the_papers_claims_are_listed_with_a_verdict(folder, monkeypatch):
-    monkeypatch.setattr("app.study.claims.simulate", lambda seed, **kw: simulate(seed, **{**kw, "turn": TURN}))
+    monkeypatch.setattr("rodsight.study.claims.simulate", lambda seed, **kw: simulate(seed, **{**kw, "turn": TURN}))
     shown = StringIO()
     verdicts = study_claims([0], grains=GRAINS, folder=folder, console=Console(file=shown, width=200), window=WINDOW)
     assert len(verdicts) == 5

@@ -11,12 +11,11 @@ import cv2
 import numba
 import numpy as np
 import pytest
-
-from app.errors import InputError
-from app.synthetic.experiment import Synthesis, synthesize
-from app.synthetic.packing import RADIUS_CLASSES, choose_radii
-from app.synthetic.rearrangement import choose_window
-from app.units import Scale
+from rodsight.errors import InputError
+from rodsight.experiment.units import Scale
+from rodsight.synthetic.experiment import Synthesis, synthesize
+from rodsight.synthetic.packing import RADIUS_CLASSES, choose_radii
+from rodsight.synthetic.rearrangement import choose_window
 
 # A packing takes some ten thousand steps to prepare: minutes without compilation.
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")

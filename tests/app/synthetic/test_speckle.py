@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from rodsight.synthetic.camera import TILE, pixel_response
+from rodsight.synthetic.speckle import SpeckleSettings, expose, render_photograph, render_scene
+from rodsight.synthetic.speckle_kernels import FINE, SMOOTHING
 from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
-
-from app.synthetic.camera import TILE, pixel_response
-from app.synthetic.speckle import SpeckleSettings, expose, render_photograph, render_scene
-from app.synthetic.speckle_kernels import FINE, SMOOTHING
 
 PIXEL = 2.0**-12  # [m], a power of two: a whole number of pixels is then exact in floating point
 NO_BARS = np.zeros((0, 2, 2))

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 FINE = 3  # sub-pixels a side
 BROWN = np.array([0.62, 0.80, 1.0])  # blue, green, red: of a face, as OpenCV stores colours

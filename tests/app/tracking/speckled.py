@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from rodsight.experiment.units import Scale
+from rodsight.synthetic.speckle import SpeckleSettings, render_photograph
 
-from app.synthetic.speckle import SpeckleSettings, render_photograph
-from app.units import Scale
-from solver.grains import Array
+from solver.bodies.grains import Array
 
 PIXEL_SIZE = 2.5e-4  # [m]
 

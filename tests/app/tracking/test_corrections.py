@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rodsight.tracking.corrections import Corrections
+from rodsight.tracking.tracker import Tracker
+from rodsight.tracks import TrackStatus
 
-from app.tracking.corrections import Corrections
-from app.tracking.tracker import Tracker
-from app.tracks import TrackStatus
 from tests.app.tracking.speckled import Rods, grid_of_rods
 
 RADIUS = 22.0  # [px]

@@ -8,15 +8,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from rodsight.experiment.photographs import Photographs
+from rodsight.experiment.units import Scale
+from rodsight.results.checkpoint import Checkpoint
+from rodsight.results.store import Provenance, load_tracks, save_tracks
+from rodsight.tracking.detection.grains import Detection
+from rodsight.tracking.follow import follow_photographs
+from rodsight.tracking.report.page import Tracked, tracking_report
+from rodsight.tracks import Tracks, TrackStatus
 
-from app.checkpoint import Checkpoint
-from app.frames import Photographs
-from app.store import Provenance, load_tracks, save_tracks
-from app.tracking.detection import Detection
-from app.tracking.follow import follow_photographs
-from app.tracking.report import Tracked, tracking_report
-from app.tracks import Tracks, TrackStatus
-from app.units import Scale
 from tests.app.tracking.speckled import PIXEL_SIZE, Rods, grid_of_rods
 
 FRAMES, DAMAGE = 14, 5

@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from rodsight.cli.main import main
+from rodsight.experiment.lens import OpenCVLens
+from rodsight.experiment.tables import read_table
+from rodsight.results.store import load_tracks
+from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
-from app.cli import main
-from app.lens import OpenCVLens
-from app.store import load_tracks
-from app.tables import read_table
-from app.tracks import Tracks, TrackStatus, WallTracks
-from tests.app.test_bad_input import edit, refuse
+from tests.app.experiment.test_bad_input import edit, refuse
 
 SEEN_ALLOWED = 0.1 * 2.5e-4  # [m] rms, a tenth of a pixel: what outlines are exact to
 WALL_ALLOWED = 5e-6  # [m] along the normal

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rodsight.tracking.poses import FramePoses
+from rodsight.tracking.settings import TrackingSettings
+from rodsight.tracking.tracker import Tracker
+from rodsight.tracks import TrackStatus
 
-from app.tracking.poses import FramePoses
-from app.tracking.tracker import Tracker, TrackingSettings
-from app.tracks import TrackStatus
 from tests.app.tracking.speckled import Rods, grid_of_rods
 
 PATCH_RADIUS = 20.0  # [px]

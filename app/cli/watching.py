@@ -1,0 +1,60 @@
+"""Watching a run while it is solved: the run tells what it has finished, a live recording shows it."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from ..experiment.scaling import make_scale
+from ..pipeline import Run
+from ..signals import answering
+
+if TYPE_CHECKING:
+    from ..recording.files.live_process import LiveProcess
+
+LIVE = "recording-live.rrd"  # what has been solved so far; the full recording takes its place
+
+
+@contextmanager
+def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, LiveProcess | None]]:
+    """Give the run with somebody who watches it, or as it is with the viewer `none`.
+
+    The live recording is removed at the end, when the full one is there. If the run ends early, it stays.
+    """
+    if viewer == "none":
+        yield run, None
+        return
+
+    def tell(sentence: str) -> None:
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+
+    watch = _watch(run, viewer, tell)
+    try:
+        # A termination from outside ends the run as an interrupt does, so that it says what it leaves.
+        with answering(signal.SIGTERM, signal.default_int_handler):
+            yield replace(run, watch=watch), watch
+            watch.close(whole=True)
+        watch.path.unlink(missing_ok=True)
+    except BaseException:
+        watch.close(whole=False)
+        if watch.started and watch.path.is_file():
+            tell(f"What was solved so far: rodsight view {watch.path}")
+        raise
+
+
+def _watch(run: Run, viewer: str, tell: Callable[[str], None]) -> LiveProcess:
+    from ..recording.files.live_process import GreyPhotographs, LiveProcess
+
+    config = run.experiment.config
+    photograph = scale = None
+    if config.photographs is not None:
+        photographs = run.experiment.photographs()
+        photograph = GreyPhotographs(photographs, run.frames[0])
+        scale = make_scale(config.photographs, photographs.shape[0])
+    sweeps = "none" if config.recording.sweeps == "none" else "log"
+    return LiveProcess(run.file(LIVE), tell, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)

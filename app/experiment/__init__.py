@@ -1,0 +1,1 @@
+"""An experiment on disk, read and checked. Touches tracks and the solver, no stage."""

@@ -1,0 +1,178 @@
+"""Photographs: a sequence of grey images, read one at a time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Image = NDArray[np.float32]
+
+# ITU-R BT.601 luma of blue, green, red: the order in which OpenCV hands out colours.
+LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
+
+FULL_SCALE = 255.0
+
+# What cameras call the data of their sensor; read with the optional package rawpy.
+RAW_SUFFIXES = frozenset(
+    (".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dng", ".iiq", ".nef", ".nrw", ".orf", ".pef", ".raf", ".rw2", ".srw")
+)
+
+
+class Photographs(Sequence[Image]):
+    """Photographs in natural order (img2 before img10); item k is read from its file when it is asked for.
+
+    Every image is float32 (H, W), grey, on a scale where the full scale of the file's depth is 255:
+    16-bit files keep all their levels as fractions. Pixels are those stored in the file: an
+    orientation tag is not applied. Raises InputError for no files, an unreadable one, or one of
+    another size than the first.
+    """
+
+    def __init__(self, files: Sequence[Path | str], *, source: Path | str = "photographs") -> None:
+        self.files: tuple[Path, ...] = tuple(sorted((Path(file) for file in files), key=natural_key))
+        if not self.files:
+            raise InputError(source, "", "there are no photographs")
+        self._shape: tuple[int, int] | None = None
+
+    @classmethod
+    def matching(cls, folder: Path, pattern: str, *, source: Path | str | None = None) -> Photographs:
+        """The files of `folder` that match the glob `pattern`, such as "photos/*.png"."""
+        whose = folder if source is None else source
+        try:
+            if Path(pattern).is_absolute():
+                found = list(Path(Path(pattern).anchor).glob(str(Path(pattern).relative_to(Path(pattern).anchor))))
+            else:
+                found = list(folder.glob(pattern))
+        except ValueError as error:
+            raise InputError(whose, f"photographs.files = {pattern!r}", str(error)) from None
+        files = [file for file in found if file.is_file()]
+        if not files:
+            raise InputError(whose, f"photographs.files = {pattern!r}", "no file matches")
+        return cls(files, source=whose)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of every photograph [px]."""
+        if self._shape is None:
+            self._shape = _shape_of(read_photograph(self.files[0]))
+        return self._shape
+
+    def check(self) -> None:
+        """Read every photograph once, so that a bad one is known before any work begins."""
+        for frame in range(len(self)):
+            self[frame]
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def __getitem__(self, frame: int) -> Image:  # pyright: ignore[reportIncompatibleMethodOverride]
+        file = self.files[frame]
+        image = read_photograph(file)
+        if self._shape is None and file == self.files[0]:
+            self._shape = _shape_of(image)
+        height, width = self.shape
+        if image.shape != (height, width):
+            raise InputError(
+                file,
+                f"photograph {range(len(self))[frame]}",
+                f"is {image.shape[1]} x {image.shape[0]} pixels, the first photograph {width} x {height}",
+            )
+        return image
+
+    def __iter__(self) -> Iterator[Image]:
+        for frame in range(len(self)):
+            yield self[frame]
+
+
+def natural_key(file: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
+    """Sort key in which numbers count as numbers: img2 before img10."""
+    parts = re.split(r"(\d+)", file.as_posix())
+    return tuple((0, int(part)) if part.isdecimal() else (1, part.lower()) for part in parts), file.as_posix()
+
+
+def read_photograph(file: Path) -> Image:
+    """Read one 8- or 16-bit photograph, grey or colour, as float32 grey (H, W) with full scale 255.
+
+    Raw files of cameras are developed to 16 bits, all alike. Raises InputError for what is not a photograph, and for
+    raw files while the package that reads them is not installed.
+    """
+    if file.suffix.lower() in RAW_SUFFIXES:
+        return _to_grey(file, _develop(file))
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise InputError(file, "", f"cannot be read: {error.strerror or error}") from None
+    _refuse_truncated(file, content)
+    pixels = _decode(content)
+    if pixels is None:
+        raise InputError(file, "", "is not a photograph that can be read (PNG, TIFF or JPEG)")
+    return _to_grey(file, pixels)
+
+
+def _to_grey(file: Path, pixels: NDArray) -> Image:
+    """Blue, green, red or grey (H, W[, c]) of either depth to grey."""
+    if pixels.dtype == np.uint8:
+        scale = np.float32(1.0)
+    elif pixels.dtype == np.uint16:
+        scale = np.float32(FULL_SCALE / 65535.0)
+    else:
+        raise InputError(file, f"depth {pixels.dtype}", "must be 8 or 16 bits per channel")
+    if pixels.ndim == 2:
+        grey = pixels.astype(np.float32)
+    elif pixels.shape[2] <= 2:  # grey, with or without an opacity
+        grey = pixels[:, :, 0].astype(np.float32)
+    else:
+        grey = cv2.transform(pixels[:, :, :3].astype(np.float32), LUMA[None, :])
+    if scale != 1.0:
+        grey *= scale
+    return np.ascontiguousarray(grey, dtype=np.float32)
+
+
+def _develop(file: Path) -> NDArray:
+    """The sensor's data as blue, green, red (H, W, 3) uint16, exposed and coloured alike in every photograph."""
+    try:
+        import rawpy  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise InputError(
+            file, "", "is a camera's raw file: pip install 'rodsight[raw]' reads it, or convert it to 16-bit TIFF"
+        ) from None
+    try:
+        with rawpy.imread(str(file)) as raw:
+            # No brightening by the picture's own content, and no turning: photographs must stay comparable.
+            colours = raw.postprocess(output_bps=16, no_auto_bright=True, use_camera_wb=True, user_flip=0)
+    except (rawpy.LibRawError, OSError) as error:
+        raise InputError(file, "", f"is not a raw file that can be read ({error})") from None
+    return np.ascontiguousarray(colours[:, :, ::-1])
+
+
+def _decode(content: bytes) -> NDArray | None:
+    if not content:
+        return None
+    # A decoder's complaints would reach standard error beside our own single line.
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(0)
+    try:
+        return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        return None
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
+def _refuse_truncated(file: Path, content: bytes) -> None:
+    """Decoders fill the missing part of a cut PNG or JPEG with grey and call it a success."""
+    cut = (content.startswith(b"\x89PNG") and b"IEND" not in content[-64:]) or (
+        content.startswith(b"\xff\xd8") and b"\xff\xd9" not in content[-4096:]
+    )
+    if cut:
+        raise InputError(file, f"{len(content)} bytes", "the file is cut short")
+
+
+def _shape_of(image: Image) -> tuple[int, int]:
+    return image.shape[0], image.shape[1]

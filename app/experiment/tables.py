@@ -1,0 +1,110 @@
+"""Tables as comma-separated text with a header, read so that every complaint names its row."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+
+class Table:
+    """Columns of one file, with the line of each row."""
+
+    def __init__(self, file: Path, columns: Mapping[str, list[str]], line: list[int]) -> None:
+        self.file = file
+        self._columns = columns
+        self._line = line
+
+    def __len__(self) -> int:
+        return len(self._line)
+
+    def where(self, row: int) -> str:
+        return f"row {self._line[row]}"
+
+    def text(self, column: str) -> list[str]:
+        return self._columns[column]
+
+    def integers(self, column: str) -> NDArray[np.int64]:
+        return np.array([self._number(int, column, row) for row in range(len(self))], np.int64)
+
+    def numbers(self, column: str) -> NDArray[np.float64]:
+        values = np.array([self._number(float, column, row) for row in range(len(self))], np.float64)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise self.error(int(bad[0]), column, "is not a finite number")
+        return values
+
+    def error(self, row: int, column: str, problem: str) -> InputError:
+        return InputError(self.file, f"{self.where(row)}, {column} = {self._columns[column][row]!r}", problem)
+
+    def _number(self, kind: type[int] | type[float], column: str, row: int) -> int | float:
+        text = self._columns[column][row]
+        try:
+            return kind(text)
+        except ValueError:
+            name = "a whole number" if kind is int else "a number"
+            raise self.error(row, column, f"is not {name}") from None
+
+
+def read_table(file: Path, columns: Sequence[str]) -> Table:
+    """Read the named columns of a table; others are passed over. Raises InputError naming file, row and value."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            reader = csv.reader(stream)
+            header = [name.strip() for name in next(reader, [])]
+            for name in columns:
+                if header.count(name) != 1:
+                    problem = "there is no such column" if name not in header else "stands twice in the header"
+                    raise InputError(file, f"column {name}", f"{problem} (header: {','.join(header)!r})")
+            place = [header.index(name) for name in columns]
+            values: dict[str, list[str]] = {name: [] for name in columns}
+            line: list[int] = []
+            for row in reader:
+                if not any(cell.strip() for cell in row):
+                    continue
+                if len(row) != len(header):
+                    raise InputError(file, f"row {reader.line_num}", f"has {len(row)} cells, not {len(header)}")
+                line.append(reader.line_num)
+                for name, at in zip(columns, place, strict=True):
+                    values[name].append(row[at].strip())
+    except FileNotFoundError:
+        raise InputError(file, "", "there is no such file") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(file, "", f"cannot be read ({error})") from None
+    if not line:
+        raise InputError(file, "", "has no rows")
+    return Table(file, values, line)
+
+
+def write_table(file: Path, columns: Mapping[str, Iterable[object]]) -> None:
+    """Write columns of equal length; floats with all their digits."""
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def check_frames(table: Table, frame: NDArray[np.int64]) -> int:
+    """The number of frames; they must start at 0 and have no gaps."""
+    if frame.min() < 0:
+        raise table.error(int(frame.argmin()), "frame", "is negative: frames count from 0")
+    present = np.unique(frame)
+    missing = np.flatnonzero(present != np.arange(len(present)))
+    if len(missing):
+        row = int(np.flatnonzero(frame == present[missing[0]])[0])
+        raise table.error(row, "frame", f"comes without frame {int(missing[0])}: frames count from 0 without gaps")
+    return len(present)
+
+
+def check_unique(table: Table, column: str, *keys: NDArray[np.int64]) -> None:
+    """No two rows may share all keys; the complaint names the later row."""
+    stacked = np.stack(keys, axis=1)
+    _, first = np.unique(stacked, axis=0, return_index=True)
+    if len(first) < len(stacked):
+        again = int(np.setdiff1d(np.arange(len(stacked)), first)[0])
+        raise table.error(again, column, "stands twice" + (" in its frame" if len(keys) > 1 else ""))

@@ -1,0 +1,1 @@
+"""What is drawn as curves and plots, a file for each."""

@@ -1,0 +1,60 @@
+"""Writes the residuals of every sweep, as powers of ten: the viewer has no logarithmic axis."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from solver.bodies.grains import Array
+from solver.nlgs.sweep_record import SweepHistory
+
+from ..look import entities
+from ..look.colours import INK, SERIES, Rgba
+from ..look.scene import Clock
+from ..look.values import log_scalar, send_scalars
+
+SMALLEST = 1e-16  # residuals below are drawn here: rounding level
+
+
+def log_residual_styles(stream: rr.RecordingStream) -> None:
+    """Log names and colours of the residual curves."""
+    _log_style(stream, entities.SWEEP_NATURAL_MAP, "natural map", SERIES[0], 1.5)
+    _log_style(stream, entities.SWEEP_UNBALANCE, "worst unbalance / mean f_n", SERIES[1], 1.5)
+    _log_style(stream, entities.SWEEP_FORCE_CHANGE, "force change |Δf|/|f|", SERIES[3], 1.0)
+
+
+def log_tolerance(clock: Clock, tolerance: float) -> None:
+    """Log the stopping level, once a frame."""
+    clock.start()
+    log_scalar(clock, entities.TOLERANCE, float(power_of_ten(np.array(tolerance))))
+
+
+def log_tolerance_style(stream: rr.RecordingStream) -> None:
+    """Log name and colour of the stopping level."""
+    _log_style(stream, entities.TOLERANCE, "stopping level", INK, 1.0)
+
+
+def log_residuals(clock: Clock, history: SweepHistory) -> None:
+    """Log one frame's residuals of every sweep measured (at least one sweep); on `frame`, those of the last."""
+    for path, residual in (
+        (entities.SWEEP_NATURAL_MAP, history.natural_map),
+        (entities.SWEEP_UNBALANCE, history.unbalance),
+        (entities.SWEEP_FORCE_CHANGE, history.force_change),
+    ):
+        powers = power_of_ten(residual)
+        known = np.flatnonzero(np.isfinite(powers))  # no gaps between, which would break the curve
+        if len(known):
+            when = rr.TimeColumn(entities.SWEEP, sequence=clock.first + known)
+            send_scalars(clock.stream, path, when, powers[known])
+        clock.frame_only()
+        log_scalar(clock, path, float(powers[-1]))
+
+
+def power_of_ten(residual: Array) -> Array:
+    """log10 of residuals, not below that of SMALLEST; NaN stays NaN, infinity becomes NaN."""
+    residual = np.where(np.isinf(residual), np.nan, residual)
+    return np.log10(np.maximum(residual, SMALLEST))
+
+
+def _log_style(stream: rr.RecordingStream, path: str, name: str, colour: Rgba, width: float) -> None:
+    stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=width), static=True)

@@ -1,0 +1,127 @@
+"""Draws a frame's residuals over its sweeps on two logarithmic axes, which the viewer itself does not have.
+
+The curves are those of the chain, the stopping level and a start from zero forces beside them; on the timeline `sweep`
+points move along the curves.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.nlgs.sweep_record import SweepHistory
+
+from ..look import entities
+from ..look.axes import Axes
+from ..look.colours import INK, SERIES, Rgba, packed
+from ..look.scene import Clock
+from .starts import COLD_SWEEPS, Starts
+
+DECADES = (-6.0, 4.0)  # log10 of a residual, bottom and top
+MOST_POINTS = 220  # of a curve
+LEAST_SWEEPS = 1000  # that the axis has room for
+COLOURS: tuple[Rgba, ...] = (SERIES[0], SERIES[1], SERIES[3])  # natural map, unbalance, force change
+COLD: Rgba = (176, 222, 128, 150)
+_POWERS = "⁰¹²³⁴⁵⁶"
+
+
+class ResidualPlot:
+    """Draws the residuals of frames; the axis of sweeps has room for what the first frame took."""
+
+    def __init__(self, tolerance: float | None) -> None:
+        self._tolerance = tolerance
+        self._axes: Axes | None = None
+
+    def log(self, clock: Clock, history: SweepHistory, starts: Starts, marked: NDArray[np.int64]) -> None:
+        """Draw one frame (at least one sweep); marked (r,): sweeps, ascending, at which points stand on the curves."""
+        axes = self._axes or self._begin(clock.stream, history.count)
+        residuals = np.stack([history.natural_map, history.unbalance, history.force_change])
+        curves = [axes_points(axes, *envelope(each)) for each in residuals]
+        known = np.isfinite(starts.cold) & (starts.cold > 0.0)
+        strips = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), starts.cold[known])]
+        shown = [len(strip) > 1 for strip in strips]
+        clock.start()
+        clock.stream.log(
+            entities.RESIDUAL_CURVES,
+            rr.LineStrips2D(
+                [strip for strip, keep in zip(strips, shown, strict=True) if keep],
+                radii=np.array([1.4, 1.0, 0.8, 1.2], np.float32)[shown],
+                colors=packed(np.array([*COLOURS, COLD], np.uint8)[shown]),
+                draw_order=10.0,
+            ),
+        )
+        self._mark(clock, axes, residuals, np.unique(np.clip(marked, 0, history.count - 1)))
+
+    def _mark(self, clock: Clock, axes: Axes, residuals: Array, at: NDArray[np.int64]) -> None:
+        """Points on the curves (3, s) at sweeps; the first row carries how they look."""
+        rows = at if len(at) and at[0] == 0 else np.concatenate([[0], at])
+        places = [axes_points(axes, np.full(3, 1.0 + row), residuals[:, row], keep=True) for row in rows.tolist()]
+        clock.start()
+        clock.stream.log(
+            entities.RESIDUAL_MARKS,
+            rr.Points2D(places[0], radii=np.float32(4.5), colors=packed(np.array(COLOURS, np.uint8)), draw_order=20.0),
+        )
+        if len(rows) > 1:
+            columns = rr.Points2D.columns(positions=np.concatenate(places[1:]))
+            clock.stream.send_columns(
+                entities.RESIDUAL_MARKS, clock.columns(rows[1:]), columns.partition(np.full(len(rows) - 1, 3))
+            )
+
+    def _begin(self, stream: rr.RecordingStream, count: int) -> Axes:
+        """Log the axes, static."""
+        decades = float(np.ceil(np.log10(max(count, LEAST_SWEEPS)) - 1e-9))
+        axes = self._axes = Axes((0.0, decades), DECADES)
+        level = []
+        if self._tolerance is not None and self._tolerance > 0.0:
+            height = float(np.clip(np.log10(self._tolerance), *DECADES))
+            level = [axes.points(np.array([0.0, decades]), np.full(2, height))]
+        notes = [
+            (0.24, 0.98, "natural map", COLOURS[0]),
+            (0.24, 0.91, "… of a cold start", (*COLD[:3], 255)),
+            (0.68, 0.98, "worst unbalance / mean f_n", COLOURS[1]),
+            (0.68, 0.91, "force change |Δf|/|f|", COLOURS[2]),
+        ]  # fmt: skip
+        if level:
+            notes.append((0.46, 0.84, "straight: stopping level", INK))
+        axes.log(
+            stream,
+            entities.RESIDUAL_AXES,
+            entities.RESIDUAL_TICKS,
+            x_ticks=[(float(k), _power(k)) for k in range(int(decades) + 1)],
+            y_ticks=[(float(k), _power(k)) for k in range(int(DECADES[0]), int(DECADES[1]) + 1, 2)],
+            notes=[(x * decades, DECADES[0] + y * (DECADES[1] - DECADES[0]), text, of) for x, y, text, of in notes],
+            guides=level,
+        )
+        return axes
+
+
+def envelope(residual: Array) -> tuple[Array, Array]:
+    """A curve thinned to steps that grow: the sweep (k,), counted from 1, of the greatest residual of each step."""
+    edges = np.unique(np.round(np.geomspace(1.0, len(residual) + 1.0, MOST_POINTS)).astype(np.int64)) - 1
+    known = np.where(np.isfinite(residual), residual, -1.0)
+    at = [a + int(np.argmax(known[a:b])) for a, b in pairwise(edges.tolist())]
+    at = np.array(at, np.int64)
+    at = at[known[at] > 0.0]
+    return (1.0 + at).astype(np.float64), residual[at]
+
+
+def axes_points(axes: Axes, sweep: Array, residual: Array, *, keep: bool = False) -> NDArray[np.float32]:
+    """Points of the plot (k, 2) at sweeps counted from 1; what lies outside is drawn at the rim.
+
+    With `keep` a residual that is not known, or zero, is drawn at the bottom; otherwise it is left out.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = np.log10(sweep), np.log10(residual)
+    y = np.where(np.isfinite(y), y, DECADES[0]) if keep else y
+    known = np.isfinite(y)
+    return axes.points(np.clip(x[known], *axes.x_range), np.clip(y[known], *DECADES))
+
+
+def _power(exponent: int) -> str:
+    if exponent == 0:
+        return "1"
+    return f"10{'⁻' if exponent < 0 else ''}{_POWERS[abs(exponent)]}"

@@ -1,0 +1,118 @@
+"""Writes how far a frame is to be trusted: status lanes, trust, settling, flags."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from solver.sequence.frame_forces import FrameForces, FrameStatus
+
+from ..look import entities
+from ..look.colours import SERIES, Rgba
+from ..look.scene import Clock, Scene
+from ..look.texts import printable
+from ..look.values import log_scalar
+from ..packing_layers.changes import Changes
+from .convergence import power_of_ten
+
+STATUS_COLOURS: dict[FrameStatus, Rgba] = {
+    FrameStatus.RESET: (142, 118, 214, 255),
+    FrameStatus.SUSPECT: (226, 92, 82, 255),
+    FrameStatus.REARRANGING: (222, 158, 62, 255),
+    FrameStatus.SETTLING: (74, 134, 196, 255),
+    FrameStatus.SETTLED: (62, 150, 104, 255),
+    FrameStatus.FAILED: (158, 32, 74, 255),
+}
+ALL_TRACKED, SOME_LOST = "all tracked", "grains lost"
+
+_LEVELS = {
+    FrameStatus.FAILED: "ERROR",
+    FrameStatus.SUSPECT: "WARN",
+    FrameStatus.REARRANGING: "INFO",
+    FrameStatus.RESET: "INFO",
+}
+
+
+def log_settling_styles(stream: rr.RecordingStream) -> None:
+    """Log lanes, names and colours."""
+    stream.log(
+        entities.STATUS_LANE,
+        rr.StateConfiguration(
+            values=[status.name.lower() for status in FrameStatus],
+            labels=[status.name.lower() for status in FrameStatus],
+            colors=list(STATUS_COLOURS.values()),
+        ),
+        static=True,
+    )
+    stream.log(
+        entities.TRACKING_LANE,
+        rr.StateConfiguration(
+            values=[ALL_TRACKED, SOME_LOST],
+            labels=[ALL_TRACKED, SOME_LOST],
+            colors=[(58, 84, 108, 255), (226, 92, 82, 255)],
+        ),
+        static=True,
+    )
+    for path, name, colour in (
+        (entities.TRUST, "trust T (these inputs)", SERIES[2]),
+        (entities.SIMILARITY, "similarity with the frame before", SERIES[1]),
+        (entities.CORRECTION, "correction ε", SERIES[0]),
+        (entities.OLD_UNBALANCE, "old unbalance ū", SERIES[3]),
+        (entities.START_DIFFERENCE, "two starts differ by H", SERIES[1]),
+        (entities.FRAMES_SINCE_RESET, "frames since reset", SERIES[1]),
+        (entities.SAVED_SWEEPS, "sweeps saved", SERIES[1]),
+        (entities.SWEEP_COUNT, "sweeps", SERIES[1]),
+        (entities.FINAL_NATURAL_MAP, "natural map reached", SERIES[2]),
+        (entities.FINAL_UNBALANCE, "worst unbalance of the reported field", SERIES[3]),
+        (entities.GAINED_COUNT, "gained", (112, 214, 134, 255)),
+        (entities.PARTED_COUNT, "lost", (255, 82, 122, 255)),
+    ):
+        stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+
+
+def log_settling(clock: Clock, scene: Scene, forces: FrameForces, changes: Changes) -> None:
+    """Log lanes, trust and flags of one frame."""
+    clock.start()
+    lost = ~scene.tracks.present[clock.frame]
+    clock.stream.log(entities.STATUS_LANE, rr.StateChange(state=forces.status.name.lower()))
+    clock.stream.log(entities.TRACKING_LANE, rr.StateChange(state=SOME_LOST if lost.any() else ALL_TRACKED))
+    _log_flags(clock, scene, forces)
+    clock.end()
+    for path, value in (
+        (entities.TRUST, forces.trust),
+        (entities.SIMILARITY, changes.similarity),
+        (entities.CORRECTION, forces.correction),
+        (entities.OLD_UNBALANCE, forces.old_unbalance),
+        (entities.START_DIFFERENCE, forces.start_difference),
+        (entities.FRAMES_SINCE_RESET, forces.frames_since_reset),
+        (entities.SWEEP_COUNT, forces.sweeps),
+        (entities.FINAL_NATURAL_MAP, power_of_ten(np.array(forces.natural_map))),
+        (entities.FINAL_UNBALANCE, power_of_ten(np.array(forces.unbalance))),
+        (entities.GAINED_COUNT, changes.gained),
+        (entities.PARTED_COUNT, changes.parted),
+    ):
+        log_scalar(clock, path, float(value))
+
+
+def _log_flags(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    present = scene.tracks.present
+    before = present[clock.frame - 1] if clock.frame else np.ones(present.shape[1], bool)
+    now = present[clock.frame]
+    if forces.status in _LEVELS:
+        _log_flag(clock, f"{forces.status.name.lower()}: {forces.reason}", _LEVELS[forces.status])
+    if (before & ~now).any():
+        ids = _listed(scene, before & ~now)
+        _log_flag(clock, f"lost grain {ids}: takes no part from here", "WARN")
+    if clock.frame and (now & ~before).any():
+        _log_flag(clock, f"grain {_listed(scene, now & ~before)} found again", "INFO")
+
+
+def _log_flag(clock: Clock, text: str, level: str) -> None:
+    clock.stream.log(entities.FLAGS, rr.TextLog(printable(text), level=level))
+
+
+def _listed(scene: Scene, rows: np.ndarray) -> str:
+    """Grain ids, at most eight of them."""
+    ids = scene.tracks.id[rows].tolist()
+    shown = ", ".join(str(i) for i in ids[:8])
+    return f"{shown} and {len(ids) - 8} more" if len(ids) > 8 else shown

@@ -1,0 +1,106 @@
+"""Writes the stress cross and the rose of contact directions: polar drawings about a unit circle."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from solver.bodies.grains import Array
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.frame_statistics import FrameStatistics
+
+from ..look import entities
+from ..look.axes import log_cross_hairs, log_texts, polar
+from ..look.colours import FAINT, INK, SERIES, packed, packed_one
+from ..look.scene import Clock
+
+BINS = 36  # of contact directions, 10° each
+STRESS_REACH = 1.75  # of the views, in units of the circle
+ROSE_REACH = 2.7
+
+
+def log_polar_axes(stream: rr.RecordingStream) -> None:
+    """Log circles and axes."""
+    log_cross_hairs(stream, entities.STRESS_AXES, STRESS_REACH)
+    log_cross_hairs(stream, entities.ROSE_AXES, ROSE_REACH)
+    log_texts(
+        stream,
+        entities.ROSE_TICKS,
+        [(_corner(ROSE_REACH, 0), "contacts", SERIES[1]), (_corner(ROSE_REACH, 1), "forces", SERIES[0])],
+    )
+
+
+def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
+    """Log the principal stresses, and the normal stress in every direction, over the pressure."""
+    clock.end()
+    if not (np.all(np.isfinite(statistics.stress)) and statistics.pressure > 0.0):
+        clock.stream.log(entities.STRESS_CROSS, rr.LineStrips2D([]))
+        clock.stream.log(entities.STRESS_VALUES, rr.Points2D([], labels=[]))
+        clock.stream.log(entities.STRESS_CURVE, rr.LineStrips2D([]))
+        return
+    stress = 0.5 * (statistics.stress + statistics.stress.T)
+    value, axis = np.linalg.eigh(stress)
+    value, axis = value[::-1], axis[:, ::-1]  # greatest first
+    share = value / statistics.pressure
+    tips = np.stack([axis[0], -axis[1]], axis=1) * (100.0 * share)[:, None]
+    clock.stream.log(
+        entities.STRESS_CROSS,
+        rr.LineStrips2D(
+            np.stack([-tips, tips], axis=1).astype(np.float32),
+            radii=np.array([3.0, 2.0], np.float32),
+            colors=packed(np.array([SERIES[0], SERIES[1]], np.uint8)),
+            draw_order=20.0,
+        ),
+    )
+    angle = np.degrees(statistics.principal_direction)
+    texts = [
+        (_corner(STRESS_REACH, 0), f"σ₁ {1e-3 * value[0]:.1f} kPa at {f'{angle:.0f}'.replace('-', '−')}°", SERIES[0]),
+        (_corner(STRESS_REACH, 1), f"σ₂ {1e-3 * value[1]:.1f} kPa", SERIES[1]),
+    ]
+    log_texts(clock.stream, entities.STRESS_VALUES, texts, static=False)
+    angle = np.linspace(0.0, 2.0 * np.pi, 97)
+    normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    radius = np.einsum("ka,ab,kb->k", normal, stress, normal) / statistics.pressure
+    clock.stream.log(
+        entities.STRESS_CURVE,
+        rr.LineStrips2D([polar(angle, radius)], radii=np.float32(0.9), colors=packed_one(INK), draw_order=10.0),
+    )
+
+
+def log_rose(clock: Clock, forces: FrameForces) -> None:
+    """Log how many contacts with force, and how much force, point in every direction, over the isotropic value."""
+    clock.end()
+    loaded = np.isfinite(forces.fn) & (forces.fn > 0.0)
+    normal, fn = forces.contacts.normal[loaded], forces.fn[loaded]
+    for path, weight, colour, order in (
+        (entities.ROSE, np.ones(len(fn)), SERIES[1], 10.0),
+        (entities.ROSE_OF_FORCES, fn, SERIES[0], 20.0),
+    ):
+        strips = [rose_outline(direction_shares(normal, weight))] if len(fn) else []
+        clock.stream.log(
+            path,
+            rr.LineStrips2D(
+                strips, radii=np.float32(1.3), colors=packed_one(colour if strips else FAINT), draw_order=order
+            ),
+        )
+
+
+def direction_shares(normal: Array, weight: Array) -> Array:
+    """Weight of the directions of normals (c, 2) and their opposites, over the isotropic share (BINS,)."""
+    angle = np.arctan2(normal[:, 1], normal[:, 0])
+    both = np.mod(np.concatenate([angle, angle + np.pi]), 2.0 * np.pi)
+    counts = np.bincount((both * BINS / (2.0 * np.pi)).astype(np.int64) % BINS, np.tile(weight, 2), BINS)
+    return counts * BINS / counts.sum()
+
+
+def rose_outline(shares: Array) -> np.ndarray:
+    """A closed outline of sectors (2 BINS + 1, 2) in view units."""
+    edges = np.arange(BINS + 1) * 2.0 * np.pi / BINS
+    angle = np.stack([edges[:-1], edges[1:]], axis=1).ravel()
+    outline = polar(angle, np.repeat(shares, 2))
+    return np.concatenate([outline, outline[:1]])
+
+
+def _corner(reach: float, line: int) -> Array:
+    """Where a line of text stands in the upper left corner of a polar view."""
+    return 100.0 * reach * np.array([-0.62, -0.95 + 0.105 * line])

@@ -1,0 +1,1 @@
+"""Recordings as files: written, live, read back, mended, shared, catalogued."""

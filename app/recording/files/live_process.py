@@ -1,0 +1,143 @@
+"""A live recording in a process of its own: the solve does not wait for its pictures.
+
+What is solved goes there through a pipe. The process ends when the pipe does, be it that the run is over, interrupted
+or killed: it closes the recording and ends its servers. Frames that wait for their turn are those of the results,
+which the run keeps anyway, so that waiting takes no memory; over there is one frame at a time.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.frame_statistics import FrameStatistics
+
+from ...results.results import Results
+from .live import LiveRecording
+
+NICENESS = 10  # added to that of the run; a system that weighs whole sessions (autogroup) pays no heed to it
+CUT_SHORT = "The run ended before its last frame."
+COMMAND = f"from {__name__} import serve; serve()"
+
+
+@dataclass(frozen=True, slots=True)
+class GreyPhotographs:
+    """Photographs of a run's frames as they are recorded; read where and when they are asked for."""
+
+    photographs: Sequence[NDArray[np.float32]]  # of the whole experiment, each (H, W), 255 is white
+    first: int  # photograph of the run's frame 0
+
+    def __call__(self, frame: int) -> NDArray[np.uint8]:
+        return np.clip(np.rint(self.photographs[self.first + frame]), 0, 255).astype(np.uint8)
+
+
+class LiveProcess:
+    """Hands a run to a LiveRecording elsewhere. Call start, frame for every frame in order, then close in any case.
+
+    tell: is given sentences for the user as they come, from another thread: how to watch, what went wrong.
+    options: of LiveRecording; they go through the pipe, as do the run and its frames.
+    """
+
+    def __init__(self, path: Path, tell: Callable[[str], None], **options: Any) -> None:
+        self.path = path
+        self.started = False
+        self._tell, self._options = tell, options
+        self._waiting: queue.SimpleQueue[tuple[str, Any] | None] = queue.SimpleQueue()
+        # It takes a second to get ready, which is over when there is something to solve.
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            start_new_session=True,  # an interrupt is meant for the run
+        )
+        self._threads = tuple(threading.Thread(target=work, daemon=True) for work in (self._feed, self._listen))
+
+    def start(self, run: Results) -> None:
+        """Open server, file and viewer; `run` has bodies and motion, its frames are still to come."""
+        self.started = True
+        self.path.unlink(missing_ok=True)  # of a former run
+        for thread in self._threads:
+            thread.start()
+        self._waiting.put(("start", (self.path, self._options, run)))
+
+    def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
+        """Have one finished frame recorded, and do not wait for it."""
+        self._waiting.put(("frame", (forces, statistics)))
+
+    def close(self, *, whole: bool) -> None:
+        """Wait for what is still to be recorded, and for the end of file, servers and page.
+
+        whole: whether the run came to its end, which the summary says.
+        """
+        if not self.started:  # it has opened nothing yet
+            self._process.kill()
+            self._process.communicate()
+            return
+        if whole:
+            self._waiting.put(("finish", ()))
+        self._waiting.put(None)
+        for thread in self._threads:
+            thread.join()
+        if self._process.wait():
+            self._tell("The live view broke off, without harm to the run.")
+
+    def _feed(self) -> None:
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError), self._process.stdin as pipe:  # who hears no more says so by how it ended
+            while (message := self._waiting.get()) is not None:
+                pickle.dump(message, pipe, pickle.HIGHEST_PROTOCOL)
+                pipe.flush()
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as lines:
+            for line in lines:
+                self._tell(line.decode().rstrip())
+
+
+def serve() -> None:
+    """What the process does: record what comes through standard input until it ends."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # The pipe alone says when to end. Not SIG_IGN, which the page's server would inherit.
+        signal.signal(number, lambda *_: None)
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+    live, whole = None, False
+    try:
+        while not whole:
+            name, given = pickle.load(sys.stdin.buffer)
+            if name == "start":
+                path, options, run = given
+                live = LiveRecording(path, **options)
+                live.start(run)
+                if live.hint:
+                    print(live.hint, flush=True)
+            elif live is not None and name == "frame":
+                live.frame(*given)
+            whole = name == "finish"
+    except (EOFError, pickle.UnpicklingError):  # between two messages, or amidst one: the run is no more
+        pass
+    finally:
+        if live is not None:
+            try:
+                live.finish(() if whole else (CUT_SHORT,))
+            finally:
+                live.close()
+            # Nobody listens any more where the run was killed.
+            with suppress(BrokenPipeError):
+                print(*live.notes, sep="\n", end="\n" if live.notes else "", flush=True)

@@ -1,0 +1,160 @@
+"""A small recording to send: some of the frames, smaller photographs, the same tabs."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from rerun.chunk import Chunk, RrdReader
+
+from ...atomic import replacing
+from ..look import entities
+from ..tabs.blueprint import make_blueprint
+from ..tabs.layout_property import PROPERTY, read_layout, send_layout
+from ..viewing.viewer import viewer_binary
+
+JPEG_QUALITY = 70  # of photographs made smaller
+
+
+@dataclass(frozen=True, slots=True)
+class ShareReport:
+    """What was written."""
+
+    path: Path
+    size: int  # [bytes]
+    former_size: int  # [bytes] of the recording it was made from
+    frames: int
+
+
+def share_recording(
+    source: Path | str, target: Path | str, *, first: int = 0, stop: int | None = None, scale: float = 1.0
+) -> ShareReport:
+    """Write the frames first … stop − 1 of a recording, photographs made smaller by `scale` (0 … 1], to a new file.
+
+    Frames and sweeps keep their numbers. Raises ValueError for a scale or frames that do not fit, OSError where the
+    viewer's own tool could not pack the file.
+    """
+    source, target = Path(source), Path(target)
+    if not 0.0 < scale <= 1.0:
+        raise ValueError(f"photographs are made smaller by a scale in (0, 1], not {scale:g}")
+    layout = read_layout(source)
+    stop = layout.frame_count if stop is None else stop
+    if not 0 <= first < stop <= layout.frame_count:
+        raise ValueError(f"{first}:{stop} is not a range of the frames 0:{layout.frame_count}")
+    entry = RrdReader(str(source)).recordings()[0]
+    chunks = RrdReader(str(source)).store().stream().to_chunks()
+    sweeps = _sweeps_of(chunks, first, stop)
+    layout = replace(layout, frame_count=stop - first)
+    with replacing(target) as part:
+        loose = part.with_name(part.name + ".loose.rrd")
+        stream = rr.RecordingStream(
+            entities.APPLICATION_ID, recording_id=f"{entry.recording_id}-{first}-{stop}", send_properties=False
+        )
+        stream.save(loose, default_blueprint=make_blueprint(layout))
+        try:
+            stream.set_log_time_enabled(False)
+            rr.send_chunks(_chosen(chunks, first, stop, sweeps, scale), recording=stream)
+            send_layout(stream, layout)
+            stream.disconnect()
+            run_tool("optimize", loose, "-o", part)
+        finally:
+            stream.disconnect()
+            loose.unlink(missing_ok=True)
+    return ShareReport(target, target.stat().st_size, source.stat().st_size, stop - first)
+
+
+def run_tool(command: str, *arguments: Path | str) -> None:
+    """Run `rerun rrd COMMAND` of the installed SDK; raises OSError with what it says where it fails."""
+    done = subprocess.run(
+        [viewer_binary(), "rrd", command, *map(str, arguments)],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+    )  # fmt: skip
+    if done.returncode:
+        raise OSError(f"rerun rrd {command} failed: {' '.join(done.stderr.split())[-300:]}")
+
+
+def _sweeps_of(chunks: list[Chunk], first: int, stop: int) -> tuple[int, int]:
+    """First value of `sweep` of the frames first … stop − 1, and the first one after them."""
+    frames, sweeps = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    for chunk in chunks:
+        if {entities.FRAME, entities.SWEEP} <= set(chunk.timeline_names):
+            batch = chunk.to_record_batch()
+            frames.append(_integers(batch, entities.FRAME))
+            sweeps.append(_integers(batch, entities.SWEEP))
+    frame, sweep = np.concatenate(frames), np.concatenate(sweeps)
+    inside = (frame >= first) & (frame < stop)
+    if not inside.any():
+        raise ValueError(f"the recording holds no row of the frames {first}:{stop}")
+    return int(sweep[inside].min()), int(sweep[inside].max()) + 1
+
+
+def _chosen(chunks: list[Chunk], first: int, stop: int, sweeps: tuple[int, int], scale: float) -> Iterator[Chunk]:
+    for chunk in chunks:
+        if chunk.entity_path == f"/__properties/{PROPERTY}":
+            continue  # it has another number of frames now
+        if _is_layer_outside(chunk.entity_path, first, stop):
+            continue
+        timelines = set(chunk.timeline_names)
+        if not timelines & {entities.FRAME, entities.SWEEP}:
+            yield chunk
+            continue
+        batch = chunk.to_record_batch()
+        line, (low, high) = (entities.FRAME, (first, stop)) if entities.FRAME in timelines else (entities.SWEEP, sweeps)
+        at = _integers(batch, line)
+        kept = (at >= low) & (at < high)
+        if not kept.any():
+            continue
+        if not kept.all():
+            batch = batch.filter(pa.array(kept))
+            chunk = Chunk.from_record_batch(batch)[0]
+        if chunk.entity_path == entities.PHOTOGRAPH and scale < 1.0:
+            yield from _smaller_photographs(batch, scale)
+        else:
+            yield chunk
+
+
+def _is_layer_outside(path: str, first: int, stop: int) -> bool:
+    """Whether an entity is the static layer of a frame that is not shared."""
+    head, _, frame = path.rpartition("/")
+    return head == entities.STACK_LAYERS and not first <= int(frame) < stop
+
+
+def _smaller_photographs(batch: pa.RecordBatch, scale: float) -> Iterator[Chunk]:
+    """The photographs of a chunk, smaller, and stretched to where they were by a transform."""
+    column = next(name for name in batch.schema.names if name.endswith("EncodedImage:blob"))
+    blobs = batch.column(column)
+    for row in range(batch.num_rows):
+        if not blobs[row].is_valid:
+            continue
+        coded = blobs[row].values[0].values.to_numpy().astype(np.uint8)
+        picture = cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)
+        if picture is None:
+            raise ValueError(f"the photograph of frame {_integers(batch, entities.FRAME)[row]} cannot be decoded")
+        height, width = picture.shape
+        shape = max(round(width * scale), 1), max(round(height * scale), 1)
+        small = cv2.resize(picture, shape, interpolation=cv2.INTER_AREA)
+        done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        if not done:
+            raise ValueError(f"a photograph of {shape[0]} × {shape[1]} pixels could not be encoded")
+        kept = batch.slice(row, 1).drop_columns([column])
+        yield Chunk.from_record_batch(kept)[0]
+        stretch = [width / shape[0], height / shape[1], 1.0]
+        yield Chunk.from_columns(
+            entities.PHOTOGRAPH,
+            [rr.TimeColumn(name, sequence=_integers(batch, name)[row : row + 1]) for name in _timelines(batch)],
+            [*rr.EncodedImage.columns(blob=[data.tobytes()]), *rr.Transform3D.columns(scale=[stretch])],
+        )
+
+
+def _timelines(batch: pa.RecordBatch) -> list[str]:
+    return [name for name in (entities.FRAME, entities.SWEEP) if name in batch.schema.names]
+
+
+def _integers(batch: pa.RecordBatch, name: str) -> np.ndarray:
+    return batch.column(name).cast(pa.int64()).to_numpy(zero_copy_only=False)

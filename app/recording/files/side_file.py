@@ -1,0 +1,66 @@
+"""A side file with every kept sweep of chosen frames. Opened beside its recording, the viewer shows both as one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from ...errors import InputError
+from ...results.results import Results
+from ..look.force_style import ForceRange, ForceStyle
+from ..look.scene import Clock
+from ..packing_layers.network import SweepChoice, send_sweeps, visible_sweeps
+from ..tabs.layout_property import read_layout
+from .recorder import BATCHES
+
+
+def write_side_file(results: Results, recording: Path, target: Path, frames: Sequence[int]) -> str:
+    """Do what record_side_file does and say so in a sentence; raises InputError for a frame that does not exist."""
+    try:
+        size = record_side_file(results, recording, target, frames)
+    except ValueError as error:
+        raise InputError("--full-frames", "", str(error)) from None
+    shown = ", ".join(map(str, frames))
+    return f"Every kept sweep of the frames {shown} is in {target} ({1e-6 * size:.1f} MB)."
+
+
+def record_side_file(results: Results, recording: Path | str, target: Path | str, frames: Sequence[int]) -> int:
+    """Write all kept sweeps of some frames beside a recording of the same results; returns the size [bytes].
+
+    The file carries the recording's own identity: `rodsight view RECORDING SIDE` shows one recording. Raises
+    FileNotFoundError where there is no recording, ValueError for a frame that does not exist.
+    """
+    recording, target = Path(recording), Path(target)
+    if not recording.is_file():
+        raise FileNotFoundError(f"there is no recording {recording}")
+    count = len(results.frames)
+    wrong = [frame for frame in frames if not 0 <= frame < count]
+    if wrong:
+        raise ValueError(f"there is no frame {wrong[0]}: frames count from 0 to {count - 1}")
+    entry = RrdReader(str(recording)).recordings()[0]
+    style = ForceStyle.on(read_layout(recording).canvas, ForceRange.of(results.frames))
+    part = target.with_name(target.name + ".part")
+    stream = rr.RecordingStream(
+        entry.application_id, recording_id=entry.recording_id, send_properties=False, batcher_config=BATCHES
+    )
+    try:
+        stream.save(part)
+        stream.set_log_time_enabled(False)
+        first = 0
+        for forces in results.frames:
+            span = forces.history.count + 1
+            if forces.frame in frames and forces.contacts.count:
+                clock = Clock(stream, forces.frame, first, first + span - 1)
+                rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
+                send_sweeps(clock, style, rows[1:], fn[1:], thin=True)  # the first has the geometry: not again
+            first += span
+        stream.disconnect()
+        os.replace(part, target)
+    finally:
+        stream.disconnect()
+        part.unlink(missing_ok=True)
+    return target.stat().st_size

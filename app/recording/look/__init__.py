@@ -1,0 +1,1 @@
+"""What every drawing shares: entity paths, scene, canvas, colours, widths, texts, axes, legends."""

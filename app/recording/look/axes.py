@@ -1,0 +1,105 @@
+"""Axes drawn as lines, for the plots that the viewer does not have: logarithmic axes, scatter, roses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+
+from .colours import FAINT, INK, Rgba, packed, packed_one
+
+WIDTH, HEIGHT = 600.0, 380.0  # of a plot, in the units of its view
+PLOT_BOUNDS = ((-60.0, WIDTH + 25.0), (-15.0, HEIGHT + 45.0))  # of a view with its labels
+CIRCLE = 100.0  # radius of the unit circle of a polar plot
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """A rectangle of data drawn into WIDTH × HEIGHT, y up."""
+
+    x_range: tuple[float, float]
+    y_range: tuple[float, float]
+    width: float = WIDTH
+    height: float = HEIGHT
+
+    def points(self, x: Array, y: Array) -> NDArray[np.float32]:
+        """Data to the units of the view (…, 2)."""
+        (x0, x1), (y0, y1) = self.x_range, self.y_range
+        across = (np.asarray(x) - x0) / (x1 - x0) * self.width
+        down = (y1 - np.asarray(y)) / (y1 - y0) * self.height
+        return np.stack(np.broadcast_arrays(across, down), axis=-1).astype(np.float32)
+
+    def log(
+        self,
+        stream: rr.RecordingStream,
+        lines: str,
+        ticks: str,
+        *,
+        x_ticks: Sequence[tuple[float, str]],
+        y_ticks: Sequence[tuple[float, str]],
+        notes: Sequence[tuple[float, float, str, Rgba]] = (),
+        guides: Sequence[NDArray[np.float32]] = (),
+    ) -> None:
+        """Log grid lines and labels, static; notes: coloured texts at points; guides: further lines."""
+        x0, x1, y0, y1 = *self.x_range, *self.y_range
+        grid = [self.points(np.array([x, x]), np.array([y0, y1])) for x, _ in x_ticks]
+        grid += [self.points(np.array([x0, x1]), np.array([y, y])) for y, _ in y_ticks]
+        strips = [*grid, *guides]
+        shades = np.array([FAINT] * len(grid) + [INK] * len(guides), np.uint8)
+        shades[: len(grid), 3] = 90
+        stream.log(
+            lines, rr.LineStrips2D(strips, radii=np.float32(0.6), colors=packed(shades), draw_order=0.0), static=True
+        )
+        raised, left = 16.0 * (y1 - y0) / self.height, 22.0 * (x1 - x0) / self.width  # the viewer writes below a point
+        texts = [(x, y0, text, INK) for x, text in x_ticks]
+        texts += [(x0 - left, y + raised, text, INK) for y, text in y_ticks]
+        placed = [(self.points(np.array(x), np.array(y)), text, colour) for x, y, text, colour in [*texts, *notes]]
+        log_texts(stream, ticks, placed)
+
+
+def log_texts(
+    stream: rr.RecordingStream, path: str, texts: Sequence[tuple[NDArray, str, Rgba]], *, static: bool = True
+) -> None:
+    """Log coloured texts at points of a view."""
+    stream.log(
+        path,
+        rr.Points2D(
+            np.array([point for point, _, _ in texts], np.float32).reshape(-1, 2),
+            radii=np.float32(0.01),
+            colors=packed(np.array([colour for _, _, colour in texts], np.uint8).reshape(-1, 4)),
+            labels=[text for _, text, _ in texts],
+            show_labels=True,
+        ),
+        static=static,
+    )
+
+
+def circle(radius: float = CIRCLE) -> NDArray[np.float32]:
+    """A closed circle about the origin (97, 2)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 97)
+    return polar(angle, np.full(97, radius / CIRCLE))
+
+
+def polar(angle: Array, radius: Array) -> NDArray[np.float32]:
+    """Points at angles [rad], counter-clockwise as seen, and radii in units of the circle (k, 2)."""
+    return (CIRCLE * np.stack([radius * np.cos(angle), -radius * np.sin(angle)], axis=-1)).astype(np.float32)
+
+
+def log_cross_hairs(stream: rr.RecordingStream, path: str, reach: float) -> None:
+    """Log the unit circle and the axes of a polar plot, static; reach in units of the circle."""
+    arm = reach * CIRCLE
+    strips = [circle(), np.array([[-arm, 0], [arm, 0]]), np.array([[0, -arm], [0, arm]])]
+    stream.log(
+        path, rr.LineStrips2D(strips, radii=np.float32(0.5), colors=packed_one(FAINT), draw_order=0.0), static=True
+    )
+
+
+def round_step(size: float) -> float:
+    """The next of 1, 2, 5 × 10^k below a size."""
+    decade = 10.0 ** np.floor(np.log10(size))
+    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= size))

@@ -1,0 +1,80 @@
+"""The canvas: where a point of the world lies in the 2D views, and what the views frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.bodies.grains import Array
+
+from ...experiment.units import Scale
+from ...tracks import Tracks
+
+LARGEST_PHOTOGRAPH = 4_000_000  # px; above it a photograph is recorded at half size
+NOMINAL_RADIUS = 30.0  # px, of the mean grain, where there is no photograph
+
+
+@dataclass(frozen=True, slots=True)
+class Canvas:
+    """The world in pixels of the photograph as recorded; y points down.
+
+    The viewer puts the corner of the first pixel at (0, 0), so its centre is at (½, ½).
+    """
+
+    scale: Scale
+    shrink: int  # 1, or 2 where photographs are recorded at half size
+    grain_radius: float  # [px] of the mean grain
+    left: float  # [px] what the grains ever cover
+    top: float
+    right: float
+    bottom: float
+
+    @classmethod
+    def around(cls, tracks: Tracks, scale: Scale | None, photograph_shape: tuple[int, int] | None = None) -> Canvas:
+        """Fit the canvas around every pose of every grain."""
+        mean_radius = float(np.mean(tracks.radius))
+        points = tracks.position[tracks.present]
+        if len(points) == 0:
+            raise ValueError("no grain has a pose in any frame: there is nothing to draw")
+        if scale is None:
+            pixel_size = mean_radius / NOMINAL_RADIUS
+            scale = Scale(pixel_size, math.ceil(points[:, 1].max() / pixel_size) + 1)
+        large = photograph_shape is not None and math.prod(photograph_shape) > LARGEST_PHOTOGRAPH
+        shrink = 2 if large else 1
+        radius = mean_radius / scale.pixel_size / shrink
+        pixels = (scale.to_pixels(points) + 0.5) / shrink
+        margin = 2.2 * radius
+        left, top = pixels.min(axis=0) - margin
+        right, bottom = pixels.max(axis=0) + margin
+        return cls(scale, shrink, radius, float(left), float(top), float(right), float(bottom))
+
+    def points(self, world: Array) -> Array:
+        """Points (…, 2) [m] to (…, 2) [px]."""
+        return (self.scale.to_pixels(world) + 0.5) / self.shrink
+
+    def lengths(self, metres: Array) -> Array:
+        """Lengths [m] to [px]."""
+        return np.asarray(metres) / (self.scale.pixel_size * self.shrink)
+
+    @property
+    def width(self) -> float:
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        return self.bottom - self.top
+
+    @property
+    def legend_height(self) -> float:
+        """Height [px] of the strip below the grains that legends use."""
+        return 0.15 * max(self.height, 0.6 * self.width)
+
+    @property
+    def quantum(self) -> float:
+        """Step of recorded line radii [px]: a power of two near 1/120 grain radius (¼ px for a grain of 30 px).
+
+        Few distinct widths make the recording small; a power of two keeps them exact in float32.
+        """
+        return 2.0 ** round(math.log2(self.grain_radius / 120.0))

@@ -1,0 +1,101 @@
+"""Colours: perceptually even ramps built in OKLab, and the few fixed colours of the views.
+
+A ramp is a path through OKLab cut into steps of equal length, so that equal differences of force
+look equally different. OKLab: B. Ottosson, "A perceptual color space for image processing" (2020).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+
+# Cone responses (cubed) from OKLab, and linear sRGB from cone responses: Ottosson (2020).
+_CONES_FROM_LAB = np.array(
+    [[1.0, 0.3963377774, 0.2158037573], [1.0, -0.1055613458, -0.0638541728], [1.0, -0.0894841775, -1.2914855480]]
+)
+_RGB_FROM_CONES = np.array(
+    [
+        [4.0767416621, -3.3077115913, 0.2309699292],
+        [-1.2684380046, 2.6097574011, -0.3413193965],
+        [-0.0041960863, -0.7034186147, 1.7076147010],
+    ]
+)
+
+Rgba = tuple[int, int, int, int]
+
+BACKGROUND: Rgba = (13, 14, 18, 255)
+INK: Rgba = (214, 218, 226, 255)  # text and axes
+FAINT: Rgba = (92, 97, 108, 255)  # grid lines
+OUTLINE: Rgba = (150, 158, 172, 120)  # grains
+WEAK: Rgba = (150, 152, 158, 200)  # contacts below the weak level
+OPEN: Rgba = (120, 122, 130, 90)  # contacts without force
+WALL: Rgba = (120, 128, 142, 255)
+LOADED_WALL: Rgba = (222, 227, 236, 255)
+SLIDING: Rgba = (64, 214, 222, 255)  # the second colour, used for the tangential state only
+SUSPECT: Rgba = (255, 186, 73, 255)
+LOST: Rgba = (255, 82, 122, 255)
+GAINED: Rgba = (112, 214, 134, 255)
+ADDED: Rgba = (196, 130, 255, 255)  # by a reviewer
+FORBIDDEN: Rgba = (255, 214, 92, 255)  # by a reviewer
+SERIES: tuple[Rgba, ...] = ((255, 176, 84, 255), (110, 190, 255, 255), (176, 222, 128, 255), (214, 150, 240, 255))
+
+# Lightness, chroma, hue [°] along the way: deep red, vermilion, orange, yellow, cream.
+_FORCE_WAY = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.87, 0.155, 92.0), (0.97, 0.06, 106.0))
+# Overlap blue, touching pale, open orange.
+_GAP_WAY = ((0.58, 0.150, 255.0), (0.74, 0.09, 240.0), (0.95, 0.0, 0.0), (0.76, 0.11, 60.0), (0.64, 0.17, 45.0))
+# Quiet slate, violet, magenta, rose, pale: what is far from converged glows.
+_DOUBT_WAY = ((0.36, 0.045, 260.0), (0.46, 0.10, 285.0), (0.58, 0.19, 330.0), (0.74, 0.15, 5.0), (0.95, 0.03, 60.0))
+# Doubtful magenta over pale to a quiet teal where two bodies surely touch.
+_PROBABILITY_WAY = (
+    (0.60, 0.20, 350.0),
+    (0.76, 0.11, 20.0),
+    (0.90, 0.03, 110.0),
+    (0.66, 0.07, 200.0),
+    (0.50, 0.07, 215.0),
+)
+RAMP_LEVELS = 64
+
+
+def lab_from_lch(way: tuple[tuple[float, float, float], ...]) -> Array:
+    """Lightness, chroma and hue [°] (k, 3) to OKLab (k, 3)."""
+    lightness, chroma, hue = np.array(way).T
+    return np.stack([lightness, chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue))], axis=1)
+
+
+def linear_srgb(lab: Array) -> Array:
+    """OKLab (k, 3) to linear sRGB (k, 3), not clipped: outside 0 … 1 a screen cannot show it."""
+    return (lab @ _CONES_FROM_LAB.T) ** 3 @ _RGB_FROM_CONES.T
+
+
+def even_way(corners: Array, count: int) -> Array:
+    """Points (count, 3) at equal distances along the polyline through OKLab corners (k, 3)."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    at = np.linspace(0.0, length[-1], count)
+    return np.stack([np.interp(at, length, corners[:, axis]) for axis in range(3)], axis=1)
+
+
+def make_ramp(way: tuple[tuple[float, float, float], ...], count: int = RAMP_LEVELS) -> NDArray[np.uint8]:
+    """A ramp (count, 4) of opaque sRGB colours along a way through OKLab."""
+    linear = np.clip(linear_srgb(even_way(lab_from_lch(way), count)), 0.0, 1.0)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    ramp = np.full((count, 4), 255, np.uint8)
+    ramp[:, :3] = np.round(255.0 * srgb)
+    return ramp
+
+
+def packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """Colours (k, 4) as 0xRRGGBBAA (k,), the form the recording keeps."""
+    red, green, blue, alpha = np.asarray(colours, np.uint32).T
+    return red << 24 | green << 16 | blue << 8 | alpha
+
+
+def packed_one(colour: Rgba) -> np.uint32:
+    return packed(np.array([colour], np.uint8))[0]
+
+
+FORCE_RAMP = make_ramp(_FORCE_WAY)
+GAP_RAMP = make_ramp(_GAP_WAY)
+DOUBT_RAMP = make_ramp(_DOUBT_WAY)
+PROBABILITY_RAMP = make_ramp(_PROBABILITY_WAY)

@@ -1,0 +1,130 @@
+"""Writes the legends that stand below the packing: forces by width and colour, gaps by colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+
+from ..packing_layers.changes import gap_colours, gap_range
+from ..packing_layers.touching import probability_colours
+from ..packing_layers.unconverged import DECADES, doubt_colours
+from . import entities
+from .axes import log_texts
+from .canvas import Canvas
+from .colours import ADDED, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
+from .scene import Scene
+
+PIECES = 48
+TICKS_BELOW, NOTES_BELOW = 0.10, 0.42  # of the legend's height, from its line to the texts
+_POWERS = ("10⁻⁴", "0.001", "0.01", "0.1")  # texts of the decades of the maps
+
+
+def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
+    """Log all legends, static."""
+    log_force_legend(stream, scene)
+    _log_gap_legend(stream, scene)
+    power = np.linspace(DECADES[0], DECADES[1], PIECES)
+    decades = int(DECADES[1] - DECADES[0])
+    log_ramp_legend(
+        stream, scene.canvas, entities.MAP_LEGEND, entities.MAP_LEGEND_TICKS, doubt_colours(10.0**power),
+        [(k / decades, _POWERS[k]) for k in range(decades)] + [(1.0, "1 × mean f_n")],
+        [(0.5, "grains: force missing to balance; lines: |Δf|", INK)],
+    )  # fmt: skip
+    share = np.linspace(0.0, 1.0, PIECES)
+    log_ramp_legend(
+        stream, scene.canvas, entities.PROBABILITY_LEGEND, entities.PROBABILITY_LEGEND_TICKS,
+        probability_colours(share), [(0.0, "P(touch) 0"), (0.5, "0.5"), (1.0, "1")],
+        [(0.5, "point: sliding", SLIDING)],
+    )  # fmt: skip
+
+
+def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
+    """A wedge from no force to the top of the range, with the mean marked."""
+    style, top = scene.style, scene.style.range.top
+    fn = np.linspace(0.0, top, PIECES + 1)[1:]
+    stream.log(
+        entities.FORCE_LEGEND,
+        rr.LineStrips2D(_pieces(scene.canvas), radii=style.radii(fn), colors=style.colours(fn), draw_order=50.0),
+        static=True,
+    )
+    mean = style.range.mean
+    values = [(0.0, "0"), (mean, f"mean {mean:.3g} N"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
+    values.append((top, f"≥ {top:.3g} N"))
+    notes = [(0.5, "point: sliding contact", SLIDING)]
+    places = [(value / top, text) for value, text in values]
+    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places, notes)
+
+
+def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:
+    reach = gap_range(scene)
+    gap = np.linspace(-reach, reach, PIECES)
+    stream.log(
+        entities.GAP_LEGEND,
+        rr.LineStrips2D(
+            _pieces(scene.canvas),
+            radii=np.float32(0.22 * scene.canvas.grain_radius),
+            colors=gap_colours(gap, reach),
+            draw_order=50.0,
+        ),
+        static=True,
+    )
+    micrometres = 1e6 * reach
+    texts = [(0.0, f"overlap {micrometres:g} µm"), (0.5, "touching"), (1.0, f"open {micrometres:g} µm")]
+    notes = [
+        (0.02, "gained", GAINED), (0.2, "lost", LOST), (0.48, "added by a reviewer", ADDED),
+        (0.88, "forbidden by one", FORBIDDEN),
+    ]  # fmt: skip
+    _log_ticks(stream, scene.canvas, entities.GAP_LEGEND_TICKS, texts, notes)
+
+
+def log_ramp_legend(
+    stream: rr.RecordingStream,
+    canvas: Canvas,
+    path: str,
+    ticks: str,
+    colours: NDArray[np.uint32],
+    texts: list[tuple[float, str]],
+    notes: Sequence[tuple[float, str, Rgba]] = (),
+) -> None:
+    """A line of colours (PIECES,) with texts at shares of its length, and coloured notes below."""
+    strips = rr.LineStrips2D(
+        _pieces(canvas), radii=np.float32(0.22 * canvas.grain_radius), colors=colours, draw_order=50.0
+    )
+    stream.log(path, strips, static=True)
+    _log_ticks(stream, canvas, ticks, texts, notes)
+
+
+def _span(canvas: Canvas) -> tuple[float, float, float]:
+    """Left and right end and height of a legend's line [px]."""
+    middle, half = 0.5 * (canvas.left + canvas.right), 0.36 * canvas.width
+    return middle - half, middle + half, canvas.bottom + 0.18 * canvas.legend_height
+
+
+def _pieces(canvas: Canvas) -> NDArray[np.float32]:
+    """A horizontal line in PIECES (PIECES, 2, 2) [px]."""
+    left, right, y = _span(canvas)
+    x = np.linspace(left, right, PIECES + 1)
+    ends: Array = np.stack([x[:-1], x[1:]], axis=1)
+    return np.stack([ends, np.full_like(ends, y)], axis=2).astype(np.float32)
+
+
+def _log_ticks(
+    stream: rr.RecordingStream,
+    canvas: Canvas,
+    path: str,
+    texts: list[tuple[float, str]],
+    notes: Sequence[tuple[float, str, Rgba]] = (),
+) -> None:
+    left, right, y = _span(canvas)
+    lines = [(share, TICKS_BELOW, text, INK) for share, text in texts]
+    lines += [(share, NOTES_BELOW, text, colour) for share, text, colour in notes]
+    placed = [
+        (np.array([left + share * (right - left), y + below * canvas.legend_height]), text, colour)
+        for share, below, text, colour in lines
+    ]
+    log_texts(stream, path, placed)

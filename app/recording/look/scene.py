@@ -1,0 +1,117 @@
+"""The scene: what the writers must know of the whole run before its first frame."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array, Grains
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts
+from solver.contacts.radius_tuning import RadiusTuning
+
+from ...results.results import TruthContacts
+from ...tracks import Tracks, WallTracks
+from . import entities
+from .canvas import Canvas
+from .force_style import ForceStyle
+from .texts import printable
+
+USUAL_ROD_LENGTH = 0.06  # [m] drawn where the configuration does not say
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One run before its frames: bodies, canvas, the look of forces."""
+
+    name: str
+    tracks: Tracks
+    walls: WallTracks
+    grains: Grains
+    friction: float
+    configuration: str  # TOML
+    canvas: Canvas
+    style: ForceStyle
+    truth: TruthContacts | None = None
+    tolerance: float | None = None  # stopping level of the residual that the solver watches
+    radius_tuning: RadiusTuning | None = None
+
+    @property
+    def rod_length(self) -> float:
+        """Length of the rods [m]: material.length of the configuration."""
+        length = setting(self.configuration, "material", "length")
+        return float(length) if isinstance(length, (int, float)) and length > 0 else USUAL_ROD_LENGTH
+
+    def body_names(self, bodies: NDArray[np.integer]) -> list[str]:
+        """Names of bodies by row: a grain's id, a wall's name."""
+        n = self.grains.count
+        return [printable(self.walls.name[b - n]) if b >= n else str(self.tracks.id[b]) for b in bodies.tolist()]
+
+    def walls_at(self, frame: int) -> Walls:
+        """The walls of one frame, at rest: for measuring, not for solving."""
+        endpoints = self.walls.endpoints[frame]
+        return Walls(endpoints, np.zeros_like(endpoints), np.full(self.walls.count, np.nan))
+
+    def branches(self, frame: int, contacts: Contacts) -> NDArray[np.float32]:
+        """Lines to draw for contacts (c, 2, 2) [px]: centre to centre; for a wall, centre to contact point."""
+        position = self.tracks.position[frame]
+        wall = contacts.with_wall
+        ends = np.empty((contacts.count, 2, 2))
+        ends[:, 0] = position[contacts.i]
+        ends[~wall, 1] = position[contacts.j[~wall]]
+        ends[wall, 1] = contacts.point[wall]
+        return self.canvas.points(ends).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Puts rows at the right place of both timelines."""
+
+    stream: rr.RecordingStream
+    frame: int
+    first: int  # value on `sweep` of the frame's first row
+    last: int  # … of its last row, first where the frame has one row only
+
+    def start(self) -> None:
+        """What is logged next belongs to the frame's first row."""
+        self._set(self.first)
+
+    def end(self) -> None:
+        """What is logged next belongs to the frame's last row."""
+        self._set(self.last)
+
+    def frame_only(self) -> None:
+        """What is logged next belongs to the frame on `frame`, and to nothing on `sweep`."""
+        self.stream.reset_time()
+        self.stream.set_time(entities.FRAME, sequence=self.frame)
+
+    def _set(self, sweep: int) -> None:
+        self.stream.reset_time()
+        self.stream.set_time(entities.FRAME, sequence=self.frame)
+        self.stream.set_time(entities.SWEEP, sequence=sweep)
+
+    def columns(self, rows: NDArray[np.int64]) -> list[rr.TimeColumn]:
+        """Both timelines for rows of this frame, counted from its first (k,)."""
+        return [
+            rr.TimeColumn(entities.FRAME, sequence=np.full(len(rows), self.frame, np.int64)),
+            rr.TimeColumn(entities.SWEEP, sequence=self.first + rows),
+        ]
+
+
+def setting(configuration: str, section: str, key: str) -> object | None:
+    """One value of a configuration in TOML, None where it is not set or the text is not TOML."""
+    try:
+        part = tomllib.loads(configuration).get(section)
+    except tomllib.TOMLDecodeError:
+        return None
+    return part.get(key) if isinstance(part, dict) else None
+
+
+def mean_force(fn: Array) -> float:
+    """Mean of f_n over contacts that carry force [N]; NaN without any."""
+    loaded = fn[np.isfinite(fn) & (fn > 0.0)]
+    return float(loaded.mean()) if len(loaded) else float("nan")

@@ -1,0 +1,40 @@
+"""Numbers as the recording keeps them: what is not known is absent, never NaN.
+
+The viewer shows an absent value as such, curves have a gap there, and two recordings of one run compare equal
+(NaN differs from itself).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+
+from .scene import Clock
+
+
+def known(values: NDArray[np.floating]) -> pa.Array:
+    """Values (k,), null where they are not finite."""
+    finite = np.isfinite(values)
+    # What lies behind a null is not shown, but is compared: it must not be NaN either.
+    return pa.array(np.where(finite, values, 0.0).astype(values.dtype), mask=~finite)
+
+
+def log_scalar(clock: Clock, path: str, value: float) -> None:
+    """Log one point of a curve; a gap where the value is not finite."""
+    clock.stream.log(path, rr.Scalars([value] if np.isfinite(value) else []))
+
+
+def log_scalars(clock: Clock, path: str, values: Array) -> None:
+    """Log one point of several curves that share a path; a gap where any is not finite."""
+    clock.stream.log(path, rr.Scalars(values if np.all(np.isfinite(values)) else []))
+
+
+def send_scalars(stream: rr.RecordingStream, path: str, when: rr.TimeColumn, values: Array) -> None:
+    """Send many points (k,) of a curve; gaps where values are not finite."""
+    finite = np.isfinite(values)
+    columns = rr.Scalars.columns(scalars=values[finite])
+    stream.send_columns(path, [when], columns.partition(finite.astype(np.int64)))

@@ -1,0 +1,1 @@
+"""What is drawn over the packing, a file for each layer."""

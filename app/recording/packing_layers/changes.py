@@ -1,0 +1,118 @@
+"""Writes what contact detection decided: gaps, contacts gained and lost since the frame before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts, measure_contacts
+from solver.sequence.frame_forces import FrameForces
+
+from ..look import entities
+from ..look.colours import GAINED, GAP_RAMP, LOST, packed, packed_one
+from ..look.scene import Clock, Scene
+from ..look.values import known
+
+GAP_RANGE_SHARE = 0.004  # of the mean radius: the gap at which colour no longer changes, in either direction
+
+_RAMP = packed(GAP_RAMP)
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """How a frame's network differs from the one before."""
+
+    gained: int
+    parted: int
+    similarity: float  # correlation of f_n on common contacts, NaN where it is not defined
+
+
+def log_changes(clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None) -> Changes:
+    """Log gaps and changes of one frame; the first frame has no former one."""
+    clock.start()
+    _log_gaps(clock, scene, forces.contacts)
+    contacts = forces.contacts
+    if former is None:
+        gained, parted = contacts.select(np.zeros(contacts.count, bool)), np.empty((0, 2, 2), np.float32)
+        similarity = float("nan")
+    else:
+        gained = contacts.select(~np.isin(contacts.key, former.contacts.key))
+        gone = former.contacts.select(~np.isin(former.contacts.key, contacts.key))
+        parted = _branches_now(scene, clock.frame, gone)
+        similarity = correlate_common(former, forces)
+    for path, strips, colour in (
+        (entities.GAINED, scene.branches(clock.frame, gained), GAINED),
+        (entities.PARTED, parted, LOST),
+    ):
+        clock.stream.log(
+            path,
+            rr.LineStrips2D(
+                strips,
+                radii=np.float32(0.09 * scene.canvas.grain_radius),
+                colors=packed_one(colour),
+                draw_order=25.0,
+            ),
+        )
+    return Changes(gained.count, len(parted), similarity)
+
+
+def correlate_common(former: FrameForces, latter: FrameForces) -> float:
+    """Pearson correlation of f_n over the contacts that both frames have; NaN with fewer than three."""
+    _, a, b = np.intersect1d(former.contacts.key, latter.contacts.key, assume_unique=True, return_indices=True)
+    return correlate(former.fn[a], latter.fn[b])
+
+
+def correlate(a: Array, b: Array) -> float:
+    """Pearson correlation; NaN with fewer than three values or where one side does not vary."""
+    known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known], b[known]
+    if len(a) < 3 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+        return float("nan")
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def gap_range(scene: Scene) -> float:
+    """Gap at the ends of the colour ramp [m]: a round number of micrometres."""
+    micrometres = 1e6 * GAP_RANGE_SHARE * float(np.mean(scene.tracks.radius))
+    decade = 10.0 ** np.floor(np.log10(micrometres))
+    return 1e-6 * float(
+        decade * np.array([1.0, 2.0, 5.0, 10.0])[np.searchsorted([1.5, 3.5, 7.5], micrometres / decade)]
+    )
+
+
+def gap_colours(gap: Array, reach: float) -> NDArray[np.uint32]:
+    """Colours along the gap ramp, overlap … open (c,)."""
+    level = np.round((np.nan_to_num(gap) / reach + 1.0) * 0.5 * (len(_RAMP) - 1))
+    return _RAMP[np.clip(level, 0, len(_RAMP) - 1).astype(np.int64)]
+
+
+def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
+    clock.stream.log(
+        entities.GAPS,
+        rr.Points2D(
+            scene.canvas.points(contacts.point).astype(np.float32),
+            radii=np.float32(0.17 * scene.canvas.grain_radius),
+            colors=gap_colours(contacts.gap, gap_range(scene)),
+            draw_order=28.0,
+        ),
+        rr.AnyValues(
+            # With a type of its own: without contacts nothing else here would have one.
+            gap_um=known((1e6 * contacts.gap).astype(np.float32)),
+            grain_a=scene.tracks.id[contacts.i],
+            body_b=scene.body_names(contacts.j),
+        ),
+    )
+
+
+def _branches_now(scene: Scene, frame: int, gone: Contacts) -> NDArray[np.float32]:
+    """Branches of contacts of the frame before, where their bodies are now; those of lost grains are left out."""
+    n, present = scene.grains.count, scene.tracks.present[frame]
+    known = present[gone.i] & (gone.with_wall | present[np.minimum(gone.j, n - 1)])
+    gone = gone.select(known)
+    walls = scene.walls_at(frame)
+    now = measure_contacts(scene.grains, scene.tracks.position[frame], walls, gone.i, gone.j)
+    return scene.branches(frame, now)

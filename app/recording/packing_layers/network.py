@@ -1,0 +1,173 @@
+"""Writes the contact forces: the network once a frame, its widths and colours as the sweeps go."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts, ContactState
+from solver.nlgs.sweep_record import SweepHistory
+from solver.sequence.frame_forces import FrameForces
+
+from ..look import entities
+from ..look.colours import SLIDING, packed_one
+from ..look.force_style import ForceStyle
+from ..look.scene import Clock, Scene
+from ..look.values import known
+
+CHUNK_BYTES = 1_000_000  # of one columnar message: the viewers load and drop data by the message
+FIRST_SWEEPS = 8  # kept whatever the spacing
+
+
+class SweepChoice(StrEnum):
+    """Which recorded sweeps go into the recording."""
+
+    LOG = "log"  # logarithmically spaced ones
+    ALL = "all"  # every one in which a width or a colour changes
+    NONE = "none"  # the reported field only
+
+
+def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepChoice, kept: int) -> int:
+    """Log one frame's contact forces, from its first sweep to the reported field.
+
+    At most `kept` sweeps with SweepChoice.LOG. Returns the rows written.
+    """
+    rows, fn, _ = visible_sweeps(forces, clock.last - clock.first, choice, kept)
+    style, contacts = scene.style, forces.contacts
+    clock.start()
+    clock.stream.log(
+        entities.FORCES,
+        rr.LineStrips2D(
+            scene.branches(clock.frame, contacts),
+            radii=style.radii(fn[0]),
+            colors=style.colours(fn[0]),
+            draw_order=20.0,
+        ),
+        contact_values(scene, forces),
+    )
+    sent = send_sweeps(clock, style, rows[1:], fn[1:], thin=choice is SweepChoice.ALL) if contacts.count else 0
+    _log_sliding(clock, scene, forces)
+    return 1 + sent
+
+
+def visible_sweeps(
+    forces: FrameForces, last: int, choice: SweepChoice, kept: int
+) -> tuple[NDArray[np.int64], NDArray[np.floating], NDArray[np.floating]]:
+    """Choose the rows of a frame (r,), the first 0, the greatest `last`, and their f_n and f_t (r, c) [N].
+
+    The row `last` holds the reported field; the one before it is the last sweep of the chain. Where the
+    first sweep's forces were not kept, row 0 shows the network without force.
+    """
+    reported = np.nan_to_num(np.stack([forces.fn, forces.ft]))[:, None]
+    if last == 0 or choice is SweepChoice.NONE:
+        return np.zeros(1, np.int64), reported[0], reported[1]
+    history = forces.history
+    chosen = chosen_sweeps(history, choice, kept)
+    rows, force = history.recorded[chosen], [history.fn[chosen], history.ft[chosen]]
+    if len(rows) == 0 or rows[0] != 0:
+        nothing = np.zeros((1, reported.shape[2]))
+        rows, force = np.concatenate([[0], rows]), [np.concatenate([nothing, each]) for each in force]
+    fn, ft = (np.concatenate([each, end]) for each, end in zip(force, reported, strict=True))
+    return np.concatenate([rows, [last]]), fn, ft
+
+
+def chosen_sweeps(history: SweepHistory, choice: SweepChoice, kept: int) -> NDArray[np.int64]:
+    """Rows of history.recorded that go into the recording, ascending."""
+    available = np.arange(len(history.recorded))
+    if choice is SweepChoice.ALL or len(available) <= kept:
+        return available
+    early = available[history.recorded < FIRST_SWEEPS][:kept]
+    spaced = np.geomspace(FIRST_SWEEPS, max(history.count - 1, FIRST_SWEEPS), max(kept - len(early), 1))
+    nearest = np.clip(np.searchsorted(history.recorded, spaced), 0, available[-1])
+    return np.union1d(early, nearest)
+
+
+def contact_values(scene: Scene, forces: FrameForces) -> rr.AnyValues:
+    """What a click on a contact shows."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mobilisation = np.abs(forces.ft) / (scene.friction * forces.fn)
+    return rr.AnyValues(
+        **body_values(scene, forces.contacts),
+        fn=known(forces.fn),
+        ft=known(forces.ft),
+        gap_um=known((1e6 * forces.contacts.gap).astype(np.float32)),
+        fn_sd=known(forces.fn_sd.astype(np.float32)),
+        mobilisation=known(np.where(forces.fn > 0.0, mobilisation, np.nan).astype(np.float32)),
+        state=pa.array([ContactState(s).name.lower() for s in forces.state.tolist()], pa.string()),
+        age=pa.array(forces.age.astype(np.int32)),
+        probability=known(forces.probability.astype(np.float32)),
+    )
+
+
+def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:
+    """Who touches whom: rows i, j, the id of grain i and the name of body j.
+
+    With types of their own: where a recording's first frame has no contacts, empty lists would have none.
+    """
+    return {
+        "i": pa.array(contacts.i),
+        "j": pa.array(contacts.j),
+        "grain_a": pa.array(scene.tracks.id[contacts.i]),
+        "body_b": pa.array(scene.body_names(contacts.j), pa.string()),
+    }
+
+
+def send_sweeps(
+    clock: Clock, style: ForceStyle, rows: NDArray[np.int64], fn: NDArray[np.floating], *, thin: bool
+) -> int:
+    """Send widths and colours of rows (r,), fn (r, c); `thin` leaves out rows that look like the one before.
+
+    Returns the rows sent.
+    """
+    count = fn.shape[1]
+    step = max(CHUNK_BYTES // (8 * count), 1)
+    former: tuple[NDArray, NDArray] | None = None
+    sent = 0
+    for start in range(0, len(rows), step):
+        part = slice(start, start + step)
+        radii, colours = style.radii(fn[part]), style.colours(fn[part])
+        keep = np.ones(len(radii), bool)
+        if thin:
+            keep[1:] = (np.diff(radii, axis=0) != 0).any(axis=1) | (colours[1:] != colours[:-1]).any(axis=1)
+            if former is not None:
+                keep[0] = bool((radii[0] != former[0]).any() or (colours[0] != former[1]).any())
+            if start + step >= len(rows):
+                keep[-1] = True  # the reported field is always there
+            former = radii[-1], colours[-1]
+        kept = rows[part][keep]
+        if len(kept):
+            lengths = np.full(len(kept), count)
+            columns = rr.LineStrips2D.columns(radii=radii[keep].ravel(), colors=colours[keep].ravel())
+            clock.stream.send_columns(entities.FORCES, clock.columns(kept), columns.partition(lengths))
+            sent += len(kept)
+    return sent
+
+
+def _log_sliding(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    sliding = (forces.state == ContactState.SLIDING) & (forces.fn > 0.0)
+    point = scene.canvas.points(forces.contacts.point[sliding]).astype(np.float32)
+    if clock.last > clock.first:
+        clock.start()
+        _log_sliding_points(clock, scene, point[:0], forces.fn[:0])
+    clock.end()
+    _log_sliding_points(clock, scene, point, forces.fn[sliding])
+
+
+def _log_sliding_points(clock: Clock, scene: Scene, point: NDArray[np.float32], fn: Array) -> None:
+    """Marks that grow a little with the force, so that weak sliding contacts do not crowd the view."""
+    share = np.clip(fn / scene.style.range.top, 0.0, 1.0)
+    clock.stream.log(
+        entities.SLIDING,
+        rr.Points2D(
+            point,
+            radii=(scene.canvas.grain_radius * (0.07 + 0.12 * np.sqrt(share))).astype(np.float32),
+            colors=packed_one(SLIDING),
+            draw_order=30.0,
+        ),
+    )

@@ -1,0 +1,143 @@
+"""Writes the bodies: walls, grain outlines, marks that show rotation, crosses over lost grains."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.sequence.frame_forces import FrameForces
+
+from ...tracks import TrackStatus
+from ..look import entities
+from ..look.colours import INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
+from ..look.scene import Clock, Scene, mean_force
+from ..look.texts import printable
+from ..look.values import known
+
+
+def log_packing(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    """Log walls and grains of one frame."""
+    clock.start()
+    _log_walls(clock, scene)
+    _log_grains(clock, scene, forces)
+
+
+def grain_unbalance(forces: FrameForces, grain_count: int) -> Array:
+    """|ΣF| of the contact forces on every grain over the mean f_n (n,); NaN without forces."""
+    contacts = forces.contacts
+    force = forces.fn[:, None] * contacts.normal + forces.ft[:, None] * contacts.tangent  # of i on j
+    total = np.zeros((grain_count, 2))
+    np.add.at(total, contacts.i, -force)
+    both = ~contacts.with_wall
+    np.add.at(total, contacts.j[both], force[both])
+    return np.linalg.norm(total, axis=1) / mean_force(forces.fn)
+
+
+def last_seen(position: Array, frame: int) -> Array:
+    """Positions at a frame; a grain without one keeps its last, or else its next (n, 2)."""
+    shown = position[frame].copy()
+    order = [*range(frame - 1, -1, -1), *range(frame + 1, len(position))]
+    for other in order:
+        missing = np.isnan(shown).any(axis=1)
+        if not missing.any():
+            break
+        shown[missing] = position[other, missing]
+    return shown
+
+
+def _log_walls(clock: Clock, scene: Scene) -> None:
+    walls, canvas = scene.walls, scene.canvas
+    loaded = np.isfinite(walls.pressure)
+    clock.stream.log(
+        entities.WALLS,
+        rr.LineStrips2D(
+            canvas.points(walls.endpoints[clock.frame]).astype(np.float32),
+            radii=np.where(loaded, 0.14, 0.09) * canvas.grain_radius,
+            colors=np.where(loaded, packed_one(LOADED_WALL), packed_one(WALL)).astype(np.uint32),
+            draw_order=5.0,
+        ),
+        rr.AnyValues(
+            name=[printable(name) for name in walls.name],
+            drive=[_drive(pressure) for pressure in walls.pressure.tolist()],
+        ),
+    )
+
+
+def _drive(pressure: float) -> str:
+    return f"{1e-3 * pressure:g} kPa" if np.isfinite(pressure) else "motion imposed"
+
+
+def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    tracks, canvas, frame = scene.tracks, scene.canvas, clock.frame
+    present = tracks.present[frame]
+    centre = canvas.points(last_seen(tracks.position, frame))
+    radius = canvas.lengths(tracks.radius)
+    status = tracks.status[frame]
+    line = np.where(present & (status != TrackStatus.SUSPECT), 0.02, 0.05) * canvas.grain_radius
+    clock.stream.log(
+        entities.GRAINS,
+        rr.Ellipses2D(
+            centers=centre.astype(np.float32),
+            half_sizes=np.repeat(radius[:, None], 2, axis=1).astype(np.float32),
+            line_radii=line.astype(np.float32),
+            colors=grain_colours(status, present),
+            draw_order=10.0,
+        ),
+        rr.AnyValues(
+            id=tracks.id,
+            x_mm=known(1e3 * tracks.position[frame, :, 0]),
+            y_mm=known(1e3 * tracks.position[frame, :, 1]),
+            theta_deg=known(np.degrees(tracks.rotation[frame])),
+            sigma_um=known((1e6 * tracks.sigma[frame]).astype(np.float32)),
+            zncc=known(tracks.zncc[frame].astype(np.float32)),
+            status=[TrackStatus(s).name.lower() for s in status.tolist()],
+            unbalance=known(grain_unbalance(forces, tracks.grain_count).astype(np.float32)),
+        ),
+    )
+    turned = tracks.rotation[frame] - _first_rotation(tracks.rotation)
+    shown = present & np.isfinite(turned)
+    clock.stream.log(
+        entities.GRAIN_SPINS,
+        rr.LineStrips2D(
+            _spin_marks(centre[shown], radius[shown], turned[shown]),
+            radii=np.float32(0.03 * canvas.grain_radius),
+            colors=packed_one(INK),
+            draw_order=11.0,
+        ),
+    )
+    clock.stream.log(
+        entities.GRAINS_LOST,
+        rr.LineStrips2D(
+            _crosses(centre[~present], radius[~present]),
+            radii=np.float32(0.07 * canvas.grain_radius),
+            colors=packed_one(LOST),
+            draw_order=40.0,
+        ),
+    )
+
+
+def grain_colours(status: NDArray[np.uint8], present: NDArray[np.bool_]) -> NDArray[np.uint32]:
+    """Outline colours: grey, amber where the pose is doubtful, red where there is none (n,)."""
+    colours = np.where(status == TrackStatus.SUSPECT, packed_one(SUSPECT), packed_one(OUTLINE))
+    return np.where(present, colours, packed_one(LOST)).astype(np.uint32)
+
+
+def _first_rotation(rotation: Array) -> Array:
+    """Every grain's rotation at frame 0, or where it first has one (n,) [rad]."""
+    seen = np.isfinite(rotation)
+    return rotation[np.argmax(seen, axis=0), np.arange(rotation.shape[1])]
+
+
+def _spin_marks(centre: Array, radius: Array, turned: Array) -> NDArray[np.float32]:
+    """Short strokes at the rim (k, 2, 2) [px], at the top where turned (counter-clockwise seen, [rad]) is 0."""
+    way = np.stack([-np.sin(turned), -np.cos(turned)], axis=1)  # y down: up is −y, counter-clockwise goes left
+    reach = radius[:, None, None] * np.array([0.62, 0.92])[None, :, None]
+    return (centre[:, None] + reach * way[:, None]).astype(np.float32)
+
+
+def _crosses(centre: Array, radius: Array) -> NDArray[np.float32]:
+    """Two strokes through every centre (2 k, 2, 2) [px]."""
+    arms = np.array([[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]]) * 0.7
+    return (centre[:, None, None] + radius[:, None, None, None] * arms).reshape(-1, 2, 2).astype(np.float32)

@@ -1,0 +1,37 @@
+"""Writes which contacts people decided on: those that a reviewer added, and those that one forbade."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+
+from solver.contacts.contacts import ContactSource
+from solver.sequence.frame_forces import FrameForces
+
+from ..look import entities
+from ..look.colours import ADDED, FORBIDDEN, packed_one
+from ..look.scene import Clock, Scene
+
+
+def log_reviewed(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    """Log the contacts of one frame whose source is a person."""
+    rows = np.flatnonzero(forces.source != ContactSource.DETECTED)
+    contacts, source = forces.contacts.select(rows), forces.source[rows]
+    added = source == ContactSource.ADDED_BY_REVIEWER
+    clock.start()
+    clock.stream.log(
+        entities.VERDICTS,
+        rr.LineStrips2D(
+            scene.branches(clock.frame, contacts),
+            radii=np.float32(0.14 * scene.canvas.grain_radius),
+            colors=np.where(added, packed_one(ADDED), packed_one(FORBIDDEN)).astype(np.uint32),
+            draw_order=30.0,
+        ),
+        rr.AnyValues(
+            # With a type of its own: an empty list would have none.
+            source=pa.array([ContactSource(value).name.lower() for value in source.tolist()], pa.string()),
+            grain_a=scene.tracks.id[contacts.i],
+            body_b=scene.body_names(contacts.j),
+        ),
+    )

@@ -1,0 +1,73 @@
+"""Writes the rods in three dimensions, with the strong forces as capsules before their ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.sequence.frame_forces import FrameForces
+
+from ...tracks import TrackStatus
+from ..look import entities
+from ..look.colours import LOST, SUSPECT, packed_one
+from ..look.scene import Clock, Scene
+
+ALUMINIUM = (128, 136, 150, 255)
+CHAIN_RADIUS_SHARE = 0.55  # of the grain's, for a chain at the top of the range
+
+
+def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    """Log rods (axis along z, front ends at z = 0) and the contacts that carry more than the mean."""
+    clock.end()
+    tracks, present = scene.tracks, scene.tracks.present[clock.frame]
+    position, radius = tracks.position[clock.frame], tracks.radius
+    status = tracks.status[clock.frame]
+    doubtful = status == TrackStatus.SUSPECT
+    shade = np.where(doubtful, packed_one(SUSPECT), packed_one(ALUMINIUM))
+    shade = np.where(status == TrackStatus.LOST, packed_one(LOST), shade)
+    centre = np.column_stack([position, np.full(len(position), -0.5 * scene.rod_length)])
+    clock.stream.log(
+        entities.RODS,
+        rr.Cylinders3D(
+            lengths=np.full(int(present.sum()), scene.rod_length, np.float32),
+            radii=(0.97 * radius[present]).astype(np.float32),  # a dark seam shows where one ends
+            centers=centre[present].astype(np.float32),
+            colors=shade[present].astype(np.uint32),
+            fill_mode=rr.components.FillMode.Solid,
+        ),
+    )
+    _log_chains(clock, scene, forces)
+
+
+def _log_chains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    contacts, style = forces.contacts, scene.style
+    strong = np.nan_to_num(forces.fn) > style.range.mean
+    wall = contacts.with_wall[strong]
+    position = scene.tracks.position[clock.frame]
+    start = position[contacts.i[strong]]
+    end = contacts.point[strong].copy()
+    end[~wall] = position[contacts.j[strong][~wall]]
+    branch = end - start
+    height = np.full(len(start), 0.6 * CHAIN_RADIUS_SHARE * scene.tracks.radius.max())  # just clear of the ends
+    share = np.clip(forces.fn[strong] / style.range.top, 0.0, 1.0)
+    radius = CHAIN_RADIUS_SHARE * float(np.mean(scene.tracks.radius)) * share
+    clock.stream.log(
+        entities.ROD_CHAINS,
+        rr.Capsules3D(
+            lengths=np.linalg.norm(branch, axis=1).astype(np.float32),
+            radii=radius.astype(np.float32),
+            translations=np.column_stack([start, height]).astype(np.float32),
+            quaternions=turns_from_axis(branch),
+            colors=style.colours(forces.fn[strong]),
+            fill_mode=rr.components.FillMode.Solid,
+        ),
+    )  # fmt: skip
+
+
+def turns_from_axis(branch: Array) -> NDArray[np.float32]:
+    """Quaternions (c, 4) (x, y, z, w) that turn the z axis onto branches (c, 2) in the plane z = 0."""
+    way = branch / np.linalg.norm(branch, axis=1)[:, None]
+    half = np.sqrt(0.5)  # a quarter turn about (−y, x, 0)
+    return (half * np.column_stack([-way[:, 1], way[:, 0], np.zeros(len(way)), np.ones(len(way))])).astype(np.float32)

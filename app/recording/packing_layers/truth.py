@@ -1,0 +1,106 @@
+"""Writes the true forces beside the inferred ones, and how well they agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from solver.contacts.contacts import ContactSource, measure_contacts
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.agreement import Agreement, align_forces, compare_forces
+
+from ...results.results import TruthContacts
+from ..look import entities
+from ..look.axes import Axes, round_step
+from ..look.colours import INK, SERIES, packed_one
+from ..look.scene import Clock, Scene
+from ..look.values import known, log_scalar
+from .network import body_values
+
+
+class TruthWriter:
+    """Logs the truth of every frame."""
+
+    def __init__(self, scene: Scene, truth: TruthContacts) -> None:
+        self._scene = scene
+        self._truth = truth
+        top = 1.15 * scene.style.range.top
+        self._axes = Axes((0.0, top), (0.0, top), width=400.0, height=400.0)
+
+    def log_axes(self, stream: rr.RecordingStream) -> None:
+        """Log axes of the scatter plot and the styles of the curves."""
+        top = self._axes.x_range[1]
+        step = round_step(top / 2.5)
+        ticks = [(step * k, f"{step * k:g}") for k in range(int(top / step) + 1)]
+        self._axes.log(
+            stream,
+            entities.TRUTH_AXES,
+            entities.TRUTH_TICKS,
+            x_ticks=ticks,
+            y_ticks=ticks,
+            notes=[
+                (0.8 * top, 0.1 * top, "across: true f_n [N]", INK),
+                (0.26 * top, 0.97 * top, "up: inferred f_n [N]", INK),
+            ],
+            guides=[self._axes.points(np.array([0.0, top]), np.array([0.0, top]))],
+        )
+        for path, name, colour in (
+            (entities.TRUTH_R_FN, "r(f_n)", SERIES[0]),
+            (entities.TRUTH_R_FT, "r(f_t)", SERIES[1]),
+            (entities.TRUTH_ERROR, "relative L2", SERIES[3]),
+        ):
+            stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+
+    def log(self, clock: Clock, forces: FrameForces) -> Agreement:
+        """Log one frame's truth and its agreement with the inferred forces."""
+        scene, truth = self._scene, self._truth
+        rows = np.flatnonzero(truth.frame == clock.frame)
+        key = truth.i[rows] * (scene.grains.count + scene.walls.count) + truth.j[rows]
+        order = np.argsort(key, kind="stable")  # that of contacts
+        rows, key = rows[order], key[order]
+        shown = rows[self._drawable(clock.frame, rows)]
+        contacts = measure_contacts(
+            scene.grains,
+            scene.tracks.position[clock.frame],
+            scene.walls_at(clock.frame),
+            truth.i[shown],
+            truth.j[shown],
+        )
+        fn, ft = truth.fn[shown], truth.ft[shown]
+        clock.start()
+        clock.stream.log(
+            entities.TRUTH_FORCES,
+            rr.LineStrips2D(
+                scene.branches(clock.frame, contacts),
+                radii=scene.style.radii(fn),
+                colors=scene.style.colours(fn),
+                draw_order=20.0,
+            ),
+            rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
+        )
+        clock.end()
+        listed = forces.source != ContactSource.FORBIDDEN_BY_REVIEWER
+        ours, inferred = forces.contacts.key[listed], np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed])
+        true = np.column_stack([truth.fn[rows], truth.ft[rows]])
+        (true_fn, _), (inferred_fn, _) = (each.T for each in align_forces(key, true, ours, inferred))
+        reach = self._axes.x_range[1]
+        clock.stream.log(
+            entities.TRUTH_SCATTER,
+            rr.Points2D(
+                self._axes.points(np.minimum(true_fn, reach), np.minimum(inferred_fn, reach)),
+                radii=np.float32(2.5),
+                colors=packed_one((*SERIES[0][:3], 200)),
+                draw_order=20.0,
+            ),
+        )
+        agreement = compare_forces(ours, inferred, key, true)
+        log_scalar(clock, entities.TRUTH_R_FN, agreement.r_fn)
+        log_scalar(clock, entities.TRUTH_R_FT, agreement.r_ft)
+        log_scalar(clock, entities.TRUTH_ERROR, agreement.relative_l2)
+        return agreement
+
+    def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:
+        """Which true contacts have both bodies in the frame; the others count as missed, but cannot be drawn."""
+        n, present = self._scene.grains.count, self._scene.tracks.present[frame]
+        i, j = self._truth.i[rows], self._truth.j[rows]
+        return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])

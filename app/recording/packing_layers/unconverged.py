@@ -1,0 +1,102 @@
+"""Writes where a frame has not converged: the unbalance of every grain and the change of every contact.
+
+Both maps are of the forces as recorded, on the contacts of the frame. The change is the one since the recorded
+sweep before; in the last row of a frame it is the step from the chain's own last sweep to the reported field.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts
+from solver.sequence.frame_forces import FrameForces
+
+from ..look import entities
+from ..look.colours import DOUBT_RAMP, OPEN, packed, packed_one
+from ..look.scene import Clock, Scene
+from .network import SweepChoice, visible_sweeps
+from .packing import last_seen
+
+DECADES = (-4.0, 0.0)  # log10 of the mean f_n: the ends of the colour ramp
+LEVELS = 33  # colours that are told apart: few of them keep the file small
+
+_RAMP = packed(DOUBT_RAMP)[np.round(np.linspace(0, len(DOUBT_RAMP) - 1, LEVELS)).astype(int)]
+_OPEN = packed_one(OPEN)
+
+
+def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepChoice, kept: int) -> None:
+    """Log both maps of one frame at no more than `kept` of its sweeps, and of the reported field."""
+    thinned = SweepChoice.NONE if choice is SweepChoice.NONE else SweepChoice.LOG
+    rows, fn, ft = visible_sweeps(forces, clock.last - clock.first, thinned, kept)
+    mean = _mean_forces(fn, forces.fn)
+    unbalance = unbalances(forces.contacts, fn, ft, scene.grains.count) / mean[:, None]
+    change = np.full(fn.shape, np.nan)
+    change[1:] = np.hypot(np.diff(fn, axis=0), np.diff(ft, axis=0)) / mean[1:, None]
+    lost = ~scene.tracks.present[clock.frame]
+    unbalance[:, lost] = np.nan
+    clock.start()
+    clock.stream.log(
+        entities.UNBALANCE_MAP,
+        rr.Points2D(
+            scene.canvas.points(last_seen(scene.tracks.position, clock.frame)).astype(np.float32),
+            radii=(0.94 * scene.canvas.lengths(scene.tracks.radius)).astype(np.float32),
+            colors=doubt_colours(unbalance[0]),
+            draw_order=5.0,
+        ),
+    )
+    clock.stream.log(
+        entities.CHANGE_MAP,
+        rr.LineStrips2D(
+            scene.branches(clock.frame, forces.contacts),
+            radii=np.float32(0.1 * scene.canvas.grain_radius),
+            colors=doubt_colours(change[0]),
+            draw_order=20.0,
+        ),
+    )
+    if len(rows) == 1:
+        return
+    when = clock.columns(rows[1:])
+    for path, colours, columns in (
+        (entities.UNBALANCE_MAP, doubt_colours(unbalance[1:]), rr.Points2D.columns),
+        (entities.CHANGE_MAP, doubt_colours(change[1:]), rr.LineStrips2D.columns),
+    ):
+        if colours.size:
+            lengths = np.full(len(colours), colours.shape[1])
+            clock.stream.send_columns(path, when, columns(colors=colours.ravel()).partition(lengths))
+
+
+def unbalances(contacts: Contacts, fn: NDArray[np.floating], ft: NDArray[np.floating], grain_count: int) -> Array:
+    """|ΣF| on every grain (r, n) [N] of forces fn, ft (r, c) [N] in r sweeps."""
+    sums = _summation(contacts, grain_count)
+    normal, tangent = contacts.normal, contacts.tangent
+    x = sums @ (fn * normal[:, 0] + ft * tangent[:, 0]).T
+    y = sums @ (fn * normal[:, 1] + ft * tangent[:, 1]).T
+    return np.hypot(x, y).T
+
+
+def doubt_colours(share: Array) -> NDArray[np.uint32]:
+    """Colours of values over the mean force, from quiet (small) to loud on a logarithmic ramp; faint if unknown."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        power = np.log10(share)
+    place = np.clip((power - DECADES[0]) / (DECADES[1] - DECADES[0]), 0.0, 1.0)
+    level = np.round(np.nan_to_num(place) * (LEVELS - 1)).astype(np.int64)
+    return np.where(np.isfinite(share), _RAMP[level], _OPEN).astype(np.uint32)
+
+
+def _summation(contacts: Contacts, grain_count: int) -> csr_matrix:
+    """Adds forces of contacts to forces on grains (n, c): −1 for the grain that exerts it, +1 for the other."""
+    both = np.flatnonzero(~contacts.with_wall)
+    grain = np.concatenate([contacts.i, contacts.j[both]])
+    contact = np.concatenate([np.arange(contacts.count), both])
+    sign = np.concatenate([-np.ones(contacts.count), np.ones(len(both))])
+    return csr_matrix((sign, (grain, contact)), shape=(grain_count, contacts.count))
+
+
+def _mean_forces(fn: NDArray[np.floating], reported: Array) -> Array:
+    """What every row is measured by (r,) [N]: the mean f_n of the reported field, NaN where it has none."""
+    loaded = reported[np.isfinite(reported) & (reported > 0.0)]
+    return np.full(len(fn), loaded.mean() if len(loaded) else np.nan)

@@ -1,0 +1,1 @@
+"""The blueprint: tabs, their views and their layout."""

@@ -1,0 +1,271 @@
+"""The blueprint: which tabs there are and what each shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import rerun.blueprint as rrb
+
+from ..curve_layers.radius_curve import RADIUS_BOUNDS
+from ..curve_layers.stress_and_fabric import ROSE_REACH, STRESS_REACH
+from ..look import entities
+from ..look.axes import PLOT_BOUNDS
+from ..look.canvas import Canvas
+from ..packing_layers.stack import STACK_HEIGHT_SHARE
+from .axis_ranges import Extremes
+from .views import (
+    curve_view,
+    drawn_view,
+    flags_view,
+    lanes_view,
+    packing_view,
+    polar_view,
+    solid_view,
+)
+
+
+class Tab(StrEnum):
+    """The tabs, in their order."""
+
+    EXPERIMENT = "Experiment"
+    CONVERGENCE = "Convergence"
+    SETTLING = "Settling"
+    STATISTICS = "Statistics"
+    LOADS = "Stress and walls"
+    CONTACTS = "Contacts"
+    RODS = "3D"
+    STACK = "Stack"
+    TRUTH = "Truth"
+    SUMMARY = "Summary"
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What the blueprint must know of a recording."""
+
+    canvas: Canvas
+    rod_length: float  # [m]
+    frame_count: int
+    photographs: bool
+    truth: bool
+    wall_count: int = 4
+    radius_curve: bool = False
+    extremes: Extremes = field(default_factory=dict)  # of curves whose values are known beforehand
+
+
+_PACKING = [entities.WALLS, f"{entities.GRAINS}/**"]
+_LOW, _HIGH = rrb.Corner2D.LeftBottom, rrb.Corner2D.LeftTop
+_FORCES = [entities.FORCES, entities.SLIDING, f"{entities.FORCE_LEGEND}/**"]
+_SHARE = (-0.04, 1.05)  # of an axis for shares and correlations
+_RESIDUALS = (-6.4, 3.0)  # log10; room for a legend above
+
+
+def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: bool = False) -> rrb.Blueprint:
+    """Make the blueprint with one tab in front; `following` keeps the cursor at the newest frame.
+
+    The Convergence tab in front starts on the timeline `sweep`.
+    """
+    tabs: dict[Tab, rrb.Container | rrb.View] = {
+        Tab.EXPERIMENT: _experiment(layout),
+        Tab.CONVERGENCE: _convergence(layout),
+        Tab.SETTLING: _settling(layout),
+        Tab.STATISTICS: _statistics(layout),
+        Tab.LOADS: _loads(layout),
+        Tab.CONTACTS: _contacts(layout),
+        Tab.RODS: _rods(layout),
+        Tab.STACK: _stack(layout),
+    }
+    if layout.truth:
+        tabs[Tab.TRUTH] = _truth(layout)
+    tabs[Tab.SUMMARY] = rrb.TextDocumentView(origin=entities.SUMMARY, name=Tab.SUMMARY)
+    if active not in tabs:
+        raise ValueError(f"there is no tab {active} in this recording")
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs.values(), active_tab=list(tabs).index(active), name="Rodsight"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=entities.SWEEP if active is Tab.CONVERGENCE else entities.FRAME,
+            fps=4.0,
+            play_state="following" if following else "paused",
+            loop_mode="off" if following else "all",
+        ),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _experiment(layout: Layout) -> rrb.Container:
+    photograph = [entities.PHOTOGRAPH] if layout.photographs else []
+    angles = [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE]
+    return rrb.Horizontal(
+        packing_view("Force network", layout.canvas, [*photograph, *_PACKING, *_FORCES]),
+        rrb.Vertical(
+            lanes_view(),
+            curve_view("Friction angle [°]", angles, layout.extremes, height=200.0, corner=_HIGH),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
+            flags_view(),
+            row_shares=[1.15, 2.0, 2.0, 1.5],
+        ),
+        column_shares=[1.75, 1.0],
+        name=Tab.EXPERIMENT,
+    )
+
+
+def _convergence(layout: Layout) -> rrb.Container:
+    maps = [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"]
+    residuals = [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE]
+    return rrb.Horizontal(
+        packing_view("Network as it forms", layout.canvas, [*_PACKING, *_FORCES]),
+        packing_view("Unbalance of grains, change since the last row", layout.canvas, maps),
+        rrb.Vertical(
+            drawn_view("Residuals of this frame over its sweeps", "/solve/plot", *PLOT_BOUNDS),
+            curve_view(
+                "log₁₀ residuals: every sweep, or the last of a frame", [*residuals, entities.TOLERANCE],
+                y_range=(-6.4, 2.6), entries=0,
+            ),
+            curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes),
+            row_shares=[2.0, 1.5, 0.8],
+        ),
+        column_shares=[1.0, 1.0, 1.05],
+        name=Tab.CONVERGENCE,
+    )  # fmt: skip
+
+
+def _settling(layout: Layout) -> rrb.Container:
+    starts = [entities.COLD_RESIDUAL, entities.WARM_RESIDUAL, entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]
+    doubts = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
+    return rrb.Vertical(
+        lanes_view(),
+        rrb.Horizontal(
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
+            curve_view("log₁₀ residuals: cold start, warm start, reached", starts, y_range=_RESIDUALS),
+        ),
+        rrb.Horizontal(
+            curve_view("Doubts: ε, ū and H", doubts, layout.extremes, height=190.0),
+            curve_view("Sweeps saved", [entities.SAVED_SWEEPS]),
+            curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes),
+            flags_view(),
+            column_shares=[1.0, 0.8, 0.8, 1.4],
+        ),
+        row_shares=[1.0, 2.0, 1.8],
+        name=Tab.SETTLING,
+    )
+
+
+def _statistics(layout: Layout) -> rrb.Container:
+    density = drawn_view("P(f_n / mean f_n), logarithmic", "/statistics/force_density", *PLOT_BOUNDS)
+    coordination = [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS]
+    strong = [entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE]
+    plots: list[tuple[str, list[str]]] = [
+        ("Coordination number", coordination),
+        ("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
+        ("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
+        ("Strong network, force chains", [*strong, entities.CHAIN_GRAIN_SHARE]),
+    ]
+    below: list[rrb.View] = [curve_view(name, paths, layout.extremes, height=330.0) for name, paths in plots]
+    if layout.radius_curve:
+        below.insert(0, drawn_view("z over a change of all radii", "/statistics/radius_curve", *RADIUS_BOUNDS))
+    return rrb.Vertical(
+        rrb.Horizontal(
+            density,
+            polar_view("Stress / pressure", "/statistics/stress", STRESS_REACH),
+            polar_view("Fabric: contacts, forces", "/statistics/rose", ROSE_REACH),
+            column_shares=[1.45, 1.0, 1.0],
+        ),
+        rrb.Horizontal(*below),
+        row_shares=[1.0, 1.0],
+        name=Tab.STATISTICS,
+    )
+
+
+def _loads(layout: Layout) -> rrb.Container:
+    angles = [entities.FRICTION_ANGLE, entities.ANISOTROPY_ANGLE, entities.WALL_RATIO_ANGLE]
+    anisotropies = [
+        entities.CONTACT_ANISOTROPY, entities.BRANCH_ANISOTROPY, entities.NORMAL_FORCE_ANISOTROPY,
+        entities.TANGENTIAL_FORCE_ANISOTROPY,
+    ]  # fmt: skip
+    stresses = [entities.SIGMA_1, entities.PRESSURE, entities.SIGMA_2]
+
+    def plot(name: str, paths: list[str], entries: int | None = None) -> rrb.View:
+        return curve_view(name, paths, layout.extremes, height=340.0, entries=entries)
+
+    return rrb.Vertical(
+        rrb.Horizontal(
+            plot("Friction angle [°]", angles),
+            plot("Principal stresses [kPa]", stresses),
+            plot("Direction of σ₁ [°]", [entities.PRINCIPAL_DIRECTION]),
+        ),
+        rrb.Horizontal(
+            plot("Anisotropies", anisotropies),
+            plot("Forces on the walls, normal [N]", [entities.WALL_NORMAL_FORCE], layout.wall_count),
+            plot("Forces on the walls, tangential [N]", [entities.WALL_TANGENTIAL_FORCE], layout.wall_count),
+        ),
+        name=Tab.LOADS,
+    )
+
+
+def _contacts(layout: Layout) -> rrb.Container:
+    changes = [entities.GAPS, entities.GAINED, entities.PARTED, entities.VERDICTS]
+    touching = [entities.WALLS, entities.GRAINS, entities.PROBABILITY, entities.SLIDING]
+    counts = [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]
+    plots = [
+        curve_view("Contacts", counts, layout.extremes, height=220.0),
+        curve_view("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
+        curve_view("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
+    ]
+    if layout.extremes and entities.EXPECTED_COUNT not in layout.extremes:
+        del plots[1]  # probabilities were not computed
+    return rrb.Horizontal(
+        packing_view("Gaps, changes, verdicts", layout.canvas, [*_PACKING, *changes, f"{entities.GAP_LEGEND}/**"]),
+        packing_view(
+            "Probability that they touch; sliding", layout.canvas, [*touching, f"{entities.PROBABILITY_LEGEND}/**"]
+        ),
+        rrb.Vertical(*plots),
+        column_shares=[1.0, 1.0, 0.8],
+        name=Tab.CONTACTS,
+    )
+
+
+def _rods(layout: Layout) -> rrb.View:
+    x, y, size = _middle(layout.canvas)
+    eye = (x + 0.36 * size, y - 0.16 * size, 0.97 * size)
+    return solid_view(Tab.RODS, "/rods", eye, (x, y, -0.3 * layout.rod_length))
+
+
+def _stack(layout: Layout) -> rrb.Container:
+    x, y, size = _middle(layout.canvas)
+    middle = 0.5 * STACK_HEIGHT_SHARE * size
+    eye, target = (x + 1.2 * size, y + 0.5 * size, middle + size), (x, y - 0.1 * size, middle)
+    return rrb.Horizontal(
+        solid_view("Frames, the later the nearer", "/stack/frames", eye, target),
+        solid_view("Sweeps of this frame, the later the nearer", "/stack/sweeps", eye, target),
+        name=Tab.STACK,
+    )
+
+
+def _middle(canvas: Canvas) -> tuple[float, float, float]:
+    """Middle of the packing [m] in the world, and its greater side [m]."""
+    metre = canvas.scale.pixel_size * canvas.shrink
+    across, down = 0.5 * (canvas.left + canvas.right), 0.5 * (canvas.top + canvas.bottom)
+    x = (across - 0.5) * metre
+    y = (canvas.scale.height - 1) * canvas.scale.pixel_size - (down - 0.5) * metre
+    return x, y, metre * max(canvas.width, canvas.height)
+
+
+def _truth(layout: Layout) -> rrb.Container:
+    agreement = [entities.TRUTH_R_FN, entities.TRUTH_R_FT, entities.TRUTH_ERROR]
+    return rrb.Vertical(
+        rrb.Horizontal(
+            packing_view("Inferred", layout.canvas, [*_PACKING, *_FORCES]),
+            packing_view("True", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]),
+        ),
+        rrb.Horizontal(
+            drawn_view("f_n: inferred over true", "/truth/scatter", (-60.0, 425.0), (-15.0, 455.0)),
+            curve_view("Correlation, relative L2", agreement, y_range=(-0.45, 1.05), corner=_LOW),
+        ),
+        row_shares=[1.7, 1.0],
+        name=Tab.TRUTH,
+    )

@@ -1,0 +1,98 @@
+"""The views that tabs are put together from."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from ..look import entities
+from ..look.canvas import Canvas
+from ..look.colours import BACKGROUND
+from .axis_ranges import Extremes, range_with_room
+
+PLOT_HEIGHT = 300.0  # px, of a curve view whose height is not told
+_TOP = (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop)
+
+
+def packing_view(name: str, canvas: Canvas, contents: list[str]) -> rrb.View:
+    """A view of the packing, with room for a legend below it."""
+    return rrb.Spatial2DView(
+        origin="/",
+        contents=contents,
+        name=name,
+        background=BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=[canvas.left, canvas.right], y_range=[canvas.top, canvas.bottom + canvas.legend_height]
+        ),
+    )
+
+
+def drawn_view(name: str, origin: str, x_range: tuple[float, float], y_range: tuple[float, float]) -> rrb.View:
+    """A plot drawn as lines, with all that is below an entity."""
+    return rrb.Spatial2DView(
+        origin=origin,
+        contents="$origin/**",
+        name=name,
+        background=BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=list(x_range), y_range=list(y_range)),
+    )
+
+
+def polar_view(name: str, origin: str, circles: float) -> rrb.View:
+    """A drawing about a unit circle; circles: how far it reaches."""
+    reach = 100.0 * circles
+    return drawn_view(name, origin, (-reach, reach), (-reach, reach))
+
+
+def solid_view(name: str, origin: str, eye: tuple[float, float, float], target: tuple[float, float, float]) -> rrb.View:
+    """A view in three dimensions, y up."""
+    return rrb.Spatial3DView(
+        origin=origin,
+        name=name,
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 1.0, 0.0)),
+        spatial_information=rrb.SpatialInformation(target_frame="tf#/", show_axes=False, show_bounding_box=False),
+    )
+
+
+def lanes_view() -> rrb.View:
+    """Status and tracking of the frames as lanes."""
+    return rrb.StateTimelineView(
+        origin="/frames", contents=[entities.STATUS_LANE, entities.TRACKING_LANE], name="Status of the frames"
+    )
+
+
+def flags_view() -> rrb.View:
+    """What a user must know, as a list."""
+    columns = rrb.TextLogColumns(timeline_columns=[entities.FRAME], text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin=entities.FLAGS, name="Flags", columns=columns)
+
+
+def curve_view(
+    name: str,
+    contents: list[str],
+    extremes: Extremes | None = None,
+    *,
+    y_range: tuple[float, float] | None = None,
+    height: float = PLOT_HEIGHT,
+    entries: int | None = None,
+    corner: rrb.Corner2D = rrb.Corner2D.RightTop,
+) -> rrb.View:
+    """A plot of curves.
+
+    extremes: of the curves, to leave room for the legend; y_range is taken instead where it is given. height [px] of
+    the plot in a usual window; entries of the legend, by default one per path, none for a single one.
+    """
+    if entries is None:
+        entries = len(contents) if len(contents) > 1 else 0
+    if y_range is None:
+        y_range = range_with_room(extremes or {}, contents, entries=entries, height=height, top=corner in _TOP)
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=contents,
+        name=name,
+        axis_x=rrb.TimeAxis(link="Independent"),
+        axis_y=rrb.ScalarAxis(range=y_range) if y_range else None,
+        plot_legend=rrb.PlotLegend(corner, visible=entries > 0),
+        background=rrb.archetypes.PlotBackground(color=BACKGROUND),  # the curves' colours are made for a dark one
+    )

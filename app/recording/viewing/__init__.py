@@ -1,0 +1,1 @@
+"""The viewer: opened, served to a browser, driven without a screen for pictures."""

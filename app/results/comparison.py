@@ -1,0 +1,184 @@
+"""Two force fields on one packing: of two runs, or of a run and its truth, contact by contact."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from solver.bodies.grains import Array
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, measure_contacts
+from solver.statistics.agreement import Agreement, compare_forces
+from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, wall_forces, wall_ratio_angle
+
+from .results import Results, TruthContacts
+
+CLOSE = 0.5  # of a radius: two grains nearer than this are the same one
+
+
+class DifferentPackingError(ValueError):
+    """The two runs are not of the same packing; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldFrame:
+    """One frame's forces, on the rows of the run that is compared."""
+
+    contacts: Contacts
+    fn: Array  # (c,) [N]
+    ft: Array  # (c,) [N]
+    friction_angle: float  # [rad] asin((σ₁−σ₂)/(σ₁+σ₂))
+    wall_ratio_angle: float  # [rad] atan(|T|/N) on the loaded plate, NaN without one
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    name: str
+    frames: Sequence[FieldFrame]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Both fields on the bodies and frames that they share."""
+
+    base: Results  # the first run, its common frames alone
+    first: Field
+    second: Field  # the reference: errors are relative to it
+    agreement: Sequence[Agreement]  # of every frame
+    notes: tuple[str, ...]  # what could not be compared
+
+
+def compare_runs(
+    a: Results, b: Results, *, names: tuple[str, str] = ("A", "B"), starts: tuple[int, int] = (0, 0)
+) -> Comparison:
+    """Compare two runs of one packing.
+
+    names: of the runs; starts: number of the first frame of each in its experiment, so that runs over different
+    frames are compared where they overlap. Grains are matched by their ids, or, where ids mean different grains, by
+    their place; walls by their names. Raises DifferentPackingError where too little agrees.
+    """
+    offset = starts[1] - starts[0]
+    first, stop = max(offset, 0), min(a.tracks.frame_count, b.tracks.frame_count + offset)
+    if first >= stop:
+        raise DifferentPackingError(f"{names[0]} and {names[1]} have no frame in common")
+    base = _frames_of(a, first, stop)
+    rows, how = _match_grains(a, b, first, first - offset)
+    body = np.concatenate([rows, _match_walls(a, b)])
+    frames, dropped = [], 0
+    for k in range(first, stop):
+        forces = b.frames[k - offset]
+        field, lost = _frame_on(base, k - first, body[forces.contacts.i], body[forces.contacts.j], forces.fn, forces.ft)
+        statistics = b.statistics[k - offset]
+        angles = {"friction_angle": statistics.friction_angle, "wall_ratio_angle": statistics.wall_ratio_angle}
+        frames.append(replace(field, **angles))
+        dropped += lost
+    notes = [how] if how else []
+    if stop - first < max(a.tracks.frame_count, b.tracks.frame_count):
+        notes.append(f"Only {stop - first} frames are in both runs.")
+    if dropped:
+        notes.append(f"{dropped} contacts of {names[1]} are of bodies that {names[0]} does not have: left out.")
+    return _compared(base, Field(names[1], frames), names[0], notes)
+
+
+def compare_with_truth(results: Results, truth: TruthContacts, *, name: str) -> Comparison:
+    """Compare a run with its truth, the reference."""
+    bounds = np.searchsorted(truth.frame, np.arange(len(results.frames) + 1))
+    frames = []
+    for k in range(len(results.frames)):
+        rows = slice(bounds[k], bounds[k + 1])
+        field, _ = _frame_on(results, k, truth.i[rows], truth.j[rows], truth.fn[rows], truth.ft[rows])
+        frames.append(_with_angles(results, k, field))
+    return _compared(results, Field("truth", frames), name, [])
+
+
+def _compared(base: Results, second: Field, name: str, notes: list[str]) -> Comparison:
+    first = Field(
+        name,
+        [
+            FieldFrame(f.contacts, f.fn, f.ft, s.friction_angle, s.wall_ratio_angle)
+            for f, s in zip(base.frames, base.statistics, strict=True)
+        ],
+    )
+    agreement = [
+        compare_forces(x.contacts.key, _forces(x), y.contacts.key, _forces(y))
+        for x, y in zip(first.frames, second.frames, strict=True)
+    ]
+    return Comparison(base, first, second, agreement, tuple(notes))
+
+
+def _forces(frame: FieldFrame) -> Array:
+    return np.nan_to_num(np.column_stack([frame.fn, frame.ft]))
+
+
+def _frames_of(results: Results, first: int, stop: int) -> Results:
+    return replace(
+        results,
+        tracks=results.tracks.frames(first, stop),
+        walls=results.walls.frames(first, stop),
+        frames=[replace(forces, frame=k) for k, forces in enumerate(results.frames[first:stop])],
+        statistics=results.statistics[first:stop],
+    )
+
+
+def _match_grains(a: Results, b: Results, frame_a: int, frame_b: int) -> tuple[NDArray[np.int64], str]:
+    """Row in a of every grain of b (n_b,), −1 where there is none; and a sentence where ids did not serve."""
+    place_a, place_b = a.tracks.position[frame_a], b.tracks.position[frame_b]
+    order: NDArray[np.int64] = np.argsort(a.tracks.id)
+    at: NDArray[np.int64] = np.minimum(np.searchsorted(a.tracks.id[order], b.tracks.id), len(order) - 1)
+    rows: NDArray[np.int64] = order[at]
+    rows[a.tracks.id[rows] != b.tracks.id] = -1
+    both = (rows >= 0) & b.tracks.present[frame_b] & a.tracks.present[frame_a][rows]
+    near = np.linalg.norm(place_b[both] - place_a[rows[both]], axis=1) < CLOSE * b.tracks.radius[both]
+    if both.sum() > 0.5 * len(rows) and near.mean() > 0.9:
+        return rows, ""
+    present_a, present_b = np.flatnonzero(a.tracks.present[frame_a]), np.flatnonzero(b.tracks.present[frame_b])
+    found = KDTree(place_a[present_a]).query(place_b[present_b])
+    distance, nearest = np.asarray(found[0]), np.asarray(found[1])
+    close = distance < CLOSE * b.tracks.radius[present_b]
+    if close.mean() < 0.5:
+        raise DifferentPackingError(
+            f"only {close.sum()} of {len(present_b)} grains are at the same place in both: not the same packing"
+        )
+    rows = np.full(len(b.tracks.id), -1, np.int64)
+    rows[present_b[close]] = present_a[nearest[close]]
+    return rows, f"Ids mean different grains in the two runs: {close.sum()} grains were matched by their place."
+
+
+def _match_walls(a: Results, b: Results) -> NDArray[np.int64]:
+    """Body in a of every wall of b (w_b,), −1 where there is none of its name."""
+    body = {name: a.grains.count + row for row, name in enumerate(a.walls.name)}
+    return np.array([body.get(name, -1) for name in b.walls.name], np.int64)
+
+
+def _frame_on(
+    base: Results, frame: int, i: NDArray[np.integer], j: NDArray[np.integer], fn: Array, ft: Array
+) -> tuple[FieldFrame, int]:
+    """Forces on bodies of the base (−1: not there) as a frame; and how many of them had to be left out."""
+    known = (i >= 0) & (j >= 0)
+    low, high = np.minimum(i, j)[known], np.maximum(i, j)[known]
+    order = np.argsort(low.astype(np.int64) * (base.grains.count + base.walls.count) + high, kind="stable")
+    walls = _walls_at(base, frame)
+    contacts = measure_contacts(base.grains, base.tracks.position[frame], walls, low[order], high[order])
+    fn, ft = np.asarray(fn)[known][order], np.asarray(ft)[known][order]
+    return FieldFrame(contacts, fn, ft, np.nan, np.nan), int((~known).sum())
+
+
+def _with_angles(base: Results, frame: int, field: FieldFrame) -> FieldFrame:
+    position, present = base.tracks.position[frame], base.tracks.present[frame]
+    drawable = np.flatnonzero(np.isfinite(field.contacts.normal).all(axis=1))
+    contacts, fn, ft = field.contacts.select(drawable), field.fn[drawable], field.ft[drawable]
+    walls = _walls_at(base, frame)
+    area = packing_area(walls, position[present])
+    stress = love_weber_stress(contacts, fn, ft, position, area, 1.0)  # a ratio: the length of the rods cancels
+    ratio = wall_ratio_angle(walls, wall_forces(contacts, fn, ft))
+    return replace(field, friction_angle=friction_angle(stress), wall_ratio_angle=ratio)
+
+
+def _walls_at(base: Results, frame: int) -> Walls:
+    """The walls of a frame at rest, plates with their pressure for a load: which are loaded is all that matters."""
+    endpoints = base.walls.endpoints[frame]
+    return Walls(endpoints, np.zeros_like(endpoints), base.walls.pressure)

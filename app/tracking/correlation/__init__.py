@@ -1,0 +1,1 @@
+"""Patches of one photograph found again in another, to hundredths of a pixel."""

@@ -1,0 +1,127 @@
+"""Where circles of a given radius might be: bright inside, dark outside, whatever is painted on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.spatial import KDTree
+
+from solver.bodies.grains import Array
+
+from ...experiment.photographs import Image
+from ..correlation.splines import shrink
+
+# Circles are looked for on shrunk photographs, where the smallest has at least this radius [px], and each about that of
+# COARSE_RADIUS.
+LEAST_RADIUS = 10.0
+COARSE_RADIUS = 20.0
+
+# Light differs over distances that do not grow with the grains: above this radius [px] they no longer set them.
+LARGEST_LOCAL = 80.0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """Circles that might be grains, the most convincing first."""
+
+    x: Array  # (c,) [px]
+    y: Array  # (c,) [px]
+    radius: Array  # (c,) [px]
+    score: Array  # (c,) mean inward slope along the circle, as a share of a full edge's
+
+
+def find_circles(image: Image, radii: Array, *, score_least: float) -> Candidates:
+    """Local maxima over position of the mean inward slope along circles of every radius (k,) [px].
+
+    Slopes are measured against the local contrast and cut off at that of a full edge, so neither uneven
+    light nor a single strong edge decides; paint inside a grain slopes every way and cancels.
+    """
+    least = max(int(radii.min() / LEAST_RADIUS), 1)
+    factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
+    found = []
+    for factor in np.unique(factors):
+        slope_x, slope_y = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))
+        for radius in radii[factors == factor]:
+            score = _ring_response(slope_x, slope_y, radius / factor)
+            peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > score_least)
+            row, column = np.nonzero(peak)
+            place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
+            found.append(np.stack([*place, np.full(len(row), radius), score[peak]], axis=1))
+    table = np.concatenate(found)
+    # A mean over a longer circle is the more significant at the same value.
+    table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
+    return Candidates(table[:, 0], table[:, 1], table[:, 2], table[:, 3])
+
+
+def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.ndarray:
+    """Rows that remain (ascending) when each, in order, strikes out the later ones that overlap it.
+
+    allowed: overlap as a share of the smaller radius that is let pass.
+    """
+    if len(x) == 0:
+        return np.empty(0, np.intp)
+    point = np.stack([x, y], axis=1)
+    tree = KDTree(point)
+    alive = np.ones(len(x), dtype=np.bool_)
+    largest = float(radius.max())
+    for k in range(len(x)):
+        if not alive[k]:
+            continue
+        near = np.asarray(tree.query_ball_point(point[k], radius[k] + largest), dtype=np.intp)
+        near = near[near > k]
+        distance = np.linalg.norm(point[near] - point[k], axis=1)
+        limit = radius[near] + radius[k] - allowed * np.minimum(radius[near], radius[k])
+        alive[near[distance < limit]] = False
+    return np.flatnonzero(alive)
+
+
+def tile_size(radius: float) -> int:
+    """Side of what counts as local [px] where the largest grain has `radius` [px]."""
+    return int(4 * min(radius, LARGEST_LOCAL))
+
+
+def local_contrast(image: Image, tile: int) -> tuple[Image, Image]:
+    """Dark level and contrast about every pixel, two (H, W) [grey], from tiles of some grains' size."""
+    height, width = image.shape
+    rows, columns = max(round(height / tile), 1), max(round(width / tile), 1)
+    dark = np.empty((rows, columns), np.float32)
+    bright = np.empty((rows, columns), np.float32)
+    for j in range(rows):
+        for i in range(columns):
+            part = image[
+                j * height // rows : (j + 1) * height // rows, i * width // columns : (i + 1) * width // columns
+            ]
+            dark[j, i], bright[j, i] = np.percentile(part, [3.0, 95.0])
+    contrast = bright - dark
+    # Where there is only backing, its faint texture must not be blown up into edges.
+    contrast = np.maximum(contrast, max(0.5 * float(np.percentile(contrast, 90.0)), 1.0)).astype(np.float32)
+    size = (width, height)
+    return (
+        np.asarray(cv2.resize(dark, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32),
+        np.asarray(cv2.resize(contrast, size, interpolation=cv2.INTER_LINEAR), dtype=np.float32),
+    )
+
+
+def _slopes(image: Image, tile: int) -> tuple[Image, Image]:
+    _, contrast = local_contrast(image, tile)
+    smooth = cv2.GaussianBlur(image, (0, 0), 1.0) / contrast
+    slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=3, scale=1.0 / 8.0)
+    slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=1.0 / 8.0)
+    steepness = np.hypot(slope_x, slope_y)
+    full = max(float(np.percentile(steepness, 90.0)), 1e-6)
+    cut = 1.0 / np.maximum(steepness, full)
+    return np.asarray(slope_x * cut, dtype=np.float32), np.asarray(slope_y * cut, dtype=np.float32)
+
+
+def _ring_response(slope_x: Image, slope_y: Image, radius: float) -> Image:
+    side = int(np.ceil(radius + 3.0))
+    y, x = np.mgrid[-side : side + 1, -side : side + 1].astype(np.float32)
+    distance = np.hypot(x, y)
+    weight = np.exp(-((distance - radius) ** 2) / (2.0 * 0.8**2))
+    weight /= weight.sum() * np.maximum(distance, 1.0)
+    border = cv2.BORDER_REPLICATE
+    response = cv2.filter2D(slope_x, cv2.CV_32F, weight * x, borderType=border)
+    response += cv2.filter2D(slope_y, cv2.CV_32F, weight * y, borderType=border)
+    return np.asarray(-response, dtype=np.float32)

@@ -1,0 +1,1 @@
+"""The bars of the frame, followed as grains are."""

@@ -1,0 +1,1 @@
+"""What people said of contacts and frames, and how it reaches the solver. Stands on experiment."""

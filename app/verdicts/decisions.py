@@ -1,0 +1,125 @@
+"""What all reviewers together decided: pairs that touch, pairs that do not, and frames that were flagged."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.contacts.verdicts import Verdicts
+
+from ..tracks import Tracks, WallTracks
+from .log import Body, Flag, Verdict, VerdictLog
+
+
+@dataclass(frozen=True, slots=True)
+class Decisions:
+    """Verdicts on the rows of one run: bodies by row, a wall's row after the grains'."""
+
+    contact: frozenset[tuple[int, int]] = frozenset()  # (frame of the run, key of the pair)
+    no_contact: frozenset[tuple[int, int]] = frozenset()
+    disputed: frozenset[tuple[int, int]] = frozenset()  # as many said one thing as the other, or all were unsure
+    unknown: int = 0  # verdicts on a frame or a body that the run does not have
+    flags: dict[int, frozenset[Flag]] = field(default_factory=dict)  # by frame of the run
+
+    @property
+    def count(self) -> int:
+        return len(self.contact) + len(self.no_contact)
+
+    def forced(self, frame: int) -> NDArray[np.int64]:
+        """Keys of the pairs that touch in a frame, ascending."""
+        return _keys(self.contact, frame)
+
+    def forbidden(self, frame: int) -> NDArray[np.int64]:
+        """Keys of the pairs that do not touch in a frame, ascending."""
+        return _keys(self.no_contact, frame)
+
+    def for_solver(self) -> dict[int, Verdicts]:
+        """What the solver must obey, by frame of the run."""
+        frames = {frame for frame, _ in self.contact | self.no_contact} | set(self.flags)
+        return {
+            frame: Verdicts(
+                self.forced(frame),
+                self.forbidden(frame),
+                rearrangement=Flag.REARRANGEMENT in self.flags.get(frame, ()),
+                reset=Flag.RESET in self.flags.get(frame, ()),
+                ignored=Flag.IGNORE in self.flags.get(frame, ()),
+            )
+            for frame in sorted(frames)
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """Rows of bodies by name, and their names by row."""
+
+    grains: tuple[int, ...]  # ids
+    walls: tuple[str, ...]
+
+    @classmethod
+    def of(cls, tracks: Tracks, walls: WallTracks | None) -> Bodies:
+        return cls(tuple(int(each) for each in tracks.id), walls.name if walls is not None else ())
+
+    @property
+    def count(self) -> int:
+        return len(self.grains) + len(self.walls)
+
+    def rows(self) -> dict[Body, int]:
+        by_id: dict[Body, int] = {each: row for row, each in enumerate(self.grains)}
+        return by_id | {name: len(self.grains) + row for row, name in enumerate(self.walls)}
+
+    def name(self, row: int) -> Body:
+        n = len(self.grains)
+        return self.grains[row] if row < n else self.walls[row - n]
+
+    def key(self, i: int, j: int) -> int:
+        """The key of a pair of rows, from either side."""
+        low, high = min(i, j), max(i, j)
+        return low * self.count + high
+
+
+def decide(log: VerdictLog, bodies: Bodies, *, first_frame: int, frame_count: int) -> Decisions:
+    """Settle every judged pair by the majority of its reviewers, each counted with the last word.
+
+    Frames of the log are those of the experiment; the run begins at first_frame.
+    """
+    rows = bodies.rows()
+    votes: dict[tuple[int, int], Counter[Verdict]] = {}
+    unknown = 0
+    for (frame, a, b), entry in log.verdicts():
+        i, j = rows.get(a), rows.get(b)
+        if i is None or j is None or not 0 <= frame - first_frame < frame_count:
+            unknown += 1
+            continue
+        assert entry.verdict is not None
+        votes.setdefault((frame - first_frame, bodies.key(i, j)), Counter())[entry.verdict] += 1
+    lead = {pair: count[Verdict.CONTACT] - count[Verdict.NO_CONTACT] for pair, count in votes.items()}
+    flags: dict[int, set[Flag]] = {}
+    for entry in log.last_words():
+        if entry.flag is not None and entry.on and 0 <= entry.frame - first_frame < frame_count:
+            flags.setdefault(entry.frame - first_frame, set()).add(entry.flag)
+    return Decisions(
+        frozenset(pair for pair, ahead in lead.items() if ahead > 0),
+        frozenset(pair for pair, ahead in lead.items() if ahead < 0),
+        frozenset(pair for pair, ahead in lead.items() if ahead == 0),
+        unknown,
+        {frame: frozenset(each) for frame, each in flags.items()},
+    )
+
+
+def fingerprint(log: VerdictLog) -> str:
+    """A digest of all last words that decide something; empty where nothing was decided."""
+    words = [
+        [entry.reviewer, *(str(each) for each in entry.subject), str(entry.verdict), entry.on]
+        for entry in log.last_words()
+        if entry.verdict is not Verdict.UNSURE and (entry.flag is None or entry.on)
+    ]
+    return hashlib.sha256(json.dumps(sorted(words)).encode()).hexdigest() if words else ""
+
+
+def _keys(pairs: frozenset[tuple[int, int]], frame: int) -> NDArray[np.int64]:
+    return np.array(sorted(key for k, key in pairs if k == frame), np.int64)

@@ -1,0 +1,102 @@
+"""Verdicts as a table frame,i,j,verdict,reviewer,time,seconds: contacts judged elsewhere come in, ours go out."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from ..experiment.tables import Table, read_table, write_table
+from .decisions import Bodies
+from .log import Entry, Origin, Pair, Verdict, VerdictLog, canonical
+
+_OPTIONAL = ("verdict", "reviewer", "time", "seconds")
+
+
+def export_verdicts(log: VerdictLog, file: Path) -> int:
+    """Write every reviewer's last word on every pair; returns how many."""
+    entries = sorted((e for _, e in log.verdicts()), key=lambda e: (e.frame, e.a, str(e.b), e.reviewer))
+    write_table(
+        file,
+        {
+            "frame": [e.frame for e in entries], "i": [e.a for e in entries], "j": [e.b for e in entries],
+            "verdict": [str(e.verdict) for e in entries], "reviewer": [e.reviewer for e in entries],
+            "time": [e.time for e in entries], "seconds": [e.seconds for e in entries],
+        },
+    )  # fmt: skip
+    return len(entries)
+
+
+def import_verdicts(
+    log: VerdictLog,
+    file: Path,
+    bodies: Bodies,
+    reviewer: str,
+    *,
+    first_frame: int,
+    frame_count: int,
+    candidates: Mapping[int, Collection[tuple[int, int]]] | None = None,
+) -> int:
+    """Append the verdicts of a table to the log; returns how many.
+
+    The table has the columns frame, i, j, and may have verdict (absent: every row is a contact), reviewer, time
+    and seconds. Frames are those of the experiment. candidates: pairs of rows by frame of the run; where given, the
+    table lists all contacts of the frames it names, so that every candidate it leaves out is no contact.
+    Raises InputError naming the row for an unknown frame, grain, wall or verdict, and writes nothing then.
+    """
+    present = [name for name in _OPTIONAL if name in _header(file)]
+    table = read_table(file, ("frame", "i", "j", *present))
+    rows = bodies.rows()
+    frame, i = table.integers("frame"), table.integers("i")
+    seconds = table.numbers("seconds") if "seconds" in present else None
+    entries: list[Entry] = []
+    listed: set[Pair] = set()
+    for row, text in enumerate(table.text("j")):
+        number, a = int(frame[row]), int(i[row])
+        b = text if text in bodies.walls else _grain(table, row, text)
+        for column, body in (("i", a), ("j", b)):
+            if body not in rows:
+                raise table.error(row, column, "is not the id of a grain")
+        if a == b:
+            raise table.error(row, "j", "is the grain itself")
+        if not first_frame <= number < first_frame + frame_count:
+            last = first_frame + frame_count - 1
+            raise table.error(row, "frame", f"is not a frame of the results ({first_frame} to {last})")
+        told = table.text("verdict")[row] if "verdict" in present else Verdict.CONTACT.value
+        verdict = told.strip().lower().replace("_", " ")
+        if verdict not in {each.value for each in Verdict}:
+            raise table.error(row, "verdict", "is none of contact, no contact, unsure")
+        pair = canonical((number, a, b))
+        listed.add(pair)
+        name = table.text("reviewer")[row] if "reviewer" in present else ""
+        entries.append(
+            Entry(
+                number, name or reviewer, pair[1], pair[2], Verdict(verdict),
+                seconds=float(seconds[row]) if seconds is not None else 0.0, origin=Origin.IMPORT,
+                time=table.text("time")[row] if "time" in present else "",
+            )
+        )  # fmt: skip
+    for number in sorted(set(frame.tolist())) if candidates is not None else ():
+        assert candidates is not None
+        for low, high in candidates.get(number - first_frame, ()):
+            a = bodies.name(low)
+            assert isinstance(a, int)
+            if canonical((number, a, bodies.name(high))) not in listed:
+                entries.append(Entry(number, reviewer, a, bodies.name(high), Verdict.NO_CONTACT, origin=Origin.IMPORT))
+    log.append_all(entries)
+    return len(entries)
+
+
+def _header(file: Path) -> list[str]:
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            return [name.strip() for name in next(csv.reader(stream), [])]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return []  # read_table says what is wrong
+
+
+def _grain(table: Table, row: int, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise table.error(row, "j", "is neither a grain's id nor the name of a wall") from None

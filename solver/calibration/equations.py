@@ -1,0 +1,196 @@
+"""The gap equations of a sequence: how constant errors of grains and walls show in every measured gap.
+
+Let a grain's true centre be (1 + ε) x + Rot(θ) o, its true radius R + δR, a wall lie b further out and be turned by a
+about its middle. The gap of grains i and j is then, to first order,
+
+    g − n·Rot(θ_i) o_i + n·Rot(θ_j) o_j − δR_i − δR_j + ε n·(x_j − x_i),
+
+and of grain i and a wall g − n·Rot(θ_i) o_i − δR_i + b − a s − ε n·x_i, at the distance s from the wall's middle, with
++ ε n·e more where the wall e was measured with the same pixel size. The angle θ counts from the first frame in which
+the grain is seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from solver.bodies.grains import Array
+from solver.calibration.gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps, outward_normals
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where each kind of unknown stands in the one vector that is solved for."""
+
+    grain_count: int
+    wall_count: int
+    class_count: int
+
+    @property
+    def offset(self) -> slice:
+        """Body-fixed centre offsets, x and y of each grain [m]."""
+        return slice(0, 2 * self.grain_count)
+
+    @property
+    def radius(self) -> slice:
+        """Radius error of each grain, beside that of its class [m]."""
+        return slice(self.offset.stop, self.offset.stop + self.grain_count)
+
+    @property
+    def wall(self) -> slice:
+        """Outward displacement of each wall's middle [m]."""
+        return slice(self.radius.stop, self.radius.stop + self.wall_count)
+
+    @property
+    def wall_tilt(self) -> slice:
+        """Rotation of each wall about its middle [rad], counter-clockwise."""
+        return slice(self.wall.stop, self.wall.stop + self.wall_count)
+
+    @property
+    def radius_class(self) -> slice:
+        """Radius error shared by each class [m]."""
+        return slice(self.wall_tilt.stop, self.wall_tilt.stop + self.class_count)
+
+    @property
+    def scale(self) -> slice:
+        """Relative error of the pixel size."""
+        return slice(self.radius_class.stop, self.radius_class.stop + 1)
+
+    @property
+    def lens(self) -> slice:
+        """Displacement by what is left of the lens's radial distortion, at the corner farthest from the centre [m]."""
+        return slice(self.scale.stop, self.scale.stop + 1)
+
+    @property
+    def count(self) -> int:
+        return self.lens.stop
+
+
+def rotate_offsets(sequence: MeasuredSequence, offset: Array) -> Array:
+    """Turn body-fixed offsets (n, 2) [m] with their grains: (f, n, 2) [m], zero where a grain is not present."""
+    angle = _angle_since_first_seen(sequence)
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.stack([c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0] + c * offset[:, 1]], axis=2)
+    return np.where(sequence.present[..., None], turned, 0.0)
+
+
+def move_walls(endpoints: Array, outward: Array, tilt: Array) -> Array:
+    """Walls with endpoints (f, w, 2, 2) [m], moved outward (w,) [m] and turned by tilt (w,) [rad], small."""
+    along = endpoints[..., 1, :] - endpoints[..., 0, :]
+    half = 0.5 * np.linalg.norm(along, axis=-1) * tilt  # (f, w) [m] outward at end 0, inward at end 1
+    moved = np.stack([outward + half, outward - half], axis=-1)
+    return endpoints + moved[..., None] * outward_normals(endpoints)[:, :, None, :]
+
+
+def bulge(sequence: MeasuredSequence) -> Array:
+    """Direction and share (f, n, 2) in which radial distortion of third order moves the centres.
+
+    It counts from the middle of the walls, in place of the middle of the picture, and is 1 at the farthest corner.
+    """
+    if sequence.wall_count == 0:
+        return np.zeros_like(sequence.position)
+    middle = sequence.endpoints.mean(axis=(0, 1, 2))
+    reach = np.linalg.norm(sequence.endpoints - middle, axis=-1).max()
+    place = (sequence.position - middle) / reach
+    return np.where(sequence.present[..., None], np.sum(place**2, axis=2, keepdims=True) * place, 0.0)
+
+
+class GapEquations:
+    """Gaps and derivatives of the rows of a sequence, for any value of the unknowns."""
+
+    def __init__(
+        self,
+        sequence: MeasuredSequence,
+        radius_class: NDArray[np.integer] | None = None,
+        *,
+        walls_follow: bool = True,
+    ) -> None:
+        """radius_class (n,): class 0, 1, … of each grain; walls_follow: the pixel size scales the walls, too."""
+        self.sequence = sequence
+        self.radius_class = radius_class
+        self.walls_follow = walls_follow
+        classes = 0 if radius_class is None else int(radius_class.max()) + 1
+        self.layout = Layout(sequence.grain_count, sequence.wall_count, classes)
+        angle = _angle_since_first_seen(sequence)
+        self._cosine, self._sine = np.cos(angle), np.sin(angle)
+        self._bulge = bulge(sequence)
+
+    def radius(self, unknowns: Array) -> Array:
+        """Corrected radii (n,) [m]."""
+        correction = unknowns[self.layout.radius]
+        if self.radius_class is not None:
+            correction = correction + unknowns[self.layout.radius_class][self.radius_class]
+        return self.sequence.radius + correction
+
+    def position(self, unknowns: Array) -> Array:
+        """Corrected centres (f, n, 2) [m]."""
+        offset = unknowns[self.layout.offset].reshape(-1, 2)
+        scaled = (1.0 + unknowns[self.layout.scale]) * self.sequence.position
+        return scaled + unknowns[self.layout.lens] * self._bulge + rotate_offsets(self.sequence, offset)
+
+    def endpoints(self, unknowns: Array) -> Array:
+        """Corrected ends of the walls (f, w, 2, 2) [m]."""
+        scale = 1.0 + unknowns[self.layout.scale] * self.walls_follow
+        return move_walls(scale * self.sequence.endpoints, unknowns[self.layout.wall], unknowns[self.layout.wall_tilt])
+
+    def measure(self, rows: GapRows, unknowns: Array) -> GapGeometry:
+        """Compute the corrected gaps, exactly, not to first order."""
+        return measure_gaps(rows, self.position(unknowns), self.endpoints(unknowns), self.radius(unknowns))
+
+    def derive(self, rows: GapRows, geometry: GapGeometry) -> sparse.csr_matrix:
+        """Derivatives (m, unknowns) of the corrected gaps of `rows`, whose geometry is `geometry`."""
+        n, layout = self.sequence.grain_count, self.layout
+        i, j, grain = rows.i.astype(np.int64), rows.j.astype(np.int64), rows.second_grain(n).astype(np.int64)
+        wall = rows.with_wall(n)
+        of_grain = np.where(wall, 0.0, 1.0)
+        ix, iy = self._in_body_frame(rows.frame, i, geometry.normal)
+        jx, jy = self._in_body_frame(rows.frame, grain, geometry.normal)
+        one = np.ones(rows.count)
+        entries = [
+            (2 * i, -ix),
+            (2 * i + 1, -iy),
+            (2 * grain, of_grain * jx),
+            (2 * grain + 1, of_grain * jy),
+            (layout.radius.start + i, -one),
+            (np.where(wall, layout.wall.start + j - n, layout.radius.start + grain), np.where(wall, one, -one)),
+            (np.full(rows.count, layout.scale.start), self._stretch(rows, geometry)),
+            (np.full(rows.count, layout.lens.start), self._bend(rows, geometry)),
+        ]
+        if layout.wall_count:
+            entries += [(np.where(wall, layout.wall_tilt.start + j - n, layout.wall_tilt.start), -geometry.along)]
+        if self.radius_class is not None:
+            start = layout.radius_class.start
+            entries += [(start + self.radius_class[i], -one), (start + self.radius_class[grain], -of_grain)]
+        columns = np.stack([column for column, _ in entries], axis=1)
+        values = np.stack([value for _, value in entries], axis=1)
+        ends = np.arange(rows.count + 1) * len(entries)
+        return sparse.csr_matrix((values.ravel(), columns.ravel(), ends), shape=(rows.count, layout.count))
+
+    def _stretch(self, rows: GapRows, geometry: GapGeometry) -> Array:
+        """What the pixel size does to the gaps (m,) [m]."""
+        n, k, position = self.sequence.grain_count, rows.frame, self.sequence.position
+        wall = rows.with_wall(n)
+        end = position[k, rows.second_grain(n)]
+        end[wall] = self.sequence.endpoints[k[wall], rows.j[wall] - n, 0] if self.walls_follow else 0.0
+        return np.einsum("mk,mk->m", geometry.normal, end - position[k, rows.i])
+
+    def _bend(self, rows: GapRows, geometry: GapGeometry) -> Array:
+        """What the lens does to the gaps (m,); the walls are straight and stay where they are."""
+        n, k = self.sequence.grain_count, rows.frame
+        wall = rows.with_wall(n)
+        end = np.where(wall[:, None], 0.0, self._bulge[k, rows.second_grain(n)])
+        return np.einsum("mk,mk->m", geometry.normal, end - self._bulge[k, rows.i])
+
+    def _in_body_frame(self, frame: NDArray, grain: NDArray, normal: Array) -> tuple[Array, Array]:
+        c, s = self._cosine[frame, grain], self._sine[frame, grain]
+        return c * normal[:, 0] + s * normal[:, 1], c * normal[:, 1] - s * normal[:, 0]
+
+
+def _angle_since_first_seen(sequence: MeasuredSequence) -> Array:
+    first = np.argmax(sequence.present, axis=0)
+    start = sequence.rotation[first, np.arange(sequence.grain_count)]
+    return np.where(sequence.present, sequence.rotation - start, 0.0)

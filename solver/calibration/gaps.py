@@ -1,0 +1,156 @@
+"""What is measured of a sequence, and the gaps in it that may be contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from solver.bodies.grains import Array
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredSequence:
+    """What tracking says of n grains and w walls in f frames. Rows that are not present may hold any number."""
+
+    radius: Array  # (n,) [m]
+    position: Array  # (f, n, 2) [m]
+    rotation: Array  # (f, n) [rad], counter-clockwise, continuous
+    present: NDArray[np.bool_]  # (f, n)
+    endpoints: Array  # (f, w, 2, 2) [m]; the packing lies to the left of endpoint 0 → 1
+    sigma: Array  # (f, n) [m], standard deviation of the random error of a position component
+
+    def __post_init__(self) -> None:
+        f, n = self.present.shape
+        if self.position.shape != (f, n, 2) or self.rotation.shape != (f, n) or self.sigma.shape != (f, n):
+            raise ValueError(f"position, rotation and sigma must be ({f}, {n}, 2), ({f}, {n}) and ({f}, {n})")
+        if self.radius.shape != (n,) or not np.all(self.radius > 0):
+            raise ValueError(f"radius must be ({n},) and positive")
+        if self.endpoints.ndim != 4 or self.endpoints.shape[0] != f or self.endpoints.shape[2:] != (2, 2):
+            raise ValueError(f"endpoints must be ({f}, w, 2, 2), not {self.endpoints.shape}")
+        for name in ("position", "rotation", "sigma"):
+            if not np.all(np.isfinite(getattr(self, name)[self.present])):
+                raise ValueError(f"the {name} of a present grain is not finite")
+
+    def thinned(self, count: int) -> MeasuredSequence:
+        """At most `count` frames, evenly spread."""
+        f = self.frame_count
+        k = np.unique(np.linspace(0, f - 1, min(f, count)).round().astype(np.int64))
+        return MeasuredSequence(
+            self.radius, self.position[k], self.rotation[k], self.present[k], self.endpoints[k], self.sigma[k]
+        )
+
+    @property
+    def frame_count(self) -> int:
+        return self.present.shape[0]
+
+    @property
+    def grain_count(self) -> int:
+        return self.present.shape[1]
+
+    @property
+    def wall_count(self) -> int:
+        return self.endpoints.shape[1]
+
+
+@dataclass(frozen=True, slots=True)
+class GapRows:
+    """The pairs that may touch, once for every frame in which both are seen, sorted by pair, then frame."""
+
+    frame: NDArray[np.int32]  # (m,)
+    i: NDArray[np.int32]  # (m,) a grain
+    j: NDArray[np.int32]  # (m,) a grain > i, or grain count + wall
+    pair: NDArray[np.int32]  # (m,) the number of the pair, ascending
+
+    @property
+    def count(self) -> int:
+        return len(self.frame)
+
+    def with_wall(self, grain_count: int) -> NDArray[np.bool_]:
+        return self.j >= grain_count
+
+    def second_grain(self, grain_count: int) -> NDArray[np.int32]:
+        """Body j (m,), and i itself where j is a wall, so that it can index arrays of grains."""
+        return np.where(self.j >= grain_count, self.i, self.j)
+
+    def select(self, rows: NDArray) -> GapRows:
+        """Keep some rows (mask, or ascending indices); pairs keep their numbers."""
+        return GapRows(self.frame[rows], self.i[rows], self.j[rows], self.pair[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class GapGeometry:
+    """Gaps of some rows and the directions they are measured in."""
+
+    gap: Array  # (m,) [m], negative: overlap
+    normal: Array  # (m, 2) unit vector from i towards j
+    along: Array  # (m,) [m] from the middle of the wall to where i meets it, in its direction 0 → 1; 0 between grains
+
+    def select(self, rows: NDArray) -> GapGeometry:
+        return GapGeometry(self.gap[rows], self.normal[rows], self.along[rows])
+
+
+def find_gap_rows(sequence: MeasuredSequence, reach: float, *, wall_reach: float | None = None) -> GapRows:
+    """List every pair and frame whose measured gap is below `reach` [m], or `wall_reach` between grain and wall."""
+    wall_reach = reach if wall_reach is None else wall_reach
+    n = sequence.grain_count
+    frames, first, second = [], [], []
+    for k in range(sequence.frame_count):
+        i, j = _pairs_of_frame(sequence, k, reach, wall_reach)
+        frames.append(np.full(len(i), k))
+        first.append(i)
+        second.append(j)
+    frame, i, j = (np.concatenate(part).astype(np.int32) for part in (frames, first, second))
+    key = i.astype(np.int64) * (n + sequence.wall_count) + j
+    order = np.lexsort((frame, key))
+    pair = np.unique(key, return_inverse=True)[1].astype(np.int32)
+    return GapRows(frame[order], i[order], j[order], pair[order])
+
+
+def measure_gaps(rows: GapRows, position: Array, endpoints: Array, radius: Array) -> GapGeometry:
+    """Gaps of `rows` at position (f, n, 2) [m], endpoints (f, w, 2, 2) [m] and radius (n,) [m]."""
+    n = len(radius)
+    k, i, grain, wall = rows.frame, rows.i, rows.second_grain(n), rows.with_wall(n)
+    branch = position[k, grain] - position[k, i]
+    normal = branch / np.maximum(np.linalg.norm(branch, axis=1, keepdims=True), np.finfo(float).tiny)
+    along = np.zeros(rows.count)
+    kw, w, at = k[wall], rows.j[wall] - n, position[k[wall], i[wall]]
+    outward = outward_normals(endpoints)[kw, w]
+    branch[wall] = endpoints[kw, w, 0] - at
+    normal[wall] = outward
+    direction = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
+    along[wall] = np.einsum("mk,mk->m", at - endpoints[kw, w].mean(axis=1), direction)
+    distance = np.einsum("mk,mk->m", branch, normal)
+    return GapGeometry(distance - radius[i] - np.where(wall, 0.0, radius[grain]), normal, along)
+
+
+def outward_normals(endpoints: Array) -> Array:
+    """Unit normals (…, 2) that point out of the packing, of walls with endpoints (…, 2, 2) [m]."""
+    along = endpoints[..., 1, :] - endpoints[..., 0, :]
+    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    return np.stack([along[..., 1], -along[..., 0]], axis=-1)
+
+
+def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach: float) -> tuple[NDArray, NDArray]:
+    rows = np.flatnonzero(sequence.present[k])
+    position, radius = sequence.position[k], sequence.radius
+    if len(rows) == 0:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    tree = KDTree(position[rows])
+    pairs = rows[tree.query_pairs(2.0 * radius[rows].max() + reach, output_type="ndarray")]
+    i, j = pairs.min(axis=1), pairs.max(axis=1)
+    near = np.linalg.norm(position[j] - position[i], axis=1) - radius[i] - radius[j] < reach
+
+    start = sequence.endpoints[k, :, 0]
+    outward = outward_normals(sequence.endpoints[k])
+    along = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
+    length = np.linalg.norm(sequence.endpoints[k, :, 1] - start, axis=1)
+    offset = position[rows, None, :] - start[None]
+    gap = -np.einsum("nwk,wk->nw", offset, outward) - radius[rows, None]
+    s = np.einsum("nwk,wk->nw", offset, along)
+    # A grain meets a wall only beside the segment, give or take its radius.
+    beside = (s > -radius[rows, None]) & (s < length + radius[rows, None]) & (gap > -radius[rows, None])
+    grain, wall = np.nonzero(beside & (gap < wall_reach))
+    return np.concatenate([i[near], rows[grain]]), np.concatenate([j[near], wall + sequence.grain_count])

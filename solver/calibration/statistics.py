@@ -1,0 +1,49 @@
+"""How physical the gaps of a sequence are, before and after its constant errors are corrected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.bodies.grains import Array
+from solver.calibration.fit import GapFit
+from solver.calibration.weights import contact_width
+
+IMPOSSIBLE = 4.0  # standard deviations of noise: no touching pair overlaps more
+
+
+@dataclass(frozen=True, slots=True)
+class GapStatistics:
+    """How physical the gaps of a sequence are."""
+
+    spread: float  # [m] rms distance from contact of the grains that touch once they are corrected
+    wall_spread: float  # [m] the same between grains and walls
+    width: float  # [m] standard deviation of the gaps of touching grains, from their overlapping side
+    wall_width: float  # [m] the same between grains and walls
+    impossible: float  # share of all gaps below the noise that lie deeper than 4 of its standard deviations
+
+
+def gap_statistics(gap: Array, fit: GapFit) -> GapStatistics:
+    """Judge gaps (m,) [m] of the candidates of a fit."""
+    candidates = fit.candidates
+    between, overlap = candidates.between_grains, candidates.overlap
+    overlapping = gap + overlap < 0.0
+    deep = gap + overlap < -IMPOSSIBLE * candidates.noise
+    return GapStatistics(
+        _spread(gap[between & fit.touching] + overlap),
+        _spread(gap[~between & fit.touching] + overlap),
+        contact_width(gap[between], overlap),
+        contact_width(gap[~between], overlap),
+        float(np.mean(deep[overlapping])) if np.any(overlapping) else 0.0,
+    )
+
+
+def width_gain(fit: GapFit) -> float:
+    """By how much the gaps of touching grains got narrower."""
+    before, after = (gap_statistics(gap, fit).width for gap in (fit.gap_before, fit.gap_after))
+    return 1.0 - after / before if before > 0.0 else 0.0
+
+
+def _spread(gap: Array) -> float:
+    return float(np.sqrt(np.mean(gap**2))) if len(gap) else 0.0

@@ -1,0 +1,141 @@
+"""Contacts: pairs of bodies close enough to touch, with their point, normal, gap and a stable key."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from solver.bodies.grains import Array, Grains
+from solver.bodies.walls import Walls
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """Contacts of one frame, ordered by key.
+
+    Body `i` is always a grain; `j` is a grain (j > i) or wall `j − n`. The normal points from i to j.
+    """
+
+    i: NDArray[np.int32]  # (c,)
+    j: NDArray[np.int32]  # (c,)
+    gap: Array  # (c,) [m], negative: overlap
+    normal: Array  # (c, 2) unit vector from i towards j
+    point: Array  # (c, 2) [m], midway between the two surfaces
+    grain_count: int  # n: j >= n is a wall
+    wall_count: int
+
+    @property
+    def count(self) -> int:
+        return len(self.i)
+
+    @property
+    def key(self) -> NDArray[np.int64]:
+        """A number that names the pair in every frame of a sequence (c,), ascending."""
+        return self.i.astype(np.int64) * (self.grain_count + self.wall_count) + self.j
+
+    @property
+    def with_wall(self) -> NDArray[np.bool_]:
+        return self.j >= self.grain_count
+
+    @property
+    def tangent(self) -> Array:
+        """The normal turned by +90° (c, 2)."""
+        return np.stack([-self.normal[:, 1], self.normal[:, 0]], axis=1)
+
+    def select(self, rows: NDArray) -> Contacts:
+        """Keep some rows (mask, or ascending indices)."""
+        return Contacts(
+            self.i[rows], self.j[rows], self.gap[rows], self.normal[rows], self.point[rows],
+            self.grain_count, self.wall_count,
+        )  # fmt: skip
+
+
+def detect_contacts(
+    grains: Grains,
+    position: Array,
+    present: NDArray[np.bool_],
+    walls: Walls,
+    threshold: float,
+    *,
+    wall_threshold: float | None = None,
+) -> Contacts:
+    """Find every pair whose gap is below the threshold.
+
+    position (n, 2) [m]; present (n,); threshold [m] between grains and, unless
+    `wall_threshold` is given, between grain and wall too.
+    """
+    wall_threshold = threshold if wall_threshold is None else wall_threshold
+    i, j = _grain_pairs(grains.radius, position, present, threshold)
+    wi, wj = _wall_pairs(grains.radius, position, present, walls, wall_threshold)
+    return measure_contacts(grains, position, walls, np.concatenate([i, wi]), np.concatenate([j, wj + grains.count]))
+
+
+def measure_contacts(
+    grains: Grains, position: Array, walls: Walls, i: NDArray[np.integer], j: NDArray[np.integer]
+) -> Contacts:
+    """Measure normal, gap and point of the named pairs i, j (c,), whatever their distance."""
+    n = grains.count
+    order = np.argsort(i.astype(np.int64) * (n + walls.count) + j, kind="stable")
+    i, j = i[order].astype(np.int32), j[order].astype(np.int32)
+    wall = j >= n
+    normal = np.empty((len(i), 2))
+    gap = np.empty(len(i))
+
+    a, b = i[~wall], j[~wall]
+    branch = position[b] - position[a]
+    distance = np.linalg.norm(branch, axis=1)
+    if np.any(distance == 0.0):
+        row = int(np.argmin(distance))
+        raise ValueError(f"grains {a[row]} and {b[row]} have the same centre")
+    normal[~wall] = branch / distance[:, None]
+    gap[~wall] = distance - grains.radius[a] - grains.radius[b]
+
+    a, w = i[wall], j[wall] - n
+    normal[wall] = walls.outward[w]
+    gap[wall] = np.einsum("ij,ij->i", walls.endpoints[w, 0] - position[a], normal[wall]) - grains.radius[a]
+
+    point = position[i] + normal * (grains.radius[i] + 0.5 * gap)[:, None]
+    return Contacts(i, j, gap, normal, point, n, walls.count)
+
+
+def _grain_pairs(
+    radius: Array, position: Array, present: NDArray[np.bool_], threshold: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rows = np.flatnonzero(present)
+    if len(rows) < 2:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    tree = KDTree(position[rows])
+    pairs = rows[tree.query_pairs(2.0 * radius[rows].max() + threshold, output_type="ndarray")]
+    i, j = pairs.min(axis=1), pairs.max(axis=1)
+    gap = np.linalg.norm(position[j] - position[i], axis=1) - radius[i] - radius[j]
+    near = gap < threshold
+    return i[near], j[near]
+
+
+def _wall_pairs(
+    radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """A grain meets a wall only beside the segment: its centre must project onto it, give or take one radius."""
+    start, direction, outward = walls.endpoints[:, 0], walls.direction, walls.outward
+    offset = position[:, None, :] - start[None, :, :]
+    gap = -np.einsum("nwk,wk->nw", offset, outward) - radius[:, None]
+    along = np.einsum("nwk,wk->nw", offset, direction)
+    beside = (along > -radius[:, None]) & (along < walls.length[None, :] + radius[:, None])
+    i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & beside & present[:, None])
+    return i, w
+
+
+class ContactState(IntEnum):
+    OPEN = 0  # carries no force
+    STICKING = 1  # |f_t| < μ f_n
+    SLIDING = 2  # |f_t| = μ f_n
+
+
+class ContactSource(IntEnum):
+    DETECTED = 0
+    ADDED_BY_REVIEWER = 1
+    FORBIDDEN_BY_REVIEWER = 2

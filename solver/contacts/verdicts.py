@@ -1,0 +1,104 @@
+"""What people said of one frame, as an explicit input of contact detection: pairs that touch, pairs that do not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array, Grains
+from solver.bodies.motion import Snapshot
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, ContactSource, measure_contacts
+
+DETECTED = 0.5  # P(touch) from which on a pair counts as detected
+
+
+def _no_keys() -> NDArray[np.int64]:
+    return np.empty(0, np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdicts:
+    """Verdicts on one frame, by the keys of Contacts.key."""
+
+    forced: NDArray[np.int64] = field(default_factory=_no_keys)  # (m,) ascending: these pairs touch
+    forbidden: NDArray[np.int64] = field(default_factory=_no_keys)  # (p,) ascending: these do not
+    rearrangement: bool = False  # the packing rearranged on the way to this frame
+    reset: bool = False  # nothing of the former forces carries over to this frame
+    ignored: bool = False  # the photograph is not to be believed
+
+    def __post_init__(self) -> None:
+        both = np.intersect1d(self.forced, self.forbidden)
+        if len(both):
+            raise ValueError(f"pair {both[0]} is both forced and forbidden")
+
+
+NO_VERDICTS = Verdicts()
+
+
+def apply_verdicts(
+    contacts: Contacts,
+    verdicts: Verdicts,
+    grains: Grains,
+    position: Array,
+    present: NDArray[np.bool_],
+    walls: Walls,
+) -> tuple[Contacts, NDArray[np.int64]]:
+    """Drop forbidden contacts and add forced ones.
+
+    position (n, 2) [m]; present (n,). Returns the contacts, and for each the row it had before (c,), −1 for one that
+    was added. A forced pair of a grain that is not present is left out.
+    """
+    if len(verdicts.forced) == 0 and len(verdicts.forbidden) == 0:
+        return contacts, np.arange(contacts.count)
+    bodies = contacts.grain_count + contacts.wall_count
+    here = np.concatenate([present, np.ones(contacts.wall_count, np.bool_)])
+    forced = verdicts.forced[here[verdicts.forced // bodies] & here[verdicts.forced % bodies]]
+    key = np.union1d(np.setdiff1d(contacts.key, verdicts.forbidden), forced)
+    before = np.full(len(key), -1, np.int64)
+    _, now, then = np.intersect1d(key, contacts.key, assume_unique=True, return_indices=True)
+    before[now] = then
+    return measure_contacts(grains, position, walls, key // bodies, key % bodies), before
+
+
+def sources(contacts: Contacts, probability: Array, verdicts: Verdicts) -> NDArray[np.uint8]:
+    """ContactSource of every contact (c,).
+
+    probability (c,): P(touch) as detected, NaN where it was not computed. A forced pair that was detected anyway
+    stays a detected one.
+    """
+    source = np.full(contacts.count, ContactSource.DETECTED, np.uint8)
+    added = np.isin(contacts.key, verdicts.forced) & (probability < DETECTED)
+    source[added] = ContactSource.ADDED_BY_REVIEWER
+    return source
+
+
+def without_ignored(snapshots: Sequence[Snapshot], verdicts: Mapping[int, Verdicts]) -> list[Snapshot]:
+    """Put snapshots between their neighbours where a frame is to be ignored.
+
+    Positions, rotations and walls go linearly in time from the last believed frame to the next; before the first and
+    behind the last they stand still. Raises ValueError where every frame is ignored.
+    """
+    ignored = {k for k, each in verdicts.items() if each.ignored and 0 <= k < len(snapshots)}
+    believed = [k for k in range(len(snapshots)) if k not in ignored]
+    if not believed:
+        raise ValueError("every frame is ignored: nothing is left to solve")
+    shown = list(snapshots)
+    for k in ignored:
+        before = max((b for b in believed if b < k), default=believed[0])
+        after = min((b for b in believed if b > k), default=believed[-1])
+        one, two = snapshots[before], snapshots[after]
+        span = two.time - one.time
+        share = min(max((snapshots[k].time - one.time) / span, 0.0), 1.0) if span > 0 else 0.0
+        shown[k] = replace(
+            snapshots[k],
+            position=(1.0 - share) * one.position + share * two.position,
+            rotation=(1.0 - share) * one.rotation + share * two.rotation,
+            present=one.present & two.present,
+            endpoints=(1.0 - share) * one.endpoints + share * two.endpoints,
+            sigma=max(one.sigma, two.sigma),
+        )
+    return shown

@@ -1,0 +1,1 @@
+"""Explicit discrete-element simulation: the truth of synthetic experiments. Touches no other room."""

@@ -1,0 +1,1 @@
+"""Who does touch, inferred from many photographs. Stands on contacts."""

@@ -1,0 +1,153 @@
+"""One frame's contact problem, assembled and validated once.
+
+The unknown forces act on bodies that resist with an *impedance* Z [N s/m]: the velocity that forces f
+produce is v = v_measured + ΣF / Z. The paper's scheme has Z = m / ((1−η) δt). Measured grain velocities then
+do not influence the forces at all, because that Z is some nine orders too small; the kinematic number κ
+sets Z = κ f₀ / v_rms · m / m̄ / (1−η) instead, with f₀ = σ L d, so that undoing the whole measured motion costs
+forces of κ f₀. Rotation resists with ½ Z R², as solid rods do.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array, GrainMotion, Grains
+from solver.bodies.packing import Material
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts
+from solver.nlgs.ordering import GROUP, WALL_GROUP, visiting_order
+
+PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
+CACHE_LINE = 64  # bytes
+
+
+class ContactProblem(NamedTuple):
+    """What the kernels read: packed records in visiting order, p contacts between grains first, then q with walls.
+
+    Contacts between grains lie in blocks of L = GROUP, one row per quantity, so that a block is read as vectors; the
+    last block is filled up with zeros. The first `grouped` of them are in groups that share no grain.
+    At most ten fields: numba's dispatch slows beyond.
+    """
+
+    body: Array  # (n, 4) free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
+    plate: Array  # (w, 2) free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
+    pair_body: NDArray[np.int32]  # (blocks, 2, L) grains i, j
+    pair: Array  # (blocks, 4, L) nx, ny, 1/W_nn, and the velocity [m/s] added to u_n: gap to close
+    grouped: int  # a multiple of L, at most p
+    wall_body: NDArray[np.int32]  # (q, 2) grain, wall
+    wall: Array  # (q, 6) nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
+    friction: Array  # (2,) between grains, with walls
+    external: Array  # (n, 2) [N] weight of the grains
+    rows: NDArray[np.int64]  # (p + q,) record → row of Contacts
+
+
+def kinematic_impedance(
+    grains: Grains, *, kappa: float, force_scale: float, velocity_scale: float, formal_weight: float = 0.0
+) -> Array:
+    """Impedance of every grain (n,) [N s/m] for a kinematic number κ.
+
+    force_scale: f₀ = σ L d [N]; velocity_scale: v_rms [m/s].
+    """
+    if not (kappa > 0 and force_scale > 0 and velocity_scale > 0):
+        raise ValueError("κ, the force scale and the velocity scale must be positive")
+    mean = kappa * force_scale / velocity_scale / (1.0 - formal_weight)
+    return mean * grains.mass / grains.mass.mean()
+
+
+def inertial_impedance(grains: Grains, *, interval: float, formal_weight: float = 0.0) -> Array:
+    """Impedance of every grain (n,) [N s/m] as the paper's time step gives it: m / ((1−η) δt)."""
+    if not interval > 0:
+        raise ValueError("the interval must be positive")
+    return grains.mass / interval / (1.0 - formal_weight)
+
+
+def assemble(
+    grains: Grains,
+    motion: GrainMotion,
+    walls: Walls,
+    contacts: Contacts,
+    material: Material,
+    impedance: Array,
+    *,
+    closing: Array | None = None,
+) -> ContactProblem:
+    """Assemble the contact problem of one frame (or sub-step).
+
+    impedance (n,) [N s/m]; closing (c,) [m/s], the velocity at which a contact must close before it bears force
+    (a doubtful contact's extra gap over the time of the step), 0 if absent.
+    """
+    n = grains.count
+    if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
+        raise ValueError("a contact names a grain that is not present")
+    compliance = 1.0 / impedance
+    weight = grains.mass[:, None] * np.asarray(material.gravity)
+    weight[~motion.present] = 0.0
+    body = np.zeros((n, 4))
+    body[:, :2] = motion.velocity + weight * compliance[:, None]
+    body[:, 2] = motion.spin * grains.radius
+    body[:, 3] = compliance
+    body[~motion.present] = 0.0
+
+    plate = np.zeros((walls.count, 2))
+    if walls.loaded.any():
+        plate_compliance = 1.0 / (PLATE_IMPEDANCE * impedance[motion.present].mean())
+        plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
+        plate[walls.loaded, 1] = plate_compliance
+
+    rows_pair = np.flatnonzero(~contacts.with_wall)
+    rows_wall = np.flatnonzero(contacts.with_wall)
+    point, i, j = contacts.point, contacts.i, contacts.j
+    order, grouped = visiting_order(point[rows_pair], i[rows_pair], j[rows_pair], GROUP)
+    rows_pair = rows_pair[order]
+    order, _ = visiting_order(point[rows_wall], i[rows_wall], j[rows_wall], WALL_GROUP)
+    rows_wall = rows_wall[order]
+    closing = np.zeros(contacts.count) if closing is None else closing
+
+    pair_w = compliance[i[rows_pair]] + compliance[j[rows_pair]]
+    pair = np.column_stack([contacts.normal[rows_pair], 1.0 / pair_w, closing[rows_pair]])
+
+    wall_body = np.stack([i[rows_wall], j[rows_wall] - n], axis=1)
+    wall_w = compliance[wall_body[:, 0]]
+    velocity = walls.velocity_at(wall_body[:, 1], point[rows_wall])
+    wall = np.column_stack([
+        contacts.normal[rows_wall],
+        1.0 / (wall_w + plate[wall_body[:, 1], 1]),
+        1.0 / (3.0 * wall_w),
+        np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall]) + closing[rows_wall],
+        np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall]),
+    ])  # fmt: skip
+
+    return ContactProblem(
+        body,
+        plate,
+        _blocks(np.stack([i[rows_pair], j[rows_pair]], axis=1)),
+        _blocks(pair),
+        grouped,
+        wall_body,
+        wall,
+        np.array([material.friction, material.wall_friction]),
+        weight,
+        np.concatenate([rows_pair, rows_wall]),
+    )
+
+
+def aligned_zeros(shape: tuple[int, ...], kind: type = np.float64) -> NDArray:
+    """Zeros on the bounds of a cache line, which no vector then straddles."""
+    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    room = np.zeros(size + CACHE_LINE, np.uint8)
+    start = -room.ctypes.data % CACHE_LINE
+    return room[start : start + size].view(kind).reshape(shape)
+
+
+def _blocks(record: NDArray) -> NDArray:
+    """Records (p, k) in blocks (ceil(p / GROUP), k, GROUP), the last one filled up with zeros."""
+    count, width = record.shape
+    blocks = -(-count // GROUP)
+    padded = np.zeros((blocks * GROUP, width), record.dtype)
+    padded[:count] = record
+    result = aligned_zeros((blocks, width, GROUP), record.dtype.type)
+    result[:] = padded.reshape(blocks, GROUP, width).transpose(0, 2, 1)
+    return result

@@ -1,0 +1,119 @@
+"""A listener that keeps what a frame's sweeps did: the residuals of many, the forces of some.
+
+To measure a sweep takes about as long as to do one. Residuals are therefore those of every MEASURED_EVERY-th
+sweep, of every sweep that keeps its forces and of the last one of a sub-step; exact ones all. Other rows hold NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts
+from solver.nlgs.problem import ContactProblem
+from solver.nlgs.solve import Sweep
+
+Keep = Literal["log", "all", "none"]
+FIRST = 8  # sweeps kept one by one before the spacing becomes logarithmic
+LOG_SPACED = 40  # sweeps kept of a frame
+MEASURED_EVERY = 32  # sweeps
+
+
+def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
+    """Which of a frame's sweeps (0 … total − 1) keep their forces; the last one always does."""
+    if total == 0:
+        return np.empty(0, np.int64)
+    if keep == "all":
+        return np.arange(total)
+    if keep == "none":
+        return np.array([total - 1])
+    spaced = np.round(np.geomspace(FIRST, total, LOG_SPACED - FIRST)).astype(np.int64) - 1
+    return np.unique(np.clip(np.concatenate([np.arange(FIRST), spaced, [total - 1]]), 0, total - 1))
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A sub-step, and the forces that were kept of its sweeps."""
+
+    problem: ContactProblem
+    contacts: Contacts
+    force: list[NDArray[np.float32]]  # (2, c) [N] each, f_n and f_t in visiting order
+
+    def place_of(self, contacts: Contacts) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Where other contacts (c,) stand in the visiting order, and which of them the sub-step knows at all."""
+        key = self.contacts.key[self.problem.rows]
+        order = np.argsort(key)
+        place = order[np.minimum(np.searchsorted(key, contacts.key, sorter=order), len(key) - 1)]
+        return place, key[place] == contacts.key
+
+
+class SweepRecorder:
+    """Hears the sweeps of a frame's successive sub-steps."""
+
+    def __init__(self, expected: int, keep: Keep) -> None:
+        self._wanted = recorded_sweeps(expected, keep)
+        self._recorded: list[int] = []
+        self._count = 0
+        self._residuals: list[Array] = [np.empty((0, 3))]
+        self._steps: list[_Step] = []
+
+    def begin(self, problem: ContactProblem, contacts: Contacts) -> None:
+        """From now on sweeps are those of this problem."""
+        self._steps.append(_Step(problem, contacts, []))
+
+    def strides(self) -> Iterator[int]:
+        """How many sweeps there are from now to the next one that keeps its forces, then to the one after it, …"""
+        count = self._count
+        for wanted in self._wanted[len(self._recorded) :].tolist():
+            yield wanted + 1 - count
+            count = wanted + 1
+
+    def hear(self, sweep: Sweep) -> None:
+        """Take the residuals up to this sweep, and its forces if they are to be kept."""
+        self._residuals.append(sweep.residuals)
+        self._count += len(sweep.residuals)
+        last, kept = self._count - 1, len(self._recorded)
+        if kept < len(self._wanted) and last == self._wanted[kept]:
+            self._steps[-1].force.append(np.ascontiguousarray(sweep.force.T, np.float32))
+            self._recorded.append(last)
+
+    def history(self, contacts: Contacts) -> SweepHistory:
+        """All that was heard, the forces on the frame's own contacts."""
+        force_change, natural_map, unbalance = np.concatenate(self._residuals).T.copy()
+        force = np.zeros((2, len(self._recorded), contacts.count), np.float32)
+        row = 0
+        for step in [step for step in self._steps if step.force]:
+            place, known = step.place_of(contacts)
+            for kept in step.force:
+                for component in range(2):
+                    np.multiply(kept[component].take(place), known, out=force[component, row])
+                row += 1
+        return SweepHistory(
+            force_change,
+            natural_map,
+            unbalance,
+            np.array(self._recorded, np.int64),
+            force[0],
+            force[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SweepHistory:
+    """What one frame's sweeps did: a row of residuals for every sweep, NaN where not measured; forces of some."""
+
+    force_change: Array  # (s,) greatest |Δf| / |f| of a contact, the paper's ε_f
+    natural_map: Array  # (s,) relative natural-map residual
+    unbalance: Array  # (s,) worst |ΣF| on a grain / mean f_n
+    recorded: NDArray[np.int64]  # (r,) ascending sweeps (0 … s−1) whose forces are kept
+    fn: NDArray[np.float32]  # (r, c) [N], on the contacts of the frame
+    ft: NDArray[np.float32]  # (r, c) [N]
+
+    @property
+    def count(self) -> int:
+        return len(self.force_change)

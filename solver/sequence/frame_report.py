@@ -1,0 +1,76 @@
+"""What is reported of a solved frame: contacts of stand-ins dropped, forbidden ones listed."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts, ContactSource, ContactState
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.agreement import pearson
+
+
+def without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
+    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them.
+
+    The trust is lowered by what is hidden that way.
+    """
+    contacts, history = frame.contacts, frame.history
+    stand_in = np.concatenate([bridged, np.zeros(contacts.wall_count, np.bool_)])
+    keep = ~(stand_in[contacts.i] | stand_in[contacts.j])
+    columns = {
+        each.name: value[keep] for each in fields(frame) if isinstance(value := getattr(frame, each.name), np.ndarray)
+    }
+    # What is left out counts as zero for whoever compares the whole network.
+    hidden = 1.0 - pearson(np.where(keep, frame.fn, 0.0), frame.fn)
+    return replace(
+        frame,
+        trust=frame.trust * (1.0 - hidden),
+        hidden_share=hidden,
+        contacts=contacts.select(keep),
+        history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
+        reason=f"{bridged.sum()} lost grains were bridged, and nothing is shown of their contacts; {frame.reason}",
+        **columns,
+    )
+
+
+def show_forbidden(frame: FrameForces, forbidden: Contacts, probability: Array, un: Array, ut: Array) -> FrameForces:
+    """List contacts that were detected but forbidden (m,), without force and marked as such.
+
+    probability (m,): P(touch) by the detector; un, ut (m,) [m/s]: their measured relative velocity.
+    """
+    if forbidden.count == 0:
+        return frame
+    contacts = frame.contacts
+    order = np.argsort(np.concatenate([contacts.key, forbidden.key]), kind="stable")
+    known = {
+        "state": np.full(forbidden.count, ContactState.OPEN),
+        "source": np.full(forbidden.count, ContactSource.FORBIDDEN_BY_REVIEWER),
+        "probability": probability, "un": un, "ut": ut,
+    }  # fmt: skip
+    columns: dict[str, NDArray] = {}
+    for each in fields(frame):
+        value = getattr(frame, each.name)
+        if isinstance(value, np.ndarray):
+            added = np.asarray(known.get(each.name, np.zeros(forbidden.count)), value.dtype)
+            columns[each.name] = np.concatenate([value, added])[order]
+    history = frame.history
+    nothing = np.zeros((len(history.recorded), forbidden.count), np.float32)
+    geometry = {
+        name: np.concatenate([getattr(contacts, name), getattr(forbidden, name)])[order]
+        for name in ("i", "j", "gap", "normal", "point")
+    }
+    merged = Contacts(**geometry, grain_count=contacts.grain_count, wall_count=contacts.wall_count)
+    return replace(
+        frame,
+        contacts=merged,
+        history=replace(
+            history,
+            fn=np.concatenate([history.fn, nothing], axis=1)[:, order],
+            ft=np.concatenate([history.ft, nothing], axis=1)[:, order],
+        ),
+        **columns,
+    )

@@ -1,0 +1,1 @@
+"""What forces say, whoever found them. Stands on contacts."""

@@ -1,0 +1,63 @@
+"""How well two force networks agree: inferred against true, one frame against another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Of one frame, over the union of both networks' contacts, an absent contact counting as zero force."""
+
+    r_fn: float  # Pearson correlation of the normal forces
+    r_ft: float  # of the tangential forces
+    relative_l2: float  # ‖f − f_true‖ / ‖f_true‖, both components
+    scale: float  # Σ f_n / Σ f_n,true
+    contact_precision: float  # of the contacts listed, the share that truly bear force
+    contact_recall: float  # of those that truly bear force, the share that is listed
+
+
+def compare_forces(key: NDArray[np.int64], force: Array, true_key: NDArray[np.int64], true_force: Array) -> Agreement:
+    """Compare forces (c, 2) [N] on contacts named by key (c,) with true ones (t, 2) [N] on true_key (t,)."""
+    ours, true = align_forces(key, force, true_key, true_force)
+    bearing = np.unique(true_key[true_force[:, 0] > 0])
+    hit = len(np.intersect1d(np.unique(key), bearing))
+    size, total = float(np.linalg.norm(true)), float(true[:, 0].sum())
+    return Agreement(
+        r_fn=pearson(ours[:, 0], true[:, 0]),
+        r_ft=pearson(ours[:, 1], true[:, 1]),
+        relative_l2=float(np.linalg.norm(ours - true)) / size if size > 0 else float("nan"),
+        scale=float(ours[:, 0].sum()) / total if total > 0 else float("nan"),
+        contact_precision=hit / len(key) if len(key) else float("nan"),
+        contact_recall=hit / len(bearing) if len(bearing) else float("nan"),
+    )
+
+
+def align_forces(
+    key: NDArray[np.int64], force: Array, other_key: NDArray[np.int64], other_force: Array
+) -> tuple[Array, Array]:
+    """Bring two sets of forces (c, …) and (t, …) [N], named by key, onto the union of their contacts; absent is 0."""
+    union = np.union1d(key, other_key)
+    one, other = np.zeros((len(union), *force.shape[1:])), np.zeros((len(union), *other_force.shape[1:]))
+    one[np.searchsorted(union, key)] = force
+    other[np.searchsorted(union, other_key)] = other_force
+    return one, other
+
+
+def relative_change(key: NDArray[np.int64], force: Array, other_key: NDArray[np.int64], other_force: Array) -> float:
+    """‖f_other − f‖ / ‖f‖ of forces (c, …) and (t, …) [N], named by key, absent ones zero; 0 where f is none."""
+    one, other = align_forces(key, force, other_key, other_force)
+    size = float(np.linalg.norm(one))
+    return float(np.linalg.norm(other - one)) / size if size > 0 else 0.0
+
+
+def pearson(a: Array, b: Array) -> float:
+    """Pearson correlation; NaN where either does not vary."""
+    if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
+        return float("nan")
+    return float(np.corrcoef(a, b)[0, 1])

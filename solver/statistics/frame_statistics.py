@@ -1,0 +1,153 @@
+"""The macroscopic quantities of one frame, gathered from stress, fabric, connectivity, forces and chains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array, Grains
+from solver.bodies.packing import Material
+from solver.bodies.walls import Walls
+from solver.contacts.connectivity import coordination_number, rattlers
+from solver.contacts.contacts import Contacts, ContactState
+from solver.statistics.fabric import anisotropies, contact_fabric, fabric_anisotropy
+from solver.statistics.force_chains import find_force_chains
+from solver.statistics.force_statistics import (
+    force_density,
+    mobilisation,
+    mobilisation_density,
+    plateau_ratio,
+    strong_network,
+    tail_exponent,
+)
+from solver.statistics.stress import (
+    branch_vectors,
+    contact_force_vectors,
+    friction_angle,
+    love_weber_stress,
+    packing_area,
+    principal_stresses,
+    wall_forces,
+    wall_ratio_angle,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameStatistics:
+    """Statistics of one frame. Means and shares over contacts are over those that carry force."""
+
+    area: float  # [m²] of the polygon between the walls
+    stress: Array  # (2, 2) [Pa] Love-Weber, compression positive
+    pressure: float  # [Pa] half the trace
+    friction_angle: float  # [rad] asin((σ₁−σ₂)/(σ₁+σ₂))
+    wall_ratio_angle: float  # [rad] atan(|T|/N) on the loaded plate, NaN without one
+    principal_direction: float  # [rad] of σ₁, in (−π/2, π/2]
+    coordination_number: float  # contacts with force per grain, walls counted once
+    coordination_number_without_rattlers: float
+    rattler_count: int
+    contact_count: int  # carrying force
+    sliding_fraction: float  # of the contacts carrying force
+    mean_fn: float  # [N] over contacts carrying force
+    max_fn: float  # [N]
+    fabric: Array  # (2, 2) mean n⊗n over contacts carrying force
+    fabric_anisotropy: float  # 2 (F₁ − F₂)
+    sigma_1: float  # [Pa] greatest principal stress
+    sigma_2: float  # [Pa] smallest
+    wall_force: Array  # (w, 2) [N] that the packing exerts on every wall
+    # Anisotropies of the contacts between grains: those with walls face where the walls face.
+    contact_anisotropy: float  # a_c, Rothenburg & Bathurst 1989
+    branch_anisotropy: float  # a_l
+    normal_force_anisotropy: float  # a_n
+    tangential_force_anisotropy: float  # a_t
+    anisotropy_direction: Array  # (4,) [rad] of a_c, a_l, a_n, a_t, in (−π/2, π/2]
+    friction_angle_of_anisotropies: float  # [rad] that the four add up to: near `friction_angle`
+    mobilisation: float  # mean of |f_t| / (μ f_n)
+    mobilisation_density: Array  # (MOBILISATION_BINS,)
+    fn_density: Array  # (FORCE_BINS,) P(f_n / ⟨f_n⟩) in the bins of FORCE_EDGES
+    ft_density: Array  # (FORCE_BINS,) P(|f_t| / ⟨|f_t|⟩)
+    tail_exponent: float  # β of P(f_n) ∝ exp(−β f_n/⟨f_n⟩) above the mean, NaN without a tail
+    tail_exponent_sd: float
+    plateau_ratio: float  # 1: P(f_n) flat below the mean; above 1: more of the weakest; NaN without weak forces
+    plateau_ratio_sd: float
+    strong_share: float  # of the contacts, with more than the mean normal force; the weak have the rest
+    strong_pressure_share: float  # of the pressure that the strong contacts carry
+    strong_deviator_share: float  # of the stress deviator; above 1 where the weak contacts oppose it
+    chain_count: int  # force chains, Peters et al. 2005
+    chain_grain_share: float  # of the grains present that belong to one
+
+
+def frame_statistics(
+    contacts: Contacts,
+    fn: Array,
+    ft: Array,
+    state: NDArray[np.uint8],
+    position: Array,
+    present: NDArray[np.bool_],
+    walls: Walls,
+    length: float,
+    *,
+    grains: Grains,
+    material: Material,
+) -> FrameStatistics:
+    """Gather the statistics of one frame.
+
+    fn, ft (c,) [N]; state (c,) ContactState; position (n, 2) [m]; present (n,); length of the rods [m].
+    """
+    bearing = fn > 0
+    carried, held = fn[bearing], ft[bearing]
+    area = packing_area(walls, position[present])
+    stress = love_weber_stress(contacts, fn, ft, position, area, length)
+    sigma_1, sigma_2, direction = principal_stresses(stress)
+    fabric = contact_fabric(contacts.normal[bearing])
+    on_walls = wall_forces(contacts, fn, ft)
+
+    force, branch = contact_force_vectors(contacts, fn, ft), branch_vectors(contacts, position)
+    between = bearing & ~contacts.with_wall
+    parts = anisotropies(contacts.normal[between], branch[between], fn[between], ft[between])
+    kinds = (parts.contact, parts.branch, parts.normal, parts.tangential)
+    friction = np.where(contacts.with_wall, material.wall_friction, material.friction)
+    mobilised = mobilisation(carried, held, friction[bearing])
+    tail, plateau = tail_exponent(carried), plateau_ratio(carried)
+    strong = strong_network(carried, force[bearing], branch[bearing])
+    chains = find_force_chains(contacts, fn, ft, position, present, grains, length)
+    return FrameStatistics(
+        area=area,
+        stress=stress,
+        pressure=0.5 * float(np.trace(stress)),
+        friction_angle=friction_angle(stress),
+        wall_ratio_angle=wall_ratio_angle(walls, on_walls),
+        principal_direction=direction,
+        coordination_number=coordination_number(contacts, bearing, present),
+        coordination_number_without_rattlers=coordination_number(contacts, bearing, present, without_rattlers=True),
+        rattler_count=int(rattlers(contacts, bearing, present).sum()),
+        contact_count=int(bearing.sum()),
+        sliding_fraction=float(np.mean(state[bearing] == ContactState.SLIDING)) if bearing.any() else 0.0,
+        mean_fn=float(carried.mean()) if bearing.any() else 0.0,
+        max_fn=float(fn.max(initial=0.0)),
+        fabric=fabric,
+        fabric_anisotropy=fabric_anisotropy(fabric),
+        sigma_1=sigma_1,
+        sigma_2=sigma_2,
+        wall_force=on_walls,
+        contact_anisotropy=parts.contact.amplitude,
+        branch_anisotropy=parts.branch.amplitude,
+        normal_force_anisotropy=parts.normal.amplitude,
+        tangential_force_anisotropy=parts.tangential.amplitude,
+        anisotropy_direction=np.array([each.direction for each in kinds]),
+        friction_angle_of_anisotropies=float(np.arcsin(np.clip(parts.sine_of_friction_angle(direction), -1.0, 1.0))),
+        mobilisation=float(mobilised.mean()) if len(mobilised) else 0.0,
+        mobilisation_density=mobilisation_density(mobilised),
+        fn_density=force_density(carried),
+        ft_density=force_density(np.abs(held)),
+        tail_exponent=tail.value,
+        tail_exponent_sd=tail.standard_error,
+        plateau_ratio=plateau.value,
+        plateau_ratio_sd=plateau.standard_error,
+        strong_share=strong.contact_share,
+        strong_pressure_share=strong.pressure_share,
+        strong_deviator_share=strong.deviator_share,
+        chain_count=chains.count,
+        chain_grain_share=float(np.mean(chains.chain[present] >= 0)) if present.any() else 0.0,
+    )

@@ -1,0 +1,170 @@
+"""Photographs: order, depth, colour, and what is said of files that are not photographs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from rodsight.errors import InputError
+from rodsight.experiment.photographs import Photographs, read_photograph
+
+ROUNDING = 1e-3  # [grey] float32 arithmetic on values up to 255
+
+
+def write(folder: Path, name: str, pixels: np.ndarray) -> Path:
+    file = folder / name
+    assert cv2.imwrite(str(file), pixels)
+    return file
+
+
+def test_files_come_in_natural_order(tmp_path: Path) -> None:
+    for name in ("img10.png", "img2.png", "img1.png", "img100.png", "IMG3.png"):
+        write(tmp_path, name, np.zeros((4, 5), np.uint8))
+    photographs = Photographs.matching(tmp_path, "*.png")
+    assert [file.name for file in photographs.files] == ["img1.png", "img2.png", "IMG3.png", "img10.png", "img100.png"]
+
+
+def test_length_shape_and_items(tmp_path: Path) -> None:
+    for k in range(3):
+        write(tmp_path, f"p{k}.png", np.full((4, 6), 10 * k, np.uint8))
+    photographs = Photographs.matching(tmp_path, "p*.png")
+    assert len(photographs) == 3
+    assert photographs.shape == (4, 6)
+    assert [float(image.mean()) for image in photographs] == [0.0, 10.0, 20.0]
+    assert photographs[-1].mean() == 20.0
+    assert photographs[0].dtype == np.float32
+
+
+def test_photographs_are_read_only_when_asked_for(tmp_path: Path) -> None:
+    write(tmp_path, "a.png", np.zeros((4, 4), np.uint8))
+    (tmp_path / "b.png").write_text("no photograph")
+    photographs = Photographs.matching(tmp_path, "*.png")
+    assert photographs.shape == (4, 4)
+    with pytest.raises(InputError):
+        photographs.check()
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif"])
+def test_sixteen_bits_keep_every_level(tmp_path: Path, suffix: str) -> None:
+    levels = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    image = read_photograph(write(tmp_path, "deep" + suffix, levels))
+    assert len(np.unique(image)) == 65536
+    assert image.max() == pytest.approx(255.0, abs=ROUNDING)
+
+
+def test_eight_and_sixteen_bits_share_their_full_scale(tmp_path: Path) -> None:
+    eight = read_photograph(write(tmp_path, "8.png", np.array([[0, 100, 255]], np.uint8)))
+    sixteen = read_photograph(write(tmp_path, "16.png", np.array([[0, 25700, 65535]], np.uint16)))
+    assert np.abs(eight - sixteen).max() < ROUNDING
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_colour_becomes_luma(tmp_path: Path, kind: type, channels: int) -> None:
+    full = np.iinfo(kind).max
+    colour = np.full((3, 3, channels), full, kind)
+    colour[..., 0], colour[..., 1], colour[..., 2] = 0, 0, full  # pure red, in OpenCV's order
+    image = read_photograph(write(tmp_path, "red.png", colour))
+    assert image.shape == (3, 3)
+    assert np.abs(image - 0.299 * 255.0).max() < ROUNDING
+
+
+def test_no_match_names_the_pattern(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\*\.png.*no file matches"):
+        Photographs.matching(tmp_path, "*.png")
+
+
+def test_no_files_are_refused() -> None:
+    with pytest.raises(InputError, match="no photographs"):
+        Photographs([])
+
+
+@pytest.mark.parametrize("content", [b"", b"text", b"\x89PNG\r\n\x1a\n broken"])
+def test_unreadable_file_is_named(tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.png").write_bytes(content)
+    with pytest.raises(InputError, match=r"bad\.png"):
+        Photographs.matching(tmp_path, "*.png").check()
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_truncated_file_is_refused(tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64), dtype=np.uint8)
+    file = write(tmp_path, "cut" + suffix, noise)
+    file.write_bytes(file.read_bytes()[:2000])
+    with pytest.raises(InputError, match="cut short"):
+        read_photograph(file)
+    assert capfd.readouterr().err == ""
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"gone\.png"):
+        Photographs([tmp_path / "gone.png"])[0]
+
+
+def test_floating_point_depth_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="8 or 16 bits"):
+        read_photograph(write(tmp_path, "real.tif", np.zeros((4, 4), np.float32)))
+
+
+def test_different_size_is_named(tmp_path: Path) -> None:
+    write(tmp_path, "a1.png", np.zeros((4, 6), np.uint8))
+    write(tmp_path, "a2.png", np.zeros((6, 4), np.uint8))
+    photographs = Photographs.matching(tmp_path, "*.png")
+    with pytest.raises(InputError, match=r"a2\.png: photograph 1: is 4 x 6 pixels, the first photograph 6 x 4"):
+        photographs[1]
+
+
+def fake_rawpy(pixels: np.ndarray | None, asked: dict[str, object]) -> ModuleType:
+    """The part of rawpy that is used: red, green, blue `pixels`, or a file that it cannot read."""
+
+    class LibRawError(Exception):
+        pass
+
+    class Raw:
+        def __enter__(self) -> SimpleNamespace:
+            def postprocess(**choices: object) -> np.ndarray:
+                asked.update(choices)
+                assert pixels is not None
+                return pixels
+
+            return SimpleNamespace(postprocess=postprocess)
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+    def imread(_: str) -> Raw:
+        if pixels is None:
+            raise LibRawError("Unsupported file format")
+        return Raw()
+
+    module = ModuleType("rawpy")
+    module.__dict__.update(LibRawError=LibRawError, imread=imread)
+    return module
+
+
+def test_raw_files_are_developed_alike_and_to_full_depth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    red_green_blue = np.array([[[65535, 0, 0], [0, 65535, 0], [0, 0, 65535], [257, 257, 257]]], np.uint16)
+    asked: dict[str, object] = {}
+    monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(red_green_blue, asked))
+    image = read_photograph(tmp_path / "a.NEF")
+    assert image[0] == pytest.approx([0.299 * 255, 0.587 * 255, 0.114 * 255, 1.0], abs=ROUNDING)
+    assert asked["output_bps"] == 16
+    assert asked["no_auto_bright"] is True
+    assert asked["user_flip"] == 0
+
+
+def test_a_raw_file_without_its_reader_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rawpy", None)
+    with pytest.raises(InputError, match=r"a\.CR2.*rodsight\[raw\]"):
+        read_photograph(tmp_path / "a.CR2")
+
+
+def test_a_raw_file_that_is_none_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(None, {}))
+    with pytest.raises(InputError, match=r"a\.dng.*Unsupported file format"):
+        read_photograph(tmp_path / "a.dng")

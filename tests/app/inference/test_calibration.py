@@ -1,0 +1,158 @@
+"""Self-calibration as a stage: what it takes for known, and what it tells a person."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.experiment.config import ExperimentFile
+from rodsight.experiment.scaling import make_scale
+from rodsight.inference.calibration import calibrate_tracks, radii_are_metres, radius_classes
+from rodsight.results.calibration_summary import calibration_facts, calibration_lines
+from rodsight.tracks import Tracks, TrackStatus, WallTracks
+
+from solver.calibration.calibrate import Calibration, calibrate
+from solver.calibration.gaps import MeasuredSequence
+from solver.calibration.priors import CalibrationPriors
+
+RADIUS = 8e-3  # [m]
+
+
+def config(**sections) -> ExperimentFile:
+    tracks = {"positions": "", "grains": "", "times": ""}
+    return ExperimentFile.model_validate({"name": "test", "tracks": tracks, **sections})
+
+
+def photographed(**keys) -> ExperimentFile:
+    photographs = {"files": "*.png", "pixel_size": 1e-4, "interval": 1.0, **keys}
+    return ExperimentFile.model_validate({"name": "test", "photographs": photographs})
+
+
+def square_lattice(*, scale: float = 0.0, noise: float = 3e-6, side: int = 7, frames: int = 4) -> tuple:
+    """Discs of one radius that touch their four neighbours and the walls; positions divided by 1 + scale."""
+    rng = np.random.default_rng(4)
+    place = 2 * RADIUS * (1.0 + np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2))
+    n = side**2
+    position = (place + rng.normal(0.0, noise, (frames, n, 2))) / (1.0 + scale)
+    low, high = RADIUS, RADIUS * (2 * side + 1)
+    ends = np.array([[[low, low], [high, low]], [[high, low], [high, high]], [[high, high], [low, high]]])
+    tracks = Tracks(
+        np.arange(n), np.full(n, RADIUS), np.arange(float(frames)), position,
+        np.cumsum(rng.normal(0.0, 0.3, (frames, n)), axis=0), np.full((frames, n), noise),
+        np.full((frames, n), np.nan), np.full((frames, n), TrackStatus.GIVEN, np.uint8),
+    )  # fmt: skip
+    walls = WallTracks(("bottom", "right", "top"), np.broadcast_to(ends, (frames, 3, 2, 2)).copy(), np.full(3, np.nan))
+    return tracks, walls
+
+
+def test_radii_tell_the_pixel_size_unless_they_were_seen_in_the_photographs():
+    assert radii_are_metres(config())
+    assert radii_are_metres(photographed(radii=[7e-3, 8e-3]))
+    assert not radii_are_metres(photographed())
+    assert not radii_are_metres(photographed(radii=[7e-3], grains="grains.csv"))
+
+
+def test_classes_are_the_different_radii():
+    radius = np.array([8e-3, 7e-3, 8e-3 * (1 + 1e-9), 11e-3])
+    np.testing.assert_array_equal(radius_classes(radius), [1, 0, 1, 2])
+    assert radius_classes(np.linspace(7e-3, 8e-3, 50)) is None
+
+
+@pytest.mark.parametrize("error", [-5e-3, 5e-3])
+def test_wrong_scale_of_tracks_is_corrected_and_walls_in_metres_stay(error):
+    tracks, walls = square_lattice(scale=error)
+    better, moved, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    assert found is not None
+    assert found.applied
+    assert abs(found.pixel_size - error) < 1e-3  # the error that known radii may share
+    exact, _ = square_lattice()
+    left = 1e-4 * 2 * RADIUS * 8  # [m], over the width of the packing
+    np.testing.assert_allclose(better.position, exact.position, atol=3 * left)
+    np.testing.assert_allclose(moved.endpoints, walls.endpoints, atol=3 * left)
+
+
+def test_exact_tracks_pass_unchanged():
+    tracks, walls = square_lattice()
+    better, moved, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    assert found is not None
+    assert not found.applied
+    np.testing.assert_array_equal(better.position, tracks.position)
+    np.testing.assert_array_equal(better.sigma, tracks.sigma)
+    np.testing.assert_array_equal(moved.endpoints, walls.endpoints)
+    assert found.pixel_size == 0.0
+    assert "as given" in " ".join(calibration_lines(calibration_facts(found, walls.name)))
+
+
+def test_pixel_size_told_to_be_exact_is_kept():
+    tracks, walls = square_lattice(scale=5e-3)
+    _, _, found = calibrate_tracks(config(calibration={"pixel_size": 0.0}), tracks, walls, 0.0)
+    assert found is not None
+    assert found.pixel_size == 0.0
+    assert found.pixel_size_sd == 0.0
+
+
+def test_understated_noise_is_raised_even_where_nothing_is_corrected():
+    tracks, walls = square_lattice(noise=30e-6, frames=12)
+    understated = replace(tracks, sigma=tracks.sigma / 4)
+    better, _, found = calibrate_tracks(config(), understated, walls, 0.0)
+    assert found is not None
+    assert 2.0 < float(better.sigma[0, 0] / understated.sigma[0, 0]) < 5.0
+
+
+def test_too_few_photographs_are_left_alone():
+    tracks, walls = square_lattice(frames=2)
+    better, _, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    assert found is None
+    assert better is tracks
+
+
+@pytest.fixture
+def corrected() -> Calibration:
+    tracks, walls = square_lattice(scale=5e-3)
+    _, _, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    assert found is not None
+    return found
+
+
+def test_what_was_corrected_is_said_with_its_uncertainty(corrected):
+    text = "\n".join(calibration_lines(calibration_facts(corrected, ("bottom", "right", "top"))))
+    assert "Pixel size: +0.5" in text
+    assert "the walls stay" in text
+    assert "before → after" in text
+    facts = calibration_facts(corrected, ("bottom", "right", "top"))
+    assert facts["gap_rms_after"] < 0.2 * facts["gap_rms_before"]
+    assert set(facts["wall"]) == {"bottom", "right", "top"}
+
+
+def test_a_turned_wall_is_named_in_milliradians(corrected):
+    turned = replace(corrected, wall_tilt=np.array([0.0, 1e-3, 0.0]), wall_tilt_sd=np.full(3, 1e-4))
+    text = "\n".join(calibration_lines(calibration_facts(turned, ("bottom", "right", "top"))))
+    assert "wall right turned by +1.00 ± 0.10 mrad" in text or "and turned by +1.00 ± 0.10 mrad" in text
+
+
+def test_photographs_are_laid_under_the_result_at_the_corrected_scale(corrected):
+    section = photographed().photographs
+    assert section is not None
+    given, better = make_scale(section, 100), make_scale(section, 100, corrected)
+    assert better.pixel_size == pytest.approx(given.pixel_size * (1.0 + corrected.pixel_size), rel=1e-12)
+
+
+def test_lens_is_found_and_corrected():
+    tracks, walls = square_lattice(side=15, noise=2e-6, frames=6)
+    middle = walls.endpoints.mean(axis=(0, 1, 2))
+    reach = np.linalg.norm(walls.endpoints - middle, axis=-1).max()
+    place = (tracks.position - middle) / reach
+    bend = 250e-6  # [m] at the farthest corner: one pixel of a photograph
+    bent = tracks.position - bend * np.sum(place**2, axis=2, keepdims=True) * place
+    measured = MeasuredSequence(
+        tracks.radius, bent, tracks.rotation, tracks.present, walls.endpoints, tracks.sigma
+    )  # fmt: skip
+    priors = CalibrationPriors(50e-6, 10e-6, wall=50e-6, lens=160e-6)
+    found = calibrate(measured, priors, rng=np.random.default_rng(1))
+    assert found.applied
+    assert "lens" in found.verdict
+    assert abs(found.lens - bend) < 4 * found.lens_sd
+    straight = calibrate(replace(measured, position=tracks.position), priors, rng=np.random.default_rng(1))
+    assert straight.lens == 0.0
+    assert straight.lens_sd > 0.0

@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import rerun as rr
+from rodsight.recording.curve_layers.convergence import SMALLEST, power_of_ten
+from rodsight.recording.curve_layers.force_density import BINS as DENSITY_BINS
+from rodsight.recording.curve_layers.force_density import EDGES, density_points, merged
+from rodsight.recording.curve_layers.stress_and_fabric import BINS, direction_shares, rose_outline
+from rodsight.recording.look import entities
+from rodsight.recording.look.canvas import Canvas
+from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.scene import Clock, Scene
+from rodsight.recording.look.texts import printable
+from rodsight.recording.packing_layers.changes import correlate, correlate_common, gap_colours
+from rodsight.recording.packing_layers.packing import _spin_marks, grain_unbalance, last_seen
+from rodsight.recording.packing_layers.rods import turns_from_axis
+from rodsight.recording.packing_layers.truth import TruthWriter
+from rodsight.results.results import TruthContacts
+from rodsight.results.truth import score
+
+from solver.contacts.contacts import Contacts
+from tests.app.recording.fake_results import make_results
+from tests.app.recording.rows import latest
+
+ROUNDING = 1e-12
+FLOAT32 = 1e-6
+
+
+def test_a_grain_pressed_from_both_sides_is_balanced():
+    forces = make_results(1).frames[0]
+    contacts = Contacts(
+        np.array([0, 1], np.int32), np.array([1, 2], np.int32), np.zeros(2), np.array([[1.0, 0.0], [1.0, 0.0]]),
+        np.zeros((2, 2)), 3, 0,
+    )  # fmt: skip
+    from dataclasses import replace
+
+    forces = replace(forces, contacts=contacts, fn=np.array([7.0, 7.0]), ft=np.array([1.0, 1.0]))
+    unbalance = grain_unbalance(forces, 3)
+    assert unbalance[1] == pytest.approx(0.0, abs=ROUNDING)
+    assert np.allclose(unbalance[[0, 2]], np.hypot(7.0, 1.0) / 7.0, rtol=ROUNDING)
+
+
+def test_a_lost_grain_is_shown_where_it_was_last_seen_or_will_be():
+    position = np.arange(12.0).reshape(3, 2, 2)
+    position[1:, 0] = np.nan
+    position[:2, 1] = np.nan
+    shown = last_seen(position, 1)
+    assert shown.tolist() == [[0.0, 1.0], [10.0, 11.0]]
+
+
+def test_similarity_uses_the_contacts_that_both_frames_have():
+    results = make_results(2)
+    former, latter = results.frames
+    assert correlate_common(former, former) == pytest.approx(1.0)
+    common = set(former.contacts.key.tolist()) & set(latter.contacts.key.tolist())
+    a = [former.fn[former.contacts.key.tolist().index(k)] for k in sorted(common)]
+    b = [latter.fn[latter.contacts.key.tolist().index(k)] for k in sorted(common)]
+    assert correlate_common(former, latter) == pytest.approx(np.corrcoef(a, b)[0, 1], rel=ROUNDING)
+
+
+def test_correlation_is_undefined_without_variation():
+    assert np.isnan(correlate(np.ones(5), np.arange(5.0)))
+    assert np.isnan(correlate(np.array([1.0, np.nan, 2.0]), np.arange(3.0)))
+
+
+def test_the_gap_ramp_ends_differ_and_nan_is_drawn_as_touching():
+    colours = gap_colours(np.array([-1.0, 0.0, 1.0, np.nan]), 1e-5)
+    assert len(set(colours[:3].tolist())) == 3
+    assert colours[3] == colours[1]
+
+
+def test_residuals_become_powers_of_ten_with_a_floor():
+    assert power_of_ten(np.array([1e-3, 0.0])).tolist() == [-3.0, np.log10(SMALLEST)]
+    assert np.isnan(power_of_ten(np.array([np.inf, np.nan]))).all()
+
+
+def test_densities_are_drawn_at_their_value():
+    width = EDGES[1] - EDGES[0]
+    points = density_points(np.array([0.6, 1.2]), np.array([30.0, 10.0]), np.full(2, width), 40)
+    assert len(points) == 2
+    drop = points[1, 1] - points[0, 1]  # y down: 30 to 10 of 40 is log10 3 on an axis of 4.5 decades over 380
+    assert drop == pytest.approx(np.log10(3.0) / 4.5 * 380.0, rel=1e-5)  # float32
+
+
+def test_thin_bins_of_the_tail_are_thrown_together_without_losing_a_force():
+    counts = np.zeros(DENSITY_BINS)
+    counts[:4], counts[4:16] = 50.0, 1.0
+    centre, count, width = merged(counts, 4)
+    assert count[:4].tolist() == [50.0] * 4  # below the mean every bin stands alone
+    assert count[4:].tolist() == [4.0, 4.0, 4.0]
+    assert width[4:] == pytest.approx(4 * (EDGES[1] - EDGES[0]))
+    assert centre[4] == pytest.approx(EDGES[4] + 2 * (EDGES[1] - EDGES[0]))
+
+
+def test_a_rose_of_isotropic_directions_is_the_unit_circle():
+    angle = (np.arange(4 * BINS) + 0.5) * 2.0 * np.pi / (4 * BINS)
+    normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    shares = direction_shares(normal, np.ones(len(angle)))
+    assert np.allclose(shares, 1.0, atol=ROUNDING)
+    assert np.allclose(np.linalg.norm(rose_outline(shares), axis=1), 100.0, rtol=FLOAT32)
+
+
+def test_a_rose_points_the_way_of_its_contacts_and_the_opposite():
+    shares = direction_shares(np.array([[0.0, 1.0]]), np.array([2.0]))
+    assert np.flatnonzero(shares).tolist() == [BINS // 4, 3 * BINS // 4]
+    outline = rose_outline(shares)
+    assert outline[:, 1].min() < -1000.0  # up, y down
+
+
+def test_capsules_turn_onto_their_branches():
+    branch = np.random.default_rng(0).normal(size=(50, 2))
+    x, y, z, w = turns_from_axis(branch).astype(np.float64).T
+    turned = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)  # of (0, 0, 1)
+    way = branch / np.linalg.norm(branch, axis=1)[:, None]
+    assert np.allclose(turned, np.column_stack([way, np.zeros(50)]), atol=FLOAT32)
+
+
+def test_the_truth_tab_and_the_summary_file_tell_the_same_figures(recording, results, truth):
+    for frame, agreement in enumerate(score(results, truth)):
+        for path, value in (
+            (entities.TRUTH_R_FN, agreement.r_fn), (entities.TRUTH_R_FT, agreement.r_ft),
+            (entities.TRUTH_ERROR, agreement.relative_l2),
+        ):  # fmt: skip
+            shown = latest(recording.path, path, entities.FRAME, frame)["Scalars:scalars"]
+            assert shown == pytest.approx([value], rel=ROUNDING)
+
+
+def test_texts_keep_what_the_font_has_and_replace_the_rest():
+    assert printable("φ = 18.3°, σ₁ ≥ 2 µm, Größe\n") == "φ = 18.3°, σ₁ ≥ 2 µm, Größe\n"
+    assert printable("⟨f⟩ 砂 \U0001f600\x07") == "<f> ? ??"
+
+
+def test_a_quarter_turn_counter_clockwise_moves_the_mark_from_the_top_to_the_left():
+    marks = _spin_marks(np.zeros((2, 2)), np.ones(2), np.array([0.0, np.pi / 2]))
+    assert np.allclose(marks[0, :, 0], 0.0, atol=FLOAT32)
+    assert np.all(marks[0, :, 1] < -0.5)  # y down
+    assert np.allclose(marks[1, :, 1], 0.0, atol=FLOAT32)
+    assert np.all(marks[1, :, 0] < -0.5)
+
+
+def test_the_stress_cross_lies_along_the_principal_direction(recording, results):
+    for statistics, frame in zip(results.statistics, range(4), strict=True):
+        strips = np.array(latest(recording.path, entities.STRESS_CROSS, entities.FRAME, frame)["LineStrips2D:strips"])
+        greatest, least = strips[:, 1] - strips[:, 0]
+        angle = np.arctan2(-greatest[1], greatest[0])  # y down
+        assert np.sin(angle - statistics.principal_direction) == pytest.approx(0.0, abs=FLOAT32)
+        ratio = np.linalg.norm(least) / np.linalg.norm(greatest)
+        assert np.arcsin((1 - ratio) / (1 + ratio)) == pytest.approx(statistics.friction_angle, rel=1e-4)  # float32
+
+
+def test_the_truth_of_a_lost_grain_counts_as_missed(recording, results, truth):
+    frame = 2  # from here on grain 20 is lost; invent its true contact
+    lost = TruthContacts(*(np.append(column, value) for column, value in (
+        (truth.frame, frame), (truth.i, 20), (truth.j, 21), (truth.fn, 500.0), (truth.ft, 0.0))))  # fmt: skip
+    writer = TruthWriter(scene_of(results), lost)
+    stream = rr.RecordingStream(entities.APPLICATION_ID)
+    memory = stream.binary_stream()
+    agreement = writer.log(Clock(stream, frame, 0, 0), results.frames[frame])
+    assert memory.read()
+    whole = TruthWriter(scene_of(results), truth).log(Clock(stream, frame, 0, 0), results.frames[frame])
+    assert agreement.r_fn < whole.r_fn
+    assert agreement.relative_l2 > whole.relative_l2
+
+
+def scene_of(results) -> Scene:
+    canvas = Canvas.around(results.tracks, None)
+    return Scene(
+        results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
+        ForceStyle.on(canvas, ForceRange.of(results.frames)),
+    )  # fmt: skip

@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.cli.main import main
+from rodsight.recording.files.live import LiveRecording
+from rodsight.recording.files.live_process import LiveProcess
+from rodsight.recording.files.readback import read_forces
+from rodsight.recording.files.repair import repair_recording
+
+from tests.app.recording.browser import Browser, forces_drawn
+from tests.app.recording.fake_results import make_results
+from tests.program import RODSIGHT
+
+
+def before(results):
+    return replace(results, frames=(), statistics=())
+
+
+def test_the_file_of_a_live_recording_is_complete(results, tmp_path):
+    live = LiveRecording(tmp_path / "live.rrd", "none")
+    live.start(before(results))
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        live.frame(forces, statistics)
+    live.finish()
+    live.close()
+    found = read_forces(live.path)
+    assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
+    assert live.notes == []
+    # Frames reach the file one by one, which must not keep it from being whole.
+    assert repair_recording(live.path, tmp_path / "again.rrd").frames == len(results.frames)
+
+
+def test_every_finished_frame_is_in_the_file_before_the_next_begins(tmp_path):
+    results = make_results(3, sweeps=20)
+    live = LiveRecording(tmp_path / "live.rrd", "none")
+    live.start(before(results))
+    try:
+        for count, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True), 1):
+            live.frame(forces, statistics)
+            copy = tmp_path / f"copy{count}.rrd"
+            copy.write_bytes(live.path.read_bytes())  # as if the machine went down here
+            assert repair_recording(copy, tmp_path / f"mended{count}.rrd").frames == count
+    finally:
+        live.close()
+
+
+def test_nobody_outside_this_machine_is_served(results, tmp_path):
+    live = LiveRecording(tmp_path / "live.rrd", "none")
+    live.start(before(results))
+    try:
+        port = int(live.address.rsplit(":", 1)[1].split("/")[0])
+        with socket.create_connection(("127.0.0.1", port), timeout=5):
+            pass
+        with pytest.raises(OSError, match=r"refused|unreachable|timed out|assign"):
+            socket.create_connection((other_address(), port), timeout=2).close()
+    finally:
+        live.close()
+
+
+def other_address() -> str:
+    """An address of this machine beside 127.0.0.1: another of the loopback network, which 0.0.0.0 would listen on."""
+    return "127.0.0.2"
+
+
+def test_a_viewer_where_there_is_no_display_is_only_told_about(results, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    live = LiveRecording(tmp_path / "live.rrd", "native")
+    live.start(before(results))
+    live.close()
+    assert "--connect" in live.hint
+
+
+def test_a_watched_run_ends_with_the_full_recording_alone(tracked, tmp_path, capsys):
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as end:
+        main(["run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=50"])
+    assert not end.value.code
+    told = capsys.readouterr().out
+    assert "ssh -L" in told
+    assert "http://127.0.0.1:" in told
+    assert sorted(file.name for file in out.glob("*.rrd")) == ["recording.rrd"]
+    assert len(read_forces(out / "recording.rrd")) == 5
+
+
+def test_what_another_process_records_is_complete(results, tmp_path):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append, viewer="web")
+    live.start(before(results))
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        live.frame(forces, statistics)
+    live.close(whole=True)
+    found = read_forces(live.path)
+    assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
+    assert ["Watch it at" in sentence for sentence in told] == [True]
+    assert not any(answers(port) for port in ports_of(told[0]))
+
+
+def test_a_process_that_breaks_off_does_no_harm_to_the_run(results, tmp_path):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append)
+    live.start(before(results))
+    live._process.kill()
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        live.frame(forces, statistics)
+    live.close(whole=True)
+    assert told == ["The live view broke off, without harm to the run."]
+
+
+def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append, viewer="web")
+    live.close(whole=True)
+    assert live._process.returncode is not None
+    assert told == []
+    assert not live.path.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
+def test_a_run_that_is_stopped_leaves_a_recording_that_opens_and_no_server(tracked, tmp_path, number):
+    out = tmp_path / "out"
+    command = [
+        *RODSIGHT,
+        "run",
+        str(tracked),
+        "--out",
+        str(out),
+    ]
+    command += ["--view", "web", "--set", "solver.sweeps=20000"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert run.stdout is not None
+    hint = run.stdout.readline()
+    ports = ports_of(hint)
+    kept, end = out / ".unfinished" / "solving", time.monotonic() + 60
+    while not (kept / "000002.npz").exists() and run.poll() is None and time.monotonic() < end:
+        time.sleep(0.005)
+    if number == signal.SIGKILL:  # what is under way to the recording is lost
+        recording = out / "recording-live.rrd"
+        wait_until(lambda: recording.exists() and recorded_frames(recording, tmp_path) >= 2)
+    os.killpg(run.pid, number)  # as a terminal does: to all of its processes
+    told, said = run.communicate(timeout=60)
+    wait_until(lambda: not any(answers(port) for port in ports))
+    assert len(read_forces(out / "recording-live.rrd")) >= 2
+    assert not (out / "recording.rrd").exists()
+    if number == signal.SIGKILL:
+        assert run.returncode == -signal.SIGKILL, said
+    else:
+        assert run.returncode == 130, said
+        assert "What was solved so far" in told
+
+
+def ports_of(hint: str) -> list[int]:
+    return [int(port) for port in re.findall(r"-L (\d+):", hint)]
+
+
+def answers(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=5).close()
+    except OSError:
+        return False
+    return True
+
+
+def recorded_frames(recording, folder) -> int:
+    copy = folder / "copy.rrd"  # of a file that is still written
+    copy.write_bytes(recording.read_bytes())
+    try:
+        return repair_recording(copy, folder / "mended.rrd").frames
+    except (OSError, RuntimeError):  # nothing is in it yet
+        return 0
+
+
+def wait_until(condition, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path):
+    live = LiveRecording(tmp_path / "live.rrd", "web")
+    live.start(before(results))
+    try:
+        with Browser() as browser:
+            browser.open(f"{live.address}&renderer=webgl")
+            assert not browser.shows(forces_drawn, seconds=8.0)  # nothing solved yet
+            for forces, statistics in zip(results.frames, results.statistics, strict=True):
+                live.frame(forces, statistics)
+            assert browser.shows(forces_drawn)
+    finally:
+        live.close()

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.cli.main import main
+from rodsight.experiment.units import Scale
+from rodsight.recording.files.readback import read_forces
+from rodsight.recording.files.recorder import record
+from rodsight.recording.files.repair import repair_recording
+from rodsight.recording.files.share import share_recording
+from rodsight.recording.look import entities
+from rodsight.recording.tabs.layout_property import read_layout
+from rodsight.recording.viewing.single_page import write_single_page
+from rodsight.recording.viewing.viewer import viewer_binary
+
+from tests.app.recording.browser import Browser, forces_drawn
+from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
+from tests.app.recording.fake_results import make_results
+from tests.app.recording.rows import latest, rows
+
+
+def verify(path) -> None:
+    done = subprocess.run([viewer_binary(), "rrd", "verify", path], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_shared_recording_is_smaller_whole_and_has_the_same_forces(recording, results, tmp_path):
+    report = share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3, scale=0.5)
+    assert report.size < 0.85 * recording.size  # what does not change with frames stays
+    assert report.former_size == recording.size
+    verify(report.path)
+    found = read_forces(report.path)
+    assert sorted(found) == [1, 2]
+    assert all(np.array_equal(found[k].fn, results.frames[k].fn) for k in found)
+    layout, former = read_layout(report.path), read_layout(recording.path)
+    assert layout == replace(former, frame_count=2)
+
+
+def test_only_the_sweeps_of_the_shared_frames_are_in_it(recording, results, tmp_path):
+    path = share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3).path
+    start = results.frames[0].history.count + 1
+    sweeps = [row["sweep"] for row in rows(path, entities.SWEEP_NATURAL_MAP) if "sweep" in row]
+    assert min(sweeps) == start
+    assert max(sweeps) < start + 2 * (results.frames[1].history.count + 1)
+    assert rows(path, entities.SUMMARY)
+
+
+def test_smaller_photographs_cover_the_same_ground(recording, tmp_path):
+    import cv2
+
+    path = share_recording(recording.path, tmp_path / "small.rrd", scale=0.3).path
+    shown = latest(path, entities.PHOTOGRAPH, entities.FRAME, 2)
+    picture = cv2.imdecode(np.array(shown["EncodedImage:blob"][0], np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
+    assert picture.shape == (72, 90)
+    stretch = shown["Transform3D:scale"][0]
+    assert np.allclose(np.array(picture.shape[::-1]) * stretch[:2], SHAPE[::-1])
+    former = latest(recording.path, entities.PHOTOGRAPH, entities.FRAME, 2)
+    assert shown["EncodedImage:opacity"] == former["EncodedImage:opacity"]
+
+
+@pytest.mark.parametrize("wrong", [{"scale": 0.0}, {"scale": 1.5}, {"first": 3, "stop": 3}, {"stop": 9}])
+def test_what_cannot_be_shared_is_refused(recording, tmp_path, wrong):
+    with pytest.raises(ValueError, match=r"scale|range"):
+        share_recording(recording.path, tmp_path / "small.rrd", **wrong)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cut_recording_is_mended_as_far_as_it_goes(tmp_path):
+    results = make_results(20, sweeps=30)
+    path = record(results, tmp_path / "run.rrd").path
+    whole = path.read_bytes()
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(whole[: int(0.7 * len(whole))])
+    report = repair_recording(cut, tmp_path / "mended.rrd")
+    verify(report.path)
+    found = read_forces(report.path)
+    assert report.frames == len(found) >= 8
+    assert all(np.array_equal(found[k].fn, results.frames[k].fn) for k in found)
+
+
+def test_a_file_with_nothing_in_it_cannot_be_mended(tmp_path):
+    (tmp_path / "noise.rrd").write_bytes(b"nothing at all" * 100)
+    with pytest.raises(OSError, match=r"nothing to save|failed"):
+        repair_recording(tmp_path / "noise.rrd", tmp_path / "mended.rrd")
+    assert [file.name for file in tmp_path.iterdir()] == ["noise.rrd"]
+
+
+def test_the_command_writes_a_small_file_and_a_page_and_tells_their_size(recording, tmp_path, capsys):
+    folder = tmp_path / "shear"
+    folder.mkdir()
+    (folder / "recording.rrd").write_bytes(recording.path.read_bytes())
+    with pytest.raises(SystemExit) as end:
+        main(["share", str(folder), "--frames", "0:2", "--html"])
+    assert not end.value.code
+    told = capsys.readouterr().out
+    assert "2 frames" in told
+    assert told.count(" MB") >= 3
+    assert sorted(file.name for file in folder.iterdir()) == ["recording.rrd", "shear-share.html", "shear-share.rrd"]
+
+
+@pytest.mark.parametrize("arguments", [["--frames", "7"], ["--frames", "0:99"], ["--scale", "3"], ["--repair", "x"]])
+def test_wrong_arguments_end_with_status_2_and_one_line(recording, arguments, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["share", str(recording.path), *arguments])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_path):
+    # Frames that all look alike: whichever the playing viewer shows, the forces must be there.
+    path = record(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
+    page = tmp_path / "run.html"
+    write_single_page(path, page, title="<shear> & test")
+    with Browser() as browser:
+        browser.open(f"file://{page}?renderer=webgl")
+        browser.wait_for("!!window.rodsight || document.title == 'failed'")
+        assert browser.evaluate("document.title") == "<shear> & test", browser.evaluate("document.body.innerText")
+        assert browser.shows(forces_drawn)
+
+
+@pytest.mark.slow
+def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording):
+    page = tmp_path / "run.html"
+    write_single_page(recording.path, page, title="empty")
+    text = page.read_text()
+    page.write_text(text.replace('handle.send_rrd_to_channel("recording", await unpack("recording"));', ""))
+    with Browser() as browser:
+        browser.open(f"file://{page}?renderer=webgl")
+        browser.wait_for("!!window.rodsight || document.title == 'failed'")
+        assert not browser.shows(forces_drawn, seconds=4.0)

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from rodsight.recording.files.recorder import record
+from rodsight.recording.look import entities
+from rodsight.recording.look.canvas import Canvas
+from rodsight.recording.look.entities import SCHEMA, Condition, describe_schema
+from rodsight.recording.look.force_style import ForceRange, ForceStyle
+
+from tests.app.recording.fake_results import make_results
+from tests.app.recording.rows import components, latest, rows
+
+
+def expected(*absent: Condition) -> dict[str, tuple[set[str], set[str]]]:
+    return {
+        entity.path: (set(entity.when.timelines), set(entity.components))
+        for entity in SCHEMA
+        if entity.condition not in absent
+    }
+
+
+def written(path) -> dict[str, tuple[set[str], set[str]]]:
+    """What is in the file; the entities of single frames as one."""
+    per_frame = {entity.path for entity in SCHEMA if entity.per_frame}
+    found = {}
+    for path_of, parts in components(path).items():
+        head, _, frame = path_of.rpartition("/")
+        if head in per_frame and frame.isdecimal():
+            path_of = head
+        if not path_of.startswith("/__properties"):
+            found[path_of] = parts
+    return found
+
+
+def test_a_full_recording_holds_exactly_what_the_schema_says(recording):
+    assert written(recording.path) == expected()
+
+
+def test_a_bare_recording_holds_the_unconditional_part_of_the_schema(tmp_path):
+    report = record(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
+    # The only frame is a reset, so that something is flagged.
+    absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
+    assert written(report.path) == expected(*absent)
+
+
+def test_the_described_schema_names_every_entity():
+    text = describe_schema()
+    assert all(f"`{entity.path}`" in text for entity in SCHEMA)
+    assert len({entity.path for entity in SCHEMA}) == len(SCHEMA)
+
+
+def test_every_frame_begins_with_geometry_width_colour_and_values_in_one_row(recording, results):
+    whole = {"LineStrips2D:strips", "LineStrips2D:radii", "LineStrips2D:colors", "fn", "ft", "i", "j"}
+    by_frame: dict[int, list[dict]] = {}
+    for row in rows(recording.path, entities.FORCES):
+        by_frame.setdefault(row["frame"], []).append(row)
+    assert sorted(by_frame) == list(range(len(results.frames)))
+    for frame_rows in by_frame.values():
+        first = min(frame_rows, key=lambda row: row["sweep"])
+        assert whole <= set(first)
+        assert sum("LineStrips2D:strips" in row for row in frame_rows) == 1
+        count = len(first["LineStrips2D:strips"])
+        assert all(len(row["LineStrips2D:radii"]) == len(row["LineStrips2D:colors"]) == count for row in frame_rows)
+
+
+def test_both_timelines_end_a_frame_with_the_reported_field(tmp_path):
+    results = make_results(3, sweeps=50)
+    path = record(results, tmp_path / "run.rrd").path
+    style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(results.frames))
+    end = -1
+    for forces in results.frames:
+        end += forces.history.count + 1  # the reported field comes after the last sweep
+        for timeline, at in ((entities.FRAME, forces.frame), (entities.SWEEP, end)):
+            shown = latest(path, entities.FORCES, timeline, at)
+            assert shown["LineStrips2D:radii"] == style.radii(forces.fn).tolist()
+            assert shown["LineStrips2D:colors"] == style.colours(forces.fn).tolist()
+            assert shown["fn"] == forces.fn.tolist()
+
+
+def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path):
+    results = make_results(2, sweeps=30)
+    path = record(results, tmp_path / "run.rrd").path
+    assert len(latest(path, entities.SLIDING, entities.SWEEP, 30)["Points2D:positions"]) > 0
+    assert len(latest(path, entities.SLIDING, entities.SWEEP, 31)["Points2D:positions"]) == 0
+    assert len(latest(path, entities.SLIDING, entities.FRAME, 1)["Points2D:positions"]) > 0
+
+
+def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
+    results = make_results(3, sweeps=50, recorded=np.array([0, 10, 49]))
+    path = record(results, tmp_path / "run.rrd", sweeps="none").path
+    logged = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
+    found = [row for row in logged if "sweep" in row]
+    assert [row["sweep"] for row in found] == [
+        *range(50),
+        *range(51, 101),
+        *range(102, 152),
+    ]  # none for the reported field
+    expected_values = np.concatenate([np.log10(frame.history.natural_map) for frame in results.frames])
+    assert np.array_equal([row["Scalars:scalars"][0] for row in found], expected_values)
+    of_frames = [row for row in logged if "sweep" not in row]  # on the timeline of frames the last sweep of each
+    assert [row["frame"] for row in of_frames] == [0, 1, 2]
+    assert np.array_equal([row["Scalars:scalars"][0] for row in of_frames], expected_values[49::50])
+
+
+def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, results):
+    grains = latest(recording.path, entities.GRAINS, entities.FRAME, 3)
+    assert len(grains["Ellipses2D:centers"]) == results.grains.count
+    assert np.all(np.isfinite(grains["Ellipses2D:centers"]))
+    assert grains["status"][20] == "lost"
+    assert len(latest(recording.path, entities.GRAINS_LOST, entities.FRAME, 1)["LineStrips2D:strips"]) == 0
+    assert len(latest(recording.path, entities.GRAINS_LOST, entities.FRAME, 2)["LineStrips2D:strips"]) == 2
+    flags = [row["TextLog:text"][0] for row in rows(recording.path, entities.FLAGS)]
+    assert any("lost grain 120" in flag for flag in flags)
+
+
+def test_the_chain_s_own_last_sweep_is_shown_before_the_reported_field(tmp_path):
+    results = make_results(2, sweeps=50)
+    other = [replace(frame, fn=0.5 * frame.fn) for frame in results.frames]  # reported by something else
+    path = record(replace(results, frames=other), tmp_path / "run.rrd").path
+    style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(other))
+    frame = other[0]
+    chain = latest(path, entities.FORCES, entities.SWEEP, 49)["LineStrips2D:radii"]
+    assert chain == style.radii(frame.history.fn[-1]).tolist()
+    reported = latest(path, entities.FORCES, entities.SWEEP, 50)["LineStrips2D:radii"]
+    assert reported == style.radii(frame.fn).tolist() != chain

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.recording.files.recorder import record
+from rodsight.recording.look import entities
+from rodsight.recording.packing_layers.packing import grain_unbalance
+from rodsight.recording.packing_layers.touching import probability_colours
+from rodsight.recording.packing_layers.unconverged import doubt_colours, unbalances
+
+from solver.contacts.contacts import Contacts
+from tests.app.recording.fake_results import make_results
+from tests.app.recording.rows import latest, rows
+
+ROUNDING = 1e-12
+
+
+def test_the_unbalance_of_every_sweep_is_that_of_its_own_forces():
+    results = make_results(1, sweeps=5)
+    forces = results.frames[0]
+    found = unbalances(forces.contacts, forces.history.fn, forces.history.ft, results.grains.count)
+    for row in range(5):
+        of_row = replace(forces, fn=forces.history.fn[row].astype(float), ft=forces.history.ft[row].astype(float))
+        mean = of_row.fn[of_row.fn > 0].mean()
+        assert np.allclose(found[row] / mean, grain_unbalance(of_row, results.grains.count), rtol=ROUNDING)
+
+
+def test_a_squeezed_grain_is_quiet_and_its_neighbours_glow():
+    contacts = Contacts(
+        np.array([0, 1], np.int32), np.array([1, 2], np.int32), np.zeros(2), np.array([[1.0, 0.0], [1.0, 0.0]]),
+        np.zeros((2, 2)), 3, 0,
+    )  # fmt: skip
+    found = unbalances(contacts, np.array([[7.0, 7.0]]), np.zeros((1, 2)), 3)
+    assert found.tolist() == [[7.0, 0.0, 7.0]]
+    quiet, loud = doubt_colours(np.array([0.0, 1.0]))
+    assert quiet != loud
+
+
+def test_louder_colours_are_lighter_and_the_unknown_is_faint():
+    colours = doubt_colours(np.array([1e-9, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 9.0, np.nan]))
+    assert colours[0] == colours[1]
+    assert colours[5] == colours[6]
+    assert len(set(colours[:6].tolist())) == 5
+    assert colours[7] & 0xFF < 255
+    red, green, blue = (colours[1:6] >> shift & 0xFF for shift in (24, 16, 8))
+    luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    assert np.all(np.diff(luminance) > 0)
+
+
+def test_maps_follow_the_sweeps_and_end_with_the_reported_field(tmp_path):
+    results = make_results(2, sweeps=40)
+    path = record(results, tmp_path / "run.rrd").path
+    frame = results.frames[0]
+    early = latest(path, entities.CHANGE_MAP, entities.SWEEP, 1)["LineStrips2D:colors"]
+    late = latest(path, entities.CHANGE_MAP, entities.SWEEP, 39)["LineStrips2D:colors"]
+    end = latest(path, entities.CHANGE_MAP, entities.SWEEP, 40)["LineStrips2D:colors"]
+    assert early != late
+    mean = frame.fn[frame.fn > 0].mean()
+    step = np.hypot(frame.fn - frame.history.fn[-1], frame.ft - frame.history.ft[-1]) / mean
+    assert end == doubt_colours(step).tolist()
+    grains = latest(path, entities.UNBALANCE_MAP, entities.FRAME, 0)["Points2D:colors"]
+    assert grains == doubt_colours(grain_unbalance(frame, results.grains.count)).tolist()
+
+
+def test_probabilities_are_shown_per_contact_and_counted(tmp_path):
+    results = make_results(1)
+    frame = results.frames[0]
+    probability = np.linspace(0.0, 1.0, frame.contacts.count)
+    path = record(replace(results, frames=[replace(frame, probability=probability)]), tmp_path / "run.rrd").path
+    shown = latest(path, entities.PROBABILITY, entities.FRAME, 0)
+    assert shown["LineStrips2D:colors"] == probability_colours(probability).tolist()
+    assert np.allclose(shown["probability"], probability, atol=1e-7)  # float32
+    expected = latest(path, entities.EXPECTED_COUNT, entities.FRAME, 0)["Scalars:scalars"]
+    assert expected == pytest.approx([probability.sum()])
+
+
+def test_walls_have_one_curve_each_with_its_name(recording, results):
+    shown = latest(recording.path, entities.WALL_NORMAL_FORCE, entities.FRAME, 1)
+    names = [
+        row["SeriesLines:names"]
+        for row in rows(recording.path, entities.WALL_NORMAL_FORCE)
+        if "SeriesLines:names" in row
+    ]
+    assert list(results.walls.name) in names
+    force = results.statistics[1].wall_force
+    outward = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # before it is sheared
+    # The cell of frame 1 is sheared by 0.25°: walls that stood upright lean by that.
+    assert np.allclose(shown["Scalars:scalars"], np.einsum("wk,wk->w", force, outward), rtol=0.02)

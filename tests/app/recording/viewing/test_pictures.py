@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from rodsight.cli.main import main
+from rodsight.recording.viewing.headless import HeadlessViewer, NoPictureError, vulkan_drivers
+from rodsight.recording.viewing.pictures import timeline_values, write_film
+
+from tests.app.recording.browser import warm_share
+
+needs_vulkan = pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
+
+
+def read(png: bytes) -> np.ndarray:
+    return cv2.cvtColor(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+
+
+@needs_vulkan
+def test_tabs_and_views_are_pictured_at_any_time(recording):
+    with HeadlessViewer(recording.path, width=900, height=600) as viewer:
+        assert viewer.tabs[0] == "Experiment"
+        viewer.set_time("frame", 1)
+        network = read(viewer.picture("Force network"))
+        assert 0.01 < warm_share(network) < 0.5
+        assert viewer.picture("Force network") == viewer.picture("Force network")
+        # The first sweep of a frame has less force than the reported field.
+        viewer.set_time("sweep", 61)
+        assert warm_share(read(viewer.picture("Force network"))) < 0.8 * warm_share(network)
+        anisotropies = read(viewer.picture("Anisotropies"))  # of another tab
+        assert np.ptp(anisotropies) > 100
+        assert viewer.warnings() == []
+        with pytest.raises(NoPictureError, match="no view 'Nothing'"):
+            viewer.picture("Nothing")
+
+
+@needs_vulkan
+@pytest.mark.slow
+def test_a_film_has_one_picture_for_every_frame(recording, tmp_path):
+    size = write_film(recording.path, tmp_path / "run.mp4", range(4), view="Force network", size=(640, 480))
+    assert (tmp_path / "run.mp4").stat().st_size == size
+    film = cv2.VideoCapture(str(tmp_path / "run.mp4"))
+    pictures = []
+    while (step := film.read())[0]:
+        pictures.append(step[1])
+    assert len(pictures) == 4
+    assert all(warm_share(each[..., ::-1]) > 0.005 for each in pictures)
+    assert np.abs(pictures[0].astype(int) - pictures[3]).mean() > 0.5  # grey levels: the frames differ
+
+
+def test_the_timelines_are_read_from_the_file(recording, results):
+    assert timeline_values(recording.path, "frame") == (0, 3)
+    sweeps = sum(forces.history.count + 1 for forces in results.frames)
+    assert timeline_values(recording.path, "sweep") == (0, sweeps - 1)
+    with pytest.raises(NoPictureError, match="no timeline"):
+        timeline_values(recording.path, "nothing")
+
+
+@pytest.mark.parametrize(
+    "wrong", [["--size", "big"], ["--frames", "7:9"], ["--step", "0"], ["--rate", "0"], ["--timeline", "time"]]
+)
+def test_wrong_arguments_of_pictures_end_with_status_2(recording, wrong, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["export", "video", str(recording.path), *wrong])
+    assert end.value.code == 2
+    capsys.readouterr()

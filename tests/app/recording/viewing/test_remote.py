@@ -1,0 +1,173 @@
+"""A run on another machine, watched from here through ssh. The other machine is a network namespace of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from rodsight.synthetic.experiment import synthesize
+
+from tests.app.recording.browser import Browser, find_chromium, forces_drawn
+from tests.program import RODSIGHT
+
+pytestmark = pytest.mark.slow
+
+HERE, THERE, SSH_PORT = "10.231.87.1", "10.231.87.2", 2222
+SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The other machine: commands in it, and how ssh gets there."""
+
+    name: str
+    key: Path
+
+    def start(self, *command: object, **options) -> subprocess.Popen:
+        return subprocess.Popen(["ip", "netns", "exec", self.name, *map(str, command)], **options)
+
+    def tunnel(self, *ports: int) -> list[str]:
+        forwards = [part for port in ports for part in ("-L", f"{port}:localhost:{port}")]
+        return [
+            "ssh", "-N", "-p", str(SSH_PORT), "-i", str(self.key), "-o", "StrictHostKeyChecking=no", "-o",
+            "UserKnownHostsFile=/dev/null", "-o", "ExitOnForwardFailure=yes", "-o", "BatchMode=yes", *forwards,
+            f"root@{THERE}",
+        ]  # fmt: skip
+
+
+def ip(*arguments: str) -> None:
+    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Iterator[Machine]:
+    for tool in ("ip", "ssh", "ssh-keygen"):
+        if shutil.which(tool) is None:
+            pytest.skip(f"no {tool}: apt-get install iproute2 openssh-client")
+    sshd = shutil.which("sshd") or "/usr/sbin/sshd"
+    if not Path(sshd).exists():
+        pytest.skip("no sshd: apt-get install openssh-server")
+    if os.geteuid() != 0:
+        pytest.skip("network namespaces need root")
+    find_chromium()
+    name, ours, theirs = f"rodsight{os.getpid()}", f"rs{os.getpid()}h", f"rs{os.getpid()}t"
+    with ExitStack() as stack:
+        try:
+            ip("netns", "add", name)
+        except subprocess.CalledProcessError as error:
+            pytest.skip(f"no network namespace: {error.stderr.strip()}")
+        stack.callback(ip, "netns", "delete", name)
+        ip("link", "add", ours, "type", "veth", "peer", "name", theirs)
+        stack.callback(ip, "link", "delete", ours)
+        ip("link", "set", theirs, "netns", name)
+        ip("address", "add", f"{HERE}/30", "dev", ours)
+        ip("link", "set", ours, "up")
+        for arguments in (
+            ("address", "add", f"{THERE}/30", "dev", theirs),
+            ("link", "set", theirs, "up"),
+            ("link", "set", "lo", "up"),
+        ):
+            ip("netns", "exec", name, "ip", *arguments)
+        made = Machine(name, make_key(tmp_path / "user_key"))
+        run = Path("/run/sshd")  # where sshd locks itself in
+        if not run.exists():
+            run.mkdir(mode=0o755)
+            stack.callback(shutil.rmtree, run)
+        server = made.start(sshd, "-D", "-e", "-f", sshd_config(tmp_path), stderr=subprocess.PIPE, text=True)
+        stack.callback(end, server)
+        wait_for(lambda: reaches(THERE, SSH_PORT), "sshd", server)
+        yield made
+
+
+def make_key(file: Path) -> Path:
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(file)], check=True)
+    return file
+
+
+def sshd_config(folder: Path) -> Path:
+    make_key(folder / "host_key")
+    file = folder / "sshd_config"
+    file.write_text(
+        f"Port {SSH_PORT}\nListenAddress {THERE}\nHostKey {folder / 'host_key'}\nPidFile {folder / 'sshd.pid'}\n"
+        f"AuthorizedKeysFile {folder / 'user_key.pub'}\nStrictModes no\nUsePAM no\nPasswordAuthentication no\n"
+        "PermitRootLogin prohibit-password\nAllowTcpForwarding local\n"
+    )
+    return file
+
+
+def reaches(host: str, port: int) -> bool:
+    try:
+        socket.create_connection((host, port), timeout=2).close()
+    except OSError:
+        return False
+    return True
+
+
+def wait_for(condition, what: str, process: subprocess.Popen) -> None:
+    give_up = time.monotonic() + SECONDS
+    while not condition():
+        assert process.poll() is None, f"{what} ended: {process.stderr.read() if process.stderr else ''}"
+        assert time.monotonic() < give_up, f"{what} does not answer"
+        time.sleep(0.1)
+
+
+def end(process: subprocess.Popen) -> None:
+    process.terminate()
+    try:
+        process.wait(20)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    for pipe in (process.stdout, process.stderr):
+        if pipe is not None:
+            pipe.close()
+
+
+@contextmanager
+def running(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
+    try:
+        yield process
+    finally:
+        end(process)
+
+
+def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(machine: Machine, tmp_path: Path):
+    experiment = tmp_path / "far"
+    synthesize(experiment, grains=120, frames=12, photographs=False, noise=1e-5, seed=1)
+    command = [
+        *RODSIGHT,
+        "run",
+        experiment,
+        "--view",
+        "web",
+    ]
+    command += ["--out", tmp_path / "out", "--set", "solver.sweeps=60000"]  # long enough to be watched
+    with running(machine.start(*command, stdout=subprocess.PIPE, text=True)) as run:
+        assert run.stdout is not None
+        told = run.stdout.readline()
+        found = re.search(r"Watch it at (\S+) .*-L (\d+):localhost:\2 -L (\d+):localhost:\3", told)
+        assert found, told
+        address, page, data = found[1], int(found[2]), int(found[3])
+        for port in (page, data):
+            if reaches("127.0.0.1", port):
+                pytest.skip(f"port {port} of this machine is taken: the tunnel needs it")
+            assert not reaches(THERE, port)  # nothing is served to the network
+        with running(subprocess.Popen(machine.tunnel(page, data), stderr=subprocess.PIPE, text=True)) as tunnel:
+            wait_for(lambda: reaches("127.0.0.1", page), "the tunnel", tunnel)
+            with Browser() as browser:
+                browser.open(f"{address}&renderer=webgl")
+                assert browser.shows(forces_drawn), browser.messages
+        assert run.poll() is None  # it was watched while it was solved
+    # Terminated, the run takes its servers with it.
+    left = subprocess.run(["ip", "netns", "pids", machine.name], capture_output=True, text=True, check=True).stdout
+    names = {Path(f"/proc/{pid}/comm").read_text().strip() for pid in left.split()}
+    assert names == {"sshd"}

@@ -1,0 +1,97 @@
+"""Detection where little is told or the picture is poor: any size, soft or tiny photographs, shaded rims."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from rodsight.experiment.photographs import LUMA
+from rodsight.tracking.detection.grains import DetectionSettings, detect_grains
+from rodsight.tracking.detection.outlines import Outliner
+
+from tests.app.tracking.real_like import Laboratory, brown_photograph
+
+SIDE = 420  # [px]
+BLUR_ALLOWED = 0.12  # [px] texture takes part in the fit
+RADIUS_ALLOWED = 0.15  # [px] median; the steepest point of a blurred circle lies .05 inside
+CENTRE_ALLOWED = 0.12  # [px] rms, where rims are shaded by half on one side
+
+
+def rods_on_a_grid(radius: float, pitch: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    generator = np.random.default_rng(seed)
+    line = np.arange(0.75 * pitch, SIDE - 0.6 * pitch, pitch)
+    x, y = (axis.ravel() + generator.uniform(-0.5, 0.5, axis.size) for axis in np.meshgrid(line, line))
+    return x, y, np.full(len(x), radius)
+
+
+def photograph(laboratory: Laboratory, x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    image = brown_photograph(
+        laboratory, SIDE, SIDE, x, y, radius, np.zeros(len(x)), pattern_seed=1, noise_seed=1
+    )  # fmt: skip
+    return np.ascontiguousarray(image.astype(np.float32) @ LUMA, dtype=np.float32)
+
+
+@pytest.mark.parametrize("blur", [0.6, 1.1, 1.5])
+def test_the_blur_of_a_photograph_is_measured_and_does_not_move_radii(blur: float) -> None:
+    x, y, radius = rods_on_a_grid(22.0, 60.0)
+    image = photograph(Laboratory(blur=blur, light=0.0), x, y, radius)
+    outliner = Outliner(image, 22.0)
+    measured = [outliner.measure(a, b, 22.0, 2.0, 0.0, np.inf) for a, b in zip(x, y, strict=True)]
+    # A pixel is a square of side 1: it blurs by 1/sqrt(12) more.
+    assert outliner.estimate_blur(measured) == pytest.approx(np.hypot(blur, 0.29), abs=BLUR_ALLOWED)
+    found = detect_grains(image, DetectionSettings(radius_range=(15.0, 30.0)))
+    assert found.count == len(x)
+    assert abs(float(np.median(found.radius)) - 22.0) < RADIUS_ALLOWED
+
+
+def test_a_sharp_binary_picture_is_no_obstacle() -> None:
+    x, y, radius = rods_on_a_grid(22.0, 60.0)
+    row, column = np.mgrid[0:SIDE, 0:SIDE]
+    inside = [np.hypot(column - a, row - b) < r for a, b, r in zip(x, y, radius, strict=True)]
+    found = detect_grains(np.where(np.any(inside, axis=0), 255.0, 0.0).astype(np.float32))
+    assert found.count == len(x)
+    assert np.abs(found.radius - 22.0).max() < 0.5
+
+
+def test_sizes_one_to_eight_are_found_when_nothing_is_told() -> None:
+    """Neither does a circle inside a large rod's texture count, nor one beyond the usual sizes get lost."""
+    x = np.array([110.0, 300.3, 300.0, 60.5, 120.2, 180.0, 240.0, 389.0, 224.0])
+    y = np.array([110.0, 90.4, 270.0, 300.0, 260.6, 320.0, 390.0, 389.0, 190.0])
+    radius = np.array([96.0, 72.0, 80.0, 30.0, 22.0, 16.0, 14.0, 12.0, 12.0])
+    found = detect_grains(photograph(Laboratory(grain=14.0, lathe=10.0), x, y, radius))
+    near = np.hypot(found.x[:, None] - x, found.y[:, None] - y)
+    assert found.count == len(x)
+    assert near.min(axis=0).max() < 0.5
+    assert np.abs(found.radius - radius[near.argmin(axis=1)]).max() < 1.0
+
+
+def test_one_sided_shadow_is_told_in_sigma() -> None:
+    x, y, radius = rods_on_a_grid(20.0, 44.0)
+    found = detect_grains(
+        photograph(Laboratory(shadow=0.5, highlight=30.0), x, y, radius), DetectionSettings(radius_range=(14.0, 28.0))
+    )
+    assert found.count == len(x)
+    nearest = np.hypot(found.x[:, None] - x, found.y[:, None] - y).argmin(axis=1)
+    error = np.stack([found.x - x[nearest], found.y - y[nearest]], axis=1)
+    assert np.sqrt((error**2).mean()) < CENTRE_ALLOWED
+    # Shading moves all rods alike, so few rods tell as much as many: half as large again is still covered.
+    assert np.sqrt(((error / found.sigma[:, None]) ** 2).mean()) < 1.5
+
+
+def test_a_circle_hardly_in_view_is_not_guessed() -> None:
+    x, y, radius = np.array([210.0, -18.0]), np.array([210.0, 200.0]), np.array([60.0, 60.0])
+    image = photograph(Laboratory(), x, y, radius)
+    found = detect_grains(image)
+    assert found.count >= 1
+    assert (found.sigma < np.maximum(1.0, 0.05 * found.radius)).all()
+    assert np.hypot(found.x - 210.0, found.y - 210.0).min() < 0.5
+
+
+def test_half_the_resolution_finds_the_same_rods() -> None:
+    x, y, radius = rods_on_a_grid(28.0, 62.0)
+    image = photograph(Laboratory(shadow=0.2, blur=1.3), x, y, radius)
+    half = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), dtype=np.float32)
+    found = detect_grains(half)
+    assert found.count == len(x)
+    near = np.hypot(found.x[:, None] - (x - 0.5) / 2, found.y[:, None] - (y - 0.5) / 2).min(axis=0)
+    assert near.max() < 0.5

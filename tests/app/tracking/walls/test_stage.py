@@ -1,0 +1,93 @@
+"""What the tracking stage makes of walls: how well they are known is stored, and what lies beyond them is no grain."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+from rodsight.experiment.tables import read_table
+
+from tests.app.experiment.test_bad_input import edit
+from tests.app.tracking.test_stage import cut_walls, off_walls, track
+
+BEYOND = 140  # [px] of backing added on the right of every photograph
+FACTOR = 4.0  # standard deviations that cover every error of few endpoints
+
+
+@pytest.fixture
+def photographed(made_photographs: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made_photographs, tmp_path / "photographed"))
+
+
+def test_how_well_followed_walls_are_known_is_stored_with_them(photographed: Path, tmp_path: Path) -> None:
+    true = cut_walls(photographed)
+    _, walls = track(photographed, tmp_path / "out")
+    assert walls is not None
+    assert walls.sigma is not None
+    assert walls.sigma.shape == true.shape[:2]
+    assert np.isnan(walls.sigma[0]).all()  # told by the table
+    off = np.abs(off_walls(walls.endpoints, true))[1:].max(axis=-1)
+    assert (walls.sigma[1:] > 0.0).all()
+    assert (off < FACTOR * walls.sigma[1:]).all()
+    assert walls.frames(1, 3).sigma == pytest.approx(walls.sigma[1:3])
+    with h5py.File(tmp_path / "out" / "tracks.h5") as store:
+        assert store["walls/sigma"].attrs["unit"] == "m"
+
+
+def test_a_wall_told_in_a_later_frame_has_no_sigma_there(photographed: Path, tmp_path: Path) -> None:
+    file = photographed / "walls.csv"
+    told = next(line for line in file.read_text().splitlines() if line.startswith("2,top"))
+    cut_walls(photographed)
+    file.write_text(file.read_text() + told + "\n")
+    edit(photographed / "experiment.toml", '[walls]\nfile = "walls.csv"', '[walls]\nfile = "walls.csv"\ntrack = true')
+    _, walls = track(photographed, tmp_path / "out")
+    assert walls is not None
+    assert walls.sigma is not None
+    top = walls.name.index("top")
+    assert np.isfinite(walls.sigma[:, top]).tolist() == [False, True, False, True]
+
+
+def test_walls_of_a_table_have_no_sigma(photographed: Path, tmp_path: Path) -> None:
+    _, walls = track(photographed, tmp_path / "out")
+    assert walls is not None
+    assert walls.sigma is None
+
+
+def test_round_things_beyond_the_walls_are_no_grains(photographed: Path, tmp_path: Path) -> None:
+    table = read_table(photographed / "grains.csv", ("id", "radius"))  # of the truth: the experiment detects
+    x, y = _add_a_wheel(photographed, float(np.median(table.numbers("radius"))))
+    tracks, _ = track(photographed, tmp_path / "with")
+    assert tracks.grain_count == len(table)
+    assert np.hypot(*(_found(tmp_path / "with") - (x, y)).T).min() > 20.0
+    # It is the walls that keep it out: without them it is found.
+    text = (photographed / "experiment.toml").read_text()
+    (photographed / "experiment.toml").write_text(_without_walls(text))
+    track(photographed, tmp_path / "without")
+    assert np.hypot(*(_found(tmp_path / "without") - (x, y)).T).min() < 1.0
+
+
+def _add_a_wheel(experiment: Path, radius: float) -> tuple[float, float]:
+    """A bright disc on the backing on the right of all photographs; returns its centre [px]."""
+    x = y = 0.0
+    for file in sorted((experiment / "photos").iterdir()):
+        image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+        assert image is not None
+        wide = np.pad(image, ((0, 0), (0, BEYOND)), constant_values=12)
+        x, y = image.shape[1] + 0.5 * BEYOND, 0.5 * image.shape[0]
+        cv2.circle(wide, (int(x), int(y)), round(radius), 170, -1, cv2.LINE_AA)
+        cv2.imwrite(str(file), wide)
+    return x, y
+
+
+def _found(folder: Path) -> np.ndarray:
+    table = read_table(folder / "detections.csv", ("x", "y"))
+    return np.column_stack([table.numbers("x"), table.numbers("y")])
+
+
+def _without_walls(text: str) -> str:
+    sections = text.split("\n[")
+    return "\n[".join(section for section in sections if not section.startswith("walls"))

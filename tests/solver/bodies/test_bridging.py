@@ -1,0 +1,55 @@
+import numpy as np
+
+from solver.bodies.bridging import bridge_lost
+from solver.bodies.motion import Snapshot
+
+EXACT = 1e-12  # rounding of centimetres
+DRIFT = np.array([1e-3, -2e-3])  # m per frame, of everything
+
+
+def moving_lattice(lost: dict[int, list[int]], frames: int = 4) -> list[Snapshot]:
+    """A lattice that drifts and turns evenly; lost: frame → grains it does not show, with nonsense for a pose."""
+    start = 0.02 * np.stack(np.meshgrid(np.arange(5), np.arange(5)), axis=-1).reshape(-1, 2)
+    snapshots = []
+    for f in range(frames):
+        position, rotation, present = start + f * DRIFT, np.full(25, 0.01 * f), np.ones(25, bool)
+        for grain in lost.get(f, []):
+            position[grain], rotation[grain], present[grain] = 99.0, 99.0, False
+        snapshots.append(Snapshot(30.0 * f, position, rotation, present, np.empty((0, 2, 2)), 1e-5))
+    return snapshots
+
+
+def test_a_grain_seen_before_and_after_is_put_between():
+    whole = moving_lattice({})
+    frame, bridged = bridge_lost(moving_lattice({1: [7], 2: [7]}), 2)
+    np.testing.assert_allclose(frame.position, whole[2].position, atol=EXACT)
+    np.testing.assert_allclose(frame.rotation, whole[2].rotation, atol=EXACT)
+    assert np.flatnonzero(bridged).tolist() == [7]
+    assert frame.present.all()
+
+
+def test_a_grain_not_seen_again_moves_with_its_neighbours():
+    whole = moving_lattice({})
+    frame, bridged = bridge_lost(moving_lattice({2: [12, 13], 3: [12]}), 3)
+    np.testing.assert_allclose(frame.position, whole[3].position, atol=EXACT)
+    assert np.flatnonzero(bridged).tolist() == [12]
+
+
+def test_a_grain_not_seen_yet_comes_with_its_neighbours():
+    whole = moving_lattice({})
+    frame, _ = bridge_lost(moving_lattice({0: [0]}), 0)
+    np.testing.assert_allclose(frame.position, whole[0].position, atol=EXACT)
+
+
+def test_a_grain_that_is_never_seen_stays_lost():
+    frame, bridged = bridge_lost(moving_lattice({f: [3] for f in range(4)}), 1)
+    assert not frame.present[3]
+    assert not bridged.any()
+
+
+def test_nothing_changes_where_nothing_is_lost():
+    window = moving_lattice({1: [4]})
+    frame, bridged = bridge_lost(window, 2)
+    np.testing.assert_array_equal(frame.position, window[2].position)
+    assert not bridged.any()
+    np.testing.assert_array_equal(window[1].position[4], 99.0)

@@ -1,0 +1,46 @@
+import numpy as np
+
+from solver.bodies.grains import Grains
+from solver.bodies.holes import find_holes
+from solver.bodies.walls import Walls
+
+R = 0.01
+HOLE = 44  # a grain in the middle of the lattice
+EXACT = 1e-9  # [m]
+
+
+def lattice(radius: np.ndarray | None = None) -> tuple[Grains, np.ndarray, Walls]:
+    """A hexagonal lattice in a box."""
+    column, row = np.meshgrid(np.arange(9), np.arange(9))
+    position = R * np.stack([1 + 2 * column + row % 2, 1 + np.sqrt(3) * row], axis=-1).reshape(-1, 2)
+    width, height = 19 * R, R * (2 + 8 * np.sqrt(3))
+    corner = np.array([[0, 0], [width, 0], [width, height], [0, height]])
+    endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    grains = Grains.of_rods(np.full(81, R) if radius is None else radius, density=2700.0, length=0.06)
+    return grains, position, Walls(endpoints, np.zeros((4, 2, 2)), np.full(4, np.nan))
+
+
+def test_a_whole_packing_has_no_holes():
+    grains, position, walls = lattice()
+    assert len(find_holes(grains, position, np.ones(81, bool), walls)) == 0
+
+
+def test_an_unseen_grain_leaves_a_hole_where_it_was():
+    grains, position, walls = lattice()
+    present = np.arange(81) != HOLE
+    position = np.where(present[:, None], position, np.nan)
+    found = find_holes(grains, position, present, walls)
+    assert len(found) == 1
+    np.testing.assert_allclose(found[0], lattice()[1][HOLE], atol=EXACT)
+
+
+def test_gaps_between_great_grains_are_no_holes():
+    radius = np.full(81, R)
+    radius[0] = 0.4 * R  # a rod that would fit into natural gaps
+    grains, position, walls = lattice(radius)
+    assert len(find_holes(grains, position, np.ones(81, bool), walls)) == 0
+
+
+def test_too_few_grains_have_no_holes():
+    grains, position, walls = lattice()
+    assert len(find_holes(grains, position, np.arange(81) < 3, walls)) == 0

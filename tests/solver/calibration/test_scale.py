@@ -1,0 +1,138 @@
+"""The scale of a sequence, on pairs of discs that touch and pairs that do not, so that the truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.calibration.calibrate import calibrate
+from solver.calibration.gaps import MeasuredSequence
+from solver.calibration.priors import CalibrationPriors
+from solver.calibration.scale import ScaleErrors, find_scale
+
+RADII = np.array([7e-3, 8e-3, 11e-3])  # [m]
+FIELD = 0.05  # [m] side of the square that a pair has for itself
+PRIORS = CalibrationPriors(centre=0.0, radius=0.0, pixel_size=5e-3, radius_class=8e-6)
+FEW_MICROMETRES = 3e-6  # [m] of a mean diameter: the tail of open gaps draws the pile aside by about as much
+
+
+def scatter_pairs(
+    rng: np.random.Generator, *, pairs: int = 300, touching: float = 0.6, noise: float = 10e-6, frames: int = 4
+) -> tuple[MeasuredSequence, np.ndarray]:
+    """Pairs of discs, each far from all others; most touch, the others are up to 1 mm apart. With their classes."""
+    classes = rng.integers(0, len(RADII), (pairs, 2))
+    radius = RADII[classes]
+    gap = np.where(rng.random(pairs) < touching, 0.0, rng.uniform(0.0, 1e-3, pairs))
+    angle = rng.uniform(0.0, 2 * np.pi, pairs)
+    side = int(np.ceil(np.sqrt(pairs)))
+    centre = FIELD * (1.0 + np.stack([np.arange(pairs) % side, np.arange(pairs) // side], axis=1))
+    branch = (radius.sum(axis=1) + gap)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    position = np.stack([centre - 0.5 * branch, centre + 0.5 * branch], axis=1).reshape(-1, 2)
+    n = 2 * pairs
+    position = position + rng.normal(0.0, noise, (frames, n, 2))
+    reach = FIELD * (side + 1)
+    walls = np.array([[[0.0, 0.0], [reach, 0.0]], [[reach, reach], [0.0, reach]]])
+    sequence = MeasuredSequence(
+        radius.ravel(), position, np.zeros((frames, n)), np.ones((frames, n), bool),
+        np.broadcast_to(walls, (frames, 2, 2, 2)), np.full((frames, n), noise),
+    )  # fmt: skip
+    return sequence, classes.ravel()
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20260211)
+
+
+@pytest.mark.parametrize("error", [-1e-2, -3e-3, 3e-3, 1e-2])
+@pytest.mark.parametrize("noise", [3e-6, 40e-6])
+def test_pixel_size_is_found_whichever_way_it_is_wrong(rng, error, noise):
+    true, classes = scatter_pairs(rng, noise=noise)
+    measured = replace(true, position=true.position / (1.0 + error))
+    found = find_scale(measured, PRIORS, 0.0, classes)
+    assert found.found
+    assert abs(found.pixel_size - error) < 3 * found.pixel_size_sd
+    assert found.pixel_size_sd < 2e-3
+    corrected = found.correct(measured, classes)
+    left = np.linalg.norm(corrected.position - true.position, axis=2) / np.linalg.norm(true.position, axis=2)
+    # What the radii of all classes may share by their prior, 0.1 %, is never told from a pixel size.
+    assert left.max() < 2e-3
+
+
+@pytest.mark.parametrize("noise", [0.0, 10e-6, 40e-6, 100e-6])
+def test_exact_scale_is_left_alone(rng, noise):
+    true, classes = scatter_pairs(rng, noise=noise)
+    found = find_scale(true, PRIORS, 0.0, classes)
+    assert not found.found
+    assert found.pixel_size == 0.0
+    assert 0.0 < found.pixel_size_sd < PRIORS.pixel_size
+    assert found.correct(true, classes) is true
+
+
+def test_elastic_overlap_is_not_taken_for_a_scale(rng):
+    true, classes = scatter_pairs(rng)
+    overlap = 5e-6
+    softened = replace(true, radius=true.radius + 0.5 * overlap)
+    assert not find_scale(softened, PRIORS, overlap, classes).found
+
+
+@pytest.mark.parametrize("error", [-80e-6, 80e-6])
+@pytest.mark.parametrize("wrong", [0, 1, 2])
+def test_one_mistaken_class_is_told_from_the_pixel_size(rng, error, wrong):
+    true, classes = scatter_pairs(rng)
+    measured = replace(true, radius=true.radius - np.where(classes == wrong, error, 0.0))
+    found = find_scale(measured, PRIORS, 0.0, classes)
+    assert found.found
+    expected = np.zeros(3)
+    expected[wrong] = error
+    np.testing.assert_allclose(found.radius_class, expected, atol=3 * FEW_MICROMETRES)
+    assert abs(found.pixel_size) < found.pixel_size_sd
+
+
+@pytest.mark.parametrize("follow", [True, False])
+def test_walls_are_scaled_only_if_they_were_measured_alike(rng, follow):
+    true, classes = scatter_pairs(rng)
+    lowest = (true.position[..., 1] - true.radius).min()
+    highest = (true.position[..., 1] + true.radius).max()
+    walls = true.endpoints.copy()
+    walls[:, 0, :, 1], walls[:, 1, :, 1] = lowest, highest
+    error = 5e-3
+    measured = replace(true, position=true.position / (1.0 + error), endpoints=walls / (1.0 + error * follow))
+    found = find_scale(measured, PRIORS, 0.0, classes)
+    assert found.walls_follow == follow
+    # The prior of the radii again: 0.1 % of 0.9 m.
+    np.testing.assert_allclose(found.correct(measured, classes).endpoints, walls, atol=1e-3)
+
+
+def test_without_touching_pairs_the_prior_stays(rng):
+    true, classes = scatter_pairs(rng, pairs=20)
+    apart = replace(true, radius=0.5 * true.radius)
+    found = find_scale(apart, PRIORS, 0.0, classes)
+    assert not found.found
+    assert found.pixel_size_sd == PRIORS.pixel_size
+    np.testing.assert_array_equal(found.radius_class, np.zeros(3))
+
+
+def test_what_is_known_exactly_is_not_corrected(rng):
+    true, classes = scatter_pairs(rng)
+    measured = replace(true, position=true.position / 1.005)
+    assert not find_scale(measured, replace(PRIORS, pixel_size=0.0, radius_class=0.0), 0.0, classes).found
+    held = find_scale(measured, replace(PRIORS, pixel_size=0.0), 0.0, classes)
+    assert held.pixel_size == 0.0
+    assert held.pixel_size_sd == 0.0
+
+
+def test_calibration_tells_and_applies_the_pixel_size(rng):
+    true, classes = scatter_pairs(rng, noise=5e-6)
+    measured = replace(true, position=true.position / 1.005)
+    result = calibrate(measured, PRIORS, rng=rng, radius_class=classes)
+    assert result.applied
+    assert "pixel size" in result.verdict
+    assert abs(result.pixel_size - 5e-3) < 3 * result.pixel_size_sd
+    assert result.after.spread < 0.3 * result.before.spread
+    scale = ScaleErrors(
+        result.pixel_size, 0.0, np.zeros(1), np.zeros(1), walls_follow=result.walls_follow, found=True
+    )  # fmt: skip
+    np.testing.assert_allclose(result.correct(measured).position, scale.correct(measured, None).position)

@@ -1,0 +1,197 @@
+import numpy as np
+import pytest
+
+from solver.bodies.grains import Grains
+from solver.bodies.walls import Walls
+from solver.detection.touch_probability import (
+    ContactProbabilitySettings,
+    find_candidates,
+    smooth_gaps,
+    touch_probability,
+)
+
+SIGMA = 14e-6  # m, of a gap
+SCALE = 75e-6  # m per interval
+FRAMES = 8
+EXACT = 1e-9  # rounding of 8 normalised steps over 49 states
+
+
+def probability(gap: np.ndarray, **settings: float) -> np.ndarray:
+    gap = np.atleast_2d(gap.T).T
+    return touch_probability(
+        gap, np.full(gap.shape, SIGMA), np.full(len(gap) - 1, SCALE), ContactProbabilitySettings(**settings)
+    )
+
+
+def enumerate_paths(gap: np.ndarray, state_gap: np.ndarray, start: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """P(state 0) per frame by summing over every path: slow and plain."""
+    frames, states = len(gap), len(state_gap)
+    weight = np.zeros((frames, states))
+    for path in np.ndindex(*([states] * frames)):
+        p = start[path[0]]
+        for f in range(frames):
+            p *= max(np.exp(-0.5 * ((gap[f] - state_gap[path[f]]) / SIGMA) ** 2), 1e-12)
+            if f:
+                p *= step[path[f - 1], path[f]]
+        for f in range(frames):
+            weight[f, path[f]] += p
+    return weight[:, 0] / weight.sum(axis=1)
+
+
+def test_a_pair_that_stays_at_zero_gap_touches():
+    assert probability(np.zeros(FRAMES)).min() > 0.95
+
+
+def test_a_clear_gap_does_not_touch():
+    assert probability(np.full(FRAMES, 10 * SIGMA)).max() < 1e-6
+
+
+def test_a_gap_of_the_size_of_the_noise_stays_uncertain():
+    certain = probability(np.full(FRAMES, 2.0 * SIGMA))[FRAMES // 2, 0]
+    assert 0.05 < certain < 0.95
+
+
+def test_more_photographs_make_more_certain():
+    once = probability(np.zeros(1))[0, 0]
+    often = probability(np.zeros(FRAMES))[FRAMES // 2, 0]
+    assert 0.5 < once < often
+
+
+def test_a_contact_that_opens_is_seen_to_open():
+    gap = np.array([0, 0, 0, 0, 60, 120, 180, 240]) * 1e-6
+    touch = probability(gap)[:, 0]
+    assert touch[:3].min() > 0.9
+    assert touch[4:].max() < 1e-3
+
+
+def test_a_pair_that_comes_from_far_is_open_there():
+    gap = np.array([5e-3, 3e-3, 1e-3, 0, 0, 0, 0, 0])
+    touch = probability(gap)[:, 0]
+    assert touch[:3].max() < 1e-9
+    assert touch[4:].min() > 0.9
+
+
+def test_a_missing_photograph_is_bridged():
+    gap = np.zeros(FRAMES)
+    gap[3:5] = np.nan
+    assert probability(gap).min() > 0.9
+    assert probability(np.where(np.isnan(gap), gap, 10 * SIGMA)).max() < 0.05
+
+
+def test_the_ends_of_a_sequence_need_no_neighbours():
+    assert probability(np.zeros(2)).shape == (2, 1)
+    assert probability(np.empty((3, 0))).shape == (3, 0)
+    np.testing.assert_array_equal(probability(np.full(3, np.nan)), 0.5)
+
+
+def test_a_deep_overlap_still_touches():
+    gap = np.zeros(FRAMES)
+    gap[4] = -30 * SIGMA
+    assert probability(gap).min() > 0.9
+
+
+def test_time_runs_both_ways():
+    gap = np.abs(np.random.default_rng(0).normal(size=(FRAMES, 40))) * 3 * SIGMA
+    gap[:, 0] = 0.0
+    forth, back = probability(gap), probability(gap[::-1])[::-1]
+    # The chain is not exactly reversible (it opens by an exponential, closes from anywhere): the same verdict is asked.
+    assert np.mean((forth > 0.5) == (back > 0.5)) > 0.95
+
+
+def test_half_an_overlap_is_allowed_for():
+    gap = np.full((FRAMES, 1), 1.2 * SIGMA)
+    shifted = touch_probability(
+        gap - 20e-6,
+        np.full(gap.shape, SIGMA),
+        np.full(FRAMES - 1, SCALE),
+        ContactProbabilitySettings(overlap=40e-6),
+    )
+    np.testing.assert_allclose(shifted, probability(gap), atol=EXACT)
+
+
+def test_smoother_agrees_with_summing_over_all_paths():
+    from solver.detection import touch_probability as module
+    from solver.detection.touch_probability_kernels import smooth_candidates
+
+    rng = np.random.default_rng(1)
+    states, frames = 4, 4
+    state_gap = np.array([0.0, 10e-6, 30e-6, 70e-6])
+    start = np.array([0.5, 0.1, 0.2, 0.2])
+    step = rng.dirichlet(np.ones(states), size=states)
+    gap = rng.uniform(0, 70e-6, (frames, 5))
+    touch = np.empty((frames, 5))
+    forward = np.repeat(step[None], frames - 1, axis=0)
+    smooth_candidates(
+        gap, np.full(gap.shape, SIGMA), module.LOWEST_GAP, state_gap, start, forward,
+        np.ascontiguousarray(forward.transpose(0, 2, 1)), 1e-12,
+        np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), touch,
+        np.zeros(states), np.full(gap.shape, SIGMA**2), np.empty(gap.shape), np.empty(gap.shape),
+    )  # fmt: skip
+    expected = np.stack([enumerate_paths(gap[:, c], state_gap, start, step) for c in range(5)], axis=1)
+    np.testing.assert_allclose(touch, expected, atol=EXACT)
+
+
+def test_the_gap_of_a_lasting_contact_is_known_better_than_any_photograph_shows_it():
+    gap = np.random.default_rng(3).normal(0.0, SIGMA, (FRAMES, 200))
+    sigma, scale = np.full(gap.shape, SIGMA), np.full(FRAMES - 1, SCALE)
+    found = smooth_gaps(gap, sigma, scale, ContactProbabilitySettings())
+    sure = found.touch > 0.9
+    assert sure.mean() > 0.5
+    assert np.sqrt(found.variance[sure]).max() < SIGMA
+    assert np.abs(found.mean[sure]).mean() < 0.5 * np.abs(gap[sure]).mean()
+
+
+def test_an_unknown_gap_is_what_its_neighbours_in_time_make_of_it():
+    gap = np.zeros((FRAMES, 1))
+    gap[FRAMES // 2] = np.nan
+    found = smooth_gaps(gap, np.full(gap.shape, SIGMA), np.full(FRAMES - 1, SCALE), ContactProbabilitySettings())
+    assert np.isfinite(found.mean).all()
+    assert found.variance[FRAMES // 2, 0] > found.variance[0, 0]
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e-4, 1e-1])
+def test_transitions_are_probabilities_at_any_scale(scale: float):
+    from solver.detection.touch_probability import _states, _transition
+
+    matrix = _transition(*_states(5e-4), scale)
+    assert matrix.min() >= 0
+    np.testing.assert_allclose(matrix.sum(axis=1), 1.0, atol=EXACT)
+
+
+def test_impossible_noise_or_scale_is_refused():
+    gap = np.zeros((3, 2))
+    with pytest.raises(ValueError, match="positive"):
+        touch_probability(gap, np.zeros((3, 2)), np.full(2, SCALE))
+    with pytest.raises(ValueError, match="positive"):
+        touch_probability(gap, np.full((3, 2), SIGMA), np.zeros(2))
+    with pytest.raises(ValueError, match="one length per interval"):
+        touch_probability(gap, np.full((3, 2), SIGMA), np.full(3, SCALE))
+
+
+def three_grains() -> tuple[Grains, np.ndarray, list[Walls]]:
+    grains = Grains.of_rods(np.full(3, 0.01), density=2700.0, length=0.06)
+    position = np.zeros((2, 3, 2))
+    position[0] = [[0.01, 0.01], [0.03, 0.01], [0.06, 0.05]]
+    position[1] = [[0.01, 0.01], [0.03, 0.01], [0.03, 0.03 + 2e-5]]
+    endpoints = np.array([[[0.0, 0.0], [0.1, 0.0]]])
+    return grains, position, [Walls(endpoints, np.zeros((1, 2, 2)), np.full(1, np.nan))] * 2
+
+
+def test_candidates_are_pairs_near_in_any_frame_measured_in_all():
+    grains, position, walls = three_grains()
+    sigma = np.full((2, 3), 1e-5)
+    found = find_candidates(grains, position, np.ones((2, 3), bool), sigma, walls, ContactProbabilitySettings())
+    assert list(zip(found.i.tolist(), found.j.tolist(), strict=True)) == [(0, 1), (0, 3), (1, 2), (1, 3)]
+    np.testing.assert_allclose(found.gap[:, 2], [np.hypot(0.03, 0.04) - 0.02, 2e-5], atol=1e-15)
+    np.testing.assert_allclose(found.sigma[0], 1e-5 * np.sqrt([2, 1, 2, 1]))
+
+
+def test_a_lost_grain_has_no_gap():
+    grains, position, walls = three_grains()
+    position[0, 1] = 7.0
+    present = np.array([[True, False, True], [True, True, True]])
+    found = find_candidates(grains, position, present, np.full((2, 3), 1e-5), walls, ContactProbabilitySettings())
+    touches = (found.i == 1) | (found.j == 1)
+    assert touches.any()
+    assert np.all(np.isnan(found.gap[0, touches]))
+    assert np.all(np.isfinite(found.gap[1]))

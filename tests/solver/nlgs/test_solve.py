@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+
+from solver.bodies.packing import Material
+from solver.contacts.contacts import detect_contacts
+from solver.nlgs.problem import assemble
+from solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps, to_contact_order
+from tests.packings import box, motion, problem_of, rods, squeezed_heap
+from tests.solver.nlgs.reference_sweep import plain_sweeps
+
+ROUNDING = 1e-10  # relative; the compiled sweep sums in another order than the plain one
+
+
+@pytest.fixture
+def heap():
+    grains, state, walls = squeezed_heap(np.random.default_rng(1))
+    contacts = detect_contacts(grains, state.position, state.present, walls, 2e-4)
+    material = Material(0.3, 0.2, 0.0, (0.0, -9.81))
+    impedance = grains.mass * 1e3
+    return grains, state, walls, contacts, material, impedance
+
+
+def test_compiled_sweeps_equal_plain_ones(heap):
+    problem = assemble(*heap)
+    found = solve(problem, NlgsSettings(sweeps=7))
+    expected = plain_sweeps(*heap, problem.rows, 7)
+    scale = np.abs(expected).max()
+    assert found.fn == pytest.approx(expected[:, 0], abs=ROUNDING * scale)
+    assert found.ft == pytest.approx(expected[:, 1], abs=ROUNDING * scale)
+
+
+@pytest.mark.parametrize(("every", "between"), [(1, 0), (7, 0), (20, 4), ((1, 30, 11), 8)])
+def test_a_listener_does_not_change_a_bit(heap, every, between):
+    problem = assemble(*heap)
+    silent = solve(problem, NlgsSettings(sweeps=60))
+    heard = []
+    loud = solve(problem, NlgsSettings(sweeps=60), observer=heard.append, every=every, between=between)
+    assert np.array_equal(silent.fn, loud.fn)
+    assert np.array_equal(silent.ft, loud.ft)
+    assert silent.sweeps == loud.sweeps == heard[-1].number == sum(len(sweep.residuals) for sweep in heard) == 60
+
+
+def test_strides_say_which_sweeps_are_heard(heap):
+    problem = assemble(*heap)
+    assert [sweep.number for sweep in sweeps(problem, NlgsSettings(), every=(1, 30, 11))] == [1, 31, 42]
+    heard = []
+    solve(problem, NlgsSettings(sweeps=35), observer=lambda sweep: heard.append(sweep.number), every=(1, 30, 11))
+    assert heard == [1, 31, 35]
+
+
+def test_sweeps_between_those_heard_are_measured_where_asked_for(heap):
+    problem = assemble(*heap)
+    each = np.concatenate([sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[1] * 40)])
+    (few,) = (sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[39], between=8))
+    (last,) = (sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[39]))
+    measured = np.array([1, 2, 4, 8, 16, 24, 32, 39]) - 1
+    assert np.array_equal(np.flatnonzero(np.isfinite(few).all(axis=1)), measured)
+    assert np.array_equal(few[measured], each[measured])
+    assert np.array_equal(np.flatnonzero(np.isfinite(last).any(axis=1)), [38])
+    assert np.array_equal(last[38], each[38])
+
+
+def test_every_force_lies_in_the_coulomb_cone(heap):
+    problem, (*_, contacts, material, _) = assemble(*heap), heap
+    for number, sweep in enumerate(sweeps(problem, NlgsSettings())):
+        force = to_contact_order(problem, sweep.force)
+        mu = np.where(contacts.with_wall, material.wall_friction, material.friction)
+        assert np.all(force[:, 0] >= 0)
+        assert np.all(np.abs(force[:, 1]) <= mu * force[:, 0])
+        if number == 20:
+            break
+
+
+def test_residual_and_unbalance_fall_as_a_load_is_taken_up():
+    radius = 0.008
+    column = motion(np.column_stack([np.full(6, 0.03), radius * (2 * np.arange(6) + 1)]))
+    problem, _ = problem_of(rods(*[radius] * 6), column, box(0.06, 12 * radius, top_load=12.0))
+    coarse = solve(problem, NlgsSettings(sweeps=20))
+    fine = solve(problem, NlgsSettings(sweeps=5000))
+    assert fine.natural_map < 1e-3 * coarse.natural_map
+    assert fine.unbalance < 1e-2 * coarse.unbalance
+
+
+def test_a_solve_tells_how_it_ended():
+    problem, _ = problem_of(rods(0.008), motion(np.array([[0.03, 0.008]])), box(0.06, 0.016, top_load=12.0))
+    assert solve(problem, NlgsSettings(sweeps=2)).stop is Stop.SWEEPS
+    assert solve(problem, NlgsSettings(sweeps=9000, natural_map=1e-9)).stop is Stop.NATURAL_MAP
+    assert solve(problem, NlgsSettings(sweeps=9000, force_change=1e-6)).stop is Stop.FORCE_CHANGE
+    lonely, _ = problem_of(rods(0.008), motion(np.array([[0.03, 0.01]])), box(0.06, 0.03))
+    assert solve(lonely, NlgsSettings()).stop is Stop.EMPTY
+
+
+def test_a_guess_is_taken_in_the_order_of_the_contacts(heap):
+    problem = assemble(*heap)
+    first = solve(problem, NlgsSettings(sweeps=30))
+    onward = solve(problem, NlgsSettings(sweeps=30), guess=first.force)
+    straight = solve(problem, NlgsSettings(sweeps=60))
+    scale = straight.fn.max()
+    assert onward.fn == pytest.approx(straight.fn, abs=1e-9 * scale)  # body velocities are summed anew at a restart
+
+
+@pytest.mark.parametrize("bad", [{"sweeps": -1}, {"relaxation": 2.0}, {"relaxation": 0.0}])
+def test_nonsense_settings_are_refused(bad):
+    with pytest.raises(ValueError, match=r"relaxation|sweeps"):
+        NlgsSettings(**bad)

@@ -1,0 +1,260 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.bodies.grains import Grains
+from solver.bodies.motion import LastSeen, Snapshot, motion_to
+from solver.bodies.packing import Material, Packing
+from solver.nlgs.chain import ChainSettings
+from solver.nlgs.sweep_record import recorded_sweeps
+from solver.nlgs.warm_start import ForceMemory
+from solver.sequence.frame_forces import FrameStatus
+from solver.sequence.frames import SequenceSettings, SequenceState, solve_sequence
+from solver.sequence.judgement import trust
+from tests.packings import LENGTH, squeezed_heap
+
+SETTINGS = SequenceSettings(estimator="nlgs", chain=ChainSettings(sweeps=40), threshold=2e-4)
+ENSEMBLE = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40))
+
+
+def sheared_frames(count, lost=()):
+    """A heap that is sheared a little from frame to frame; `lost`: (frame, grain) without a pose."""
+    grains, state, walls = squeezed_heap(np.random.default_rng(3))
+    packing = Packing(grains, LENGTH, Material(0.25, 0.25), np.array([np.nan, np.nan, 5e4, np.nan]))
+    snapshots = []
+    for k in range(count):
+        shear = np.array([[1.0, 2e-3 * k], [0.0, 1.0]])
+        position = state.position @ shear.T
+        rotation = np.full(grains.count, -1e-3 * k)
+        present = np.ones(grains.count, bool)
+        for frame, grain in lost:
+            if frame == k:
+                present[grain] = False
+                position[grain] = np.nan
+                rotation[grain] = np.nan
+        snapshots.append(Snapshot(30.0 * k, position, rotation, present, walls.endpoints @ shear.T, 1e-5))
+    return packing, snapshots
+
+
+def run(packing, snapshots, settings=SETTINGS, **kwargs):
+    return list(solve_sequence(packing, snapshots, settings, **kwargs))
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
+def test_a_sequence_goes_on_from_a_kept_state_bit_for_bit(settings):
+    packing, snapshots = sheared_frames(5)
+    whole = run(packing, snapshots, settings)
+    resumed = run(packing, snapshots, settings, state=whole[2][1], first=3)
+    for (frame, _), (again, _) in zip(whole[3:], resumed, strict=True):
+        assert np.array_equal(frame.fn, again.fn)
+        assert np.array_equal(frame.ft, again.ft)
+        assert np.array_equal(frame.age, again.age)
+
+
+def test_frames_before_a_motion_exists_and_after_are_resets_then_carry_on():
+    frames = [frame for frame, _ in run(*sheared_frames(4))]
+    assert [frame.status for frame in frames[:2]] == [FrameStatus.RESET, FrameStatus.RESET]
+    assert frames[1].frames_since_reset == 0
+    assert frames[3].frames_since_reset == 2
+    assert np.isnan(frames[0].trust)
+
+
+def test_a_lost_grain_takes_no_part_and_comes_back():
+    packing, snapshots = sheared_frames(5, lost=[(2, 14)])
+    frames = [frame for frame, _ in run(packing, snapshots)]
+
+    def touching(frame):
+        return np.any((frame.contacts.i == 14) | (frame.contacts.j == 14))
+
+    assert touching(frames[1])
+    assert not touching(frames[2])
+    assert touching(frames[3])
+
+
+def test_forces_of_a_lost_grains_contacts_are_remembered():
+    packing, snapshots = sheared_frames(4, lost=[(2, 14)])
+    states = [state for _, state in run(packing, snapshots)]
+    bodies = packing.grains.count + 4
+
+    def of(state):
+        key = state.members.soft.key
+        return set(key[(key // bodies == 14) | (key % bodies == 14)].tolist())
+
+    assert of(states[1]) == of(states[2])
+
+
+def test_motion_since_a_grain_was_last_seen_bridges_its_absence():
+    packing, snapshots = sheared_frames(3, lost=[(1, 14)])
+    seen = LastSeen.never(packing.grains.count).renewed(snapshots[0]).renewed(snapshots[1])
+    motion = motion_to(snapshots[2], seen, snapshots[1].time, snapshots[1].endpoints)
+    expected = (snapshots[2].position[14] - snapshots[0].position[14]) / 60.0
+    assert motion.grains.velocity[14] == pytest.approx(expected)
+
+
+def test_an_unseen_grain_moves_like_its_neighbours():
+    packing, snapshots = sheared_frames(2, lost=[(0, 14)])
+    seen = LastSeen.never(packing.grains.count).renewed(snapshots[0])
+    motion = motion_to(snapshots[1], seen, snapshots[0].time, snapshots[0].endpoints)
+    around = motion.grains.velocity[[13, 15, 8, 20]]
+    assert around[:, 0].min() <= motion.grains.velocity[14, 0] <= around[:, 0].max()
+
+
+def test_time_must_go_forward():
+    packing, snapshots = sheared_frames(2)
+    late = [snapshots[0], Snapshot(0.0, *[getattr(snapshots[1], n) for n in Snapshot.__slots__[1:]])]
+    with pytest.raises(ValueError, match="not after"):
+        run(packing, late)
+
+
+def test_a_single_frame_can_be_solved():
+    packing, snapshots = sheared_frames(1)
+    frames = run(packing, snapshots)
+    assert len(frames) == 1
+    assert frames[0][0].status is FrameStatus.RESET
+
+
+def test_every_sweep_is_heard_and_the_last_recorded_is_the_frames_own():
+    packing, snapshots = sheared_frames(3)
+    frame, _ = run(packing, snapshots)[2]
+    history = frame.history
+    assert history.count == frame.sweeps == 5 * 40
+    assert history.recorded[-1] == history.count - 1
+    assert history.fn[-1] == pytest.approx(frame.nlgs_fn.astype(np.float32))
+
+
+def test_recorded_sweeps_are_log_spaced_and_end_with_the_last():
+    kept = recorded_sweeps(5000, "log")
+    assert kept[:8].tolist() == list(range(8))
+    assert kept[-1] == 4999
+    assert len(kept) <= 41
+    assert recorded_sweeps(5000, "none").tolist() == [4999]
+    assert len(recorded_sweeps(50, "all")) == 50
+
+
+def test_memory_recalls_forces_by_the_pair_and_zero_for_strangers():
+    packing, snapshots = sheared_frames(2)
+    frame, _ = run(packing, snapshots)[1]
+    memory = ForceMemory(frame.contacts.key[::2], np.column_stack([frame.fn, frame.ft])[::2])
+    force = memory.recall(frame.contacts)
+    assert np.array_equal(force[::2, 0], frame.fn[::2])
+    assert not force[1::2].any()
+
+
+def test_forces_scale_with_the_pressure_through_a_whole_sequence():
+    packing, snapshots = sheared_frames(3)
+    double = Packing(packing.grains, packing.length, packing.material, 2 * packing.pressure)
+    once, twice = run(packing, snapshots)[2][0], run(double, snapshots)[2][0]
+    assert twice.fn == pytest.approx(2 * once.fn, rel=1e-9, abs=1e-9 * once.fn.max())
+
+
+def test_states_start_empty():
+    grains = Grains.of_rods(np.array([0.01]), density=1.0, length=1.0)
+    packing = Packing(grains, 1.0, Material(0, 0), np.full(4, np.nan))
+    assert len(SequenceState.first(packing).members.soft.key) == 0
+
+
+def test_the_ensemble_reports_a_balanced_field_inside_the_coulomb_cone():
+    packing, snapshots = sheared_frames(4, lost=[(2, 14)])
+    for frame, _ in run(packing, snapshots, ENSEMBLE):
+        assert np.all(frame.fn >= 0)
+        assert np.all(np.abs(frame.ft) <= 0.25 * frame.fn * (1 + 1e-12))
+        assert np.all(frame.probability > 0)
+        assert len(frame.nlgs_fn) == len(frame.fn)
+        assert not np.any((frame.contacts.i == 14) & (frame.frame == 2))
+
+
+def test_a_single_frame_falls_back_to_the_chain():
+    packing, snapshots = sheared_frames(1)
+    frame, _ = run(packing, snapshots, ENSEMBLE)[0]
+    assert np.array_equal(frame.fn, frame.nlgs_fn)
+
+
+def test_the_members_disagreement_is_evidence_and_a_single_chain_has_none():
+    packing, snapshots = sheared_frames(4)
+    for frame, state in run(packing, snapshots, ENSEMBLE):
+        assert state.evidence.disagreement > 0
+        assert state.evidence.unbalance == frame.unbalance
+        assert np.all(frame.fn_sd[frame.fn > 0] > 0)
+    for _, state in run(packing, snapshots):
+        assert np.isnan(state.evidence.disagreement)
+
+
+def test_a_share_of_the_load_is_evidence_only_where_a_load_is_known():
+    packing, snapshots = sheared_frames(3)
+    imposed = Packing(packing.grains, packing.length, packing.material, np.full(4, np.nan))
+    assert run(packing, snapshots)[2][1].evidence.load_share > 0
+    assert np.isnan(run(imposed, snapshots)[2][1].evidence.load_share)
+
+
+def test_members_are_kept_when_asked_for():
+    packing, snapshots = sheared_frames(4)
+    asked = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40), keep_members=True)
+    for (frame, _), (without, _) in zip(run(packing, snapshots, asked), run(packing, snapshots, ENSEMBLE), strict=True):
+        assert without.member_force is None
+        assert frame.member_force is not None
+        assert frame.member_force.shape == (frame.contacts.count, 7, 2)
+        assert np.array_equal(frame.member_force[:, 0, 0], frame.nlgs_fn)  # the first member is the recorded chain
+        assert np.array_equal(frame.fn, without.fn)
+
+
+def test_inertia_alone_has_no_correction_and_no_trust():
+    packing, snapshots = sheared_frames(3)
+    chain = ChainSettings(kappa=None, sweeps=40)
+    frame, _ = run(packing, snapshots, SequenceSettings(estimator="nlgs", chain=chain, threshold=2e-4))[2]
+    assert np.isnan(frame.correction)
+    assert np.isnan(frame.trust)
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
+def test_a_reset_can_be_forced_at_a_frame(settings):
+    packing, snapshots = sheared_frames(5)
+    frames = [frame for frame, _ in run(packing, snapshots, replace(settings, reset_frames=frozenset({3})))]
+    assert frames[3].status is FrameStatus.RESET
+    assert "asked for a reset" in frames[3].reason
+    assert [frame.frames_since_reset for frame in frames[3:]] == [0, 1]
+
+
+def test_a_reset_at_a_rearrangement_says_what_it_changed_and_can_be_forbidden(monkeypatch):
+    def rearranging(evidence):
+        return (FrameStatus.RESET if evidence.reset else FrameStatus.REARRANGING), "so this test says"
+
+    monkeypatch.setattr("solver.sequence.frames.judge", rearranging)
+    packing, snapshots = sheared_frames(5)
+    settings = replace(SETTINGS, reset_to_zero=True, kept_frames=frozenset({3}))
+    frames = [frame for frame, _ in run(packing, snapshots, settings)]
+    assert [frame.status for frame in frames[2:]] == [FrameStatus.RESET, FrameStatus.REARRANGING, FrameStatus.RESET]
+    assert "changed the forces by" in frames[2].reason
+    carried = [frame for frame, _ in run(packing, snapshots)]
+    assert not np.array_equal(frames[2].fn, carried[2].fn)
+
+
+def test_only_the_ensemble_compares_two_starts():
+    packing, snapshots = sheared_frames(4)
+    chain = [frame.start_difference for frame, _ in run(packing, snapshots)]
+    ensemble = [frame.start_difference for frame, _ in run(packing, snapshots, ENSEMBLE)]
+    assert np.isnan(chain).all()
+    assert np.isnan(ensemble[0])
+    assert np.isfinite(ensemble[1:]).all()
+    assert ensemble[3] < ensemble[1]
+
+
+def test_what_a_lost_grain_hides_lowers_the_trust():
+    packing, snapshots = sheared_frames(5, lost=[(2, 14)])
+    (seen, _), (holed, state) = run(packing, snapshots)[1:3]
+    assert seen.hidden_share == 0.0
+    assert 0.0 < holed.hidden_share < 1.0
+    assert holed.trust == pytest.approx(trust(state.evidence) * (1.0 - holed.hidden_share))
+
+
+def test_coming_back_from_a_faulty_frame_is_no_jump_of_the_stress():
+    packing, snapshots = sheared_frames(5)
+    state = run(packing, snapshots)[2][1]
+    state = replace(state, sound_pressure=state.pressure)
+    faulty = replace(state, pressure=3.0 * state.pressure)
+    (_, after), *_ = run(packing, snapshots, state=faulty, first=3)
+    (_, sound), *_ = run(packing, snapshots, state=state, first=3)
+    assert after.evidence.pressure_jump == sound.evidence.pressure_jump
+    never_sound = replace(faulty, sound_pressure=np.nan)
+    (_, jumped), *_ = run(packing, snapshots, state=never_sound, first=3)
+    assert jumped.evidence.pressure_jump > after.evidence.pressure_jump

@@ -1,0 +1,133 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.sequence.frame_forces import FrameStatus
+from solver.sequence.judgement import (
+    CHAIN_UNBALANCED,
+    LOAD_SHARES,
+    SETTLED_CORRECTION,
+    SETTLED_DIFFERENCE,
+    SETTLING_FRAMES,
+    SUSPECT_CORRECTION,
+    SUSPECT_PRESSURE_JUMP,
+    UNBALANCED,
+    Evidence,
+    free_standard_deviation,
+    is_suspect,
+    judge,
+    rearranging_level,
+    tangential_standard_deviation,
+    trust,
+)
+
+SHEAR = math.radians(0.25)
+SOUND = Evidence(
+    reset=False, correction=0.03, disagreement=0.12, old_unbalance=0.02, pressure_jump=0.03, load_share=1.2,
+    unbalance=1e-3, shear=SHEAR, frames_since_event=10,
+)  # fmt: skip
+
+
+def test_sound_evidence_is_settled_and_trusted():
+    assert judge(SOUND)[0] is FrameStatus.SETTLED
+    assert not is_suspect(SOUND)
+    assert 0.9 < trust(SOUND) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "word"),
+    [
+        ({"unbalance": 1.01 * UNBALANCED}, "out of balance"),
+        ({"unbalance": 1.01 * CHAIN_UNBALANCED, "disagreement": math.nan}, "out of balance"),
+        ({"load_share": 0.99 * LOAD_SHARES[0]}, "load"),
+        ({"load_share": 1.01 * LOAD_SHARES[1]}, "load"),
+        ({"correction": 1.01 * SUSPECT_CORRECTION}, "ε"),
+        ({"pressure_jump": 1.01 * SUSPECT_PRESSURE_JUMP}, "jumped"),
+    ],
+)
+def test_each_fault_makes_a_frame_suspect_and_is_named(fault, word):
+    faulty = replace(SOUND, **fault)
+    status, why = judge(faulty)
+    assert status is FrameStatus.SUSPECT
+    assert is_suspect(faulty)
+    assert word in why
+
+
+def test_all_faults_are_named_at_once():
+    _, why = judge(replace(SOUND, unbalance=2.0, load_share=0.1, correction=3.0))
+    assert why.count("pathological") == 2
+    assert "ε = 3.00" in why
+
+
+def test_a_first_guess_that_is_pathological_is_named_as_such():
+    status, why = judge(replace(SOUND, reset=True, load_share=0.1))
+    assert status is FrameStatus.RESET
+    assert "pathological" in why
+
+
+def test_without_a_load_the_mean_stress_is_no_evidence():
+    assert judge(replace(SOUND, load_share=math.nan))[0] is FrameStatus.SETTLED
+
+
+def test_old_forces_that_no_longer_fit_tell_a_rearrangement():
+    level = rearranging_level(SHEAR)
+    assert judge(replace(SOUND, old_unbalance=1.01 * level))[0] is FrameStatus.REARRANGING
+    assert judge(replace(SOUND, old_unbalance=0.99 * level))[0] is FrameStatus.SETTLED
+    assert rearranging_level(0.5 * SHEAR) < level < rearranging_level(2.0 * SHEAR)
+
+
+def test_a_frame_settles_some_frames_after_an_event_and_when_motion_and_forces_agree():
+    assert judge(replace(SOUND, frames_since_event=SETTLING_FRAMES - 1))[0] is FrameStatus.SETTLING
+    assert judge(replace(SOUND, frames_since_event=SETTLING_FRAMES))[0] is FrameStatus.SETTLED
+    assert judge(replace(SOUND, correction=1.01 * SETTLED_CORRECTION))[0] is FrameStatus.SETTLING
+
+
+def test_trust_falls_with_disagreement_and_with_correction_within_its_bounds():
+    assert trust(replace(SOUND, disagreement=0.3)) < trust(SOUND)
+    assert trust(replace(SOUND, correction=0.3)) < trust(SOUND)
+    assert trust(replace(SOUND, correction=1e6)) == 0.0
+    assert trust(replace(SOUND, correction=0.0, disagreement=0.0)) == 1.0
+
+
+def test_a_single_chain_is_trusted_by_its_correction_alone():
+    chain = replace(SOUND, disagreement=math.nan)
+    assert 0.0 < trust(replace(chain, correction=0.2)) < trust(chain) < 1.0
+
+
+def test_standard_deviations_grow_with_force_and_spread_and_scale_with_the_load():
+    fn, spread = np.array([0.0, 10.0, 50.0]), np.array([0.0, 2.0, 2.0])
+    for deviation in (
+        lambda f, s: free_standard_deviation(f, s),
+        lambda f, s: tangential_standard_deviation(f, 0.25, s),
+    ):
+        assert np.all(np.diff(deviation(fn, spread)) > 0)
+        assert np.all(deviation(fn, 2.0 * spread)[1:] > deviation(fn, spread)[1:])
+        np.testing.assert_allclose(deviation(3.0 * fn, 3.0 * spread), 3.0 * deviation(fn, spread))
+        np.testing.assert_array_equal(deviation(np.zeros(3), spread), 0.0)
+
+
+def test_a_single_chain_has_error_bars_too():
+    fn = np.array([5.0, 20.0])
+    assert np.all(free_standard_deviation(fn) > 0)
+    np.testing.assert_allclose(tangential_standard_deviation(fn, 0.25), 0.25 * free_standard_deviation(fn))
+
+
+def test_a_frame_whose_start_is_not_forgotten_is_still_settling():
+    status, why = judge(replace(SOUND, start_difference=1.01 * SETTLED_DIFFERENCE))
+    assert status is FrameStatus.SETTLING
+    assert "H = " in why
+    assert judge(replace(SOUND, start_difference=0.99 * SETTLED_DIFFERENCE))[0] is FrameStatus.SETTLED
+
+
+def test_holes_lower_the_trust_and_are_named():
+    holed = replace(SOUND, holes=3, grains=600)
+    assert trust(holed) < trust(SOUND)
+    assert "3 holes" in judge(holed)[1]
+    assert "hole" not in judge(SOUND)[1]
+
+
+def test_a_single_chain_is_trusted_less_the_farther_its_threshold_reaches():
+    chain = replace(SOUND, disagreement=math.nan)
+    assert trust(replace(chain, reach=0.015)) < trust(replace(chain, reach=0.004)) < trust(chain)
