@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 from rodsight.synthetic.experiment import synthesize
 
+from tests.shapes import check_shapes
+
+check_shapes("solver")
+
 
 @pytest.fixture(scope="session")
 def made_tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:

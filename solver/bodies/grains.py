@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -14,8 +15,8 @@ Array = NDArray[np.float64]
 class Grains:
     """The bodies of a packing: solid rods seen end on."""
 
-    radius: Array  # (n,) [m]
-    mass: Array  # (n,) [kg]
+    radius: Float[Array, " n"]  # [m]
+    mass: Float[Array, " n"]  # [kg]
 
     def __post_init__(self) -> None:
         if self.radius.shape != self.mass.shape or self.radius.ndim != 1:
@@ -46,10 +47,10 @@ class GrainMotion:
     Rows of grains that are not present may hold any number: nobody reads them.
     """
 
-    position: Array  # (n, 2) [m]
-    velocity: Array  # (n, 2) [m/s], the mean over the interval that ends here
-    spin: Array  # (n,) [rad/s], counter-clockwise
-    present: NDArray[np.bool_]  # (n,) False: lost or never seen; takes no part
+    position: Float[Array, "n 2"]  # [m]
+    velocity: Float[Array, "n 2"]  # [m/s], the mean over the interval that ends here
+    spin: Float[Array, " n"]  # [rad/s], counter-clockwise
+    present: Bool[NDArray[np.bool_], " n"]  # False: lost or never seen; takes no part
 
     def __post_init__(self) -> None:
         n = len(self.present)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
@@ -19,10 +20,10 @@ class Snapshot:
     """One frame, as measured. Rows of grains that are not present may hold any number."""
 
     time: float  # [s]
-    position: Array  # (n, 2) [m]
-    rotation: Array  # (n,) [rad]
-    present: NDArray[np.bool_]  # (n,)
-    endpoints: Array  # (w, 2, 2) [m]
+    position: Float[Array, "n 2"]  # [m]
+    rotation: Float[Array, " n"]  # [rad]
+    present: Bool[NDArray[np.bool_], " n"]
+    endpoints: Float[Array, "w 2 2"]  # [m]
     sigma: float  # [m] standard deviation of a position component, error of the centre included
 
 
@@ -30,9 +31,9 @@ class Snapshot:
 class LastSeen:
     """When and where each grain was last seen; NaN: never."""
 
-    time: Array  # (n,) [s]
-    position: Array  # (n, 2) [m]
-    rotation: Array  # (n,) [rad]
+    time: Float[Array, " n"]  # [s]
+    position: Float[Array, "n 2"]  # [m]
+    rotation: Float[Array, " n"]  # [rad]
 
     @classmethod
     def never(cls, grain_count: int) -> LastSeen:
@@ -54,8 +55,8 @@ class FrameMotion:
 
     interval: float  # [s]
     grains: GrainMotion  # at the frame
-    endpoints: Array  # (w, 2, 2) [m] at the frame
-    wall_velocity: Array  # (w, 2, 2) [m/s]
+    endpoints: Float[Array, "w 2 2"]  # [m] at the frame
+    wall_velocity: Float[Array, "w 2 2"]  # [m/s]
     spans: bool  # True: the interval ends here, so that earlier instants of it exist
     sigma: float  # [m]
 

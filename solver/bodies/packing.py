@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.walls import Walls
@@ -31,7 +32,7 @@ class Packing:
     grains: Grains
     length: float  # [m] of the rods
     material: Material
-    pressure: Array  # (w,) [Pa] on plates, NaN where the motion is imposed
+    pressure: Float[Array, " w"]  # [Pa] on plates, NaN where the motion is imposed
 
     def load(self, endpoints: Array) -> Array:
         """Load on every wall (w,) [N] of given endpoints (w, 2, 2) [m]."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
@@ -22,9 +23,9 @@ class Walls:
     is pressed against the packing by `load`.
     """
 
-    endpoints: Array  # (w, 2, 2) [m], wall, end, (x, y)
-    velocity: Array  # (w, 2, 2) [m/s], of the endpoints
-    load: Array  # (w,) [N], NaN where the normal motion is imposed
+    endpoints: Float[Array, "w 2 2"]  # [m], wall, end, (x, y)
+    velocity: Float[Array, "w 2 2"]  # [m/s], of the endpoints
+    load: Float[Array, " w"]  # [N], NaN where the normal motion is imposed
 
     def __post_init__(self) -> None:
         w = len(self.load)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+from jaxtyping import Float, Int32
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
@@ -20,11 +21,11 @@ class Contacts:
     Body `i` is always a grain; `j` is a grain (j > i) or wall `j − n`. The normal points from i to j.
     """
 
-    i: NDArray[np.int32]  # (c,)
-    j: NDArray[np.int32]  # (c,)
-    gap: Array  # (c,) [m], negative: overlap
-    normal: Array  # (c, 2) unit vector from i towards j
-    point: Array  # (c, 2) [m], midway between the two surfaces
+    i: Int32[NDArray[np.int32], " c"]
+    j: Int32[NDArray[np.int32], " c"]
+    gap: Float[Array, " c"]  # [m], negative: overlap
+    normal: Float[Array, "c 2"]  # unit vector from i towards j
+    point: Float[Array, "c 2"]  # [m], midway between the two surfaces
     grain_count: int  # n: j >= n is a wall
     wall_count: int
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float, Int32, Int64
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, GrainMotion, Grains
@@ -32,16 +33,17 @@ class ContactProblem(NamedTuple):
     At most ten fields: numba's dispatch slows beyond.
     """
 
-    body: Array  # (n, 4) free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
-    plate: Array  # (w, 2) free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
-    pair_body: NDArray[np.int32]  # (blocks, 2, L) grains i, j
-    pair: Array  # (blocks, 4, L) nx, ny, 1/W_nn, and the velocity [m/s] added to u_n: gap to close
+    body: Float[Array, "n 4"]  # free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
+    plate: Float[Array, "w 2"]  # free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
+    pair_body: Int32[NDArray[np.int32], "blocks 2 L"]  # grains i, j
+    pair: Float[Array, "blocks 4 L"]  # nx, ny, 1/W_nn, and the velocity [m/s] added to u_n: gap to close
     grouped: int  # a multiple of L, at most p
-    wall_body: NDArray[np.int32]  # (q, 2) grain, wall
-    wall: Array  # (q, 6) nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
-    friction: Array  # (2,) between grains, with walls
-    external: Array  # (n, 2) [N] weight of the grains
-    rows: NDArray[np.int64]  # (p + q,) record → row of Contacts
+    wall_body: Int32[NDArray[np.int32], "q 2"]  # grain, wall
+    # nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
+    wall: Float[Array, "q 6"]
+    friction: Float[Array, "2"]  # between grains, with walls
+    external: Float[Array, "n 2"]  # [N] weight of the grains
+    rows: Int64[NDArray[np.int64], " c"]  # c = p + q: record → row of Contacts
 
 
 def kinematic_impedance(

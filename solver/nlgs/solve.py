@@ -14,6 +14,7 @@ from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from solver.bodies.grains import Array
 from solver.nlgs.acceleration import PERIOD, Acceleration
@@ -59,10 +60,10 @@ class Sweep(NamedTuple):
     """The state after a sweep that is heard. `force` is live memory: copy what you keep."""
 
     number: int  # 1 … sweeps
-    force: Array  # (p + q, 2) [N] in visiting order
-    # (s, 3) of the sweeps since the one heard before, this one last: greatest |Δf| / |f| in the sweep, relative
+    force: Float[Array, "c 2"]  # [N] in visiting order
+    # Of the sweeps since the one heard before, this one last: greatest |Δf| / |f| in the sweep, relative
     # natural-map residual after it, worst |ΣF| on a grain / mean f_n. NaN where not measured; this sweep's always are.
-    residuals: Array
+    residuals: Float[Array, "s 3"]
 
     @property
     def force_change(self) -> float:
@@ -79,8 +80,8 @@ class Sweep(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    fn: Array  # (c,) [N] in the order of the contacts
-    ft: Array  # (c,) [N]
+    fn: Float[Array, " c"]  # [N] in the order of the contacts
+    ft: Float[Array, " c"]  # [N]
     stop: Stop
     sweeps: int
     natural_map: float
