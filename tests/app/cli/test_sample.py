@@ -15,6 +15,8 @@ from rodsight.experiment.tables import read_table
 from rodsight.recording.viewing.viewer import viewer_binary
 from rodsight.synthetic.speckle import SpeckleSettings, render_scene
 
+from tests.golden import sample as golden
+
 SAMPLE = Path(__file__).parents[3] / "sample_data" / "shear"
 SEED = 12
 LEAST_R = 0.90  # of every frame from the fifth on, through the photographs
@@ -100,6 +102,10 @@ def test_the_sample_runs_to_trustworthy_forces_and_a_sound_recording(tmp_path, c
     assert r.mean() >= LEAST_MEAN_R
     assert summary["lost_poses"] == 0
     assert summary["grain_count"] == 250
+    changed = {
+        name: by for name, by in golden.differences(tmp_path / "run" / "results.h5").items() if by > golden.TOLERANCE
+    }
+    assert not changed, "the sample's forces are not those of the stored run: see tests/golden/sample.py"
     recording = tmp_path / "run" / "recording.rrd"
     verified = subprocess.run([str(viewer_binary()), "rrd", "verify", str(recording)], capture_output=True, text=True)
     assert verified.returncode == 0, verified.stderr

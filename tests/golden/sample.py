@@ -1,0 +1,42 @@
+"""The sample's forces as an earlier version found them: what moves and splits must not change.
+
+TOLERANCE: the sequential sweeps are deterministic, so that one machine gives the same bits. Another instruction set
+rounds otherwise: with kernels compiled for a generic processor and another BLAS the sample's forces moved by 2e-11 of
+the mean force at most. A change of mechanics, however small its constant, shows above 1e-6.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+STORED = Path(__file__).with_name("sample.npz")
+TOLERANCE = 1e-9  # of the mean force, and of a metre
+DATASETS = ("contacts/offset", "contacts/i", "contacts/j", "forces/fn", "forces/ft", "frames/trust", "frames/status")
+
+
+def renew(results: Path) -> None:
+    """Store the forces of a run of the sample; only where a change of the forces is meant, and said so."""
+    with h5py.File(results) as run:
+        plain = {name: np.asarray(run[name][()]) for name in (*DATASETS, "tracks/position")}
+    kinds = {"contacts/i": np.int16, "contacts/j": np.int16, "frames/status": np.uint8}
+    np.savez_compressed(
+        STORED, **{name: values.astype(kinds.get(name, values.dtype.str)) for name, values in plain.items()}
+    )
+
+
+def differences(results: Path) -> dict[str, float]:
+    """The greatest difference of every dataset of a run from the stored one, forces over their mean."""
+    found = {}
+    with h5py.File(results) as run, np.load(STORED) as stored:
+        for name in stored.files:
+            now, then = np.asarray(run[name][()], np.float64), stored[name].astype(np.float64)
+            if now.shape != then.shape:
+                found[name] = np.inf
+                continue
+            unit = float(then[then > 0].mean()) if name.startswith("forces/") else 1.0
+            known = ~(np.isnan(now) & np.isnan(then))
+            found[name] = float(np.abs(now - then)[known].max(initial=0.0)) / unit
+    return found
