@@ -15,7 +15,8 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts, measure_contacts
+from solver.contacts.contacts import Contacts, measure_pairs
+from solver.contacts.pairs import align
 
 from ..experiment.units import Scale
 from ..results.comparison import Comparison, FieldFrame
@@ -245,14 +246,9 @@ def _log_difference(clock: Clock, scene: Scene, key: NDArray[np.int64], fn: Arra
 
 def _on_union(a: FieldFrame, b: FieldFrame, name: str) -> tuple[NDArray[np.int64], Array]:
     """Keys of the contacts of either field (u,), and both forces on them (2, u) [N], 0 where one has no contact."""
-    key = np.union1d(a.contacts.key, b.contacts.key)
-    both = np.zeros((2, len(key)))
-    for row, field in enumerate((a, b)):
-        both[row, np.searchsorted(key, field.contacts.key)] = np.nan_to_num(getattr(field, name))
-    return key, both
+    key, *both = align(a.contacts.key, np.nan_to_num(getattr(a, name)), b.contacts.key, np.nan_to_num(getattr(b, name)))
+    return key, np.stack(both)
 
 
 def _contacts_of(scene: Scene, frame: int, key: NDArray[np.int64]) -> Contacts:
-    bodies = scene.grains.count + scene.walls.count
-    i, j = np.divmod(key, bodies)
-    return measure_contacts(scene.grains, scene.tracks.position[frame], scene.walls_at(frame), i, j)
+    return measure_pairs(scene.grains, scene.tracks.position[frame], scene.walls_at(frame), key)

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from solver.bodies.grains import Array
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, measure_contacts
+from solver.contacts.pairs import make_keys
 from solver.statistics.agreement import Agreement, compare_forces
 from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, wall_forces, wall_ratio_angle
 
@@ -160,7 +161,7 @@ def _frame_on(
     """Forces on bodies of the base (−1: not there) as a frame; and how many of them had to be left out."""
     known = (i >= 0) & (j >= 0)
     low, high = np.minimum(i, j)[known], np.maximum(i, j)[known]
-    order = np.argsort(low.astype(np.int64) * (base.grains.count + base.walls.count) + high, kind="stable")
+    order = np.argsort(make_keys(low, high, base.grains.count + base.walls.count), kind="stable")
     walls = _walls_at(base, frame)
     contacts = measure_contacts(base.grains, base.tracks.position[frame], walls, low[order], high[order])
     fn, ft = np.asarray(fn)[known][order], np.asarray(ft)[known][order]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
 from solver.calibration.calibrate import Calibration
+from solver.contacts.pairs import Keys, make_keys
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.convex.friction_check import FrictionCheck
 from solver.sequence.frame_forces import FrameForces
@@ -29,9 +30,9 @@ class TruthContacts:
     fn: Array  # (t,) [N]
     ft: Array  # (t,) [N]
 
-    def by_frame(self, bodies: int, frame_count: int) -> tuple[tuple[NDArray[np.int64], Array], ...]:
+    def by_frame(self, bodies: int, frame_count: int) -> tuple[tuple[Keys, Array], ...]:
         """Keys (c,) of the pairs and forces (c, 2) [N] of every frame; bodies: grains and walls together."""
-        key, force = self.i * bodies + self.j, np.column_stack([self.fn, self.ft])
+        key, force = make_keys(self.i, self.j, bodies), np.column_stack([self.fn, self.ft])
         bounds = np.searchsorted(self.frame, np.arange(frame_count + 1))
         return tuple((key[a:b], force[a:b]) for a, b in pairwise(bounds))
 

@@ -10,7 +10,8 @@ from scipy.stats import norm
 
 from solver.bodies.grains import Array
 from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, ContactSource, detect_contacts, measure_contacts
+from solver.contacts.contacts import Contacts, ContactSource, detect_contacts, measure_pairs
+from solver.contacts.pairs import are_among, are_there, join_keys, recall
 from solver.contacts.verdicts import DETECTED
 
 from ..results.results import Results
@@ -60,12 +61,9 @@ def find_candidates(results: Results, frame: int, threshold: float | None = None
         results.grains, position, present, walls, threshold + REACH * deviation * np.sqrt(2.0),
         wall_threshold=threshold + REACH * deviation,
     )  # fmt: skip
-    bodies = results.grains.count + walls.count
-    here = np.concatenate([present, np.ones(walls.count, np.bool_)])
-    key = np.union1d(near.key, listed.key)
-    i, j = key // bodies, key % bodies
-    measurable = here[i] & here[j]  # a stand-in for a lost grain cannot be judged on the photograph
-    contacts = measure_contacts(results.grains, position, walls, i[measurable], j[measurable])
+    key = join_keys(near.key, listed.key)
+    # A stand-in for a lost grain cannot be judged on the photograph.
+    contacts = measure_pairs(results.grains, position, walls, key[are_there(key, present, near.body_count)])
     sigma = gap_sigma(contacts, deviation)
     probability, detected = _detection(results, frame, contacts, sigma, threshold)
     return Candidates(frame, contacts, sigma, probability, detected, threshold)
@@ -88,13 +86,8 @@ def _detection(
     """P(touch) and whether the pair was detected (c,)."""
     forces = results.frames[frame]
     from_gap = norm.cdf((threshold - contacts.gap) / np.maximum(sigma, 1e-12))
-    place = np.searchsorted(forces.contacts.key, contacts.key)
-    place = np.minimum(place, max(forces.contacts.count - 1, 0))
-    listed = np.zeros(contacts.count, np.bool_)
-    if forces.contacts.count:
-        listed = forces.contacts.key[place] == contacts.key
-    told = np.full(contacts.count, np.nan)
-    told[listed] = forces.probability[place[listed]]
+    listed = are_among(contacts.key, forces.contacts.key)
+    told = recall(contacts.key, forces.contacts.key, forces.probability, fill=np.nan)
     detector = forces.source == ContactSource.DETECTED  # of an added contact even the plain detector tells P = 0
     by_probability = bool(np.isfinite(forces.probability[detector]).any())
     unlisted = np.minimum(from_gap, UNLISTED) if by_probability else from_gap

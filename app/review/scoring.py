@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from solver.bodies.grains import Array
-from solver.contacts.contacts import measure_contacts
+from solver.contacts.contacts import measure_pairs
+from solver.contacts.pairs import are_among, are_there, join_keys, recall
 
 from ..errors import InputError
 from ..verdicts.decisions import Decisions, decide
@@ -189,20 +190,15 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
 
 def _pairs_of(reviewed: Reviewed, candidates: Candidates, decisions: Decisions) -> JudgedPairs:
     results, frame = reviewed.results, candidates.frame
-    bodies, n = results.grains.count + results.walls.count, results.grains.count
-    here = np.concatenate([results.tracks.present[frame], np.ones(results.walls.count, np.bool_)])
     yes, no = decisions.forced(frame), decisions.forbidden(frame)
-    key = np.union1d(candidates.key, np.union1d(yes, no))
-    key = key[here[key // bodies] & here[key % bodies]]
-    position, walls = results.tracks.position[frame], walls_at(results, frame)
-    contacts = measure_contacts(results.grains, position, walls, key // bodies, key % bodies)
-    place = np.searchsorted(key, candidates.key)
-    stratum = np.full(len(key), -1, np.int64)
-    detected, probability = np.zeros(len(key), np.bool_), np.zeros(len(key))
-    stratum[place], detected[place] = strata(candidates), candidates.detected
-    probability[place] = candidates.probability
-    outcome = np.where(np.isin(key, yes), YES, np.where(np.isin(key, no), NO, UNJUDGED))
-    return JudgedPairs(contacts.gap, contacts.j >= n, stratum, detected, probability, outcome)
+    key = join_keys(candidates.key, yes, no)
+    key = key[are_there(key, results.tracks.present[frame], candidates.contacts.body_count)]
+    contacts = measure_pairs(results.grains, results.tracks.position[frame], walls_at(results, frame), key)
+    stratum = recall(key, candidates.key, strata(candidates), fill=-1)
+    detected = recall(key, candidates.key, candidates.detected, fill=False)
+    probability = recall(key, candidates.key, candidates.probability)
+    outcome = np.where(are_among(key, yes), YES, np.where(are_among(key, no), NO, UNJUDGED))
+    return JudgedPairs(contacts.gap, contacts.with_wall, stratum, detected, probability, outcome)
 
 
 def _plain(value: Any) -> Any:

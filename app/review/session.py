@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.contacts.contacts import Contacts, measure_contacts
+from solver.contacts.contacts import Contacts, measure_pairs
+from solver.contacts.pairs import split_key
 
 from .. import __version__
 from ..recording.review_layer import (
@@ -162,7 +163,7 @@ class ReviewSession:
         if not all(row >= n or present[row] for row in (i, j)):
             raise BadRequest(f"a grain of the pair {a} {b} is lost in this frame")
         key = self.bodies.key(i, j)
-        known = bool(np.isin(key, self.candidates(view.frame).key))
+        known = key in self.candidates(view.frame).key
         return self.describe(view, view.frame, key, Origin.CLICK if known else Origin.ADDED)
 
     def judge(
@@ -287,10 +288,9 @@ class ReviewSession:
         })  # fmt: skip
 
     def _measure(self, frame: int, key: int) -> Contacts:
-        n, w = self.results.grains.count, self.results.walls.count
-        i, j = divmod(key, n + w)
+        i, j = split_key(key, self.bodies.count)
         self._check(frame)
-        if not 0 <= i < min(j, n) or not self._can_be_seen(frame, key):
+        if not 0 <= i < min(j, self.results.grains.count) or not self._can_be_seen(frame, key):
             raise BadRequest(f"there is no pair {key} in frame {frame}")
         return self._measure_all(frame, [key])
 
@@ -298,15 +298,11 @@ class ReviewSession:
         """Whether both bodies have a pose in the frame."""
         n = self.results.grains.count
         here = self.results.tracks.present[frame]
-        return all(row >= n or bool(here[row]) for row in divmod(key, self.bodies.count))
+        return all(row >= n or bool(here[row]) for row in split_key(key, self.bodies.count))
 
     def _measure_all(self, frame: int, keys: list[int]) -> Contacts:
-        key = np.array(keys, np.int64)
-        bodies = self.bodies.count
-        position = self.results.tracks.position[frame]
-        return measure_contacts(
-            self.results.grains, position, walls_at(self.results, frame), key // bodies, key % bodies
-        )
+        position, walls = self.results.tracks.position[frame], walls_at(self.results, frame)
+        return measure_pairs(self.results.grains, position, walls, np.array(keys, np.int64))
 
     def _row(self, name: str) -> int | None:
         """Row of a body by what a person calls it; a wall's name goes before a grain's id."""

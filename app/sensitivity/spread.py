@@ -15,13 +15,12 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from solver.bodies.grains import Array
+from solver.contacts.pairs import Keys, recall
 from solver.contacts.verdicts import Verdicts
 from solver.sequence.frame_forces import FrameForces
-from solver.statistics.agreement import align_forces
 
 from ..experiment.experiment import Experiment
 from ..inference.inference import Inputs, Networks, infer
@@ -109,15 +108,14 @@ def solve_members(
     return [found[number] for number in range(count)]
 
 
-def spread_around(key: NDArray[np.int64], force: Array, members: Sequence[tuple[NDArray[np.int64], Array]]) -> Spread:
+def spread_around(key: Keys, force: Array, members: Sequence[tuple[Keys, Array]]) -> Spread:
     """Spread of the members around nominal forces (c, 2) [N] on contacts named by key (c,); absent is zero.
 
     members: keys (m,) and forces (m, 2) [N] of each.
     """
     square = np.zeros_like(force)
     for other_key, other in members:
-        rows = np.searchsorted(np.union1d(key, other_key), key)
-        square += (align_forces(key, force, other_key, other)[1][rows] - force) ** 2
+        square += (recall(key, other_key, other) - force) ** 2
     rms = np.sqrt(square / max(len(members), 1))
     return Spread(rms[:, 0], rms[:, 1])
 

@@ -11,12 +11,13 @@ from rich.console import Console
 from rich.table import Table
 
 from solver.bodies.grains import Array
-from solver.contacts.contacts import measure_contacts
+from solver.contacts.contacts import measure_pairs
+from solver.contacts.pairs import align
 from solver.dem.simulation import DemTruth
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frames import SequenceSettings, solve_sequence
-from solver.statistics.agreement import align_forces, pearson
+from solver.statistics.agreement import pearson
 from solver.statistics.force_statistics import plateau_ratio, tail_exponent
 from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
 
@@ -123,7 +124,7 @@ def _boundaries(loaded: list[_Sequence], imposed: list[_Sequence]) -> Verdict:
     for one, other in zip(loaded, imposed, strict=True):
         factors = []
         for a, b in zip(one.frames[3:], other.frames[3:], strict=True):
-            fa, fb = align_forces(a.contacts.key, a.fn, b.contacts.key, b.fn)
+            _, fa, fb = align(a.contacts.key, a.fn, b.contacts.key, b.fn)
             r.append(pearson(fa, fb))
             factors.append(fb.sum() / fa.sum())
         factor.append(np.std(factors) / np.mean(factors))
@@ -144,8 +145,7 @@ def _stresses(sequences: list[_Sequence]) -> tuple[list[Array], list[Array]]:
             walls = packing.walls(s.truth.endpoints[k])
             area = packing_area(walls, s.truth.position[k])
             key, force = true_forces(s.truth, k)
-            bodies = packing.grains.count + walls.count
-            exact = measure_contacts(packing.grains, s.truth.position[k], walls, key // bodies, key % bodies)
+            exact = measure_pairs(packing.grains, s.truth.position[k], walls, key)
             force = force[np.argsort(key)]
             position = s.truth.position[k]
             true.append(love_weber_stress(exact, force[:, 0], force[:, 1], position, area, packing.length))

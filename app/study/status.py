@@ -20,6 +20,7 @@ from scipy.optimize import minimize
 from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
+from solver.contacts.pairs import Keys, recall
 from solver.dem.simulation import DemTruth
 from solver.sequence import judgement
 from solver.sequence.frame_forces import FrameForces, FrameStatus
@@ -30,8 +31,6 @@ from solver.statistics.agreement import compare_forces
 from ..progress import Progress, silent
 from .accuracy import default_settings
 from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
-
-Keys = NDArray[np.int64]
 
 WINDOW = 12  # photographs of one sequence
 FAULTY_WINDOW = 6
@@ -252,9 +251,7 @@ def _change(key: Keys, force: Array, before: Keys, former: Array) -> float:
 
 def _contact_errors(frame: FrameForces, key: Keys, force: Array) -> tuple[Array, Array, Array]:
     """Error (c, 2), f_n (c,) and spread (c, 2) over the mean f_n, of contacts that bear force here or in truth."""
-    true = np.zeros((frame.contacts.count, 2))
-    _, here, there = np.intersect1d(frame.contacts.key, key, assume_unique=True, return_indices=True)
-    true[here] = force[there]
+    true = recall(frame.contacts.key, key, force)
     mean = float(frame.fn[frame.fn > 0].mean())
     bearing = np.maximum(frame.fn, true[:, 0]) > WEAK * mean
     error = (np.column_stack([frame.fn, frame.ft]) - true) / mean

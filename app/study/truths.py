@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Material, Packing
+from solver.contacts.pairs import make_keys
 from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.agreement import Agreement, compare_forces
@@ -79,8 +80,7 @@ def true_forces(truth: DemTruth, frame: int) -> tuple[NDArray[np.int64], Array]:
     """Keys (t,) and forces (t, 2) [N] of one frame's true contacts."""
     rows = slice(truth.offset[frame], truth.offset[frame + 1])
     bodies = len(truth.radius) + len(truth.wall_names)
-    key = truth.i[rows].astype(np.int64) * bodies + truth.j[rows]
-    return key, np.column_stack([truth.fn[rows], truth.ft[rows]])
+    return make_keys(truth.i[rows], truth.j[rows], bodies), np.column_stack([truth.fn[rows], truth.ft[rows]])
 
 
 def agreement_of(forces: FrameForces, truth: DemTruth, frame: int) -> Agreement:

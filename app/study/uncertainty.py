@@ -17,8 +17,8 @@ from rich.table import Table
 from scipy.optimize import minimize
 
 from solver.bodies.grains import Array
+from solver.contacts.pairs import recall
 from solver.dem.simulation import DemTruth
-from solver.statistics.agreement import align_forces
 
 from ..experiment.config import ExperimentFile
 from ..experiment.experiment import Experiment
@@ -141,12 +141,11 @@ def _measure_window(
     for k, frame in enumerate(nominal[1:], start=1):
         key, force = frame.contacts.key, np.column_stack([frame.fn, frame.ft])
         true_key, true_force = true_forces(truth, photographs[k])
-        rows = np.searchsorted(np.union1d(key, true_key), key)
-        _, true = align_forces(key, force, true_key, true_force)
+        true = recall(key, true_key, true_force)
         spread = spread_around(key, force, [each.at(k) for each in others])
         mean = float(frame.fn[frame.fn > 0].mean())
-        told = np.maximum(frame.fn, true[rows, 0]) > WEAK * mean
-        errors.append((force - true[rows])[told] / mean)
+        told = np.maximum(frame.fn, true[:, 0]) > WEAK * mean
+        errors.append((force - true)[told] / mean)
         spreads.append(np.column_stack([spread.fn, spread.ft])[told] / mean)
         free.append(np.column_stack([frame.fn_sd, frame.ft_sd])[told] / mean)
     error = np.concatenate(errors)

@@ -7,6 +7,7 @@ import numpy as np
 from solver.bodies.grains import Array, Grains
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import measure_contacts
+from solver.contacts.pairs import are_among, make_keys
 from solver.dem.simulation import DemTruth
 
 
@@ -21,8 +22,8 @@ def measure_old_unbalance(truth: DemTruth) -> Array:
     result = np.full(truth.frame_count, np.nan)
     for k in range(1, truth.frame_count):
         old, new = (slice(int(truth.offset[m]), int(truth.offset[m + 1])) for m in (k - 1, k))
-        old_key = truth.i[old].astype(np.int64) * bodies + truth.j[old]
-        lasting = np.isin(old_key, truth.i[new].astype(np.int64) * bodies + truth.j[new], assume_unique=True)
+        old_key, new_key = (make_keys(truth.i[rows], truth.j[rows], bodies) for rows in (old, new))
+        lasting = are_among(old_key, new_key)
         i, j = truth.i[old][lasting], truth.j[old][lasting]
         endpoints = truth.endpoints[k]
         walls = Walls(endpoints, np.zeros_like(endpoints), np.full(len(endpoints), np.nan))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.contacts.pairs import make_key
 from solver.contacts.verdicts import Verdicts
 
 from ..tracks import Tracks, WallTracks
@@ -78,8 +79,7 @@ class Bodies:
 
     def key(self, i: int, j: int) -> int:
         """The key of a pair of rows, from either side."""
-        low, high = min(i, j), max(i, j)
-        return low * self.count + high
+        return make_key(i, j, self.count)
 
 
 def decide(log: VerdictLog, bodies: Bodies, *, first_frame: int, frame_count: int) -> Decisions:

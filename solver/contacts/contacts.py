@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.walls import Walls
+from solver.contacts.pairs import Keys, make_keys, split_keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +35,14 @@ class Contacts:
         return len(self.i)
 
     @property
-    def key(self) -> NDArray[np.int64]:
+    def body_count(self) -> int:
+        """Grains and walls together."""
+        return self.grain_count + self.wall_count
+
+    @property
+    def key(self) -> Keys:
         """A number that names the pair in every frame of a sequence (c,), ascending."""
-        return self.i.astype(np.int64) * (self.grain_count + self.wall_count) + self.j
+        return make_keys(self.i, self.j, self.body_count)
 
     @property
     def with_wall(self) -> NDArray[np.bool_]:
@@ -80,7 +86,7 @@ def measure_contacts(
 ) -> Contacts:
     """Measure normal, gap and point of the named pairs i, j (c,), whatever their distance."""
     n = grains.count
-    order = np.argsort(i.astype(np.int64) * (n + walls.count) + j, kind="stable")
+    order = np.argsort(make_keys(i, j, n + walls.count), kind="stable")
     i, j = i[order].astype(np.int32), j[order].astype(np.int32)
     wall = j >= n
     normal = np.empty((len(i), 2))
@@ -101,6 +107,11 @@ def measure_contacts(
 
     point = position[i] + normal * (grains.radius[i] + 0.5 * gap)[:, None]
     return Contacts(i, j, gap, normal, point, n, walls.count)
+
+
+def measure_pairs(grains: Grains, position: Array, walls: Walls, key: Keys) -> Contacts:
+    """Measure the pairs that are named by key (c,), whatever their distance."""
+    return measure_contacts(grains, position, walls, *split_keys(key, grains.count + walls.count))
 
 
 def _grain_pairs(

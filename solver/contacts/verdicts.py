@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
 from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, ContactSource, measure_contacts
+from solver.contacts.contacts import Contacts, ContactSource, measure_pairs
+from solver.contacts.pairs import Keys, are_among, are_there, find_rows, join_keys
 
 DETECTED = 0.5  # P(touch) from which on a pair counts as detected
 
 
-def _no_keys() -> NDArray[np.int64]:
+def _no_keys() -> Keys:
     return np.empty(0, np.int64)
 
 
@@ -24,16 +25,16 @@ def _no_keys() -> NDArray[np.int64]:
 class Verdicts:
     """Verdicts on one frame, by the keys of Contacts.key."""
 
-    forced: NDArray[np.int64] = field(default_factory=_no_keys)  # (m,) ascending: these pairs touch
-    forbidden: NDArray[np.int64] = field(default_factory=_no_keys)  # (p,) ascending: these do not
+    forced: Keys = field(default_factory=_no_keys)  # (m,) ascending: these pairs touch
+    forbidden: Keys = field(default_factory=_no_keys)  # (p,) ascending: these do not
     rearrangement: bool = False  # the packing rearranged on the way to this frame
     reset: bool = False  # nothing of the former forces carries over to this frame
     ignored: bool = False  # the photograph is not to be believed
 
     def __post_init__(self) -> None:
-        both = np.intersect1d(self.forced, self.forbidden)
-        if len(both):
-            raise ValueError(f"pair {both[0]} is both forced and forbidden")
+        both = are_among(self.forced, self.forbidden)
+        if both.any():
+            raise ValueError(f"pair {self.forced[both][0]} is both forced and forbidden")
 
 
 NO_VERDICTS = Verdicts()
@@ -54,14 +55,10 @@ def apply_verdicts(
     """
     if len(verdicts.forced) == 0 and len(verdicts.forbidden) == 0:
         return contacts, np.arange(contacts.count)
-    bodies = contacts.grain_count + contacts.wall_count
-    here = np.concatenate([present, np.ones(contacts.wall_count, np.bool_)])
-    forced = verdicts.forced[here[verdicts.forced // bodies] & here[verdicts.forced % bodies]]
-    key = np.union1d(np.setdiff1d(contacts.key, verdicts.forbidden), forced)
-    before = np.full(len(key), -1, np.int64)
-    _, now, then = np.intersect1d(key, contacts.key, assume_unique=True, return_indices=True)
-    before[now] = then
-    return measure_contacts(grains, position, walls, key // bodies, key % bodies), before
+    forced = verdicts.forced[are_there(verdicts.forced, present, contacts.body_count)]
+    key = join_keys(contacts.key[~are_among(contacts.key, verdicts.forbidden)], forced)
+    row, known = find_rows(key, contacts.key)
+    return measure_pairs(grains, position, walls, key), np.where(known, row, -1)
 
 
 def sources(contacts: Contacts, probability: Array, verdicts: Verdicts) -> NDArray[np.uint8]:
@@ -71,7 +68,7 @@ def sources(contacts: Contacts, probability: Array, verdicts: Verdicts) -> NDArr
     stays a detected one.
     """
     source = np.full(contacts.count, ContactSource.DETECTED, np.uint8)
-    added = np.isin(contacts.key, verdicts.forced) & (probability < DETECTED)
+    added = are_among(contacts.key, verdicts.forced) & (probability < DETECTED)
     source[added] = ContactSource.ADDED_BY_REVIEWER
     return source
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, GrainMotion, Grains
 from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
+from solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
+from solver.contacts.pairs import Keys, are_there, join_keys, recall
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts, apply_verdicts
 
 SURE = 0.3  # P(touch) from which on a contact bears force at once
@@ -44,21 +44,16 @@ class NearPairs:
 class PairProbability:
     """P(touch) of the pairs that probably touch in one frame, by key."""
 
-    key: NDArray[np.int64]  # (m,) ascending
+    key: Keys  # (m,) ascending
     touch: Array  # (m,)
 
     @classmethod
     def none(cls) -> PairProbability:
         return cls(np.empty(0, np.int64), np.empty(0))
 
-    def of(self, key: NDArray[np.int64]) -> Array:
+    def of(self, key: Keys) -> Array:
         """P(touch) of the named pairs (c,), zero for others."""
-        touch = np.zeros(len(key))
-        if len(self.key):
-            place = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
-            known = self.key[place] == key
-            touch[known] = self.touch[place[known]]
-        return touch
+        return recall(key, self.key, self.touch)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +64,8 @@ class ProbablePairs:
     end: PairProbability
 
     def at(self, fraction: float, grains: Grains, state: GrainMotion, walls: Walls) -> tuple[Contacts, Array | None]:
-        key = np.union1d(self.start.key, self.end.key) if fraction < 1.0 else self.end.key
-        bodies = grains.count + walls.count
-        i, j = key // bodies, key % bodies
-        here = np.concatenate([state.present, np.ones(walls.count, np.bool_)])
+        key = join_keys(self.start.key, self.end.key) if fraction < 1.0 else self.end.key
         touch = (1.0 - fraction) * self.start.of(key) + fraction * self.end.of(key)
-        keep = (touch > LEAST) & here[i] & here[j]
-        contacts = measure_contacts(grains, state.position, walls, i[keep], j[keep])
+        keep = (touch > LEAST) & are_there(key, state.present, grains.count + walls.count)
+        contacts = measure_pairs(grains, state.position, walls, key[keep])
         return contacts, np.maximum(0.0, np.log10(SURE / touch[keep]))

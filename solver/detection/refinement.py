@@ -21,7 +21,8 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
 from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, measure_contacts
+from solver.contacts.contacts import Contacts, measure_contacts, measure_pairs
+from solver.contacts.pairs import Keys, are_there, make_keys, recall
 from solver.detection.band_inverse import band_inverse
 from solver.detection.displacement import displacement_scale
 from solver.detection.touch_probability import (
@@ -46,7 +47,7 @@ class RefinedBlock:
     """Consecutive frames, refined together."""
 
     start: int  # first frame
-    key: NDArray[np.int64]  # (c,) candidates, ascending
+    key: Keys  # (c,) candidates, ascending
     touch: Array  # (f, c) P(touch)
     position: Array  # (f, n, 2) [m] refined; NaN where a grain is missing
     slide_variance: Array  # (f, c) [m²] of the pair's relative position along its tangent
@@ -61,11 +62,9 @@ class RefinedBlock:
 
         snapshot: that of the frame, with stand-ins for lost grains.
         """
-        touch, bodies = self.touch[frame - self.start], grains.count + walls.count
-        i, j = self.key // bodies, self.key % bodies
-        there = np.concatenate([snapshot.present, np.ones(walls.count, np.bool_)])
-        keep = (touch > least) & there[i] & there[j]
-        return measure_contacts(grains, snapshot.position, walls, i[keep], j[keep]), touch[keep]
+        touch = self.touch[frame - self.start]
+        keep = (touch > least) & are_there(self.key, snapshot.present, grains.count + walls.count)
+        return measure_pairs(grains, snapshot.position, walls, self.key[keep]), touch[keep]
 
     def slide_deviation(self, contacts: Contacts, frames: tuple[int, int], sigma: tuple[float, float]) -> Array:
         """Standard deviation of the sliding measured at contacts between two frames (c,) [m].
@@ -73,14 +72,11 @@ class RefinedBlock:
         sigma [m]: of a position component in either frame, and of the rim where a rotation is measured.
         """
         grains = np.where(contacts.with_wall, 1.0, 2.0)
-        row = np.minimum(np.searchsorted(self.key, contacts.key), max(len(self.key) - 1, 0))
-        known = self.key[row] == contacts.key if len(self.key) else np.zeros(contacts.count, np.bool_)
         total = np.zeros(contacts.count)
         for frame, each in zip(frames, sigma, strict=True):
             moved = grains * each**2
-            if len(self.key):
-                refined = self.slide_variance[frame - self.start, row]
-                moved = np.where(known & np.isfinite(refined), refined, moved)
+            refined = recall(contacts.key, self.key, self.slide_variance[frame - self.start], fill=np.nan)
+            moved = np.where(np.isfinite(refined), refined, moved)
             total += moved + grains * each**2
         return np.sqrt(total)
 
@@ -134,7 +130,7 @@ def refine(
             cavity[f] = (gap / variance - pull[f]) / left
     touch = smooth_gaps(cavity, np.sqrt(doubt + spread), scale, settings).touch
     bodies = grains.count + (walls[0].count if walls else 0)
-    return RefinedBlock(start, pairs.i.astype(np.int64) * bodies + pairs.j, touch, seen + shift, slide)
+    return RefinedBlock(start, make_keys(pairs.i, pairs.j, bodies), touch, seen + shift, slide)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
+from solver.contacts.pairs import join_keys, split_keys
 from solver.detection.displacement import displacement_scale
 from solver.detection.touch_probability_kernels import smooth_candidates
 
@@ -125,10 +126,9 @@ def find_candidates(
         detect_contacts(grains, position[f], present[f], walls[f], _reach(sigma[f][present[f]], settings))
         for f in range(len(position))
     ]
-    key = np.unique(np.concatenate([contacts.key for contacts in near])) if near else np.empty(0, np.int64)
-    i, j = (key // size).astype(np.int32), (key % size).astype(np.int32)
+    i, j = (each.astype(np.int32) for each in split_keys(join_keys(*(contacts.key for contacts in near)), size))
 
-    gap = np.empty((len(position), len(key)))
+    gap = np.empty((len(position), len(i)))
     deviation = np.empty_like(gap)
     wall = j >= n
     partner = np.where(wall, 0, j)

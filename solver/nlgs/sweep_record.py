@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
+from solver.contacts.pairs import find_rows
 from solver.nlgs.problem import ContactProblem
 from solver.nlgs.solve import Sweep
 
@@ -44,12 +45,9 @@ class _Step:
     contacts: Contacts
     force: list[NDArray[np.float32]]  # (2, c) [N] each, f_n and f_t in visiting order
 
-    def place_of(self, contacts: Contacts) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def place_of(self, contacts: Contacts) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         """Where other contacts (c,) stand in the visiting order, and which of them the sub-step knows at all."""
-        key = self.contacts.key[self.problem.rows]
-        order = np.argsort(key)
-        place = order[np.minimum(np.searchsorted(key, contacts.key, sorter=order), len(key) - 1)]
-        return place, key[place] == contacts.key
+        return find_rows(contacts.key, self.contacts.key[self.problem.rows])
 
 
 class SweepRecorder:

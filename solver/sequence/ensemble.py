@@ -19,6 +19,7 @@ from solver.bodies.motion import FrameMotion, Snapshot
 from solver.bodies.packing import Packing
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
+from solver.contacts.pairs import are_among
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts, apply_verdicts
 from solver.convex.members import RefinedMotion, Slip, advance_member, read_slip, steady_slip
 from solver.convex.program import ConvexSettings, assemble_balance, polish
@@ -126,8 +127,8 @@ def solve_ensemble(
     contacts, before = apply_verdicts(detected, verdicts, packing.grains, snapshot.position, snapshot.present, walls)
     # A pair that people saw touch is certain, whatever its measured gaps say.
     told = np.where(before >= 0, touch[before], 0.0) if len(touch) else np.zeros(contacts.count)
-    probability = np.where(np.isin(contacts.key, verdicts.forced), 1.0, told)
-    forbidden = np.isin(detected.key, verdicts.forbidden)
+    probability = np.where(are_among(contacts.key, verdicts.forced), 1.0, told)
+    forbidden = are_among(detected.key, verdicts.forbidden)
     pairs = PairProbability(contacts.key, probability)
     network = ProbablePairs(state.pairs if motion.spans else pairs, pairs)
     soft = advance_chain(packing, motion, state.soft, chain, network)

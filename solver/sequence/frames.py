@@ -16,6 +16,7 @@ from solver.bodies.motion import FrameMotion, LastSeen, Snapshot, motion_from, m
 from solver.bodies.packing import Packing
 from solver.contacts.contacts import Contacts, ContactState, detect_contacts
 from solver.contacts.kinematics import relative_motion
+from solver.contacts.pairs import are_among, recall
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts, sources, without_ignored
 from solver.detection.networks import NearPairs
 from solver.detection.precision import believed_precision, measure_precision, with_precision
@@ -255,9 +256,9 @@ def _estimate_by_chain(
             step, evidence = wider, wider_evidence
             remark = f"solved again with a gap threshold {WIDER} times as wide"
     near = detect_contacts(packing.grains, snapshot.position, snapshot.present, step.walls, threshold)
-    only_people_saw = np.isin(step.contacts.key, verdicts.forced) & ~np.isin(step.contacts.key, near.key)
+    only_people_saw = are_among(step.contacts.key, verdicts.forced) & ~are_among(step.contacts.key, near.key)
     unknown = np.where(only_people_saw, 0.0, np.nan)
-    forbidden = near.select(np.isin(near.key, verdicts.forbidden))
+    forbidden = near.select(are_among(near.key, verdicts.forbidden))
     members = replace(state.members, soft=step.memory if motion.spans else ForceMemory.empty())
     return _Estimate(
         step, step.solution.fn, step.solution.ft, unknown, members, forbidden, np.full(forbidden.count, np.nan), remark
@@ -326,10 +327,7 @@ def _pressure(packing: Packing, motion: FrameMotion, step: ChainStep, fn: Array,
 
 
 def _age(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
-    age = np.zeros(contacts.count, np.int32)
-    _, here, there = np.intersect1d(contacts.key, state.age_key, assume_unique=True, return_indices=True)
-    age[here] = state.age[there] + 1
-    return age
+    return recall(contacts.key, state.age_key, state.age, fill=-1) + np.int32(1)
 
 
 def _with_verdicts(

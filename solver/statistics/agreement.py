@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.contacts.pairs import Keys, align, are_among
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,11 @@ class Agreement:
     contact_recall: float  # of those that truly bear force, the share that is listed
 
 
-def compare_forces(key: NDArray[np.int64], force: Array, true_key: NDArray[np.int64], true_force: Array) -> Agreement:
+def compare_forces(key: Keys, force: Array, true_key: Keys, true_force: Array) -> Agreement:
     """Compare forces (c, 2) [N] on contacts named by key (c,) with true ones (t, 2) [N] on true_key (t,)."""
-    ours, true = align_forces(key, force, true_key, true_force)
+    _, ours, true = align(key, force, true_key, true_force)
     bearing = np.unique(true_key[true_force[:, 0] > 0])
-    hit = len(np.intersect1d(np.unique(key), bearing))
+    hit = int(are_among(bearing, key).sum())
     size, total = float(np.linalg.norm(true)), float(true[:, 0].sum())
     return Agreement(
         r_fn=pearson(ours[:, 0], true[:, 0]),
@@ -38,20 +38,9 @@ def compare_forces(key: NDArray[np.int64], force: Array, true_key: NDArray[np.in
     )
 
 
-def align_forces(
-    key: NDArray[np.int64], force: Array, other_key: NDArray[np.int64], other_force: Array
-) -> tuple[Array, Array]:
-    """Bring two sets of forces (c, …) and (t, …) [N], named by key, onto the union of their contacts; absent is 0."""
-    union = np.union1d(key, other_key)
-    one, other = np.zeros((len(union), *force.shape[1:])), np.zeros((len(union), *other_force.shape[1:]))
-    one[np.searchsorted(union, key)] = force
-    other[np.searchsorted(union, other_key)] = other_force
-    return one, other
-
-
-def relative_change(key: NDArray[np.int64], force: Array, other_key: NDArray[np.int64], other_force: Array) -> float:
+def relative_change(key: Keys, force: Array, other_key: Keys, other_force: Array) -> float:
     """‖f_other − f‖ / ‖f‖ of forces (c, …) and (t, …) [N], named by key, absent ones zero; 0 where f is none."""
-    one, other = align_forces(key, force, other_key, other_force)
+    _, one, other = align(key, force, other_key, other_force)
     size = float(np.linalg.norm(one))
     return float(np.linalg.norm(other - one)) / size if size > 0 else 0.0
 

@@ -6,8 +6,9 @@ import numpy as np
 import rerun as rr
 
 from solver.contacts.contacts import ContactSource, measure_contacts
+from solver.contacts.pairs import align
 from solver.sequence.frame_forces import FrameForces
-from solver.statistics.agreement import Agreement, align_forces, compare_forces
+from solver.statistics.agreement import Agreement, compare_forces
 
 from ...results.results import TruthContacts
 from ..look import entities
@@ -82,7 +83,7 @@ class TruthWriter:
         listed = forces.source != ContactSource.FORBIDDEN_BY_REVIEWER
         ours, inferred = forces.contacts.key[listed], np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed])
         true = np.column_stack([truth.fn[rows], truth.ft[rows]])
-        (true_fn, _), (inferred_fn, _) = (each.T for each in align_forces(key, true, ours, inferred))
+        _, (true_fn, _), (inferred_fn, _) = (each.T for each in align(key, true, ours, inferred))
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,
