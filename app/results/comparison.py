@@ -181,5 +181,4 @@ def _with_angles(base: Results, frame: int, field: FieldFrame) -> FieldFrame:
 
 def _walls_at(base: Results, frame: int) -> Walls:
     """The walls of a frame at rest, plates with their pressure for a load: which are loaded is all that matters."""
-    endpoints = base.walls.endpoints[frame]
-    return Walls(endpoints, np.zeros_like(endpoints), base.walls.pressure)
+    return Walls.at_rest(base.walls.endpoints[frame], base.walls.pressure)

@@ -71,8 +71,7 @@ def find_candidates(results: Results, frame: int, threshold: float | None = None
 
 def walls_at(results: Results, frame: int) -> Walls:
     """The walls of one frame, at rest."""
-    endpoints = results.walls.endpoints[frame]
-    return Walls(endpoints, np.zeros_like(endpoints), np.full(results.walls.count, np.nan))
+    return Walls.at_rest(results.walls.endpoints[frame])
 
 
 def gap_sigma(contacts: Contacts, deviation: float) -> Array:

@@ -25,9 +25,7 @@ def measure_old_unbalance(truth: DemTruth) -> Array:
         old_key, new_key = (make_keys(truth.i[rows], truth.j[rows], bodies) for rows in (old, new))
         lasting = are_among(old_key, new_key)
         i, j = truth.i[old][lasting], truth.j[old][lasting]
-        endpoints = truth.endpoints[k]
-        walls = Walls(endpoints, np.zeros_like(endpoints), np.full(len(endpoints), np.nan))
-        contacts = measure_contacts(grains, truth.position[k], walls, i, j)
+        contacts = measure_contacts(grains, truth.position[k], Walls.at_rest(truth.endpoints[k]), i, j)
         fn, ft = truth.fn[old][lasting], truth.ft[old][lasting]
         force = fn[:, None] * contacts.normal + ft[:, None] * contacts.tangent
         resultant = np.zeros((bodies, 2))

@@ -40,4 +40,4 @@ class Packing:
 
     def walls(self, endpoints: Array) -> Walls:
         """The walls at rest at these endpoints (w, 2, 2) [m], under their loads."""
-        return Walls(endpoints, np.zeros_like(endpoints), self.load(endpoints))
+        return Walls.at_rest(endpoints, self.load(endpoints))

@@ -34,6 +34,12 @@ class Walls:
         if w and not np.all(self.length > 0):
             raise ValueError("a wall has no length: its two endpoints coincide")
 
+    @classmethod
+    def at_rest(cls, endpoints: Array, load: Array | None = None) -> Walls:
+        """Walls (w, 2, 2) [m] that do not move, under loads (w,) [N] if there are any."""
+        load = np.full(len(endpoints), np.nan) if load is None else load
+        return cls(endpoints, np.zeros_like(endpoints), load)
+
     @property
     def count(self) -> int:
         return len(self.load)

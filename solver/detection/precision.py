@@ -71,7 +71,7 @@ def with_precision(snapshots: Sequence[Snapshot], factor: float) -> list[Snapsho
 
 def _gaps_in_a_row(grains: Grains, three: Sequence[Snapshot]) -> Array:
     """Gaps (3, c) [m] of near pairs of grains that all three snapshots show."""
-    walls = [Walls(s.endpoints, np.zeros_like(s.endpoints), np.full(len(s.endpoints), np.nan)) for s in three]
+    walls = [Walls.at_rest(s.endpoints) for s in three]
     present = three[0].present & three[1].present & three[2].present
     near = detect_contacts(grains, three[1].position, present, walls[1], REACH * 2.0 * float(grains.radius.mean()))
     i, j = near.i[~near.with_wall], near.j[~near.with_wall]

@@ -94,7 +94,7 @@ def refine(
     position = np.stack([each.position for each in snapshots])
     present = np.stack([each.present for each in snapshots])
     sigma = np.repeat([[each.sigma] for each in snapshots], grains.count, axis=1).astype(np.float64)
-    walls = [Walls(s.endpoints, np.zeros_like(s.endpoints), np.full(len(s.endpoints), np.nan)) for s in snapshots]
+    walls = [Walls.at_rest(s.endpoints) for s in snapshots]
     seen = np.where(present[:, :, None], position, np.nan)
     pairs = find_candidates(grains, position, present, sigma, walls, settings)
     scale = np.array([

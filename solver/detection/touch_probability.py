@@ -94,7 +94,7 @@ def probable_contacts(
     position = np.stack([snapshot.position for snapshot in window])
     present = np.stack([snapshot.present for snapshot in window])
     sigma = np.repeat([[snapshot.sigma] for snapshot in window], grains.count, axis=1).astype(np.float64)
-    walls = [_unloaded(snapshot.endpoints) for snapshot in window]
+    walls = [Walls.at_rest(snapshot.endpoints) for snapshot in window]
     seen = np.where(present[:, :, None], position, np.nan)
     candidates = find_candidates(grains, position, present, sigma, walls, settings)
     scale = np.array(
@@ -181,10 +181,6 @@ def smooth_gaps(gap: Array, sigma: Array, scale: Array, settings: ContactProbabi
         mean, variance,
     )  # fmt: skip
     return SmoothedGaps(touch, mean - 0.5 * settings.overlap, variance)
-
-
-def _unloaded(endpoints: Array) -> Walls:
-    return Walls(endpoints, np.zeros_like(endpoints), np.full(len(endpoints), np.nan))
 
 
 def _reach(sigma: Array, settings: ContactProbabilitySettings) -> float:

@@ -100,7 +100,7 @@ def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ..
 
 def wall_values(endpoints: Array, statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
     """Entity and values (w,) [N] of the curves of the walls; endpoints (w, 2, 2) [m] of the frame."""
-    walls = Walls(endpoints, np.zeros_like(endpoints), np.full(len(endpoints), np.nan))
+    walls = Walls.at_rest(endpoints)
     force = np.broadcast_to(statistics.wall_force, (walls.count, 2))
     return (
         (entities.WALL_NORMAL_FORCE, np.einsum("wk,wk->w", force, walls.outward)),

@@ -53,8 +53,7 @@ class Scene:
 
     def walls_at(self, frame: int) -> Walls:
         """The walls of one frame, at rest: for measuring, not for solving."""
-        endpoints = self.walls.endpoints[frame]
-        return Walls(endpoints, np.zeros_like(endpoints), np.full(self.walls.count, np.nan))
+        return Walls.at_rest(self.walls.endpoints[frame])
 
     def branches(self, frame: int, contacts: Contacts) -> NDArray[np.float32]:
         """Lines to draw for contacts (c, 2, 2) [px]: centre to centre; for a wall, centre to contact point."""

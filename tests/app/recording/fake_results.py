@@ -55,7 +55,7 @@ def make_results(
 
 def contacts_at(tracks: Tracks, walls: WallTracks, grains: Grains, frame: int) -> Contacts:
     endpoints = walls.endpoints[frame]
-    still = Walls(endpoints, np.zeros_like(endpoints), np.full(walls.count, np.nan))
+    still = Walls.at_rest(endpoints)
     return detect_contacts(grains, tracks.position[frame], tracks.present[frame], still, 0.03 * RADIUS)
 
 

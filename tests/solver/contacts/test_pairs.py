@@ -51,6 +51,11 @@ def test_a_key_comes_back_from_its_pair(bodies: int, data: st.DataObject) -> Non
     np.testing.assert_array_equal(make_keys(*split_keys(key, bodies), bodies), key)
 
 
+def test_keys_of_many_bodies_do_not_wrap_around() -> None:
+    i, j = np.array([69_998], np.int32), np.array([69_999], np.int32)
+    assert make_keys(i, j, 70_000).tolist() == [69_998 * 70_000 + 69_999]
+
+
 def test_keys_ascend_as_pairs_do() -> None:
     i, j = np.triu_indices(7, 1)
     assert np.all(np.diff(make_keys(i, j, 7)) > 0)

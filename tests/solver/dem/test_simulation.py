@@ -169,7 +169,7 @@ def truth() -> DemTruth:
 def bodies_of(truth: DemTruth, k: int) -> tuple[Grains, Walls]:
     settings, ends = truth.settings, truth.endpoints[k]
     grains = Grains.of_rods(truth.radius, density=settings.density, length=settings.length)
-    return grains, Walls(ends, np.zeros_like(ends), np.full(len(ends), np.nan))
+    return grains, Walls.at_rest(ends)
 
 
 def contacts_of(truth: DemTruth, k: int) -> tuple[Contacts, np.ndarray, np.ndarray]:

@@ -174,7 +174,7 @@ def three_grains() -> tuple[Grains, np.ndarray, list[Walls]]:
     position[0] = [[0.01, 0.01], [0.03, 0.01], [0.06, 0.05]]
     position[1] = [[0.01, 0.01], [0.03, 0.01], [0.03, 0.03 + 2e-5]]
     endpoints = np.array([[[0.0, 0.0], [0.1, 0.0]]])
-    return grains, position, [Walls(endpoints, np.zeros((1, 2, 2)), np.full(1, np.nan))] * 2
+    return grains, position, [Walls.at_rest(endpoints)] * 2
 
 
 def test_candidates_are_pairs_near_in_any_frame_measured_in_all():
