@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,20 +11,19 @@ from ..tracks import TrackStatus
 from .correlation.correlator import Fits, Rows
 from .correlation.patches import Patches
 from .neighbours import local_motion, nearby_median
-
-if TYPE_CHECKING:
-    from .settings import TrackingSettings
+from .settings import TrackingSettings
 
 
 class Findings:
     """The best fit of every grain so far; a better one replaces it."""
 
-    def __init__(self, patches: Patches, accepted_zncc: Array, settings: TrackingSettings) -> None:
+    def __init__(self, patches: Patches, settings: TrackingSettings) -> None:
         n = len(patches.centre)
         self.settings = settings
         self._contrast = patches.norm / np.sqrt(np.maximum(patches.pixel_count, 1))  # (n,) [grey]
         self._common, self._floor = np.inf, 0.0  # [grey²] residual typical of the frame, and the least that noise has
-        self.accepted_zncc = accepted_zncc  # (n,)
+        # ZNCC above which a place is the right one (n,): the smaller a patch, the more it takes.
+        self.accepted_zncc = np.clip(patches.accidental_zncc + settings.margin, 0.5, 0.9)
         self.usable = patches.usable.copy()  # (n,) false too for what a user has settled
         self.pose = np.full((n, 3), np.nan)  # x, y [px], rotation [rad]
         self.expected = np.full((n, 3), np.nan)  # where the neighbours' motion leads

@@ -17,18 +17,45 @@ from ..experiment.units import Scale
 from ..progress import Progress, silent
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
-from .corrections import Corrections
 from .correlation.correlator import Rows
-from .detection.grains import Detection
+from .detection.detect import Detection
+from .manual_poses import ManualPoses
 from .poses import FramePoses
 from .settings import TrackingSettings
 from .tracker import Tracker
-from .walls.tracker import WallPoses, WallTracker
+from .walls.wall_tracker import WallPoses, WallTracker
 
 HISTORY = 8  # frames that the tracker looks back upon
 
 # What is assumed of the centre of a grain whose outline could not be seen [px].
 UNSEEN_SIGMA = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """The photographs of one test."""
+
+    photographs: Photographs
+    time: Array  # (f,) [s] of those that are followed, the first ones
+    scale: Scale
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceGrains:
+    """The grains of the first photograph."""
+
+    id: NDArray[np.int64]  # (n,)
+    detection: Detection
+    radius: Array  # (n,) [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Execution:
+    """How the work is done: by how many threads, where finished frames are kept, who hears of it."""
+
+    workers: int
+    checkpoint: Checkpoint
+    progress: Progress = silent
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,26 +69,21 @@ class FollowedWalls:
 
 
 def follow_photographs(
-    photographs: Photographs,
-    detection: Detection,
-    ids: NDArray[np.int64],
-    radius: Array,
-    time: Array,
-    scale: Scale,
-    *,
-    workers: int,
-    checkpoint: Checkpoint,
+    series: Series,
+    grains: ReferenceGrains,
+    execution: Execution,
     settings: TrackingSettings | None = None,
-    corrections: Mapping[int, Corrections] | None = None,
-    progress: Progress = silent,
+    told: Mapping[int, ManualPoses] | None = None,
 ) -> Tracks:
     """Follow the detected grains through all photographs; finished ones are taken from the checkpoint.
 
-    radius (n,) [m]; corrections: poses told by hand, by frame.
+    told: poses given by hand, by frame.
     """
-    told = corrections if corrections is not None else {}
-    tracker = Tracker(photographs[0], detection, settings, workers=workers)
-    frame_count = len(time)
+    told = told if told is not None else {}
+    photographs, scale, detection = series.photographs, series.scale, grains.detection
+    checkpoint, progress = execution.checkpoint, execution.progress
+    tracker = Tracker(photographs[0], detection, settings, workers=execution.workers)
+    frame_count = len(series.time)
     poses: list[FramePoses] = [
         checkpoint.load(k, FramePoses)[0] for k in range(min(checkpoint.finished(), frame_count))
     ]
@@ -81,9 +103,9 @@ def follow_photographs(
     pixels = np.stack([np.stack([p.x, p.y], axis=1) for p in poses])
     centre = np.stack([detection.x, detection.y], axis=1)
     return Tracks(
-        id=ids,
-        radius=radius,
-        time=time,
+        id=grains.id,
+        radius=grains.radius,
+        time=series.time,
         position=scale.to_world(pixels),
         rotation=scale.angle_to_world(np.stack([p.rotation for p in poses])),
         sigma=np.stack([p.sigma for p in poses]) * scale.size_at(pixels),
@@ -101,23 +123,14 @@ def _renew(tracker: Tracker, photographs: Photographs, poses: list[FramePoses], 
         tracker.renew(rows, len(poses) - 1, photographs[len(poses) - 1], poses[-1])
 
 
-def follow_walls(
-    photographs: Photographs,
-    walls: WallTracks,
-    scale: Scale,
-    depth: Array,
-    *,
-    source: Path,
-    workers: int,
-    checkpoint: Checkpoint,
-    progress: Progress = silent,
-) -> FollowedWalls:
+def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Execution, source: Path) -> FollowedWalls:
     """Follow the walls where their endpoints are NaN; depth (w,) [m]: how much of each bar is seen.
 
     source: the walls' table. Raises InputError for a wall without texture and for one that is not found.
     """
+    photographs, checkpoint, progress = series.photographs, execution.checkpoint, execution.progress
     frame_count = len(walls.endpoints)
-    tracker = WallTracker(photographs[0], walls.endpoints[0], scale, depth, workers=workers)
+    tracker = WallTracker(photographs[0], walls.endpoints[0], series.scale, depth, workers=execution.workers)
     asked = np.asarray(np.isnan(walls.endpoints).any(axis=(2, 3)), dtype=np.bool_)
     for w in np.flatnonzero(asked.any(axis=0) & (tracker.patch_count < tracker.settings.least_patches)):
         raise InputError(

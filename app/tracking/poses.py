@@ -1,4 +1,4 @@
-"""The poses of the grains in one photograph."""
+"""The poses of the grains in one photograph, as they are handed out."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+
+from ..tracks import TrackStatus
+from .correlation.patches import Patches
+from .registration import Registration
+
+# What a patch needs about it to be correlated [px]: splines reach that far.
+SPLINE_REACH = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,3 +38,47 @@ class FramePoses:
     def pose(self) -> Array:
         """x, y, rotation (n, 3)."""
         return np.stack([self.x, self.y, self.rotation], axis=1)
+
+
+def reference_poses(patches: Patches, noise: float, reference: NDArray[np.int32]) -> FramePoses:
+    """The poses in the reference itself: no displacement by definition, known as its noise [grey] allows.
+
+    Grains whose patch leaves the photograph or has no texture cannot be followed and have no pose.
+    """
+    n, good = len(patches.centre), patches.usable
+    x, y = patches.centre[:, 0], patches.centre[:, 1]
+    cut = _leave_photograph(patches, patches.centre)
+    status = np.where(good, TrackStatus.OK, np.where(cut, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST))
+    inverse = patches.hessian_inverse
+    sigma = noise / patches.norm * np.sqrt(0.5 * (inverse[:, 0, 0] + inverse[:, 1, 1]))
+    return FramePoses(
+        np.where(good, x, np.nan), np.where(good, y, np.nan), np.where(good, np.zeros(n), np.nan),
+        np.where(good, sigma, np.nan), np.where(good, 1.0, np.nan), np.full(n, np.nan), status.astype(np.uint8),
+        reference,
+    )  # fmt: skip
+
+
+def found_poses(registration: Registration, first: FramePoses, reference: NDArray[np.int32]) -> FramePoses:
+    """The poses that a photograph has shown; first: those in the reference, which tell what was never to be seen."""
+    findings, last, patches = registration.findings, registration.last, registration.patches
+    status = findings.status.copy()
+    missing = ~findings.accepted
+    expected = np.where(np.isfinite(findings.expected), findings.expected, last)
+    leaving = _leave_photograph(patches, expected)
+    status[missing] = np.where(leaving, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST)[missing]
+    unseen = ~patches.usable & missing
+    status[unseen] = first.status[unseen]
+    pose = np.where(missing[:, None], np.nan, findings.pose)
+    rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
+    blank = np.where(missing, np.nan, 1.0)
+    return FramePoses(
+        pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank,
+        findings.second_zncc * blank, status, reference,
+    )  # fmt: skip
+
+
+def _leave_photograph(patches: Patches, place: Array) -> NDArray[np.bool_]:
+    """Which grains (n,) show less than their whole patch at places (n, 2+) [px]."""
+    height, width = patches.reference.image.shape
+    x, y, reach = place[:, 0], place[:, 1], patches.reach + SPLINE_REACH
+    return (x < reach) | (y < reach) | (x > width - 1 - reach) | (y > height - 1 - reach)

@@ -22,9 +22,9 @@ from ..experiment.units import Scale
 from ..progress import Progress
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
-from .corrections import Corrections
-from .detection.grains import Detection, DetectionSettings, detect_grains, refine_grains
-from .follow import FollowedWalls, follow_photographs, follow_walls
+from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
+from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
+from .manual_poses import ManualPoses
 from .report.page import Tracked
 from .settings import TrackingSettings
 from .walls.bar_depth import visible_depth
@@ -52,27 +52,25 @@ def track_photographs(
     scale = make_scale(section, photographs.shape[0])
     walls = read_walls(experiment, count)
     progress("detection", 0, 1)
-    ids, detection, radius = _detect(experiment, first, scale, walls)
+    grains = _detect(experiment, first, scale, walls)
     progress("detection", 1, 1)
-    if detection.count == 0:
+    if grains.detection.count == 0:
         raise InputError(photographs.files[0], "", "no grains were found; give them with photographs.grains")
-    tables = {DETECTIONS: _detections_table(ids, detection)}
-    time = read_times(experiment, count)[:stop]
+    tables = {DETECTIONS: _detections_table(grains)}
+    series = Series(photographs, read_times(experiment, count)[:stop], scale)
     if walls is not None:
         walls = walls.frames(0, stop)
         if np.isnan(walls.endpoints).any():
             followed = follow_walls(
-                photographs, walls, scale, _bar_depth(experiment, first, walls, scale, float(radius.mean())),
+                series, walls, _bar_depth(experiment, first, walls, scale, float(grains.radius.mean())),
+                Execution(tuning.workers, Checkpoint(checkpoint / "walls", fingerprint), progress),
                 source=experiment.folder / (experiment.config.walls.file if experiment.config.walls else ""),
-                workers=tuning.workers, checkpoint=Checkpoint(checkpoint / "walls", fingerprint), progress=progress,
             )  # fmt: skip
             walls = replace(followed.walls, sigma=np.sqrt((followed.sigma**2).mean(axis=2)))
             tables[WALLS] = _walls_table(followed)
     tracks = follow_photographs(
-        photographs, detection, ids, radius, time, scale,
-        settings=TrackingSettings(search_window=tuning.search_window), workers=tuning.workers,
-        corrections=_corrections(experiment, ids, scale, count),
-        checkpoint=Checkpoint(checkpoint / "tracking", fingerprint), progress=progress,
+        series, grains, Execution(tuning.workers, Checkpoint(checkpoint / "tracking", fingerprint), progress),
+        TrackingSettings(search_window=tuning.search_window), _manual_poses(experiment, grains.id, scale, count),
     )  # fmt: skip
     return tracks, walls, tables
 
@@ -103,10 +101,8 @@ def gather_report(
     )  # fmt: skip
 
 
-def _detect(
-    experiment: Experiment, first: Image, scale: Scale, walls: WallTracks | None
-) -> tuple[NDArray[np.int64], Detection, Array]:
-    """Ids (n,), the grains in pixels, and their radii (n,) [m]."""
+def _detect(experiment: Experiment, first: Image, scale: Scale, walls: WallTracks | None) -> ReferenceGrains:
+    """The grains that are told, else those that are found."""
     section, tuning = experiment.config.photographs, experiment.config.tracking
     assert section is not None
     guess = read_grain_guess(experiment)
@@ -114,7 +110,7 @@ def _detect(
         detection = refine_grains(first, guess.x, guess.y, guess.radius)
         centres = np.stack([detection.x, detection.y], axis=1)
         # Its own radius is what the user measured on this photograph, so the lens bent it too.
-        return guess.id, detection, detection.radius * scale.size_at(centres)
+        return ReferenceGrains(guess.id, detection, detection.radius * scale.size_at(centres))
     classes = np.array(section.radii)
     # What the user did not set is left to detection, which knows the size of the photograph.
     limits = tuning.radius_range if "radius_range" in tuning.model_fields_set else None
@@ -132,7 +128,7 @@ def _detect(
         radius = detection.radius * scale.mean_size
     else:
         radius = detection.radius * scale.size_at(centres)
-    return np.arange(detection.count), detection, radius
+    return ReferenceGrains(np.arange(detection.count), detection, radius)
 
 
 def _inside(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
@@ -159,7 +155,7 @@ def _bar_depth(experiment: Experiment, first: Image, walls: WallTracks, scale: S
     return visible_depth(first, walls.endpoints[0], scale, BAR_DEPTH * radius)
 
 
-def _corrections(experiment: Experiment, ids: NDArray[np.int64], scale: Scale, count: int) -> dict[int, Corrections]:
+def _manual_poses(experiment: Experiment, ids: NDArray[np.int64], scale: Scale, count: int) -> dict[int, ManualPoses]:
     """Poses told by hand, by frame, as the tracker takes them."""
     told = read_corrections(experiment, ids, count)
     if told is None:
@@ -168,13 +164,14 @@ def _corrections(experiment: Experiment, ids: NDArray[np.int64], scale: Scale, c
     at = {int(name): k for k, name in enumerate(ids)}
     row = np.array([at[int(name)] for name in told.id], dtype=np.intp)
     return {
-        int(frame): Corrections(row[told.frame == frame], pose[told.frame == frame]) for frame in np.unique(told.frame)
+        int(frame): ManualPoses(row[told.frame == frame], pose[told.frame == frame]) for frame in np.unique(told.frame)
     }
 
 
-def _detections_table(ids: NDArray[np.int64], detection: Detection) -> Columns:
+def _detections_table(grains: ReferenceGrains) -> Columns:
+    detection = grains.detection
     return {
-        "id": ids,
+        "id": grains.id,
         "x": np.round(detection.x, 4),
         "y": np.round(detection.y, 4),
         "radius": np.round(detection.radius, 4),

@@ -18,11 +18,11 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.photographs import LUMA
-from rodsight.tracking.detection.grains import Detection, DetectionSettings, detect_grains
+from rodsight.tracking.detection.detect import Detection, DetectionSettings, detect_grains
 from scipy.spatial import KDTree
 
 from tests.app.tracking.detection.polydisperse import draw_discs, lay_discs
-from tests.app.tracking.detection.test_grains import HEIGHT, WIDTH, packing
+from tests.app.tracking.detection.test_detect import HEIGHT, WIDTH, packing
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import grid_of_rods
 

@@ -17,7 +17,7 @@ from rodsight.experiment.scaling import make_scale
 from rodsight.tracking.poses import FramePoses
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracking.walls.bar_depth import visible_depth
-from rodsight.tracking.walls.tracker import WallTracker
+from rodsight.tracking.walls.wall_tracker import WallTracker
 from rodsight.tracks import TrackStatus
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph

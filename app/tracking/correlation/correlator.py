@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,6 @@ Rows = NDArray[np.intp]
 # Grains of one task. It is fixed, and no grain's result depends on another's within a task, so the number
 # of workers cannot change anything.
 CHUNK = 32
-
-# A plain fit that reaches this share of the greatest accidental ZNCC may be the right place, partly hidden.
-PROMISING = 0.7
 
 # A patch is sifted on the next coarser level first, if it has this radius there and a pixel of it is not coarser than
 # paint.
@@ -57,6 +54,15 @@ class Fits:
     def sigma(self) -> Array:
         """Standard deviation of a position component (m,) [px]."""
         return np.sqrt(0.5 * (self.covariance[:, 0, 0] + self.covariance[:, 1, 1]))
+
+
+@dataclass(frozen=True, slots=True)
+class SearchRange:
+    """Where m grains are searched for."""
+
+    middle: Array  # (m, 3) x [px], y [px], rotation [rad]
+    window: Array  # (m,) [px] half width
+    sweep: float  # [rad] half width of the angles
 
 
 class Correlator:
@@ -127,12 +133,11 @@ class Correlator:
         return (self.patches.reach[rows] >= SIFTED_REACH * 2.0 * factor) & (2 * factor <= SIFTED_COARSEST)
 
     def search(
-        self, photograph: Pyramid, rows: Rows, pose: Array, window: Array, sweep: float, count: int,
-        *, looks: int = 0, parts: bool = False,
-    ) -> Array:  # fmt: skip
+        self, photograph: Pyramid, rows: Rows, within: SearchRange, count: int, *, looks: int = 0, parts: bool = False
+    ) -> Array:
         """The `count` most similar places of every grain (m, count, 4): x, y [px], rotation [rad], ZNCC.
 
-        pose (m, 3): middle; window (m,) [px] and sweep [rad]: half widths. Places that are not there have ZNCC −1.
+        Places that are not there have ZNCC −1.
         looks: the places of a coarser level, where there is one to be sifted, that are looked at more closely; 0: the
         level itself is searched, which takes ten times as long. parts: halves of a patch are searched for, too.
         """
@@ -148,45 +153,15 @@ class Correlator:
         beyond_doubt = np.minimum(patches.accidental_zncc[rows] + 0.2, 0.9)
 
         def one(k: int) -> None:
-            if not sifted[k]:
-                self._search_level(
-                    photograph, rows[k], int(factor[k]), pose[k], float(window[k]), sweep, best[k], parts=parts
-                )
-                return
-            level = int(factor[k])
-            places = np.empty((looks, 4))
-            self._search_level(photograph, rows[k], 2 * level, pose[k], float(window[k]), sweep, places, spacing=2.0)
-            # Half a step of the coarse angles to either side, and a pixel of the coarse level.
-            half = 0.6 * sweep / angle_steps(float(patches.reach[rows[k]]) / (2 * level), sweep)
-            looked = np.full((looks, 1, 4), -1.0)
-            last = looks
-            for m in np.flatnonzero(places[:, 3] > 0.0):
-                if m >= last:
-                    break
-                self._search_level(photograph, rows[k], level, places[m, :3], LOOK * level, half, looked[m])
-                if looked[m, 0, 3] > beyond_doubt[k]:
-                    last = min(last, m + 1 + RUNNERS_UP)
-            best[k] = _most_similar(looked[:, 0], count, 3.0 * level)
+            level = _Level(photograph, patches, int(rows[k]), int(factor[k]))
+            pose, window = within.middle[k], float(within.window[k])
+            if sifted[k]:
+                level.sift(pose, window, within.sweep, best[k], looks, float(beyond_doubt[k]))
+            else:
+                level.search(pose, window, within.sweep, best[k], parts=parts)
 
         self._each(len(rows), one)
         return best
-
-    def _search_level(
-        self, photograph: Pyramid, row: int, level: int, pose: Array, window: float, sweep: float, best: Array,
-        spacing: float = 3.0, *, parts: bool = False,
-    ) -> None:  # fmt: skip
-        """Search one grain on one level; best (c, 4) in pixels of the photograph, spacing in those of the level."""
-        patches = self.patches
-        shift = 0.5 * (level - 1)
-        search = search_parts if parts else search_patch
-        search(
-            patches.source(row).coefficients(level), photograph.level(level),
-            (patches.place[row, 0] - shift) / level, (patches.place[row, 1] - shift) / level,
-            patches.reach[row] / level, (pose[0] - shift) / level, (pose[1] - shift) / level,
-            pose[2] - patches.turn[row], window / level, sweep, spacing, best,
-        )  # fmt: skip
-        best[:, :2] = best[:, :2] * level + shift
-        best[:, 2] += patches.turn[row]
 
     def _from_reference(self, rows: Rows, pose: Array) -> Array:
         """Poses (m, 3) whose rotation counts from where each patch was cut, as a new array."""
@@ -214,6 +189,52 @@ class Correlator:
             return
         with ThreadPoolExecutor(self._workers) as pool:
             list(pool.map(chunk, range(0, count, CHUNK)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """One grain on one level of the pyramids. Poses are in pixels of the photograph."""
+
+    photograph: Pyramid
+    patches: Patches
+    row: int
+    factor: int  # by which the photographs are shrunk
+
+    def search(
+        self, pose: Array, window: float, sweep: float, best: Array, spacing: float = 3.0, *, parts: bool = False
+    ) -> None:
+        """Search about a pose (3,); best (c, 4) is written; spacing in pixels of the level."""
+        patches, row, factor = self.patches, self.row, self.factor
+        shift = 0.5 * (factor - 1)
+        search = search_parts if parts else search_patch
+        search(
+            patches.source(row).coefficients(factor), self.photograph.level(factor),
+            (patches.place[row, 0] - shift) / factor, (patches.place[row, 1] - shift) / factor,
+            patches.reach[row] / factor, (pose[0] - shift) / factor, (pose[1] - shift) / factor,
+            pose[2] - patches.turn[row], window / factor, sweep, spacing, best,
+        )  # fmt: skip
+        best[:, :2] = best[:, :2] * factor + shift
+        best[:, 2] += patches.turn[row]
+
+    def sift(self, pose: Array, window: float, sweep: float, best: Array, looks: int, beyond_doubt: float) -> None:
+        """Search the next coarser level, and look at its `looks` best places on this one.
+
+        beyond_doubt: ZNCC of a place after which few more are looked at.
+        """
+        coarse = replace(self, factor=2 * self.factor)
+        places = np.empty((looks, 4))
+        coarse.search(pose, window, sweep, places, spacing=2.0)
+        # Half a step of the coarse angles to either side, and a pixel of the coarse level.
+        half = 0.6 * sweep / angle_steps(float(self.patches.reach[self.row]) / coarse.factor, sweep)
+        looked = np.full((looks, 1, 4), -1.0)
+        last = looks
+        for m in np.flatnonzero(places[:, 3] > 0.0):
+            if m >= last:
+                break
+            self.search(places[m, :3], LOOK * self.factor, half, looked[m])
+            if looked[m, 0, 3] > beyond_doubt:
+                last = min(last, m + 1 + RUNNERS_UP)
+        best[:] = _most_similar(looked[:, 0], len(best), 3.0 * self.factor)
 
 
 def _most_similar(places: Array, count: int, spacing: float) -> Array:

@@ -12,8 +12,8 @@ from rodsight.experiment.photographs import Photographs
 from rodsight.experiment.units import Scale
 from rodsight.results.checkpoint import Checkpoint
 from rodsight.results.store import Provenance, load_tracks, save_tracks
-from rodsight.tracking.detection.grains import Detection
-from rodsight.tracking.follow import follow_photographs
+from rodsight.tracking.detection.detect import Detection
+from rodsight.tracking.follow import Execution, ReferenceGrains, Series, follow_photographs
 from rodsight.tracking.report.page import Tracked, tracking_report
 from rodsight.tracks import Tracks, TrackStatus
 
@@ -49,10 +49,9 @@ def photograph(rods: Rods, frame: int, bare: np.ndarray, moves: tuple[float, flo
 def follow(rods: Rods, photographs: Photographs, folder: Path, workers: int = 1) -> Tracks:
     n = rods.count
     detection = Detection(rods.x, rods.y, rods.radius, np.full(n, 0.05), np.ones(n))
-    return follow_photographs(
-        photographs, detection, np.arange(n), rods.radius * PIXEL_SIZE, np.arange(float(len(photographs))),
-        Scale(PIXEL_SIZE, rods.height), workers=workers, checkpoint=Checkpoint(folder, "one"),
-    )  # fmt: skip
+    series = Series(photographs, np.arange(float(len(photographs))), Scale(PIXEL_SIZE, rods.height))
+    grains = ReferenceGrains(np.arange(n), detection, rods.radius * PIXEL_SIZE)
+    return follow_photographs(series, grains, Execution(workers, Checkpoint(folder, "one")))
 
 
 def off(tracks: Tracks, rods: Rods) -> np.ndarray:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.photographs import LUMA
-from rodsight.tracking.detection.grains import DetectionSettings, detect_grains
+from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
 from rodsight.tracking.detection.outlines import Outliner
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph

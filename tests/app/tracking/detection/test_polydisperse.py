@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rodsight.experiment.photographs import LUMA
-from rodsight.tracking.detection.grains import detect_grains
+from rodsight.tracking.detection.detect import detect_grains
 from scipy.spatial import KDTree
 
 from tests.app.tracking.detection.polydisperse import draw_discs, lay_discs

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.photographs import read_photograph
-from rodsight.tracking.detection.grains import DetectionSettings, detect_grains
+from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus
 
-from tests.app.tracking.detection.test_grains import HEIGHT, WIDTH, match, packing
+from tests.app.tracking.detection.test_detect import HEIGHT, WIDTH, match, packing
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import Rods
 

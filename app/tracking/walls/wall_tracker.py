@@ -18,7 +18,8 @@ from solver.bodies.grains import Array
 
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
-from ..correlation.correlator import Correlator, Fits, Patches, Rows
+from ..correlation.correlator import Correlator, Fits, Rows, SearchRange
+from ..correlation.patches import Patches
 from ..correlation.splines import Pyramid
 from .rigid_motion import share_motion, turn
 
@@ -184,7 +185,8 @@ class WallTracker:
         if len(rows) == 0:
             return []
         window = np.full(len(rows), self.settings.search_window)
-        places = self._correlator.search(photograph, rows, pose, window, self.settings.search_sweep, 1)[:, 0]
+        within = SearchRange(pose, window, self.settings.search_sweep)
+        places = self._correlator.search(photograph, rows, within, 1)[:, 0]
         order = np.argsort(-places[:, 3])[:4]
         proposals = []
         for m in order:

@@ -11,7 +11,7 @@ from rodsight.experiment.units import Scale
 from rodsight.synthetic.speckle import SpeckleSettings, render_photograph
 from rodsight.tracking.walls.bar_depth import visible_depth
 from rodsight.tracking.walls.rigid_motion import share_motion, turn
-from rodsight.tracking.walls.tracker import WallPoses, WallTracker
+from rodsight.tracking.walls.wall_tracker import WallPoses, WallTracker
 
 PIXEL_SIZE = 2.5e-4  # [m]
 WIDTH, HEIGHT = 520, 460
@@ -166,7 +166,7 @@ def test_a_point_known_across_one_line_holds_the_motion_only_there() -> None:
 
 
 def test_settings_are_checked() -> None:
-    from rodsight.tracking.walls.tracker import WallSettings
+    from rodsight.tracking.walls.wall_tracker import WallSettings
 
     with pytest.raises(ValueError, match="reach"):
         replace(WallSettings(), reach=(9.0, 5.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.tracking.corrections import Corrections
+from rodsight.tracking.manual_poses import ManualPoses
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus
 
@@ -25,8 +25,8 @@ def tracker(rods: Rods) -> Tracker:
     return Tracker(rods.reference(), (rods.x, rods.y, rods.radius))
 
 
-def told(row: int, x: float, y: float, rotation: float) -> Corrections:
-    return Corrections(np.array([row]), np.array([[x, y, rotation]]))
+def told(row: int, x: float, y: float, rotation: float) -> ManualPoses:
+    return ManualPoses(np.array([row]), np.array([[x, y, rotation]]))
 
 
 def far(rods: Rods, row: int, dx: float, dy: float, turn: float) -> np.ndarray:
@@ -90,7 +90,7 @@ def test_a_wrong_told_pose_does_not_spoil_a_good_neighbour(rods: Rods, tracker: 
 
 def test_without_corrections_nothing_changes(rods: Rods, tracker: Tracker) -> None:
     image = rods.moved(2.0, 1.0, 0.1)
-    nothing = Corrections(np.empty(0, np.intp), np.empty((0, 3)))
+    nothing = ManualPoses(np.empty(0, np.intp), np.empty((0, 3)))
     with_none, plain = tracker.follow(image, [tracker.first()], nothing), tracker.follow(image, [tracker.first()])
     for name in ("x", "y", "rotation", "sigma", "zncc", "status"):
         assert getattr(with_none, name).tobytes() == getattr(plain, name).tobytes()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rodsight.synthetic.speckle import SpeckleSettings
-from rodsight.tracking.detection.grains import Detection, DetectionSettings, detect_grains, refine_grains
+from rodsight.tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from scipy.spatial import KDTree
 
 from tests.app.tracking.speckled import PIXEL_SIZE, Rods
