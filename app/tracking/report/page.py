@@ -1,10 +1,14 @@
-"""A page that shows how well tracking went: what was detected, how it correlated, and the worst of it, close up."""
+"""A page that shows how well tracking went: what was detected, how it correlated, and the worst of it, close up.
+
+What the page says is gathered here; how it looks is told by the template beside this file.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from html import escape
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,26 +18,16 @@ from solver.bodies.grains import Array
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
 from ...tracks import Tracks, TrackStatus, WallTracks
-from .charts import line_chart
-from .pictures import as_data, look_at, photograph_shown, residual_map, side_by_side
+from .charts import Labels, line_chart, stacked_chart
+from .residual_pictures import FULL_COLOUR, RAMP, as_data, look_at, photograph_shown, residual_map, side_by_side
+
+TEMPLATE = Path(__file__).with_name("page.html")
 
 WORST = 12  # grains shown close up
 LISTED = 200  # poses listed that need a look
 DOUBTFUL = (TrackStatus.SUSPECT, TrackStatus.LOST)
 
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1d2430; max-width: 1080px; margin: 2.5em auto; padding: 0 1.2em }
-h1 { font-size: 1.5em; margin-bottom: .2em } h2 { font-size: 1.15em; margin-top: 2.2em }
-p, figcaption, .note { color: #4a5463 } figure { margin: 0 } img, svg { max-width: 100%; height: auto }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums }
-td, th { padding: .15em .8em; text-align: right; border-bottom: 1px solid #e3e6ea }
-th { font-weight: 600; color: #4a5463 }
-.grains { display: grid; grid-template-columns: repeat(auto-fill, minmax(410px, 1fr)); gap: 1.2em }
-.charts { display: grid; grid-template-columns: 1fr 1fr; gap: 1.5em }
-pre { background: #f4f5f7; padding: .8em 1em; overflow: auto; max-height: 22em }
-circle.grain { fill: none; stroke: #21b35b; stroke-width: 1.5 } circle.grain:hover { fill: #21b35b55 }
-circle.unsure { stroke: #e8871e } line.wall { stroke: #2b7de9; stroke-width: 2 }
-"""
+Facts = dict[str, Any]  # by the name that the template knows them by
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,126 +52,108 @@ class Tracked:
 
 def tracking_report(tracked: Tracked) -> str:
     """The page, self-contained HTML."""
+    # Nobody who asks for no report waits for it.
+    from jinja2 import Environment, StrictUndefined
+
     reference = tracked.photograph(0)
-    parts = [
-        _summary(tracked),
-        _detected(tracked, reference),
-        _charts(tracked),
-        _residuals(tracked, reference),
-        _worst(tracked, reference),
-        _to_be_looked_at(tracked),
-    ]
-    title = f"Tracking of {escape(tracked.name)}"
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n'
-        f"<body><h1>{title}</h1>\n" + "\n".join(parts) + "\n</body></html>\n"
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+        **_summary(tracked),
+        **_detected(tracked, reference),
+        charts=_charts(tracked),
+        maps=_residual_maps(tracked, reference),
+        ramp=[f"rgb({red}, {green}, {blue})" for blue, green, red in RAMP],
+        full_colour=FULL_COLOUR,
+        worst=_worst(tracked, reference),
+        **_doubtful(tracked),
     )
 
 
-def _summary(tracked: Tracked) -> str:
+def _summary(tracked: Tracked) -> Facts:
     tracks = tracked.tracks
-    count = {status: int((tracks.status == status).sum()) for status in TrackStatus}
-    rows = "".join(
-        f"<tr><th>{status.name.lower().replace('_', ' ')}</th><td>{count[status]}</td>"
-        f"<td>{100 * count[status] / max(tracks.status.size, 1):.2f} %</td></tr>"
-        for status in TrackStatus
-        if count[status]
-    )
-    sigma = _percentile(tracks.sigma, 50.0)
-    return (
-        f"<p>{tracks.grain_count} grains in {tracks.frame_count} photographs; median ZNCC "
-        f"{_percentile(tracks.zncc, 50.0):.4f}, median σ of a displacement {1e6 * sigma:.2f} µm "
-        f"({sigma / tracked.scale.mean_size:.4f} px).</p><table><tr><th>status</th><th>poses</th><th></th></tr>{rows}"
-        f"</table>{_renewed(tracks)}"
-    )
+    count = {_words(status): int((tracks.status == status).sum()) for status in TrackStatus}
+    return {
+        "name": tracked.name,
+        "grain_count": tracks.grain_count,
+        "frame_count": tracks.frame_count,
+        "zncc": _percentile(tracks.zncc, 50.0),
+        "sigma": _percentile(tracks.sigma, 50.0),
+        "pixel_size": tracked.scale.mean_size,
+        "counts": {words: number for words, number in count.items() if number},
+        "pose_count": max(tracks.status.size, 1),
+        "renewal_count": tracks.renewal_count,
+        "renewed": _renewed(tracks),
+    }
 
 
-def _renewed(tracks: Tracks) -> str:
-    """Which grains are compared with a later photograph than the first."""
-    if tracks.reference_frame is None or tracks.renewal_count == 0:
-        return ""
-    names = ", ".join(
+def _renewed(tracks: Tracks) -> list[str]:
+    """The grains that are compared with a later photograph than the first."""
+    if tracks.reference_frame is None:
+        return []
+    return [
         f"{tracks.id[row]} (from photograph {' and '.join(str(k) for k in np.unique(column) if k > 0)})"
         for row, column in enumerate(tracks.reference_frame.T)
         if (column > 0).any()
-    )
-    return (
-        f"<p>{tracks.renewal_count} grains were damaged and got a new reference, whose own error counts in their σ: "
-        f"{names}.</p>"
-    )
+    ]
 
 
-def _detected(tracked: Tracked, reference: Image) -> str:
+def _detected(tracked: Tracked, reference: Image) -> Facts:
     picture, scale = photograph_shown(reference)
     height, width = picture.shape[:2]
-    marks = []
-    for k in range(len(tracked.centre)):
-        x, y = (tracked.centre[k] + 0.5) * scale
-        kind = "grain" if tracked.quality[k] > 0.0 else "grain unsure"
-        told = f"{tracked.tracks.id[k]}: R = {tracked.radius[k]:.2f} px, outline seen {100 * tracked.quality[k]:.0f} %"
-        marks.append(
-            f'<circle class="{kind}" cx="{x:.2f}" cy="{y:.2f}" r="{tracked.radius[k] * scale:.2f}">'
-            f"<title>{told}</title></circle>"
-        )
+    place = (tracked.centre + 0.5) * scale
+    grains = [
+        {"id": name, "x": x, "y": y, "shown_radius": radius * scale, "radius": radius, "quality": quality}
+        for name, (x, y), radius, quality in zip(tracked.tracks.id, place, tracked.radius, tracked.quality, strict=True)
+    ]
+    walls = []
     if tracked.walls is not None and tracked.first_frame == 0:
         for name, ends in zip(tracked.walls.name, tracked.scale.to_pixels(tracked.walls.endpoints[0]), strict=True):
             (x1, y1), (x2, y2) = (ends + 0.5) * scale
-            marks.append(
-                f'<line class="wall" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}">'
-                f"<title>{escape(name)}</title></line>"
-            )
-    return (
-        "<h2>What was detected</h2><p>Point at a grain for its number. Orange: its outline was not seen and it stays "
-        "where it was told to be. <code>detections.csv</code> holds the table; edited, it can be given as "
-        "<code>photographs.grains</code>.</p>"
-        f'<figure><svg viewBox="0 0 {width} {height}" width="{width}"><image href="{as_data(picture)}" '
-        f'width="{width}" height="{height}"/>{"".join(marks)}</svg></figure>'
-    )
+            walls.append({"name": name, "x1": x1, "y1": y1, "x2": x2, "y2": y2})
+    photograph = {"data": as_data(picture), "width": width, "height": height}
+    return {"photograph": photograph, "detected": grains, "walls": walls}
 
 
-def _charts(tracked: Tracked) -> str:
+def _charts(tracked: Tracked) -> list[str]:
     tracks = tracked.tracks
-    frame = tracked.first_frame + np.arange(tracks.frame_count)
+    # What the first photograph shows of itself is no news, and would flatten the rest.
+    begin = 1 if tracked.first_frame == 0 and tracks.frame_count > 1 else 0
+    frame = tracked.first_frame + np.arange(begin, tracks.frame_count)
+    zncc, sigma, status = tracks.zncc[begin:], 1e6 * tracks.sigma[begin:], tracks.status[begin:]
 
     def over_time(value: Array, percent: float) -> Array:
         return np.array([_percentile(row, percent) for row in value])
 
-    zncc = line_chart(
-        frame,
-        {"median": over_time(tracks.zncc, 50.0), "worst 5 %": over_time(tracks.zncc, 5.0),
-         "least": over_time(tracks.zncc, 0.0)},
-        "ZNCC", "photograph",
-    )  # fmt: skip
-    sigma = line_chart(
-        frame,
-        {"median": 1e6 * over_time(tracks.sigma, 50.0), "worst 5 %": 1e6 * over_time(tracks.sigma, 95.0)},
-        "σ of a displacement [µm]", "photograph",
-    )  # fmt: skip
-    return f'<h2>Correlation over time</h2><div class="charts">{zncc}{sigma}</div>'
+    correlation = {
+        "median": over_time(zncc, 50.0),
+        "worst 5 %": over_time(zncc, 5.0),
+        "least": over_time(zncc, 0.0),
+    }
+    precision = {"median": over_time(sigma, 50.0), "worst 5 %": over_time(sigma, 95.0)}
+    charts = [
+        line_chart(frame, correlation, Labels("Correlation with the first photograph", "photograph", "ZNCC")),
+        line_chart(frame, precision, Labels("Standard deviation of a displacement", "photograph", "σ [µm]")),
+    ]
+    unusual = {_words(kind): (status == kind).sum(axis=1) for kind in TrackStatus if kind is not TrackStatus.OK}
+    unusual = {words: count for words, count in unusual.items() if count.any()}
+    if unusual:
+        charts.append(stacked_chart(frame, unusual, Labels("Grains not found where predicted", "photograph", "grains")))
+    return charts
 
 
-def _residuals(tracked: Tracked, reference: Image) -> str:
-    tracks = tracked.tracks
-    chosen = _frames_to_show(tracks, tracked.first_frame)
-    parts = []
-    for frame in chosen:
+def _residual_maps(tracked: Tracked, reference: Image) -> list[Facts]:
+    maps = []
+    for frame in _frames_to_show(tracked.tracks, tracked.first_frame):
         number = tracked.first_frame + frame
         picture, _ = residual_map(
             reference, tracked.photograph(number), tracked.centre, tracked.pose(frame), tracked.radius
         )
-        parts.append(
-            f'<figure><img src="{as_data(picture)}" alt="residual"><figcaption>Photograph {number}, median ZNCC '
-            f"{_percentile(tracks.zncc[frame], 50.0):.4f}.</figcaption></figure>"
-        )
-    return (
-        "<h2>Residual maps</h2><p>What is left of a photograph under each grain once the first one has been moved, "
-        "turned and lit as it was found: red brighter, blue darker, full colour at half of the paint's standard "
-        "deviation. Noise is even; a wrong pose, damage and shadows show as patterns. Grey: lost.</p>" + "".join(parts)
-    )
+        zncc = _percentile(tracked.tracks.zncc[frame], 50.0)
+        maps.append({"photograph": number, "zncc": zncc, "data": as_data(picture)})
+    return maps
 
 
-def _worst(tracked: Tracked, reference: Image) -> str:
+def _worst(tracked: Tracked, reference: Image) -> list[Facts]:
     tracks = tracked.tracks
     order = np.argsort(np.where(tracks.present & np.isfinite(tracks.zncc), tracks.zncc, np.inf), axis=None)
     shown: dict[int, int] = {}  # each grain once, at its worst
@@ -187,51 +163,41 @@ def _worst(tracked: Tracked, reference: Image) -> str:
             break
         if tracked.first_frame + frame > 0:
             shown.setdefault(row, frame)
-    parts = []
+    grains = []
     for row, frame in shown.items():
         number = tracked.first_frame + frame
         image = tracked.photograph(number)
         seen = look_at(reference, image, tracked.centre[row], tracked.pose(frame)[row], float(tracked.radius[row]))
-        status = TrackStatus(tracks.status[frame, row]).name.lower().replace("_", " ")
-        parts.append(
-            f'<figure><img src="{as_data(side_by_side(seen))}" alt="grain {tracks.id[row]}"><figcaption>grain '
-            f"{tracks.id[row]}, photograph {number}: ZNCC {tracks.zncc[frame, row]:.4f}, σ "
-            f"{1e6 * tracks.sigma[frame, row]:.2f} µm, {status}{_told(tracks, frame, row)}</figcaption></figure>"
-        )
-    return (
-        "<h2>The worst grains</h2><p>Each at its least ZNCC: on the first photograph, on that one (turned back), "
-        f'and the residual.</p><div class="grains">{"".join(parts)}</div>'
-    )
+        data, facts = as_data(side_by_side(seen)), _facts_of_pose(tracks, frame, row)
+        grains.append({"id": tracks.id[row], "photograph": number, "data": data, "facts": facts})
+    return grains
 
 
-def _told(tracks: Tracks, frame: int, row: int) -> str:
-    """What is known beyond ZNCC, σ and status."""
-    told = ""
+def _facts_of_pose(tracks: Tracks, frame: int, row: int) -> list[str]:
+    told = [
+        f"ZNCC {tracks.zncc[frame, row]:.4f}",
+        f"σ {1e6 * tracks.sigma[frame, row]:.2f} µm",
+        _words(TrackStatus(tracks.status[frame, row])),
+    ]
     if tracks.second_zncc is not None and np.isfinite(tracks.second_zncc[frame, row]):
-        told += f", second best ZNCC {tracks.second_zncc[frame, row]:.4f}"
+        told.append(f"second best ZNCC {tracks.second_zncc[frame, row]:.4f}")
     if tracks.reference_frame is not None and tracks.reference_frame[frame, row] > 0:
-        told += f", compared with photograph {tracks.reference_frame[frame, row]}"
+        told.append(f"compared with photograph {tracks.reference_frame[frame, row]}")
     return told
 
 
-def _to_be_looked_at(tracked: Tracked) -> str:
+def _doubtful(tracked: Tracked) -> Facts:
+    """Lost and suspect poses as the rows of a table that can be given back."""
     tracks = tracked.tracks
-    doubtful = np.argwhere(np.isin(tracks.status, DOUBTFUL))
-    if len(doubtful) == 0:
-        return "<h2>To be looked at</h2><p>No pose is lost or suspect.</p>"
-    lines = ["frame,id,x,y,theta"]
-    for frame, row in doubtful[:LISTED]:
+    found = np.argwhere(np.isin(tracks.status, DOUBTFUL))
+    lines = []
+    for frame, row in found[:LISTED]:
         number = tracked.first_frame + int(frame)
         x, y, _ = tracked.pose(int(frame))[row]
         theta = tracks.rotation[frame, row]
         pose = f"{x:.2f},{y:.2f},{theta:.4f}" if np.isfinite(x) else "lost,lost,lost"
         lines.append(f"{number},{tracks.id[row]},{pose}")
-    more = f" The first {LISTED} of {len(doubtful)}." if len(doubtful) > LISTED else ""
-    return (
-        "<h2>To be looked at</h2><p>Lost and suspect poses, as a table that <code>photographs.corrections</code> "
-        "takes once x, y (pixels) and theta (radians, counter-clockwise; may stay empty) are mended, or "
-        f"<code>lost</code> where the grain is not to be seen.{more}</p><pre>{escape(chr(10).join(lines))}</pre>"
-    )
+    return {"doubtful": lines, "doubtful_count": len(found)}
 
 
 def _frames_to_show(tracks: Tracks, first: int) -> list[int]:
@@ -242,6 +208,10 @@ def _frames_to_show(tracks: Tracks, first: int) -> list[int]:
     middle = np.array([_percentile(tracks.zncc[k], 5.0) for k in later])
     worst = later[int(np.nanargmin(middle))] if np.isfinite(middle).any() else later[-1]
     return sorted({int(later[len(later) // 2]), int(worst), int(later[-1])})
+
+
+def _words(status: TrackStatus) -> str:
+    return status.name.lower().replace("_", " ")
 
 
 def _percentile(values: Array, percent: float) -> float:

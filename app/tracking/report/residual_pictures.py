@@ -19,6 +19,8 @@ WIDEST = 1040  # [px] of a photograph as shown
 MAP_WIDEST = 700  # [px] of a map of residuals as shown
 SHADES = 8  # grey levels that a shown map does not tell apart: noise is most of a PNG
 
+RAMP = ((172, 102, 33), (250, 250, 250), (43, 24, 178))  # blue, green, red of a residual below, at and above zero
+
 Picture = NDArray[np.uint8]
 
 
@@ -100,7 +102,7 @@ def photograph_shown(image: Image) -> tuple[Picture, float]:
 def two_sided(value: Image) -> Picture:
     """Blue below zero, white at zero, red above it (…, 3); full colour at FULL_COLOUR."""
     t = np.clip(value / FULL_COLOUR, -1.0, 1.0)[..., None]
-    white, blue, red = np.full(3, 250.0), np.array([172.0, 102.0, 33.0]), np.array([43.0, 24.0, 178.0])
+    blue, white, red = np.array(RAMP, dtype=np.float64)
     colour = np.where(t < 0, white + (blue - white) * -t, white + (red - white) * t)
     return np.asarray(np.rint(colour), dtype=np.uint8)
 

@@ -1,0 +1,64 @@
+"""Charts of the tracking report: they say what they show in words, and nobody else waits for the library."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import numpy as np
+from rodsight.tracking.report.charts import Labels, line_chart, stacked_chart
+
+LABELS = Labels("How well < before", "photograph", "ZNCC")
+X = np.arange(1, 9)
+
+
+def words(chart: str) -> list[str]:
+    return [text.strip() for text in ET.fromstring(chart).itertext() if text.strip()]
+
+
+def marks(chart: str) -> int:
+    """Points drawn: those that are not known are left out."""
+    return chart.count("<use ")
+
+
+def test_a_chart_names_its_lines_and_axes_in_letters() -> None:
+    said = words(line_chart(X, {"median": np.linspace(0.9, 0.95, 8), "least": np.linspace(0.7, 0.8, 8)}, LABELS))
+    for word in ("How well < before", "photograph", "ZNCC", "median", "least", "2"):
+        assert word in said
+
+
+def test_names_of_lines_that_end_together_do_not_cover_one_another() -> None:
+    chart = line_chart(X, {"median": np.full(8, 0.9), "least": np.full(8, 0.9), "wide": np.linspace(0, 1, 8)}, LABELS)
+    height = {}
+    for text in ET.fromstring(chart).iter("{http://www.w3.org/2000/svg}text"):
+        if text.text in ("median", "least"):
+            height[text.text] = float(text.attrib["y"])
+    assert abs(height["median"] - height["least"]) > 9.0  # [px], of letters 10 px high
+
+
+def test_values_that_are_not_known_interrupt_a_line() -> None:
+    whole = np.linspace(0.9, 0.95, 8)
+    broken = np.where(X == 4, np.nan, whole)
+    assert marks(line_chart(X, {"a": whole}, LABELS)) == marks(line_chart(X, {"a": broken}, LABELS)) + 1
+
+
+def test_a_chart_of_nothing_says_so() -> None:
+    assert "not known" in words(line_chart(X, {"median": np.full(8, np.nan)}, LABELS))
+
+
+def test_counts_are_named() -> None:
+    said = words(stacked_chart(X, {"rescued": np.arange(8), "lost": np.ones(8, np.int64)}, LABELS))
+    assert "rescued" in said
+    assert "lost" in said
+
+
+def test_the_same_chart_has_the_same_bytes() -> None:
+    first, second = (line_chart(X, {"median": np.linspace(0.9, 0.95, 8)}, LABELS) for _ in range(2))
+    assert first == second
+
+
+def test_tracking_without_a_report_waits_for_no_drawing_library() -> None:
+    asked = "import sys, rodsight.tracking.stage; print([m for m in ('matplotlib', 'jinja2') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
