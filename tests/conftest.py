@@ -1,13 +1,16 @@
-"""Experiments that several tests share; made once."""
+"""What tests of several rooms share: experiments made once, and a browser."""
 
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 from rodsight.synthetic.experiment import synthesize
 
+from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
 from tests.shapes import check_shapes
 
 check_shapes("solver")
@@ -33,3 +36,33 @@ def made_photographs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("synthetic") / "photographed"
     synthesize(folder, grains=30, frames=4, seed=2)
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser without a screen; pages of different tests know nothing of each other."""
+    chromium = find_chromium()
+    folder = str(tmp_path_factory.mktemp("browser"))  # for all that it and its driver write
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", folder)
+        patch.setenv("HOME", folder)
+        with sync_playwright() as driver:
+            started = driver.chromium.launch(executable_path=chromium, args=FLAGS, chromium_sandbox=False)
+            expect.set_options(timeout=1e3 * SECONDS)
+            yield started
+            started.close()
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A page of its own, which waits long enough for pictures drawn in software."""
+    context = browser.new_context(viewport={"width": 1000, "height": 700}, color_scheme="dark")
+    context.set_default_timeout(1e3 * SECONDS)
+    context.add_init_script(SEEN)
+    yield context.new_page()
+    context.close()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The browser's driver keeps an event loop in this thread until the end: tests that start a loop come before."""
+    items.sort(key=lambda item: "browser" in getattr(item, "fixturenames", ()))

@@ -4,26 +4,28 @@ import json
 import shutil
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from playwright.sync_api import Page, expect
 from rodsight.cli.main import main
 from rodsight.results.store import load_results
 from rodsight.review.command import open_reviewed, open_session
 from rodsight.review.server import ReviewServer
+from rodsight.review.session import ReviewSession
 from rodsight.verdicts.decisions import Bodies
 from rodsight.verdicts.log import VERDICTS
 
+from solver.bodies.grains import Array
 from solver.contacts.contacts import ContactSource
-from tests.app.review.browser import chromium, open_browser
-
-pytest.importorskip("websockets", reason="websockets, which drives chromium, is not installed")
-pytestmark = pytest.mark.skipif(chromium() is None, reason="chromium is not installed")
+from tests.browser import LIKE, picture_of, wait_for_colour, wait_until_still
 
 WIDTH, HEIGHT = 1280, 800
 NO_PICTURE = "HTMLCanvasElement.prototype.getContext = () => null;"  # a browser that cannot draw WebGL
-SECONDS = 90.0  # for a picture drawn in software on a busy machine
+PINK, GREEN = (255, 84, 130), (40, 224, 150)  # of the marks of verdicts
+MARKED = {"least": 20, "reach": 14}  # [px] of a mark that is drawn
 
 
 def rodsight(*arguments: str) -> int:
@@ -57,37 +59,49 @@ def server(run):
     thread.join()
 
 
-def ready(tab, address):
-    tab.open(address)
-    tab.wait("globalThis.review && review.drawn > 0", SECONDS)
-    tab.wait("review.viewer && document.getElementById('loading').hidden", SECONDS)
+@pytest.fixture
+def tab(page: Page) -> Page:
+    """A page as wide as a reviewer's."""
+    page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
+    return page
 
 
-def act(tab, step, seconds=SECONDS):
+def open_page(tab: Page, address: str) -> None:
+    tab.goto(address)
+    tab.wait_for_function("() => globalThis.review && review.drawn > 0")
+
+
+def open_with_picture(tab: Page, address: str) -> None:
+    open_page(tab, address)
+    tab.wait_for_function("() => review.viewer && document.getElementById('loading').hidden")
+
+
+def act(tab: Page, step: Callable[[], None]) -> None:
     """Do something and wait until the page has put the outcome before the reviewer."""
-    before = tab.run("review.drawn")
+    before = tab.evaluate("review.drawn")
     step()
-    tab.wait(f"review.drawn > {before}", seconds)
-    tab.run("review.busy.then(() => null)")
+    tab.wait_for_function("(before) => review.drawn > before", arg=before)
+    tab.evaluate("review.busy.then(() => null)")
 
 
-def on_screen(tab, session, point):
+def press(tab: Page, key: str) -> None:
+    act(tab, lambda: tab.keyboard.press(key))
+
+
+def on_screen(tab: Page, session: ReviewSession, point: Array) -> Array:
     """Where a point of the picture [px] lies on the page, with the whole packing in view."""
     canvas = session.picture.canvas
-    width, height = tab.run("document.getElementById('stage').clientWidth"), HEIGHT
+    width, height = tab.evaluate("document.getElementById('stage').clientWidth"), HEIGHT
     scale = min(width / canvas.width, height / canvas.height)  # the view keeps the picture's proportions
     middle = np.array([canvas.left + 0.5 * canvas.width, canvas.top + 0.5 * canvas.height])
     return np.array([0.5 * width, 0.5 * height]) + scale * (np.asarray(point) - middle)
 
 
-def colour_near(tab, place, colour, reach=14):
+def colour_near(tab: Page, place: Array, colour: tuple[int, int, int], reach: int = 14) -> int:
     """How many pixels around a place of the page have about a colour."""
-    import cv2
-
-    picture = cv2.imdecode(np.frombuffer(tab.picture(), np.uint8), cv2.IMREAD_COLOR)
     x, y = (round(v) for v in place)
-    part = picture[max(y - reach, 0) : y + reach, max(x - reach, 0) : x + reach, ::-1].astype(int)
-    return int((np.abs(part - np.array(colour)).max(axis=2) < 50).sum())
+    part = picture_of(tab)[max(y - reach, 0) : y + reach, max(x - reach, 0) : x + reach].astype(int)
+    return int((np.abs(part - np.array(colour)).max(axis=2) < LIKE).sum())
 
 
 def lines(out):
@@ -108,53 +122,44 @@ def missed_gap(session, frame):
     raise AssertionError("this experiment has no such gap")
 
 
-def test_a_person_judges_adds_and_undoes_and_the_solver_obeys(server, run):
+@pytest.mark.screen
+def test_a_person_judges_adds_and_undoes_and_the_solver_obeys(server, run, tab):
     experiment, out = run
     session = server.session
     known = session.candidates(0)
     row = int(np.argmax(np.where(known.detected, known.probability, 0.0)))
     contact, point = int(known.key[row]), session.picture.canvas.points(known.contacts.point[row])
     gap, between = missed_gap(session, 0)
-    with open_browser(WIDTH, HEIGHT) as tab:
-        ready(tab, server.address)
-        assert "token" not in tab.run("location.href")
-        tab.run("document.getElementById('viewer').focus()")
-        tab.key("w")  # the whole packing
-        tab.run("review.busy.then(() => null)")
-        time.sleep(3)
-        place = on_screen(tab, session, point)
+    asked, failed = [], []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.on("requestfailed", lambda request: failed.append(request.url))
+    open_with_picture(tab, server.address)
+    assert "token" not in tab.url
+    tab.evaluate("document.getElementById('viewer').focus()")
+    tab.keyboard.press("w")  # the whole packing
+    tab.evaluate("review.busy.then(() => null)")
+    wait_until_still(tab)
 
-        act(tab, lambda: tab.click(*place))
-        assert tab.run("review.pair.key") == str(contact)
-        pink, green = (255, 84, 130), (40, 224, 150)
-        assert colour_near(tab, place, pink) == 0
-        act(tab, lambda: tab.key("n"))
-        end = time.monotonic() + SECONDS
-        while colour_near(tab, place, pink) < 20:  # the mark is drawn
-            assert time.monotonic() < end
-            time.sleep(0.3)
+    place = on_screen(tab, session, point)
+    act(tab, lambda: tab.mouse.click(*place))
+    assert tab.evaluate("review.pair.key") == str(contact)
+    assert colour_near(tab, place, PINK) == 0
+    press(tab, "n")
+    wait_for_colour(tab, place, PINK, **MARKED)
 
-        place = on_screen(tab, session, between)
-        act(tab, lambda: tab.click(*place))
-        assert tab.run("review.pair.key") == str(gap)
-        assert tab.run("review.pair.verdict") == "contact"
-        end = time.monotonic() + SECONDS
-        while colour_near(tab, place, green) < 20:
-            assert time.monotonic() < end
-            time.sleep(0.3)
+    place = on_screen(tab, session, between)
+    act(tab, lambda: tab.mouse.click(*place))
+    assert tab.evaluate("review.pair.key") == str(gap)
+    assert tab.evaluate("review.pair.verdict") == "contact"
+    wait_for_colour(tab, place, GREEN, **MARKED)
 
-        act(tab, lambda: tab.key("z"))
-        assert tab.run("review.pair.verdict") is None
-        act(tab, lambda: tab.key("c"))  # after all
-        act(tab, lambda: tab.key("u"))
-        act(tab, lambda: tab.key("z"))
-        outside = [
-            event["params"]["request"]["url"]
-            for event in tab.events
-            if event["method"] == "Network.requestWillBeSent" and "127.0.0.1" not in event["params"]["request"]["url"]
-        ]
-        blocked = {e["params"]["requestId"] for e in tab.events if e["method"] == "Network.loadingFailed"}
-        assert not [url for url in outside if url not in blocked and url.startswith("http")], outside
+    press(tab, "z")
+    assert tab.evaluate("review.pair.verdict") is None
+    press(tab, "c")  # after all
+    press(tab, "u")
+    press(tab, "z")
+    outside = [url for url in asked if url.startswith("http") and "127.0.0.1" not in url]
+    assert not set(outside) - set(failed), outside
     told = lines(out)
     assert [line.get("verdict", "undo") for line in told] == [
         "no contact", "contact", "undo", "contact", "unsure", "undo",
@@ -169,32 +174,31 @@ def test_a_person_judges_adds_and_undoes_and_the_solver_obeys(server, run):
     assert frame.source[at[gap]] == ContactSource.ADDED_BY_REVIEWER
 
 
-def test_everything_works_without_a_mouse_or_a_picture(server, run):
+@pytest.mark.screen
+def test_everything_works_without_a_mouse_or_a_picture(server, run, tab):
     """A browser that cannot draw WebGL: the crop and the keys are enough."""
-    with open_browser(WIDTH, HEIGHT) as tab:
-        tab.call("Page.addScriptToEvaluateOnNewDocument", source=NO_PICTURE)
-        tab.open(server.address)
-        tab.wait("globalThis.review && review.drawn > 0", SECONDS)
-        tab.wait("document.getElementById('loading').textContent.includes('goes on with the crop')", SECONDS)
-        assert tab.run("document.getElementById('cropped').naturalWidth") > 0
-        for key in "cnu":
-            act(tab, lambda key=key: tab.key(key))
-        first = tab.run("review.frame")
-        act(tab, lambda: tab.key("]"))
-        assert tab.run("review.frame") == first + 1
-        tab.key("r")
-        tab.wait("document.getElementById('rearrangement').getAttribute('aria-pressed') === 'true'")
-        act(tab, lambda: tab.key("b"))
-        assert tab.run("document.getElementById('detector').textContent") == ""
-        assert tab.run("getComputedStyle(document.getElementById('estimate')).display") == "none"
-        act(tab, lambda: tab.key(" "))
-        act(tab, lambda: tab.key("m"))
-        assert tab.run("review.sampled") is True
-        a, b = server.session.bodies.grains[:2]
-        tab.key("g")
-        tab.call("Input.insertText", text=f"{a} {b}")
-        act(tab, lambda: tab.key("Enter"))
-        assert tab.run("[review.pair.a, review.pair.b]") == [a, b]
+    tab.add_init_script(NO_PICTURE)
+    open_page(tab, server.address)
+    expect(tab.locator("#loading")).to_contain_text("goes on with the crop")
+    assert tab.evaluate("document.getElementById('cropped').naturalWidth") > 0
+    for key in "cnu":
+        press(tab, key)
+    first = tab.evaluate("review.frame")
+    press(tab, "]")
+    assert tab.evaluate("review.frame") == first + 1
+    tab.keyboard.press("r")
+    expect(tab.locator("#rearrangement")).to_have_attribute("aria-pressed", "true")
+    press(tab, "b")
+    expect(tab.locator("#detector")).to_be_empty()
+    assert tab.evaluate("getComputedStyle(document.getElementById('estimate')).display") == "none"
+    press(tab, " ")
+    press(tab, "m")
+    assert tab.evaluate("review.sampled") is True
+    a, b = server.session.bodies.grains[:2]
+    tab.keyboard.press("g")
+    tab.keyboard.insert_text(f"{a} {b}")
+    press(tab, "Enter")
+    assert tab.evaluate("[review.pair.a, review.pair.b]") == [a, b]
     told = lines(run[1])
     assert [line.get("verdict") or line["flag"] for line in told] == [
         "contact",
@@ -204,39 +208,37 @@ def test_everything_works_without_a_mouse_or_a_picture(server, run):
     ]
 
 
-def test_names_from_the_experiment_stay_text(server):
+@pytest.mark.screen
+def test_names_from_the_experiment_stay_text(server, tab):
     """A wall called like a script is shown, not run."""
     session = server.session
     name = "<img src=x onerror='globalThis.hacked = 1'>"
     session.bodies = Bodies(session.bodies.grains, tuple(f"{name}{w}" for w in session.bodies.walls))
     session._rows = session.bodies.rows()
-    with open_browser(WIDTH, HEIGHT) as tab:
-        tab.call("Page.addScriptToEvaluateOnNewDocument", source=NO_PICTURE)
-        tab.open(server.address)
-        tab.wait("globalThis.review && review.drawn > 0", SECONDS)
-        for _ in range(session.candidates(0).count):
-            if tab.run("typeof review.pair.b") == "string":
-                break
-            act(tab, lambda: tab.key(" "))
-        assert name in tab.run("document.getElementById('bodies').textContent")
-        assert tab.run("document.querySelectorAll('#pair img').length") == 0
-        assert tab.run("globalThis.hacked") is None
+    tab.add_init_script(NO_PICTURE)
+    open_page(tab, server.address)
+    for _ in range(session.candidates(0).count):
+        if tab.evaluate("typeof review.pair.b") == "string":
+            break
+        press(tab, " ")
+    assert name in tab.locator("#bodies").text_content()
+    assert tab.locator("#pair img").count() == 0
+    assert tab.evaluate("globalThis.hacked") is None
 
 
 @pytest.mark.slow
-def test_a_hundred_doubtful_contacts_by_keyboard_in_four_minutes(server, run):
+def test_a_hundred_doubtful_contacts_by_keyboard_in_four_minutes(server, run, tab):
     seconds = []
-    with open_browser(WIDTH, HEIGHT) as tab:
-        ready(tab, server.address)
-        tab.key("m")
-        tab.run("review.busy.then(() => null)")
-        for number in range(100):
-            if tab.run("review.pair === null"):
-                break
-            begun = time.monotonic()
-            act(tab, lambda number=number: tab.key("cn"[number % 2]))
-            tab.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))).then(() => null)")
-            seconds.append(time.monotonic() - begun)
+    open_with_picture(tab, server.address)
+    tab.keyboard.press("m")
+    tab.evaluate("review.busy.then(() => null)")
+    for number in range(100):
+        if tab.evaluate("review.pair === null"):
+            break
+        begun = time.monotonic()
+        press(tab, "cn"[number % 2])
+        tab.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))).then(() => null)")
+        seconds.append(time.monotonic() - begun)
     print(
         f"{len(seconds)} verdicts: {sum(seconds):.1f} s, median {np.median(seconds):.2f} s, worst {max(seconds):.2f} s"
     )

@@ -8,8 +8,8 @@ from rodsight.cli.main import main
 from rodsight.recording.files.catalogue import can_serve, find_recordings, read_properties, serve, show_together
 from rodsight.recording.files.recorder import record
 
-from tests.app.recording.browser import Browser, forces_drawn
 from tests.app.recording.fake_results import make_results, make_truth
+from tests.browser import open_when_served, wait_for_forces
 
 
 def view(*arguments: str) -> int:
@@ -85,7 +85,7 @@ def test_a_damaged_recording_does_not_hide_the_others(folder, tmp_path, capsys):
     assert f"--repair {tmp_path / 'bad.rrd'}" in told.replace("\n", "")
 
 
-@pytest.mark.slow
+@pytest.mark.screen
 def test_the_catalogue_server_has_the_properties_as_columns_and_the_tabs_as_blueprint(folder):
     if not can_serve():
         pytest.skip("no datafusion: pip install 'rodsight[catalog]'")
@@ -100,13 +100,12 @@ def test_the_catalogue_server_has_the_properties_as_columns_and_the_tabs_as_blue
         assert dataset.default_blueprint() is not None
 
 
-@pytest.mark.slow
-def test_recordings_open_together_in_a_browser(folder):
-    viewer, page = show_together(find_recordings(folder), web=True)
+@pytest.mark.screen
+def test_recordings_open_together_in_a_browser(folder, page):
+    viewer, address = show_together(find_recordings(folder), web=True)
     try:
-        with Browser() as browser:
-            browser.open(f"{page}&renderer=webgl")
-            assert browser.shows(forces_drawn)
+        open_when_served(page, f"{address}&renderer=webgl")
+        wait_for_forces(page)
     finally:
         viewer.terminate()
         viewer.wait(20)

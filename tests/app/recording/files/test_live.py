@@ -17,9 +17,11 @@ from rodsight.recording.files.live_process import LiveProcess
 from rodsight.recording.files.readback import read_forces
 from rodsight.recording.files.repair import repair_recording
 
-from tests.app.recording.browser import Browser, forces_drawn
 from tests.app.recording.fake_results import make_results
+from tests.browser import forces_drawn, open_when_served, picture_of, wait_for_colour, wait_for_forces
 from tests.program import RODSIGHT
+
+CANVAS = (13, 14, 18)  # behind a packing
 
 
 def before(results):
@@ -188,16 +190,17 @@ def wait_until(condition, seconds: float = 60.0) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.slow
-def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path):
+@pytest.mark.screen
+def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path, page):
     live = LiveRecording(tmp_path / "live.rrd", "web")
     live.start(before(results))
     try:
-        with Browser() as browser:
-            browser.open(f"{live.address}&renderer=webgl")
-            assert not browser.shows(forces_drawn, seconds=8.0)  # nothing solved yet
-            for forces, statistics in zip(results.frames, results.statistics, strict=True):
-                live.frame(forces, statistics)
-            assert browser.shows(forces_drawn)
+        page.emulate_media(color_scheme="light")  # so that nothing is dark but a view
+        open_when_served(page, f"{live.address}&renderer=webgl")
+        wait_for_colour(page, np.array([300, 400]), CANVAS, least=2000, reach=25)
+        assert not forces_drawn(picture_of(page))  # nothing solved yet
+        for forces, statistics in zip(results.frames, results.statistics, strict=True):
+            live.frame(forces, statistics)
+        wait_for_forces(page)
     finally:
         live.close()

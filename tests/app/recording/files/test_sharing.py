@@ -16,10 +16,10 @@ from rodsight.recording.tabs.layout_property import read_layout
 from rodsight.recording.viewing.single_page import write_single_page
 from rodsight.recording.viewing.viewer import viewer_binary
 
-from tests.app.recording.browser import Browser, forces_drawn
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest, rows
+from tests.browser import forces_drawn, picture_of, wait_for_forces, wait_until_still
 
 
 def verify(path) -> None:
@@ -110,25 +110,25 @@ def test_wrong_arguments_end_with_status_2_and_one_line(recording, arguments, ca
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_path):
+@pytest.mark.screen
+def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_path, page):
     # Frames that all look alike: whichever the playing viewer shows, the forces must be there.
     path = record(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
-    page = tmp_path / "run.html"
-    write_single_page(path, page, title="<shear> & test")
-    with Browser() as browser:
-        browser.open(f"file://{page}?renderer=webgl")
-        browser.wait_for("!!window.rodsight || document.title == 'failed'")
-        assert browser.evaluate("document.title") == "<shear> & test", browser.evaluate("document.body.innerText")
-        assert browser.shows(forces_drawn)
+    file = tmp_path / "run.html"
+    write_single_page(path, file, title="<shear> & test")
+    page.goto(f"file://{file}?renderer=webgl")
+    page.wait_for_function("() => window.rodsight || document.title === 'failed'")
+    assert page.title() == "<shear> & test", page.inner_text("body")
+    wait_for_forces(page)
 
 
-@pytest.mark.slow
-def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording):
-    page = tmp_path / "run.html"
-    write_single_page(recording.path, page, title="empty")
-    text = page.read_text()
-    page.write_text(text.replace('handle.send_rrd_to_channel("recording", await unpack("recording"));', ""))
-    with Browser() as browser:
-        browser.open(f"file://{page}?renderer=webgl")
-        browser.wait_for("!!window.rodsight || document.title == 'failed'")
-        assert not browser.shows(forces_drawn, seconds=4.0)
+@pytest.mark.screen
+def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording, page):
+    file = tmp_path / "run.html"
+    write_single_page(recording.path, file, title="empty")
+    text = file.read_text()
+    file.write_text(text.replace('handle.send_rrd_to_channel("recording", await unpack("recording"));', ""))
+    page.goto(f"file://{file}?renderer=webgl")
+    page.wait_for_function("() => window.rodsight && seen.colours() > 20")  # the viewer has drawn itself
+    wait_until_still(page)
+    assert not forces_drawn(picture_of(page))

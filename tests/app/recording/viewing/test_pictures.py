@@ -7,27 +7,24 @@ from rodsight.cli.main import main
 from rodsight.recording.viewing.headless import HeadlessViewer, NoPictureError, vulkan_drivers
 from rodsight.recording.viewing.pictures import timeline_values, write_film
 
-from tests.app.recording.browser import warm_share
+from tests.browser import read_picture, warm_share
 
 needs_vulkan = pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
 
 
-def read(png: bytes) -> np.ndarray:
-    return cv2.cvtColor(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
-
-
 @needs_vulkan
+@pytest.mark.screen
 def test_tabs_and_views_are_pictured_at_any_time(recording):
     with HeadlessViewer(recording.path, width=900, height=600) as viewer:
         assert viewer.tabs[0] == "Experiment"
         viewer.set_time("frame", 1)
-        network = read(viewer.picture("Force network"))
+        network = read_picture(viewer.picture("Force network"))
         assert 0.01 < warm_share(network) < 0.5
         assert viewer.picture("Force network") == viewer.picture("Force network")
         # The first sweep of a frame has less force than the reported field.
         viewer.set_time("sweep", 61)
-        assert warm_share(read(viewer.picture("Force network"))) < 0.8 * warm_share(network)
-        anisotropies = read(viewer.picture("Anisotropies"))  # of another tab
+        assert warm_share(read_picture(viewer.picture("Force network"))) < 0.8 * warm_share(network)
+        anisotropies = read_picture(viewer.picture("Anisotropies"))  # of another tab
         assert np.ptp(anisotropies) > 100
         assert viewer.warnings() == []
         with pytest.raises(NoPictureError, match="no view 'Nothing'"):

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Page
 from rodsight.synthetic.experiment import synthesize
 
-from tests.app.recording.browser import Browser, find_chromium, forces_drawn
+from tests.browser import open_when_served, wait_for_forces
 from tests.program import RODSIGHT
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.screen
 
 HERE, THERE, SSH_PORT = "10.231.87.1", "10.231.87.2", 2222
 SECONDS = 60.0
@@ -58,7 +59,6 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
         pytest.skip("no sshd: apt-get install openssh-server")
     if os.geteuid() != 0:
         pytest.skip("network namespaces need root")
-    find_chromium()
     name, ours, theirs = f"rodsight{os.getpid()}", f"rs{os.getpid()}h", f"rs{os.getpid()}t"
     with ExitStack() as stack:
         try:
@@ -140,7 +140,9 @@ def running(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
         end(process)
 
 
-def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(machine: Machine, tmp_path: Path):
+def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(
+    machine: Machine, tmp_path: Path, page: Page
+):
     experiment = tmp_path / "far"
     synthesize(experiment, grains=120, frames=12, photographs=False, noise=1e-5, seed=1)
     command = [
@@ -156,16 +158,15 @@ def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(mac
         told = run.stdout.readline()
         found = re.search(r"Watch it at (\S+) .*-L (\d+):localhost:\2 -L (\d+):localhost:\3", told)
         assert found, told
-        address, page, data = found[1], int(found[2]), int(found[3])
-        for port in (page, data):
+        address, ports = found[1], (int(found[2]), int(found[3]))
+        for port in ports:
             if reaches("127.0.0.1", port):
                 pytest.skip(f"port {port} of this machine is taken: the tunnel needs it")
             assert not reaches(THERE, port)  # nothing is served to the network
-        with running(subprocess.Popen(machine.tunnel(page, data), stderr=subprocess.PIPE, text=True)) as tunnel:
-            wait_for(lambda: reaches("127.0.0.1", page), "the tunnel", tunnel)
-            with Browser() as browser:
-                browser.open(f"{address}&renderer=webgl")
-                assert browser.shows(forces_drawn), browser.messages
+        with running(subprocess.Popen(machine.tunnel(*ports), stderr=subprocess.PIPE, text=True)) as tunnel:
+            open_when_served(page, f"{address}&renderer=webgl")
+            assert tunnel.poll() is None
+            wait_for_forces(page)
         assert run.poll() is None  # it was watched while it was solved
     # Terminated, the run takes its servers with it.
     left = subprocess.run(["ip", "netns", "pids", machine.name], capture_output=True, text=True, check=True).stdout

@@ -1,12 +1,8 @@
 from __future__ import annotations
 
-import glob
-import socket
 import subprocess
 import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +10,10 @@ from rodsight.recording.files.recorder import record
 from rodsight.recording.look.texts import _ALIKE, _RANGES, _SIGNS, printable
 from rodsight.recording.tabs.blueprint import Tab
 from rodsight.recording.viewing import viewer
+from rodsight.recording.viewing.headless import HeadlessViewer, vulkan_drivers
 from rodsight.recording.viewing.viewer import open_viewer, view_command
 
-SECONDS = 60.0  # a viewer that draws in software on a busy machine
+from tests.browser import read_picture, warm_share
 
 
 def test_the_command_names_the_viewer_of_the_installed_wheel(tmp_path):
@@ -61,63 +58,21 @@ def test_a_missing_recording_is_named(tmp_path):
         open_viewer(tmp_path / "nowhere.rrd")
 
 
+@pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
+@pytest.mark.screen
 def test_the_viewer_draws_the_forces_and_every_printable_character(results, tmp_path):
     characters = "".join(chr(code) for low, high in _RANGES for code in range(low, high + 1))
     characters += "".join(sorted(_SIGNS - {"\n"})) + "".join(_ALIKE.values())
     assert printable(characters) == characters
     named = replace(results, name="all", configuration=characters)
     frames = [replace(forces, reason=characters) for forces in results.frames]
-    named = replace(named, frames=frames)
-    forces, summary = (
-        record(named, tmp_path / f"{tab.name}.rrd", active=tab).path for tab in (Tab.EXPERIMENT, Tab.SUMMARY)
-    )
-    # The summary shows the characters in proportional and in monospaced type.
-    network, text = pixels(take_picture(forces, "Force network")), pixels(take_picture(summary, "Summary"))
-    warm = (network[..., 0].astype(int) - network[..., 2] > 80).mean()
-    assert 0.01 < warm < 0.5  # share of the picture that strong forces and the legend cover
+    path = record(replace(named, frames=frames), tmp_path / "all.rrd", active=Tab.SUMMARY).path
+    with HeadlessViewer(path) as viewer:
+        front = viewer.picture()
+        viewer.show_tab(Tab.SUMMARY)
+        assert viewer.picture() == front  # the tab that was asked for came up by itself
+        # The summary shows the characters in proportional and in monospaced type.
+        text, network = read_picture(viewer.picture("Summary")), read_picture(viewer.picture("Force network"))
+    assert 0.01 < warm_share(network) < 0.5  # of the picture, that strong forces and the legend cover
     assert len(np.unique(network.reshape(-1, network.shape[-1]), axis=0)) > 100
     assert np.ptp(text[..., 0]) > 100
-
-
-def take_picture(path: Path, view: str) -> bytes:
-    """A view as PNG, from a viewer of its own without a window; skips where nothing can draw."""
-    if sys.platform.startswith("linux") and not glob.glob("/usr/share/vulkan/icd.d/*.json"):
-        pytest.skip("no Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1")
-    from rerun.experimental import ViewerClient
-
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with ViewerClient.spawn(
-        headless=True, port=port, hide_welcome_screen=True, executable_path=str(viewer.viewer_binary())
-    ) as client:
-        client.open(str(path))
-        end, last = time.monotonic() + SECONDS, b""
-        while time.monotonic() < end:
-            client.take_screenshot(max_size=64)  # a view has an id once it was drawn
-            state = client.get_state()
-            found = [shown.view_id for shown in state.views if shown.name == view]
-            if found and not state.loading:
-                picture = picture_of(client, found[0])
-                if picture and picture == last:  # it has stopped changing: the viewer loads in the background
-                    return picture
-                last = picture
-            time.sleep(0.2)
-    pytest.fail(f"the viewer did not show {view} in {SECONDS:.0f} s")
-
-
-def picture_of(client, view_id) -> bytes:
-    """The view as PNG; nothing while the viewer is still laying it out."""
-    try:
-        return client.take_screenshot(view_id)
-    except ConnectionError as error:
-        if "NotFound" in str(error):
-            return b""
-        raise
-
-
-def pixels(png: bytes) -> np.ndarray:
-    import cv2
-
-    assert png[:8] == b"\x89PNG\r\n\x1a\n"
-    return cv2.cvtColor(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
