@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import Quantity
 
 
 class TrackStatus(IntEnum):
@@ -31,17 +33,28 @@ class TrackStatus(IntEnum):
 class Tracks:
     """Poses of n grains in f frames. Poses of grains without one are NaN."""
 
-    id: NDArray[np.int64]  # (n,)
-    radius: Array  # (n,) [m]
-    time: Array  # (f,) [s], ascending
-    position: Array  # (f, n, 2) [m]
-    rotation: Array  # (f, n) [rad], counter-clockwise, continuous (not wrapped)
-    sigma: Array  # (f, n) [m], standard deviation of a position component
-    zncc: Array  # (f, n) correlation with the reference patch, NaN where unknown
-    status: NDArray[np.uint8]  # (f, n) TrackStatus
-    centre_sigma: Array | None = None  # (n,) [m], of the error of a centre that is fixed in its grain; None: none
-    second_zncc: Array | None = None  # (f, n) of the best other place, NaN where nothing was searched; None: unknown
-    reference_frame: NDArray[np.int32] | None = None  # (f, n) photograph it is compared with; None: unknown
+    id: Annotated[NDArray[np.int64], Quantity("name of the grain", dims="grain", essential=True, path="grains/id")]
+    radius: Annotated[Array, Quantity("radius as it was used", "m", "grain", essential=True, path="grains/radius")]
+    time: Annotated[Array, Quantity("time of the frame, ascending", "s", "frame", essential=True, path="frames/time")]
+    position: Annotated[Array, Quantity("centre; NaN: lost", "m", "frame grain xy", essential=True)]
+    rotation: Annotated[
+        Array, Quantity("angle, counter-clockwise, not wrapped; NaN: lost", "rad", "frame grain", essential=True)
+    ]
+    sigma: Annotated[Array, Quantity("standard deviation of a position component", "m", "frame grain")]
+    zncc: Annotated[Array, Quantity("correlation with the reference patch, NaN: unknown", dims="frame grain")]
+    status: Annotated[
+        NDArray[np.uint8],
+        Quantity("how the pose was found", dims="frame grain", absent=TrackStatus.GIVEN, names=TrackStatus),
+    ]
+    centre_sigma: Annotated[Array | None, Quantity("standard deviation of a centre's constant error", "m", "grain")] = (
+        None
+    )
+    second_zncc: Annotated[
+        Array | None, Quantity("correlation of the best other place, NaN: not searched", dims="frame grain")
+    ] = None
+    reference_frame: Annotated[
+        NDArray[np.int32] | None, Quantity("photograph it is compared with", dims="frame grain")
+    ] = None
 
     def __post_init__(self) -> None:
         f, n = len(self.time), len(self.id)
@@ -99,13 +112,19 @@ class Tracks:
 class WallTracks:
     """The walls of f frames, with the pressure that some of them carry."""
 
-    name: tuple[str, ...]  # (w,)
-    endpoints: Array  # (f, w, 2, 2) [m]; the packing lies to the left of endpoint 0 → 1
-    pressure: Array  # (w,) [Pa], NaN where the measured motion is imposed
-    force: Array | None = None  # (f, w, 2) [N] recorded by sensors, of the packing on the wall; NaN: not recorded
+    name: Annotated[tuple[str, ...], Quantity("name of the wall", dims="wall", essential=True)]
+    endpoints: Annotated[
+        Array, Quantity("ends; packing to the left of 0 → 1", "m", "frame wall end xy", essential=True)
+    ]
+    pressure: Annotated[Array, Quantity("pressure on the wall, NaN where its motion is imposed", "Pa", "wall")]
+    force: Annotated[
+        Array | None, Quantity("recorded force of the packing on the wall, NaN: none", "N", "frame wall xy")
+    ] = None
     # (f, w) [m] standard deviation of a followed wall's endpoint along its normal, against frame 0, rms over its two
     # endpoints; NaN in frames where a table gives the wall, None where tables give all
-    sigma: Array | None = None
+    sigma: Annotated[
+        Array | None, Quantity("standard deviation of an end along the normal; NaN: given", "m", "frame wall")
+    ] = None
 
     @property
     def count(self) -> int:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import NDArray
+
+from solver.bodies.quantity import Quantity
 
 Array = NDArray[np.float64]
 
@@ -15,8 +18,8 @@ Array = NDArray[np.float64]
 class Grains:
     """The bodies of a packing: solid rods seen end on."""
 
-    radius: Float[Array, " n"]  # [m]
-    mass: Float[Array, " n"]  # [kg]
+    radius: Annotated[Float[Array, " n"], Quantity("radius as it was used", "m", "grain", essential=True)]
+    mass: Annotated[Float[Array, " n"], Quantity("mass", "kg", "grain", essential=True)]
 
     def __post_init__(self) -> None:
         if self.radius.shape != self.mass.shape or self.radius.ndim != 1:

@@ -11,11 +11,13 @@ from the scale of the errors to that of the noise. Gaussian priors hold whatever
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import Quantity
 from solver.calibration.equations import GapEquations, bulge, move_walls, rotate_offsets
 from solver.calibration.fit import ROUNDS, GapFit, fit_gaps
 from solver.calibration.gaps import MeasuredSequence, measure_gaps
@@ -43,27 +45,29 @@ RADIUS_SHARE = 0.5  # prior of a radius over that of a centre without being told
 class Calibration:
     """Constant errors found in a sequence. Add the corrections to what was measured."""
 
-    offset: Array  # (n, 2) [m] from measured to true centre, in the body frame of the grain's first frame
-    radius: Array  # (n,) [m] from given to true radius
-    wall: Array  # (w,) [m] outward, at the wall's middle
-    wall_tilt: Array  # (w,) [rad] about the wall's middle, counter-clockwise
-    pixel_size: float  # relative; true distances are (1 + pixel_size) times the measured ones
-    lens: float  # [m] outward at the farthest corner, by what is left of the lens's radial distortion
-    walls_follow: bool  # the walls were measured with the same pixel size: they are corrected by it, too
-    offset_sd: Array  # (n, 2) [m] posterior standard deviation; the prior's where a grain meets nobody
-    radius_sd: Array  # (n,) [m]
-    wall_sd: Array  # (w,) [m]
-    wall_tilt_sd: Array  # (w,) [rad]
-    pixel_size_sd: float  # the prior's where the sequence tells nothing
-    lens_sd: float  # [m]
-    gap_sd: float  # [m] what the errors that are left do to the gap of a touching pair, noise apart
+    offset: Annotated[Array, Quantity("from measured to true centre, turning with the grain", "m", "grain xy")]
+    radius: Annotated[Array, Quantity("from given to true radius", "m", "grain")]
+    wall: Annotated[Array, Quantity("of a wall outward, at its middle", "m", "wall")]
+    wall_tilt: Annotated[Array, Quantity("of a wall about its middle, counter-clockwise", "rad", "wall")]
+    pixel_size: Annotated[float, Quantity("true distances are (1 + pixel_size) times the measured ones")]
+    lens: Annotated[float, Quantity("outward shift of the farthest corner by the lens", "m")]
+    walls_follow: Annotated[bool, Quantity("the walls are corrected by the pixel size, too", absent=False)]
+    offset_sd: Annotated[
+        Array, Quantity("standard deviation of offset, the prior's without neighbours", "m", "grain xy")
+    ]
+    radius_sd: Annotated[Array, Quantity("standard deviation of radius", "m", "grain")]
+    wall_sd: Annotated[Array, Quantity("standard deviation of wall", "m", "wall")]
+    wall_tilt_sd: Annotated[Array, Quantity("standard deviation of wall_tilt", "rad", "wall")]
+    pixel_size_sd: Annotated[float, Quantity("standard deviation of pixel_size")]
+    lens_sd: Annotated[float, Quantity("standard deviation of lens", "m")]
+    gap_sd: Annotated[float, Quantity("what the errors left do to a gap, noise apart", "m")]
     priors: CalibrationPriors  # those used: never wider than given, narrower where the gaps say so
-    noise_factor: float  # noise of positions that the corrected gaps show over that stated, at least 1
+    noise_factor: Annotated[float, Quantity("noise that the corrected gaps show over that stated")]
     before: GapStatistics
     after: GapStatistics  # with the corrections, whether they are applied or not
-    rounds: int
-    applied: bool  # False: every correction above is zero
-    verdict: str  # why, in a sentence for the user
+    rounds: Annotated[int, Quantity("times that contacts were looked for again", absent=0)]
+    applied: Annotated[bool, Quantity("whether the corrections were applied; if not, all are zero", absent=True)]
+    verdict: Annotated[str, Quantity("why, in a sentence for the user", absent="")]
 
     def position_sd(self, sigma: float) -> float:
         """Standard deviation [m] of a position for contact detection: stated noise `sigma` [m] and what is left.

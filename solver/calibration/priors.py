@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import Quantity
 from solver.calibration.equations import GapEquations
 from solver.calibration.gaps import GapRows, MeasuredSequence, find_gap_rows
 from solver.calibration.weights import contact_width
@@ -22,13 +24,13 @@ FINEST_SURFACE = 1e-5  # of the mean radius: below this no real grain is round
 class CalibrationPriors:
     """Standard deviations of the constant errors before the gaps are looked at. Zero: known exactly."""
 
-    centre: float  # [m] of each component of a centre
-    radius: float  # [m] of a radius, independent from grain to grain
-    wall: float = 0.0  # [m] of a wall along its normal
-    wall_tilt: float = 0.0  # [rad] of a wall about its middle
-    pixel_size: float = 0.0  # relative
-    lens: float = 0.0  # [m] of the displacement by radial distortion at the farthest corner
-    radius_class: float = 0.0  # [m] of the error that all grains of a class share
+    centre: Annotated[float, Quantity("prior standard deviation of each component of a centre", "m")]
+    radius: Annotated[float, Quantity("… of a radius, independent from grain to grain", "m")]
+    wall: Annotated[float, Quantity("… of a wall along its normal", "m")] = 0.0
+    wall_tilt: Annotated[float, Quantity("… of a wall about its middle", "rad")] = 0.0
+    pixel_size: Annotated[float, Quantity("… of the pixel size, relative")] = 0.0
+    lens: Annotated[float, Quantity("… of the displacement by radial distortion at the farthest corner", "m")] = 0.0
+    radius_class: Annotated[float, Quantity("… of the error that all grains of a class share", "m")] = 0.0
 
     def __post_init__(self) -> None:
         given = (

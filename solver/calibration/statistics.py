@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import Quantity
 from solver.calibration.fit import GapFit
 from solver.calibration.weights import contact_width
 
@@ -17,11 +19,11 @@ IMPOSSIBLE = 4.0  # standard deviations of noise: no touching pair overlaps more
 class GapStatistics:
     """How physical the gaps of a sequence are."""
 
-    spread: float  # [m] rms distance from contact of the grains that touch once they are corrected
-    wall_spread: float  # [m] the same between grains and walls
-    width: float  # [m] standard deviation of the gaps of touching grains, from their overlapping side
-    wall_width: float  # [m] the same between grains and walls
-    impossible: float  # share of all gaps below the noise that lie deeper than 4 of its standard deviations
+    spread: Annotated[float, Quantity("rms gap of grains that touch once corrected", "m")]
+    wall_spread: Annotated[float, Quantity("rms gap of grains that touch walls", "m")]
+    width: Annotated[float, Quantity("standard deviation of these gaps, from their overlapping side", "m")]
+    wall_width: Annotated[float, Quantity("the same at walls", "m")]
+    impossible: Annotated[float, Quantity("share of overlaps deeper than 4 standard deviations of the noise")]
 
 
 def gap_statistics(gap: Array, fit: GapFit) -> GapStatistics:

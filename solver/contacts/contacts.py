@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int32
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from solver.bodies.grains import Array, Grains
+from solver.bodies.quantity import Quantity
 from solver.bodies.walls import Walls
 from solver.contacts.pairs import Keys, make_keys, split_keys
 
@@ -22,11 +24,17 @@ class Contacts:
     Body `i` is always a grain; `j` is a grain (j > i) or wall `j − n`. The normal points from i to j.
     """
 
-    i: Int32[NDArray[np.int32], " c"]
-    j: Int32[NDArray[np.int32], " c"]
-    gap: Float[Array, " c"]  # [m], negative: overlap
-    normal: Float[Array, "c 2"]  # unit vector from i towards j
-    point: Float[Array, "c 2"]  # [m], midway between the two surfaces
+    i: Annotated[Int32[NDArray[np.int32], " c"], Quantity("row of a grain", dims="contact", essential=True)]
+    j: Annotated[
+        Int32[NDArray[np.int32], " c"], Quantity("row of a grain, j > i; then walls", dims="contact", essential=True)
+    ]
+    gap: Annotated[
+        Float[Array, " c"], Quantity("distance of the two surfaces, negative: overlap", "m", "contact", essential=True)
+    ]
+    normal: Annotated[Float[Array, "c 2"], Quantity("unit vector from i towards j", dims="contact xy", essential=True)]
+    point: Annotated[
+        Float[Array, "c 2"], Quantity("midway between the two surfaces", "m", "contact xy", essential=True)
+    ]
     grain_count: int  # n: j >= n is a wall
     wall_count: int
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
+from solver.bodies.quantity import Quantity
 from solver.bodies.walls import Walls
 from solver.contacts.connectivity import coordination_number
 from solver.contacts.contacts import Contacts, detect_contacts
@@ -34,12 +36,12 @@ class Candidates:
 class RadiusTuning:
     """The curve z(δR), and the change at which it meets the wanted coordination number."""
 
-    change: Array  # (m,) [m] δR, ascending
-    coordination_number: Array  # (m,) without rattlers, the mean over frames
-    frame_coordination_number: Array  # (m, f) of every frame
-    wanted: float
-    found: float  # [m] δR; NaN where the curve does not meet the wanted value
-    reached: float  # coordination number at `found`, NaN without one
+    change: Annotated[Array, Quantity("change of all radii δR, ascending", "m", "radius_change")]
+    coordination_number: Annotated[Array, Quantity("without rattlers, the mean over frames", dims="radius_change")]
+    frame_coordination_number: Annotated[Array, Quantity("the same in every frame", dims="radius_change frame")]
+    wanted: Annotated[float, Quantity("coordination number that was asked for")]
+    found: Annotated[float, Quantity("δR that gives it; NaN where the curve does not meet it", "m")]
+    reached: Annotated[float, Quantity("coordination number at `found`, NaN without one")]
 
     @property
     def met(self) -> bool:

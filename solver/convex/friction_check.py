@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from solver.bodies.grains import Array
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
+from solver.bodies.quantity import Quantity
 from solver.convex.friction_estimate import FACTORS, SlidingFrame, estimate_friction
 from solver.convex.members import measured_slip
 from solver.convex.program import assemble_balance
@@ -27,15 +29,15 @@ FRAMES = 8  # consecutive photographs that the check looks at
 class FrictionCheck:
     """The friction that the motion shows, over the one that was given."""
 
-    given: float
-    measured: float  # corrected for the known bias; NaN where nothing slides
-    low: float  # interval of two standard deviations, spread over frames and scatter of the bias
-    high: float
-    first: int  # frames looked at: first … last
-    last: int
-    enclosed: bool  # False: the friction lies beyond the trials, or nothing slides
-    trial: Array  # (q,) factors on the given friction that were tried
-    gap: Array  # (q,) relative power gap
+    given: Annotated[float, Quantity("friction that was given")]
+    measured: Annotated[float, Quantity("friction that the motion shows; NaN where nothing slides")]
+    low: Annotated[float, Quantity("lower end of the interval of two standard deviations")]
+    high: Annotated[float, Quantity("upper end")]
+    first: Annotated[int, Quantity("first of the frames looked at", absent=0)]
+    last: Annotated[int, Quantity("last of them", absent=0)]
+    enclosed: Annotated[bool, Quantity("whether it lies within the trials", absent=False)]
+    trial: Annotated[Array, Quantity("factors on the given friction that were tried", dims="friction_trial")]
+    gap: Annotated[Array, Quantity("relative power gap of every trial", dims="friction_trial")]
 
     @property
     def agrees(self) -> bool:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import Quantity
 from solver.contacts.contacts import Contacts
 from solver.contacts.pairs import find_rows
 from solver.nlgs.problem import ContactProblem
@@ -105,12 +106,12 @@ class SweepRecorder:
 class SweepHistory:
     """What one frame's sweeps did: a row of residuals for every sweep, NaN where not measured; forces of some."""
 
-    force_change: Array  # (s,) greatest |Δf| / |f| of a contact, the paper's ε_f
-    natural_map: Array  # (s,) relative natural-map residual
-    unbalance: Array  # (s,) worst |ΣF| on a grain / mean f_n
-    recorded: NDArray[np.int64]  # (r,) ascending sweeps (0 … s−1) whose forces are kept
-    fn: NDArray[np.float32]  # (r, c) [N], on the contacts of the frame
-    ft: NDArray[np.float32]  # (r, c) [N]
+    force_change: Annotated[Array, Quantity("greatest |Δf| / |f| of a contact, the paper's ε_f", dims="sweep")]
+    natural_map: Annotated[Array, Quantity("relative natural-map residual", dims="sweep")]
+    unbalance: Annotated[Array, Quantity("worst |ΣF| on a grain / mean f_n", dims="sweep")]
+    recorded: Annotated[NDArray[np.int64], Quantity("sweeps, from 0, whose forces are kept", dims="kept_sweep")]
+    fn: Annotated[NDArray[np.float32], Quantity("f_n after each of these sweeps", "N", "kept_sweep contact")]
+    ft: Annotated[NDArray[np.float32], Quantity("f_t after each of these sweeps", "N", "kept_sweep contact")]
 
     @property
     def count(self) -> int:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
+from solver.bodies.quantity import Quantity
+from solver.contacts.contacts import Contacts, ContactSource, ContactState
 from solver.nlgs.sweep_record import SweepHistory
 
 
@@ -24,34 +26,45 @@ class FrameStatus(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class FrameForces:
-    """Contacts and forces of one frame. f_n > 0 is compression; forces are those that i exerts on j."""
+    """Contacts and forces of one frame. f_n > 0 is compression; forces are those that i exerts on j.
+
+    c contacts, m members of the ensemble: (c,), (c, m, 2) and single values.
+    """
 
     frame: int
     contacts: Contacts
-    fn: Array  # (c,) [N] the reported field
-    ft: Array  # (c,) [N]
-    nlgs_fn: Array  # (c,) [N] the Gauss-Seidel chain whose sweeps are recorded
-    nlgs_ft: Array  # (c,) [N]
-    un: Array  # (c,) [m/s] measured relative velocity, u_n > 0 opens
-    ut: Array  # (c,) [m/s]
-    state: NDArray[np.uint8]  # (c,) ContactState
-    age: NDArray[np.int32]  # (c,) frames since the contact was last absent
-    source: NDArray[np.uint8]  # (c,) ContactSource
-    probability: Array  # (c,) P(touch), NaN where not computed
-    fn_sd: Array  # (c,) [N] calibrated standard deviation
-    ft_sd: Array  # (c,) [N]
-    status: FrameStatus
-    reason: str  # why the frame has this status and how its solve ended: sentences for the user
-    sweeps: int
-    natural_map: float  # reached, of the Gauss-Seidel chain
-    unbalance: float  # worst |ΣF| on a grain / mean f_n, of the reported field
-    kappa: float  # kinematic number w m v_rms / (δt σ L d)
-    correction: float  # ε: how much the forces must correct the measured motion
-    old_unbalance: float  # ū: mean |ΣF| of the former forces on this network / mean f_n; NaN without former forces
-    trust: float  # T, an estimate of the correlation with the true forces, given these inputs
-    frames_since_reset: int
+    fn: Annotated[Array, Quantity("normal force, compression positive", "N", "contact", essential=True)]
+    ft: Annotated[Array, Quantity("tangential force of i on j", "N", "contact", essential=True)]
+    nlgs_fn: Annotated[Array, Quantity("f_n of the chain whose sweeps are recorded", "N", "contact")]
+    nlgs_ft: Annotated[Array, Quantity("f_t of the same chain", "N", "contact")]
+    un: Annotated[Array, Quantity("measured relative velocity, positive: opens", "m/s", "contact")]
+    ut: Annotated[Array, Quantity("… along the tangent", "m/s", "contact")]
+    state: Annotated[
+        NDArray[np.uint8],
+        Quantity("how the contact bears its force", dims="contact", essential=True, names=ContactState),
+    ]
+    age: Annotated[NDArray[np.int32], Quantity("frames since the contact was last absent", dims="contact", absent=0)]
+    source: Annotated[
+        NDArray[np.uint8], Quantity("who says that the contact is there", dims="contact", absent=0, names=ContactSource)
+    ]
+    probability: Annotated[Array, Quantity("P(touch), NaN where not computed", dims="contact")]
+    fn_sd: Annotated[Array, Quantity("standard deviation of f_n, calibrated", "N", "contact")]
+    ft_sd: Annotated[Array, Quantity("standard deviation of f_t, calibrated", "N", "contact")]
+    status: Annotated[FrameStatus, Quantity("how far the forces may be trusted", essential=True, names=FrameStatus)]
+    reason: Annotated[str, Quantity("why it has this status and how its solve ended", absent="")]
+    sweeps: Annotated[int, Quantity("sweeps done", absent=0)]
+    natural_map: Annotated[float, Quantity("relative natural-map residual reached, of the Gauss-Seidel chain")]
+    unbalance: Annotated[float, Quantity("worst |ΣF| on a grain / mean f_n, of the reported field")]
+    kappa: Annotated[float, Quantity("kinematic number w m v_rms / (δt σ L d)")]
+    correction: Annotated[float, Quantity("ε: how much the forces must correct the measured motion")]
+    old_unbalance: Annotated[float, Quantity("ū: mean |ΣF| of the former forces on this network / mean f_n")]
+    trust: Annotated[float, Quantity("T, an estimate of the correlation with the true forces, given these inputs")]
+    frames_since_reset: Annotated[int, Quantity("frames since the last reset", absent=0)]
     history: SweepHistory
-    member_force: Array | None = None  # (c, m, 2) [N] (f_n, f_t) of every member of the ensemble, where asked for
-    start_difference: float = float("nan")  # H: of two chains started differently, over the rms; NaN: not computed
-    unseen_grains: int = 0  # holes inside the walls that a rod would fit into
-    hidden_share: float = 0.0  # 1 − correlation of the field with what is left when bridged grains are dropped
+    member_force: Annotated[
+        Array | None,
+        Quantity("forces of the members, NaN: nothing to read", "N", "contact member component", path="members/force"),
+    ] = None
+    start_difference: Annotated[float, Quantity("H: of two chains started differently, over the rms")] = float("nan")
+    unseen_grains: Annotated[int, Quantity("holes inside the walls that a rod would fit into")] = 0
+    hidden_share: Annotated[float, Quantity("1 − correlation with the field less bridged grains")] = 0.0

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import columns
 from solver.contacts.contacts import Contacts, ContactSource, ContactState
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.agreement import pearson
@@ -21,9 +22,7 @@ def without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForc
     contacts, history = frame.contacts, frame.history
     stand_in = np.concatenate([bridged, np.zeros(contacts.wall_count, np.bool_)])
     keep = ~(stand_in[contacts.i] | stand_in[contacts.j])
-    columns = {
-        each.name: value[keep] for each in fields(frame) if isinstance(value := getattr(frame, each.name), np.ndarray)
-    }
+    kept = {name: value[keep] for name, value in _contact_columns(frame).items()}
     # What is left out counts as zero for whoever compares the whole network.
     hidden = 1.0 - pearson(np.where(keep, frame.fn, 0.0), frame.fn)
     return replace(
@@ -33,7 +32,7 @@ def without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForc
         contacts=contacts.select(keep),
         history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
         reason=f"{bridged.sum()} lost grains were bridged, and nothing is shown of their contacts; {frame.reason}",
-        **columns,
+        **kept,
     )
 
 
@@ -51,17 +50,17 @@ def show_forbidden(frame: FrameForces, forbidden: Contacts, probability: Array, 
         "source": np.full(forbidden.count, ContactSource.FORBIDDEN_BY_REVIEWER),
         "probability": probability, "un": un, "ut": ut,
     }  # fmt: skip
-    columns: dict[str, NDArray] = {}
-    for each in fields(frame):
-        value = getattr(frame, each.name)
-        if isinstance(value, np.ndarray):
-            added = np.asarray(known.get(each.name, np.zeros(forbidden.count)), value.dtype)
-            columns[each.name] = np.concatenate([value, added])[order]
+    listed: dict[str, NDArray] = {}
+    for name, value in _contact_columns(frame).items():
+        added = np.zeros((forbidden.count, *value.shape[1:]), value.dtype)
+        if name in known:
+            added[:] = known[name]
+        listed[name] = np.concatenate([value, added])[order]
     history = frame.history
     nothing = np.zeros((len(history.recorded), forbidden.count), np.float32)
     geometry = {
         name: np.concatenate([getattr(contacts, name), getattr(forbidden, name)])[order]
-        for name in ("i", "j", "gap", "normal", "point")
+        for name in columns(Contacts, "contact")
     }
     merged = Contacts(**geometry, grain_count=contacts.grain_count, wall_count=contacts.wall_count)
     return replace(
@@ -72,5 +71,11 @@ def show_forbidden(frame: FrameForces, forbidden: Contacts, probability: Array, 
             fn=np.concatenate([history.fn, nothing], axis=1)[:, order],
             ft=np.concatenate([history.ft, nothing], axis=1)[:, order],
         ),
-        **columns,
+        **listed,
     )
+
+
+def _contact_columns(frame: FrameForces) -> dict[str, NDArray]:
+    """The columns that have a row per contact, those that are there."""
+    named = {name: getattr(frame, name) for name in columns(type(frame), "contact")}
+    return {name: value for name, value in named.items() if value is not None}

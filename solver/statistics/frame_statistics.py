@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.packing import Material
+from solver.bodies.quantity import Quantity
 from solver.bodies.walls import Walls
 from solver.contacts.connectivity import coordination_number, rattlers
 from solver.contacts.contacts import Contacts, ContactState
@@ -38,44 +40,46 @@ from solver.statistics.stress import (
 class FrameStatistics:
     """Statistics of one frame. Means and shares over contacts are over those that carry force."""
 
-    area: float  # [m²] of the polygon between the walls
-    stress: Array  # (2, 2) [Pa] Love-Weber, compression positive
-    pressure: float  # [Pa] half the trace
-    friction_angle: float  # [rad] asin((σ₁−σ₂)/(σ₁+σ₂))
-    wall_ratio_angle: float  # [rad] atan(|T|/N) on the loaded plate, NaN without one
-    principal_direction: float  # [rad] of σ₁, in (−π/2, π/2]
-    coordination_number: float  # contacts with force per grain, walls counted once
-    coordination_number_without_rattlers: float
-    rattler_count: int
-    contact_count: int  # carrying force
-    sliding_fraction: float  # of the contacts carrying force
-    mean_fn: float  # [N] over contacts carrying force
-    max_fn: float  # [N]
-    fabric: Array  # (2, 2) mean n⊗n over contacts carrying force
-    fabric_anisotropy: float  # 2 (F₁ − F₂)
-    sigma_1: float  # [Pa] greatest principal stress
-    sigma_2: float  # [Pa] smallest
-    wall_force: Array  # (w, 2) [N] that the packing exerts on every wall
+    area: Annotated[float, Quantity("area of the polygon between the walls", "m2")]
+    stress: Annotated[Array, Quantity("Love-Weber stress, compression positive", "Pa", "xy axis")]
+    pressure: Annotated[float, Quantity("half the trace of the stress", "Pa")]
+    friction_angle: Annotated[float, Quantity("asin((σ₁−σ₂)/(σ₁+σ₂))", "rad")]
+    wall_ratio_angle: Annotated[float, Quantity("atan(|T|/N) on the loaded plate, NaN without one", "rad")]
+    principal_direction: Annotated[float, Quantity("direction of σ₁, in (−π/2, π/2]", "rad")]
+    coordination_number: Annotated[float, Quantity("contacts with force per grain, walls counted once")]
+    coordination_number_without_rattlers: Annotated[float, Quantity("the same among the grains that are no rattlers")]
+    rattler_count: Annotated[int, Quantity("grains with fewer than two contacts that carry force")]
+    contact_count: Annotated[int, Quantity("contacts carrying force")]
+    sliding_fraction: Annotated[float, Quantity("share of the contacts carrying force that slide")]
+    mean_fn: Annotated[float, Quantity("mean f_n over contacts carrying force", "N")]
+    max_fn: Annotated[float, Quantity("greatest f_n", "N")]
+    fabric: Annotated[Array, Quantity("mean n⊗n over contacts carrying force", dims="xy axis")]
+    fabric_anisotropy: Annotated[float, Quantity("2 (F₁ − F₂) of the fabric")]
+    sigma_1: Annotated[float, Quantity("greatest principal stress", "Pa")]
+    sigma_2: Annotated[float, Quantity("smallest principal stress", "Pa")]
+    wall_force: Annotated[Array, Quantity("force of the packing on every wall", "N", "wall xy")]
     # Anisotropies of the contacts between grains: those with walls face where the walls face.
-    contact_anisotropy: float  # a_c, Rothenburg & Bathurst 1989
-    branch_anisotropy: float  # a_l
-    normal_force_anisotropy: float  # a_n
-    tangential_force_anisotropy: float  # a_t
-    anisotropy_direction: Array  # (4,) [rad] of a_c, a_l, a_n, a_t, in (−π/2, π/2]
-    friction_angle_of_anisotropies: float  # [rad] that the four add up to: near `friction_angle`
-    mobilisation: float  # mean of |f_t| / (μ f_n)
-    mobilisation_density: Array  # (MOBILISATION_BINS,)
-    fn_density: Array  # (FORCE_BINS,) P(f_n / ⟨f_n⟩) in the bins of FORCE_EDGES
-    ft_density: Array  # (FORCE_BINS,) P(|f_t| / ⟨|f_t|⟩)
-    tail_exponent: float  # β of P(f_n) ∝ exp(−β f_n/⟨f_n⟩) above the mean, NaN without a tail
-    tail_exponent_sd: float
-    plateau_ratio: float  # 1: P(f_n) flat below the mean; above 1: more of the weakest; NaN without weak forces
-    plateau_ratio_sd: float
-    strong_share: float  # of the contacts, with more than the mean normal force; the weak have the rest
-    strong_pressure_share: float  # of the pressure that the strong contacts carry
-    strong_deviator_share: float  # of the stress deviator; above 1 where the weak contacts oppose it
-    chain_count: int  # force chains, Peters et al. 2005
-    chain_grain_share: float  # of the grains present that belong to one
+    contact_anisotropy: Annotated[float, Quantity("a_c of contacts between grains, Rothenburg & Bathurst 1989")]
+    branch_anisotropy: Annotated[float, Quantity("a_l of branch lengths")]
+    normal_force_anisotropy: Annotated[float, Quantity("a_n of normal forces")]
+    tangential_force_anisotropy: Annotated[float, Quantity("a_t of tangential forces")]
+    anisotropy_direction: Annotated[Array, Quantity("of each, in (−π/2, π/2]", "rad", "anisotropy")]
+    friction_angle_of_anisotropies: Annotated[float, Quantity("that the four add up to, near friction_angle", "rad")]
+    mobilisation: Annotated[float, Quantity("mean of |f_t| / (μ f_n)")]
+    mobilisation_density: Annotated[Array, Quantity("P(|f_t| / (μ f_n))", dims="mobilisation_bin")]
+    fn_density: Annotated[Array, Quantity("P(f_n / ⟨f_n⟩)", dims="force_bin")]
+    ft_density: Annotated[Array, Quantity("P(|f_t| / ⟨|f_t|⟩)", dims="force_bin")]
+    tail_exponent: Annotated[float, Quantity("β of P(f_n) ∝ exp(−β f_n/⟨f_n⟩) above the mean, NaN: no tail")]
+    tail_exponent_sd: Annotated[float, Quantity("its standard error")]
+    plateau_ratio: Annotated[float, Quantity("1: P(f_n) flat below the mean; above 1: more of the weakest")]
+    plateau_ratio_sd: Annotated[float, Quantity("its standard error")]
+    strong_share: Annotated[float, Quantity("share of the contacts with more than the mean normal force")]
+    strong_pressure_share: Annotated[float, Quantity("share of the pressure that the strong contacts carry")]
+    strong_deviator_share: Annotated[
+        float, Quantity("share of the deviator that they carry; above 1: the weak oppose it")
+    ]
+    chain_count: Annotated[int, Quantity("force chains, Peters et al. 2005")]
+    chain_grain_share: Annotated[float, Quantity("share of the grains present that belong to a force chain")]
 
 
 def frame_statistics(

@@ -1,0 +1,82 @@
+"""What a stored number is: its dimensions, unit and meaning, said once, on the field that holds it.
+
+    fn: Annotated[Array, Quantity("normal force, compression positive", "N", "contact")]
+
+Whoever stores, exports or documents results reads these declarations and keeps no list of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import MISSING, Field, dataclass, fields
+from enum import IntEnum
+from functools import cache
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What a field of a result holds."""
+
+    meaning: str  # a phrase for people
+    unit: str = ""  # SI; empty: none
+    dims: str = ""  # names of the dimensions, separated by spaces: "contact xy"; empty: a single value
+    since: int = 1  # first version of the stored schema that has it
+    essential: bool = False  # without it the rest means nothing
+    absent: Any = float("nan")  # value where an earlier version stored none; a default of the field goes before
+    path: str | None = None  # where it is stored, if not with the rest of its class
+    names: type[IntEnum] | None = None  # of its values
+
+
+class Declared(NamedTuple):
+    """A field of a class with what it holds."""
+
+    name: str
+    dtype: np.dtype  # object: text
+    quantity: Quantity
+    absent: Any  # value where none was stored: a number, text or None
+
+
+@cache
+def quantities(kind: type) -> tuple[Declared, ...]:
+    """The declared fields of a dataclass, in order."""
+    return tuple(_declared(kind))
+
+
+def columns(kind: type, dimension: str) -> tuple[str, ...]:
+    """Names of the fields with a row for each of the dimension: columns(FrameForces, "contact")."""
+    return tuple(each.name for each in quantities(kind) if each.quantity.dims.split()[:1] == [dimension])
+
+
+def _declared(kind: type) -> Iterator[Declared]:
+    hints = get_type_hints(kind, include_extras=True)
+    for each in fields(kind):
+        hint = hints[each.name]
+        if get_origin(hint) is not Annotated:
+            continue
+        told, *notes = get_args(hint)
+        for quantity in (note for note in notes if isinstance(note, Quantity)):
+            yield Declared(each.name, _dtype(told), quantity, _absent(each, quantity))
+
+
+def _dtype(hint: Any) -> np.dtype:
+    """The type of the numbers that a hint allows: of an array, a scalar, either of them or None."""
+    if hasattr(hint, "array_type"):  # of jaxtyping, Float[Array, "n 2"]: the widest of the kind that it names
+        widest = [name for name in ("float64", "int64") if name in hint.dtypes]
+        return np.dtype(*(widest or hint.dtypes[:1]))
+    parts = [part for part in get_args(hint) if part is not type(None)]
+    if get_origin(hint) is np.ndarray:  # ndarray[shape, dtype[number]]
+        return np.dtype(get_args(parts[1])[0])
+    if len(parts) == 1 and type(None) in get_args(hint):
+        return _dtype(parts[0])
+    if get_origin(hint) is tuple or hint is str:
+        return np.dtype(object)
+    return np.dtype(np.uint8) if issubclass(hint, IntEnum) else np.dtype(hint)
+
+
+def _absent(each: Field[Any], quantity: Quantity) -> Any:
+    if each.default is not MISSING:
+        return each.default
+    return each.default_factory() if each.default_factory is not MISSING else quantity.absent
