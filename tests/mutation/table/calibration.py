@@ -1,0 +1,54 @@
+"""Constant errors of centres, radii, walls and scale."""
+
+from tests.mutation.mutant import mutants_of
+
+CALIBRATE = "tests/solver/calibration/test_calibrate.py"
+SCALE = "tests/solver/calibration/test_scale.py"
+
+MUTANTS = [
+    *mutants_of(
+        "solver/calibration/equations.py",
+        CALIBRATE,
+        ("(2 * grain, of_grain * jx)", "(2 * grain, -of_grain * jx)"),
+        ("(layout.radius.start + i, -one)", "(layout.radius.start + i, one)"),
+        ("-geometry.along)]", "geometry.along)]"),
+        (
+            "[c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0]",
+            "[c * offset[:, 0] + s * offset[:, 1], s * offset[:, 0]",
+        ),
+        ("np.sum(place**2, axis=2, keepdims=True) * place", "place"),
+        ("np.stack([outward + half, outward - half], axis=-1)", "np.stack([outward - half, outward + half], axis=-1)"),
+    ),
+    *mutants_of(
+        "solver/calibration/gaps.py",
+        (CALIBRATE, SCALE),
+        ("distance - radius[i] - np.where(wall, 0.0, radius[grain])", "distance - radius[i] - radius[grain]"),
+        ("endpoints[kw, w].mean(axis=1)", "endpoints[kw, w, 0]"),
+    ),
+    *mutants_of(
+        "solver/calibration/priors.py",
+        CALIBRATE,
+        ("share = min(1.0, ratio)", "share = 1.0"),
+        ("np.sqrt(first**2 + second**2 + finest**2)", "np.sqrt(first**2 + finest**2)"),
+    ),
+    *mutants_of(
+        "solver/calibration/statistics.py",
+        CALIBRATE,
+        ("1.0 - after / before if before > 0.0 else 0.0", "1.0 - before / after if after > 0.0 else 0.0"),
+        ("deep = gap + overlap < -IMPOSSIBLE * candidates.noise", "deep = gap + overlap < 0.0 * candidates.noise"),
+    ),
+    *mutants_of(
+        "solver/calibration/calibrate.py",
+        CALIBRATE,
+        ("self.noise_factor * sigma, self.gap_sd / np.sqrt(2.0)", "self.noise_factor * sigma, 0.0"),
+        ("LEAST_GAIN = 0.1", "LEAST_GAIN = -10.0"),
+        ("MISJUDGED_NOISE = 2.0", "MISJUDGED_NOISE = 2000.0"),
+    ),
+    *mutants_of(
+        "solver/calibration/scale.py",
+        SCALE,
+        ("target = -piles.excess", "target = piles.excess"),
+        ("place + overlap, width / np.sqrt(pairs)", "place, width / np.sqrt(pairs)"),
+        ("DECISIVE = 20.0", "DECISIVE = -20.0"),
+    ),
+]

@@ -1,0 +1,64 @@
+"""Who may touch whom, and how they move there."""
+
+from tests.mutation.mutant import mutants_of
+
+TESTS = "tests/solver/contacts"
+
+MUTANTS = [
+    *mutants_of(
+        "solver/contacts/contacts.py",
+        TESTS,
+        ("np.stack([-self.normal[:, 1], self.normal[:, 0]]", "np.stack([self.normal[:, 1], -self.normal[:, 0]]"),
+        ("(grains.radius[i] + 0.5 * gap)", "grains.radius[i]"),
+        (
+            "gap[~wall] = distance - grains.radius[a] - grains.radius[b]",
+            "gap[~wall] = distance - 2.0 * grains.radius[a]",
+        ),
+        ("(gap > -radius[:, None]) & beside", "(gap > -radius[:, None])"),
+        ("near = gap < threshold", "near = gap < 0.5 * threshold"),
+        ("threshold if wall_threshold is None else wall_threshold", "threshold"),
+    ),
+    *mutants_of(
+        "solver/contacts/kinematics.py",
+        TESTS,
+        ("turn = -radius[i] * rotation[i]", "turn = radius[i] * rotation[i]"),
+        (
+            "turn[~wall] -= radius[j[~wall]] * rotation[j[~wall]]",
+            "turn[~wall] += radius[j[~wall]] * rotation[j[~wall]]",
+        ),
+        ("motion[wall] += walls.velocity_at", "motion[wall] -= walls.velocity_at"),
+        (
+            "add(2 * n + j[pair], c + column[pair], -radius[j[pair]])",
+            "add(2 * n + j[pair], c + column[pair], radius[j[pair]])",
+        ),
+        (
+            "add(axis * n + j[pair], offset + column[pair], direction[pair, axis])",
+            "add(axis * n + j[pair], offset + column[pair], -direction[pair, axis])",
+        ),
+        ("-mass * gravity[1]", "mass * gravity[1]"),
+        ('un = np.einsum("ij,ij->i", motion, contacts.normal)', 'un = -np.einsum("ij,ij->i", motion, contacts.normal)'),
+    ),
+    *mutants_of(
+        "solver/contacts/connectivity.py",
+        (TESTS, "tests/solver/statistics/test_stress.py"),
+        ("(contacts_per_grain(contacts, bearing) < 2)", "(contacts_per_grain(contacts, bearing) < 1)"),
+        ("np.bincount(i, minlength=n) + np.bincount(j[j < n], minlength=n)[:n]", "2 * np.bincount(i, minlength=n)"),
+        ("counted &= ~loose", "counted &= present"),
+        ("kept = bearing & ~loose[contacts.i]", "kept = bearing.copy()"),
+    ),
+    *mutants_of(
+        "solver/contacts/radius_tuning.py",
+        TESTS,
+        ("np.where(contacts.with_wall, contacts.gap, 0.5 * contacts.gap)", "0.5 * contacts.gap"),
+        ("(mean[:-1] < wanted) & (mean[1:] >= wanted)", "mean[1:] >= wanted"),
+        (".mean() >= wanted:", ".mean() > wanted + 0.5:"),
+    ),
+    *mutants_of(
+        "solver/contacts/verdicts.py",
+        (TESTS, "tests/app/review/test_solver_obeys.py"),
+        ("DETECTED = 0.5", "DETECTED = 0.0"),
+        ("np.union1d(np.setdiff1d(contacts.key, verdicts.forbidden), forced)", "np.union1d(contacts.key, forced)"),
+        ("here[verdicts.forced // bodies] & here[verdicts.forced % bodies]", "here[verdicts.forced // bodies]"),
+        ("position=(1.0 - share) * one.position + share * two.position", "position=one.position"),
+    ),
+]

@@ -1,0 +1,77 @@
+"""Who does touch, inferred from many photographs."""
+
+from tests.mutation.mutant import mutants_of
+
+KERNELS = ("tests/reference/test_detection.py", "tests/solver/detection/test_touch_probability.py")
+PROBABILITY = ("tests/reference/test_detection.py", "tests/solver/detection/test_touch_probability.py")
+DETECTION = "tests/solver/detection"
+
+MUTANTS = [
+    *mutants_of(
+        "solver/detection/touch_probability_kernels.py",
+        KERNELS,
+        ("np.exp(-0.5 * z * z)", "np.exp(-z * z)"),
+        ("min(max(measured, lowest * s), state_gap[states - 1])", "min(measured, state_gap[states - 1])"),
+        ("alpha[f, r] *= emission[f, r]", "alpha[f, r] *= 1.0"),
+        ("b = beta[0, r] * emission[f + 1, r]", "b = beta[0, r] * emission[f, r]"),
+        ("forward[f - 1, q, r]", "forward[0, q, r]"),
+        ("touch[f, c] = alpha[f, 0] * beta[1, 0] / share", "touch[f, c] = alpha[f, 0]"),
+        ("alpha[0, q] = start[q] * emission[0, q]", "alpha[0, q] = emission[0, q]"),
+        ("width[q] / (width[q] + error)", "error / (width[q] + error)"),
+        ("second += share * (middle * middle + width[q] * (1.0 - gain))", "second += share * middle * middle"),
+    ),
+    *mutants_of(
+        "solver/detection/touch_probability.py",
+        PROBABILITY,
+        ("STAY = 0.95", "STAY = 0.5"),
+        ("matrix[1:, 0] = 0.5 * np.exp(-state_gap[1:] / scale)", "matrix[1:, 0] = 0.0"),
+        ("gap + 0.5 * settings.overlap, sigma, LOWEST_GAP", "gap, sigma, LOWEST_GAP"),
+        ("variance[i] + np.where(wall, 0.0, variance[partner])", "variance[i] + variance[partner]"),
+        (
+            "range(max(frame - BACK, 0), min(frame + AHEAD + 1, frame_count))",
+            "range(max(frame - BACK, 0), min(frame + AHEAD, frame_count))",
+        ),
+        ("matrix[0, 1:] = (1.0 - STAY) * opened / opened.sum()", "matrix[0, 1:] = (1.0 - STAY) / len(opened)"),
+        ("settings.margin + 3.0 * settings.radius_sd", "3.0 * settings.radius_sd"),
+        ("keep = (touch > settings.least) & there", "keep = there"),
+    ),
+    *mutants_of(
+        "solver/detection/band_inverse.py",
+        ("tests/solver/detection/test_band_inverse.py", "tests/reference/test_detection.py"),
+        ("total += factor[k, a] * other", "total -= factor[k, a] * other"),
+        ("diagonal -= factor[k, a] * inverse[k, a] / pivot", "diagonal += factor[k, a] * inverse[k, a] / pivot"),
+    ),
+    *mutants_of(
+        "solver/detection/refinement.py",
+        "tests/solver/detection/test_refinement.py",
+        ("right, 2 * self.i + a, -force[:, a]", "right, 2 * self.i + a, force[:, a]"),
+        ("DAMPING = 0.7", "DAMPING = -0.7"),
+        ("total += moved + grains * each**2", "total += moved"),
+        ("touch[keep]\n", "touch[keep] ** 2\n"),
+        ("own + partner - 2.0 * cross", "own + partner + 2.0 * cross"),
+    ),
+    *mutants_of(
+        "solver/detection/displacement.py",
+        "tests/solver/detection/test_displacement.py",
+        ("noise = 2.0 * (variance.mean()", "noise = 0.0 * (variance.mean()"),
+        ("motion[f] @ motion[last] < 0.0", "motion[f] @ motion[last] > 0.0"),
+        ("endpoints[1] - endpoints[0], walls.load", "endpoints[0] - endpoints[1], walls.load"),
+        ("lowest = int(before[-1]) if len(before) else 0", "lowest = 0"),
+    ),
+    *mutants_of(
+        "solver/detection/networks.py",
+        DETECTION,
+        ("np.maximum(0.0, np.log10(SURE / touch[keep]))", "np.maximum(0.0, np.log(SURE / touch[keep]))"),
+        ("(1.0 - fraction) * self.start.of(key) + fraction * self.end.of(key)", "self.end.of(key)"),
+        ("keep = (touch > LEAST) & here[i] & here[j]", "keep = (touch > LEAST) & here[i]"),
+        ("SURE = 0.3", "SURE = 0.9"),
+        ("np.union1d(self.start.key, self.end.key) if fraction < 1.0 else self.end.key", "self.end.key"),
+    ),
+    *mutants_of(
+        "solver/detection/precision.py",
+        "tests/solver/detection/test_precision.py",
+        ("/ np.sqrt(12.0)", "/ np.sqrt(6.0)"),
+        ("np.mean(mean**2) - 2.0 / 3.0 * sigma**2", "np.mean(mean**2)"),
+        ("1.0 / CONTRADICTION <= factor <= CONTRADICTION", "factor <= CONTRADICTION"),
+    ),
+]

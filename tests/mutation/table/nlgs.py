@@ -1,0 +1,132 @@
+"""The contact law, its sweeps and what is measured of them."""
+
+from tests.mutation.mutant import mutants_of
+
+SWEEPS = ("tests/reference/test_sweeps.py",)
+MEASURES = ("tests/reference/test_measures.py",)
+
+MUTANTS = [
+    *mutants_of(
+        "solver/nlgs/contact_law.py",
+        (*SWEEPS, *MEASURES),
+        ("fn = max(fn, 0.0)", "fn = abs(fn)"),
+        ("limit = friction * fn", "limit = 0.5 * friction * fn"),
+        ("min(max(ft, -limit), limit)", "min(max(ft, 0.0), limit)"),
+        ("ft - ut * inverse_wtt, friction", "ft + ut * inverse_wtt, friction"),
+        ("restitution / (1.0 + restitution)", "restitution"),
+    ),
+    *mutants_of(
+        "solver/nlgs/kernels.py",
+        (*SWEEPS, *MEASURES),
+        ("THIRD = 1.0 / 3.0", "THIRD = 1.0 / 2.0"),
+        ("        body[i, 2] -= ci * (2.0 * force[c, 1])", "        body[i, 2] -= ci * force[c, 1]"),
+        ("        body[j, 0] += cj * fx", "        body[j, 0] += ci * fx"),
+        ("    plate[w, 0] += plate[w, 1] * fn", "    plate[w, 0] -= plate[w, 1] * fn"),
+        ("    body[i + U2] -= ci * (2.0 * ft)", "    body[i + U2] += ci * (2.0 * ft)"),
+        (
+            "        un = dx * nx + dy * ny + pair[p + 3 * L + k]\n        ut = dy * nx - dx * ny - aw - bw",
+            "        un = dx * nx + dy * ny\n        ut = dy * nx - dx * ny - aw - bw",
+        ),
+        ("ut = dy * nx - dx * ny - aw - bw", "ut = dy * nx - dx * ny - aw + bw"),
+        ("work[4 * L + k] = bx + cj * fx", "work[4 * L + k] = bx + ci * fx"),
+        ("work[6 * L + k] = bw - cj * turn", "work[6 * L + k] = bw + cj * turn"),
+        (
+            "_relax_group(pair, ids, flat, flat_force, work, block, relaxation, mu)",
+            "_relax_group(pair, ids, flat, flat_force, work, block, relaxation, wall_mu)",
+        ),
+        (
+            "    un = dx * nx + dy * ny + pair[p + 3 * L]\n    ut = dy * nx - dx * ny - body[i + U2] - body[j + U2]",
+            "    un = dx * nx + dy * ny\n    ut = dy * nx - dx * ny - body[i + U2] - body[j + U2]",
+        ),
+        ("    body[j + U2] -= cj * turn", "    body[j + U2] -= ci * turn"),
+        (
+            "un = plate[w, 0] - body[i] * nx - body[i + U1] * ny + wall[c, 4]",
+            "un = plate[w, 0] - body[i] * nx - body[i + U1] * ny",
+        ),
+        (
+            "ut = body[i] * ny - body[i + U1] * nx - body[i + U2] + wall[c, 5]",
+            "ut = body[i] * ny - body[i + U1] * nx - body[i + U2]",
+        ),
+        ("relaxation * wall[c, 3], mu)", "relaxation * wall[c, 2], mu)"),
+        ("first + c, c, relaxation, wall_mu)", "first + c, c, relaxation, mu)"),
+        (
+            "for c in range(problem.grouped, first):\n            _relax_pair",
+            "for c in range(problem.grouped, problem.grouped):\n            _relax_pair",
+        ),
+        ("step = min(step, max(number, 1), spacing - number % spacing)", "step = min(step, max(number, 1))"),
+        ("work[2 * L + k] += 1.0 if fn > 0.0 else 0.0", "work[2 * L + k] += 1.0"),
+        ("size = size if size > 0.0 else change", "size = max(size, 1.0)"),
+        ("work[8 * L + k] += _miss(", "work[8 * L + k] = _miss("),
+        (
+            "un = plate[w, 0] - flat[i] * nx - flat[i + U1] * ny + problem.wall[c, 4]",
+            "un = plate[w, 0] - flat[i] * nx - flat[i + U1] * ny",
+        ),
+        ("+ problem.wall[c, 5]", ""),
+        ("problem.wall[c, 2], problem.wall[c, 3], wall_mu)", "problem.wall[c, 2], problem.wall[c, 3], mu)"),
+        ("x = external[at] + (now[row]", "x = (now[row]"),
+        ("return worst, total / max(grains, 1.0)", "return worst, total / count"),
+    ),
+    *mutants_of(
+        "solver/nlgs/problem.py",
+        SWEEPS,
+        ("PLATE_IMPEDANCE = 30.0", "PLATE_IMPEDANCE = 3.0"),
+        ("body[:, 2] = motion.spin * grains.radius", "body[:, 2] = motion.spin"),
+        ("-walls.load[walls.loaded] * plate_compliance", "walls.load[walls.loaded] * plate_compliance"),
+        ("grains.mass / grains.mass.mean()", "grains.radius / grains.radius.mean()"),
+        ("weight = grains.mass[:, None] *", "weight = grains.radius[:, None] *"),
+        ("1.0 / (3.0 * wall_w),", "1.0 / wall_w,"),
+        ("contacts.normal[rows_wall]) + closing[rows_wall]", "contacts.normal[rows_wall])"),
+        ('np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall])', "np.zeros(len(rows_wall))"),
+        ("1.0 / pair_w, closing[rows_pair]", "1.0 / pair_w, 0.0 * closing[rows_pair]"),
+        ("velocity_scale / (1.0 - formal_weight)", "velocity_scale"),
+        (
+            "return grains.mass / interval / (1.0 - formal_weight)",
+            "return grains.mass / interval * (1.0 - formal_weight)",
+        ),
+        ("impedance[motion.present].mean()", "impedance.mean()"),
+        ("weight[~motion.present] = 0.0", "weight[~motion.present] *= 1.0"),
+    ),
+    *mutants_of(
+        "solver/nlgs/acceleration.py",
+        ("tests/reference/test_measures.py", "tests/solver/nlgs/test_acceleration.py"),
+        ("flat[k] -= weight * row[k]", "flat[k] += weight * row[k]"),
+        ("friction[0 if c < pairs else 1]", "friction[0]"),
+        ("if self._natural_map < kept_natural_map:", "if self._natural_map > 0.0:"),
+    ),
+    *mutants_of(
+        "solver/nlgs/ordering.py",
+        ("tests/reference/test_measures.py", "tests/solver/nlgs/test_ordering.py"),
+        ("group_of[j[c]] = groups", "group_of[i[c]] = groups"),
+        ("_spread(cell[:, 1]) << np.uint64(1)", "_spread(cell[:, 1]) << np.uint64(2)"),
+    ),
+    *mutants_of(
+        "solver/nlgs/solve.py",
+        "tests/solver/nlgs",
+        ("force[:] = guess[problem.rows]", "force[:] = guess"),
+        ("result[..., problem.rows, :] = force", "result[:] = force[..., problem.rows, :]"),
+        ("sweep.natural_map <= settings.natural_map", "sweep.natural_map >= settings.natural_map"),
+        ("(worst / mean, mean_size / mean) if mean > 0", "(worst / mean, worst / mean) if mean > 0"),
+    ),
+    *mutants_of(
+        "solver/nlgs/chain.py",
+        "tests/solver/nlgs",
+        ("pressure * packing.length * 2.0 *", "pressure * packing.length *"),
+        ("motion.velocity_rms * reluctance", "0.0 * reluctance"),
+        ("problem, contacts, _ = contacts_at(step / steps)", "problem, contacts, _ = contacts_at(1.0)"),
+        ("(settings.spin_up if fresh else settings.substeps)", "settings.substeps"),
+        ("memory=memory.renew(contacts, solution.force, motion.grains.present)", "memory=former"),
+        ("step = motion.interval / steps", "step = motion.interval"),
+    ),
+    *mutants_of(
+        "solver/nlgs/sweep_record.py",
+        "tests/solver/nlgs/test_sweep_record.py",
+        ("yield wanted + 1 - count", "yield wanted - count"),
+        ("key[place] == contacts.key", "key[place] >= contacts.key"),
+    ),
+    *mutants_of(
+        "solver/nlgs/warm_start.py",
+        "tests/solver/nlgs",
+        ("known = self.key[place] == contacts.key", "known = self.key[place] >= contacts.key"),
+        ("unseen = ~(seen[i] & seen[j])", "unseen = ~(seen[i] | seen[j])"),
+    ),
+]

@@ -1,0 +1,56 @@
+"""Frames in order, the mean of the members, trust and status."""
+
+from tests.mutation.mutant import mutants_of
+
+JUDGEMENT = "tests/solver/sequence/test_judgement.py"
+FRAMES = ("tests/golden", "tests/solver/sequence")
+
+MUTANTS = [
+    *mutants_of(
+        "solver/sequence",
+        JUDGEMENT,
+        ("TRUST_DISAGREEMENT = (0.83, 2.65)", "TRUST_DISAGREEMENT = (0.53, 2.65)"),
+        ("TRUST_CORRECTION = (0.42, 0.73)", "TRUST_CORRECTION = (0.42, 1.73)"),
+        ("CHAIN_CORRECTION = (0.95, 0.8)", "CHAIN_CORRECTION = (0.5, 0.8)"),
+        ("CHAIN_REACH = 4.45", "CHAIN_REACH = 0.0"),
+        ("HOLE_DOUBT = 6.0", "HOLE_DOUBT = 1.0"),
+        ("NORMAL_DEVIATION = (0.003, 0.088, 0.985)", "NORMAL_DEVIATION = (0.003, 0.088, 0.5)"),
+        ("TANGENT_DEVIATION = (0.001, 0.008, 1.206)", "TANGENT_DEVIATION = (0.001, 0.008, 0.6)"),
+        ("CHAIN_DEVIATION = (0.071, 0.239)", "CHAIN_DEVIATION = (0.071, 0.039)"),
+        ("SUSPECT_CORRECTION = 0.25", "SUSPECT_CORRECTION = 2.5"),
+        ("LOAD_SHARES = (0.62, 2.5)", "LOAD_SHARES = (0.062, 25.0)"),
+        ("** 1.5, 0.4, 4.0))", "** 1.0, 0.4, 4.0))"),
+        ("REARRANGING_UNBALANCE = 0.037", "REARRANGING_UNBALANCE = 0.37"),
+        ("SETTLING_FRAMES = 2", "SETTLING_FRAMES = 5"),
+        ("a**2 + b**2 * np.maximum(fn, 0.0) / mean", "a**2 + b**2 * (np.maximum(fn, 0.0) / mean) ** 2"),
+    ),
+    *mutants_of(
+        "solver/sequence",
+        FRAMES,
+        ("NEGLIGIBLE_KAPPA = 1e-5", "NEGLIGIBLE_KAPPA = 1e5"),
+        ("age[here] = state.age[there] + 1", "age[here] = state.age[there]"),
+        ("friction * fn * (1.0 - SLIDING_TOLERANCE)", "0.5 * friction * fn"),
+        ("step.solution.mean_unbalance / step.kappa", "step.solution.unbalance / step.kappa"),
+    ),
+    *mutants_of(
+        "solver/sequence",
+        FRAMES,
+        ("stiffer: float = 2.0", "stiffer: float = 4.0"),
+        ("np.average(members, axis=0, weights=worth)", "np.average(members, axis=0)"),
+        ("np.isin(contacts.key, verdicts.forced), 1.0, told)", "np.isin(contacts.key, verdicts.forced), told, told)"),
+        (
+            "return np.sqrt(np.average((member - mean) ** 2, axis=0, weights=worth))",
+            "return np.average(np.abs(member - mean), axis=0, weights=worth)",
+        ),
+        (
+            "former = (state.last, state.ahead, state.around, state.wide, state.steady)",
+            "former = (state.last, state.last, state.last, state.last, state.last)",
+        ),
+    ),
+    *mutants_of(
+        "solver/sequence",
+        FRAMES,
+        ("keep = ~(stand_in[contacts.i] | stand_in[contacts.j])", "keep = ~stand_in[contacts.i]"),
+        ("trust=frame.trust * (1.0 - hidden)", "trust=frame.trust"),
+    ),
+]

@@ -1,0 +1,28 @@
+"""The tests' own test: hand-made errors of mechanics that they must notice. Slow; the mutants are in table/."""
+
+import pytest
+
+from tests.mutation.mutant import Mutant, StaleMutantError
+from tests.mutation.run import GREATEST_SURVIVAL, ROOT, format_table, judge_mutants, survival
+from tests.mutation.table import MUTANTS
+
+
+def test_a_mutant_whose_text_is_gone_is_said_to_be_stale():
+    with pytest.raises(StaleMutantError, match="0 times"):
+        Mutant("solver/nlgs/contact_law.py", "no such line", "", ()).locate(ROOT)
+    with pytest.raises(StaleMutantError, match="not once"):
+        Mutant("solver/nlgs", "import", "", ()).locate(ROOT)
+
+
+@pytest.mark.slow
+def test_every_mutant_is_found_once():
+    assert len({(mutant.place, mutant.old, mutant.new) for mutant in MUTANTS}) == len(MUTANTS) >= 100
+    for mutant in MUTANTS:
+        mutant.locate(ROOT)
+        assert all((ROOT / test).exists() for test in mutant.tests)
+
+
+@pytest.mark.slow
+def test_few_mutants_survive(tmp_path):
+    verdicts = list(judge_mutants(MUTANTS, tmp_path))
+    assert survival(verdicts) <= GREATEST_SURVIVAL, format_table(verdicts)

@@ -1,0 +1,69 @@
+"""One packing that takes every branch of the solver's kernels, shared by the comparisons with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.bodies.grains import Array, GrainMotion, Grains
+from solver.bodies.packing import Material
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import Contacts, detect_contacts
+from solver.nlgs.problem import ContactProblem, assemble
+
+COLUMNS, ROWS = 13, 12
+PITCH = 0.0161  # [m]
+LOST = (0, 30, 77, 140)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """All that `assemble` takes."""
+
+    grains: Grains
+    motion: GrainMotion
+    walls: Walls
+    contacts: Contacts
+    material: Material
+    impedance: Array  # (n,) [N s/m]
+    closing: Array  # (c,) [m/s]
+
+    def assemble(self) -> ContactProblem:
+        return assemble(
+            self.grains, self.motion, self.walls, self.contacts, self.material, self.impedance, closing=self.closing
+        )
+
+
+def make_case(seed: int = 7) -> Case:
+    """A disordered packing between walls that move, turn and press.
+
+    Masses follow neither the radii nor the impedances, some grains are lost and their rows hold nonsense, some
+    contacts must close before they bear force, and friction with walls is not that between grains.
+    """
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(COLUMNS) * PITCH, np.arange(ROWS) * PITCH)
+    position = np.column_stack([x.ravel(), y.ravel()]) + PITCH / 2
+    n = len(position)
+    position += rng.uniform(-3e-4, 3e-4, position.shape)
+    grains = Grains(rng.choice([0.0078, 0.0080, 0.0082], n), rng.uniform(0.02, 0.06, n))
+    present = np.ones(n, bool)
+    present[list(LOST)] = False
+    velocity, spin = rng.normal(0, 1e-5, (n, 2)), rng.normal(0, 1e-3, n)
+    position[~present], velocity[~present], spin[~present] = np.nan, np.nan, np.nan
+    motion = GrainMotion(position, velocity, spin, present)
+    corner = np.array([[0.0, 0.0], [COLUMNS, 0.0], [COLUMNS, ROWS], [0.0, ROWS]]) * PITCH
+    endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    # Every wall moves along itself, across itself and turns.
+    walls = Walls(endpoints, rng.normal(0, 3e-5, (4, 2, 2)), np.array([np.nan, np.nan, 50.0, np.nan]))
+    contacts = detect_contacts(grains, position, present, walls, 3e-4)
+    closing = np.where(rng.random(contacts.count) < 0.3, rng.uniform(0, 3e-5, contacts.count), 0.0)
+    material = Material(0.3, 0.15, 0.1, (0.7, -9.81))
+    return Case(grains, motion, walls, contacts, material, rng.uniform(500.0, 2000.0, n), closing)
+
+
+def make_guess(case: Case, seed: int = 3) -> Array:
+    """Forces (c, 2) [N] to start from: bearing, sliding and open contacts."""
+    rng = np.random.default_rng(seed)
+    fn = np.maximum(rng.normal(1.0, 1.0, case.contacts.count), 0.0)
+    return np.column_stack([fn, rng.uniform(-0.15, 0.15, len(fn)) * fn])

@@ -1,0 +1,159 @@
+"""What is measured of forces, how contacts are ordered and what accelerates a solve, against the plain ones."""
+
+import numpy as np
+import pytest
+
+from solver.nlgs.acceleration import extrapolate, inner_products
+from solver.nlgs.contact_law import project_on_cone
+from solver.nlgs.kernels import (
+    advance,
+    advance_and_measure,
+    apply_forces,
+    measure_forces,
+    measure_natural_map,
+    measure_state,
+    measure_unbalance,
+)
+from solver.nlgs.ordering import GROUP, visiting_order
+from tests.reference.ordering import plain_order
+from tests.reference.packing import make_case, make_guess
+from tests.reference.sweeps import PlainSolver, greatest_change, mean_normal, measured_sweeps
+
+pytestmark = pytest.mark.unit
+
+ROUNDING = 1e-9  # relative; what the forces add to a velocity is read off the velocity again, which costs some digits
+
+
+@pytest.fixture(scope="module")
+def case():
+    return make_case()
+
+
+@pytest.fixture(scope="module")
+def plain(case):
+    return PlainSolver(case.grains, case.motion, case.walls, case.contacts, case.material, case.impedance, case.closing)
+
+
+def state_of(problem, force):
+    body, plate = np.empty_like(problem.body), np.empty_like(problem.plate)
+    apply_forces(problem, body, plate, force)
+    return body, plate
+
+
+def test_forces_are_measured_as_the_paper_does(case):
+    force, before = make_guess(case, 3), make_guess(case, 4)
+    before[5] = force[5] = 0.0
+    assert ((force == 0).all(axis=1) & (before != 0).any(axis=1)).any()  # contacts that have lost all
+    change, norm, mean = measure_forces(force, before)
+    assert change == pytest.approx(greatest_change(force, before), rel=ROUNDING)
+    assert norm == pytest.approx(np.sqrt(sum(fn**2 + ft**2 for fn, ft in force)), rel=ROUNDING)
+    assert mean == pytest.approx(mean_normal(force), rel=ROUNDING)
+
+
+def test_a_contact_that_loses_all_its_force_counts_as_one():
+    force, before = np.array([[1.0, 0.0], [0.0, 0.0]]), np.array([[1.0, 1e-6], [1e-9, 0.0]])
+    assert measure_forces(force, before)[0] == 1.0
+    assert measure_forces(force[:1], before[:1])[0] == pytest.approx(1e-6)
+    assert measure_forces(force[1:], force[1:]) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("sweeps", [0, 3])
+def test_residuals_are_those_of_the_forces(case, plain, sweeps):
+    problem = case.assemble()
+    force = make_guess(case)[problem.rows].copy()
+    body, plate = state_of(problem, force)
+    advance(problem, body, plate, force, sweeps, 1.0)
+    ordered = np.empty_like(force)
+    ordered[problem.rows] = force
+    natural_map, (worst, mean) = plain.natural_map(ordered), plain.unbalance(ordered)
+    norm = float(np.linalg.norm(force))
+    assert measure_natural_map(problem, body, plate, force, norm) == pytest.approx(natural_map, rel=ROUNDING)
+    assert measure_unbalance(problem, body) == pytest.approx((worst, mean), rel=ROUNDING)
+    expected = natural_map, worst / mean_normal(ordered)
+    assert measure_state(problem, body, plate, force) == pytest.approx(expected, rel=ROUNDING)
+
+
+def test_no_force_at_all_is_infinitely_far_from_a_load(case):
+    problem = case.assemble()
+    force = np.zeros((case.contacts.count, 2))
+    body, plate = state_of(problem, force)
+    assert measure_natural_map(problem, body, plate, force, 0.0) == np.inf
+    assert measure_state(problem, body, plate, force)[1] == 0.0
+
+
+@pytest.mark.parametrize(("count", "spacing"), [(1, 0), (11, 0), (11, 4), (21, 6), (16, 16)])
+def test_sweeps_are_measured_where_they_should_be(case, plain, count, spacing):
+    problem = case.assemble()
+    force = make_guess(case)[problem.rows].copy()
+    body, plate = state_of(problem, force)
+    silent = [each.copy() for each in (body, plate, force)]
+    residuals = np.empty((count, 3))
+    advance_and_measure(problem, body, plate, force, np.empty_like(force), 1.0, 0, spacing, residuals)
+    known = np.flatnonzero(np.isfinite(residuals).all(axis=1)) + 1
+    assert known.tolist() == measured_sweeps(count, spacing)
+    assert np.isfinite(residuals).any(axis=1).sum() == len(known)
+    advance(problem, *silent, count, 1.0)
+    assert np.array_equal(silent[2], force)
+
+
+def test_measured_sweeps_hold_their_own_residuals(case, plain):
+    problem, spacing, count = case.assemble(), 4, 6
+    expected = make_guess(case)
+    force = expected[problem.rows].copy()
+    body, plate = state_of(problem, force)
+    residuals = np.empty((count, 3))
+    advance_and_measure(problem, body, plate, force, np.empty_like(force), 1.0, 0, spacing, residuals)
+    world = plain.world(expected)
+    for number in range(1, count + 1):
+        before = expected.copy()
+        plain.sweep(world, expected, problem.rows)
+        if number in measured_sweeps(count, spacing):
+            row = (
+                greatest_change(expected, before),
+                plain.natural_map(expected),
+                plain.unbalance(expected)[0] / mean_normal(expected),
+            )
+            assert residuals[number - 1] == pytest.approx(row, rel=ROUNDING)
+
+
+def test_later_chunks_are_measured_at_the_same_sweeps(case):
+    problem = case.assemble()
+    force = make_guess(case)[problem.rows].copy()
+    body, plate = state_of(problem, force)
+    residuals = np.empty((10, 3))
+    advance_and_measure(problem, body, plate, force, np.empty_like(force), 1.0, 8, 4, residuals)
+    assert (np.flatnonzero(np.isfinite(residuals[:, 1])) + 9).tolist() == [12, 16, 18]
+
+
+@pytest.mark.parametrize("size", [4, GROUP])
+def test_contacts_are_visited_in_the_plain_order(case, size):
+    pair = ~case.contacts.with_wall
+    point, i, j = case.contacts.point[pair], case.contacts.i[pair], case.contacts.j[pair]
+    order, grouped = visiting_order(point, i, j, size)
+    assert (order.tolist(), grouped) == plain_order(point, i, j, size)
+    assert 0 < grouped < len(order)
+
+
+def test_forces_are_extrapolated_and_put_back_on_their_cones():
+    rng = np.random.default_rng(0)
+    rows, vector = rng.normal(size=(3, 70)), rng.normal(size=70)
+    assert inner_products(rows, vector) == pytest.approx(
+        [sum(a * b for a, b in zip(r, vector, strict=True)) for r in rows]
+    )
+    force, weights = rng.normal(size=(35, 2)) + np.array([1.0, 0.0]), np.array([0.5, -0.2, 0.1])
+    expected = []
+    for c in range(35):
+        fn, ft = (force[c, k] - sum(weights[r] * rows[r, 2 * c + k] for r in range(3)) for k in range(2))
+        mu = 0.3 if c < 20 else 0.1
+        fn = fn if fn > 0 else 0.0
+        expected.append((fn, ft if abs(ft) <= mu * fn else np.sign(ft) * mu * fn))
+    extrapolate(force, rows, weights, np.array([0.3, 0.1]), 20)
+    assert force == pytest.approx(np.array(expected), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [((2.0, 0.1), (2.0, 0.1)), ((2.0, 3.0), (2.0, 0.5)), ((2.0, -3.0), (2.0, -0.5)), ((-1.0, 0.4), (0.0, 0.0))],
+)
+def test_a_force_is_projected_by_components(given, expected):
+    assert project_on_cone(*given, 0.25) == expected

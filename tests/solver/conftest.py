@@ -1,0 +1,18 @@
+"""Which of the solver's tests are small enough to pass without compilation, too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+# Thousands of sweeps, time steps or bands, or nothing that is compiled: interpreted they would take minutes, or
+# say nothing new. The kernels that they stand on are compared with plain twins in tests/reference.
+COMPILED_ALONE = ("calibration", "convex", "dem", "sequence", "test_acceleration.py", "test_refinement.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.is_relative_to(here) and not set(item.path.parts) & set(COMPILED_ALONE):
+            item.add_marker(pytest.mark.unit)
