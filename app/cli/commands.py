@@ -22,6 +22,7 @@ from ..results.store import load_results, read_origin
 from ..results.summary import print_summary, save_summary, summarize
 from ..results.truth import accuracy, correlations
 from ..results.truth import score as score_frames
+from ..run_folder import SUMMARY, TRACKS
 from .frame_range import parse_frames
 from .terminal import progress_bars
 from .watching import watching
@@ -52,7 +53,7 @@ def run_all(request: Request, view: str) -> int:
         recording = pipeline.record(run, results, truth)
     seconds = {**run.timings.seconds, "total": time.perf_counter() - began}
     summary = summarize(results, agreement, seconds)
-    save_summary(run.file(pipeline.SUMMARY), summary)
+    save_summary(run.file(SUMMARY), summary)
     print_summary(request.console, summary)
     request.console.print(f"Results in {run.folder}/ after {seconds['total']:.1f} s.", highlight=False)
     _tell_notes(run, request.console)
@@ -82,7 +83,7 @@ def track(request: Request, *, report: bool = False) -> int:
         page = pipeline.report_tracking(run, tracks, walls) if report else None
     lost = int((~tracks.present).sum())
     renewed = f", {tracks.renewal_count} damaged grains with a new reference" if tracks.renewal_count else ""
-    where = run.file(pipeline.TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
+    where = run.file(TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
     request.console.print(
         f"{tracks.grain_count} grains over {tracks.frame_count} frames, {lost} poses lost{renewed}; tracks in {where}.",
         highlight=False,
@@ -98,7 +99,7 @@ def solve(request: Request) -> int:
         truth = pipeline.load_truth(run, results)
     agreement = score_frames(results, truth) if truth is not None else None
     summary = summarize(results, agreement, run.timings.seconds)
-    save_summary(run.file(pipeline.SUMMARY), summary)
+    save_summary(run.file(SUMMARY), summary)
     print_summary(request.console, summary)
     _tell_notes(run, request.console)
     return 0

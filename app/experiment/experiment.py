@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.packing import Material, Packing
+from solver.bodies.grains import Array
 
 from ..errors import InputError
 from ..tracks import Tracks, TrackStatus, WallTracks
@@ -204,18 +203,6 @@ def _read_wall_forces(experiment: Experiment, names: tuple[str, ...], frame_coun
     force = np.full((frame_count, len(names), 2), np.nan)
     force[frame, wall] = np.column_stack([table.numbers("fx"), table.numbers("fy")])
     return force
-
-
-def make_packing(experiment: Experiment, radius: Array, pressure: Array) -> Packing:
-    """The mechanics of the experiment's rods: radius (n,) [m], pressure (w,) [Pa] NaN where motion is imposed."""
-    material = experiment.config.material
-    wall_friction = material.friction if material.wall_friction is None else material.wall_friction
-    return Packing(
-        Grains.of_rods(radius, density=material.density, length=material.length),
-        material.length,
-        Material(material.friction, wall_friction, material.formal_weight, material.gravity),
-        pressure,
-    )
 
 
 def _all_positive(table: Table, column: str, values: Array) -> None:

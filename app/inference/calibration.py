@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.calibration.calibrate import EXCESSIVE_NOISE, Calibration, calibrate, expected_priors
 from solver.calibration.gaps import MeasuredSequence
+from solver.calibration.settings import CalibrationSettings
 
-from ..experiment.config import ExperimentFile
 from ..tracks import Tracks, WallTracks
 
 SEED = 0  # of the draws behind the standard deviations: the same input gives the same bits
@@ -21,7 +21,7 @@ SAME = 1e-6  # of a radius: radii that differ less are one class
 
 
 def calibrate_tracks(
-    config: ExperimentFile, tracks: Tracks, walls: WallTracks, typical_overlap: float
+    settings: CalibrationSettings, tracks: Tracks, walls: WallTracks, typical_overlap: float
 ) -> tuple[Tracks, WallTracks, Calibration | None]:
     """Find the constant errors of centres, radii, walls and pixel size, and correct them where gaps get narrower.
 
@@ -34,13 +34,12 @@ def calibrate_tracks(
     measured = MeasuredSequence(
         tracks.radius, tracks.position, tracks.rotation, present, walls.endpoints, np.where(present, tracks.sigma, 0.0)
     )
-    known = radii_are_metres(config)
     priors = expected_priors(
         measured,
-        pixel_size=config.calibration.pixel_size if known else 0.0,
-        radius_class=config.calibration.radius_class if known else 0.0,
+        pixel_size=settings.pixel_size if settings.radii_are_known else 0.0,
+        radius_class=settings.radius_class if settings.radii_are_known else 0.0,
     )
-    if not config.calibration.lens:
+    if not settings.lens:
         priors = replace(priors, lens=0.0)
     found = calibrate(
         measured, priors, rng=np.random.default_rng(SEED), typical_overlap=typical_overlap,
@@ -60,15 +59,6 @@ def calibrate_tracks(
         centre_sigma=left,
     )
     return corrected, replace(walls, endpoints=better.endpoints), found
-
-
-def radii_are_metres(config: ExperimentFile) -> bool:
-    """Whether radii are known by themselves, so that they tell the pixel size.
-
-    Radii that were seen in the photographs share the error of its pixel size and cannot tell it.
-    """
-    section = config.photographs
-    return section is None or (bool(section.radii) and section.grains is None)
 
 
 def radius_classes(radius: Array) -> NDArray[np.int64] | None:

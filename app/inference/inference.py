@@ -1,85 +1,123 @@
-"""One sequence solved from given inputs, reduced to the forces and the few numbers that are compared."""
+"""The one road from tracks to forces: corrected, made a packing, solved frame after frame, summed up.
+
+Arrays in, arrays out: what keeps, shows or compares the frames takes them as they come. Whoever keeps them can go on
+after the last one, bit for bit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from solver.bodies.grains import Array
+from solver.bodies.motion import Snapshot
+from solver.bodies.packing import Packing
+from solver.bodies.rods import RodMaterial
+from solver.calibration.calibrate import Calibration
+from solver.contacts.radius_tuning import RadiusTuning
 from solver.contacts.verdicts import Verdicts
+from solver.convex.friction_check import FrictionCheck
+from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import solve_sequence
-from solver.statistics.frame_statistics import FrameStatistics
+from solver.sequence.frames import SequenceSettings, SequenceState, solve_sequence
+from solver.statistics.frame_statistics import FrameStatistics, frame_statistics
 
-from ..experiment.experiment import Experiment
 from ..tracks import Tracks, WallTracks
-from .preparation import prepare
-from .solver_input import make_snapshots, sequence_settings
+from .calibration import calibrate_tracks
+from .friction_and_radii import friction_of, tuned_radii
+from .settings import InferenceSettings
+from .snapshots import make_snapshots
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """What a run starts from, before calibration."""
+    """All that the forces follow from."""
 
-    experiment: Experiment
     tracks: Tracks
     walls: WallTracks
-    noise: Array  # (f, n) [m] standard deviation that positions really have, as far as is known
-    frames: NDArray[np.int64]  # (f,) which photographs of the nominal run these are
-    verdicts: Mapping[int, Verdicts]  # by row of frames
+    material: RodMaterial = field(default_factory=RodMaterial)
+    settings: InferenceSettings = field(default_factory=InferenceSettings)
+    verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # what people said of frames, by row
 
 
 @dataclass(frozen=True, slots=True)
-class Networks:
-    """Forces of f photographs, contacts laid end to end: those of row k are offset[k] : offset[k + 1]."""
+class CorrectedSequence:
+    """A sequence as the solver reads it: calibrated, its radii tuned, its settings complete."""
 
-    frame: NDArray[np.int64]  # (f,) photographs of the nominal run
-    offset: NDArray[np.int64]  # (f + 1,)
-    key: NDArray[np.int64]  # (c,) of the pair, ascending within a photograph
-    force: Array  # (c, 2) [N] f_n and f_t
-    friction_angle: Array  # (f,) [rad]
-    principal_direction: Array  # (f,) [rad] in (−π/2, π/2]
-    pressure: Array  # (f,) [Pa]
-    contact_count: NDArray[np.int64]  # (f,) carrying force
-    trust: Array  # (f,)
+    packing: Packing
+    tracks: Tracks
+    walls: WallTracks
+    snapshots: Sequence[Snapshot]
+    settings: SequenceSettings
+    verdicts: Mapping[int, Verdicts]
+    calibration: Calibration | None  # None: not tried
+    tuning: RadiusTuning | None  # None: not asked for
 
-    def at(self, row: int) -> tuple[NDArray[np.int64], Array]:
-        """Keys (c,) and forces (c, 2) [N] of one photograph."""
-        part = slice(self.offset[row], self.offset[row + 1])
-        return self.key[part], self.force[part]
-
-
-def gather(frame: NDArray[np.int64], forces: Sequence[FrameForces], statistics: Sequence[FrameStatistics]) -> Networks:
-    """Reduce a solved sequence; frame (f,): the photographs it shows."""
-    return Networks(
-        frame=frame,
-        offset=np.concatenate([[0], np.cumsum([each.contacts.count for each in forces])]).astype(np.int64),
-        key=np.concatenate([each.contacts.key for each in forces]),
-        force=np.concatenate([np.column_stack([each.fn, each.ft]) for each in forces]),
-        friction_angle=np.array([each.friction_angle for each in statistics]),
-        principal_direction=np.array([each.principal_direction for each in statistics]),
-        pressure=np.array([each.pressure for each in statistics]),
-        contact_count=np.array([each.contact_count for each in statistics], np.int64),
-        trust=np.array([each.trust for each in forces]),
-    )
+    def check_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
+        """What the motion of all solved frames says of the friction that was given."""
+        probability = ContactProbabilitySettings(overlap=self.settings.overlap)
+        return friction_of(self.packing, self.snapshots, frames, probability)
 
 
-def infer(inputs: Inputs) -> Networks:
-    """Calibrate, find contacts and solve, as a run does."""
-    return gather(inputs.frames, *infer_frames(inputs))
+@dataclass(frozen=True, slots=True)
+class SolvedFrame:
+    """What is known of one frame, and what it hands to the next."""
+
+    forces: FrameForces
+    statistics: FrameStatistics
+    state: SequenceState
 
 
-def infer_frames(inputs: Inputs) -> tuple[list[FrameForces], list[FrameStatistics]]:
-    """The same, with everything that is known of every photograph but the sweeps' forces."""
-    prepared = prepare(inputs.experiment, inputs.tracks, inputs.walls)
-    settings = sequence_settings(inputs.experiment.config, prepared.overlap)
-    settings = replace(settings, chain=replace(settings.chain, keep="none"))
-    snapshots = make_snapshots(prepared.tracks, prepared.walls)
-    frames, statistics = [], []
-    for forces, _ in solve_sequence(prepared.packing, snapshots, settings, verdicts=inputs.verdicts):
-        frames.append(forces)
-        statistics.append(prepared.statistics(forces, snapshots[forces.frame]))
-    return frames, statistics
+class CoordinationError(ValueError):
+    """No change of the radii gives the coordination number that was asked for."""
+
+    def __init__(self, tuning: RadiusTuning) -> None:
+        low, high = tuning.coordination_number.min(), tuning.coordination_number.max()
+        super().__init__(f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 4 %")
+        self.wanted = tuning.wanted
+
+
+def correct_sequence(inputs: Inputs) -> CorrectedSequence:
+    """Calibrate tracks and tune radii as the settings ask for. Raises CoordinationError."""
+    tracks, walls, settings = inputs.tracks, inputs.walls, inputs.settings
+    overlap = settings.typical_overlap(tracks.radius)
+    calibration = tuning = None
+    if settings.calibration is not None:
+        tracks, walls, calibration = calibrate_tracks(settings.calibration, tracks, walls, overlap)
+    packing = inputs.material.pack(tracks.radius, walls.pressure)
+    if settings.coordination is not None:
+        tuning = tuned_radii(packing, tracks, walls, settings.coordination)
+        if not tuning.met:
+            raise CoordinationError(tuning)
+        tracks = replace(tracks, radius=tracks.radius + tuning.found)
+        packing = inputs.material.pack(tracks.radius, walls.pressure)
+    return CorrectedSequence(
+        packing, tracks, walls, make_snapshots(tracks, walls), settings.for_overlap(overlap), inputs.verdicts,
+        calibration, tuning,
+    )  # fmt: skip
+
+
+def solve_frames(sequence: CorrectedSequence, *, after: SolvedFrame | None = None) -> Iterator[SolvedFrame]:
+    """Solve frame after frame; `after`: the last one that is solved already, None: begin with the first."""
+    for forces, state in solve_sequence(
+        sequence.packing,
+        sequence.snapshots,
+        sequence.settings,
+        state=None if after is None else after.state,
+        first=0 if after is None else after.forces.frame + 1,
+        verdicts=sequence.verdicts,
+    ):
+        yield SolvedFrame(forces, _summarize(sequence, forces), state)
+
+
+def infer_frames(inputs: Inputs) -> Iterator[SolvedFrame]:
+    """Correct, find contacts and solve, frame after frame, as a run does. Raises CoordinationError."""
+    yield from solve_frames(correct_sequence(inputs))
+
+
+def _summarize(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatistics:
+    packing, snapshot = sequence.packing, sequence.snapshots[forces.frame]
+    return frame_statistics(
+        forces.contacts, forces.fn, forces.ft, forces.state,
+        snapshot.position, snapshot.present, packing.walls(snapshot.endpoints), packing.length,
+        grains=packing.grains, material=packing.material,
+    )  # fmt: skip

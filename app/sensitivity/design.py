@@ -12,8 +12,8 @@ from scipy.stats import qmc
 
 from ..errors import InputError
 from ..experiment.experiment import Experiment
-from ..inference.inference import Inputs
 from .factors import FACTORS, Factor, Scale
+from .networks import VariedInputs
 
 Design = Literal["oat", "sobol"]
 SAMPLES = 64  # runs of a space-filling design, unless told otherwise
@@ -95,7 +95,7 @@ def space_filling(factors: Sequence[Factor], samples: int, seed: int) -> list[Ca
     ]
 
 
-def vary(inputs: Inputs, case: Case) -> Inputs:
+def vary(inputs: VariedInputs, case: Case) -> VariedInputs:
     """Inputs with everything that a case changes changed."""
     values = dict(case.values)
     for number, factor in enumerate(FACTORS):

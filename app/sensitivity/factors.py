@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..experiment.config import ExperimentFile
-from ..inference.inference import Inputs
-from ..inference.solver_input import typical_overlap
+from .networks import VariedInputs
 
 EVALUATED = 5  # photographs from which on forces are compared: those before still settle
 
@@ -29,7 +27,7 @@ class Scale(Enum):
     COUNT = "count"  # a whole number
 
 
-Apply = Callable[[Inputs, float, np.random.Generator], Inputs]
+Apply = Callable[[VariedInputs, float, np.random.Generator], VariedInputs]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,105 +85,104 @@ class Factor:
         return self.text[int(value)] if self.text else self.form.format(value)
 
 
-def _changed(inputs: Inputs, section: str, **values: Any) -> Inputs:
-    """Inputs whose experiment has other settings in one section."""
-    config: ExperimentFile = inputs.experiment.config
-    part = getattr(config, section).model_copy(update=values)
-    return replace(inputs, experiment=replace(inputs.experiment, config=config.model_copy(update={section: part})))
+def _sequence(inputs: VariedInputs, **values: Any) -> VariedInputs:
+    """Inputs with other settings of the solver."""
+    settings = inputs.settings
+    return replace(inputs, settings=replace(settings, sequence=replace(settings.sequence, **values)))
 
 
-def _wall_friction(inputs: Inputs) -> float:
-    material = inputs.experiment.config.material
-    return material.friction if material.wall_friction is None else material.wall_friction
+def _friction(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
+    material = inputs.material  # the walls keep theirs, also where it was not given
+    changed = replace(material, friction=value * material.friction, wall_friction=material.at_walls())
+    return replace(inputs, material=changed)
 
 
-def _friction(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
-    material = inputs.experiment.config.material  # the walls keep theirs, also where it was not given
-    return _changed(inputs, "material", friction=value * material.friction, wall_friction=_wall_friction(inputs))
+def _friction_of_walls(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
+    material = inputs.material
+    return replace(inputs, material=replace(material, wall_friction=value * material.at_walls()))
 
 
-def _friction_of_walls(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
-    return _changed(inputs, "material", wall_friction=value * _wall_friction(inputs))
-
-
-def _precision(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _precision(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     return replace(inputs, tracks=replace(inputs.tracks, sigma=value * inputs.tracks.sigma))
 
 
-def _overlap(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
-    usual = typical_overlap(inputs.experiment.config, inputs.tracks.radius)
-    return _changed(inputs, "contacts", overlap=value * usual)
+def _overlap(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
+    usual = inputs.settings.typical_overlap(inputs.tracks.radius)
+    return replace(inputs, settings=replace(inputs.settings, overlap=value * usual))
 
 
-def _threshold(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
-    contacts = inputs.experiment.config.contacts
-    absolute = None if contacts.threshold is None else value * contacts.threshold
-    return _changed(inputs, "contacts", threshold=absolute, threshold_sigmas=value * contacts.threshold_sigmas)
+def _threshold(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
+    given = inputs.settings.sequence
+    absolute = None if given.threshold is None else value * given.threshold
+    return _sequence(inputs, threshold=absolute, threshold_sigmas=value * given.threshold_sigmas)
 
 
-def _position_noise(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _position_noise(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     tracks = inputs.tracks
     added = value * inputs.noise[:, :, None] * rng.standard_normal(tracks.position.shape)
     return replace(inputs, tracks=replace(tracks, position=tracks.position + added))
 
 
-def _rotation_noise(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _rotation_noise(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     tracks = inputs.tracks  # a rotation is known as well as the rim's place
     added = value * inputs.noise / tracks.radius * rng.standard_normal(tracks.rotation.shape)
     return replace(inputs, tracks=replace(tracks, rotation=tracks.rotation + added))
 
 
-def _radius_scatter(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _radius_scatter(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     factor = 1.0 + value * rng.standard_normal(inputs.tracks.grain_count)
     return replace(inputs, tracks=replace(inputs.tracks, radius=factor * inputs.tracks.radius))
 
 
-def _radius_error(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _radius_error(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     return replace(inputs, tracks=replace(inputs.tracks, radius=(1.0 + value) * inputs.tracks.radius))
 
 
-def _pixel_size(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _pixel_size(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     """Stretch the tracks about the middle of the packing; the walls and the known radii are measured otherwise."""
     position = inputs.tracks.position
     middle = np.nanmean(position, axis=(0, 1))
     return replace(inputs, tracks=replace(inputs.tracks, position=middle + (1.0 + value) * (position - middle)))
 
 
-def _kappa(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
-    return _changed(inputs, "solver", kappa=value * inputs.experiment.config.solver.kappa)
+def _kappa(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
+    chain = inputs.settings.sequence.chain
+    if chain.kappa is None:  # inertia alone
+        return inputs
+    return _sequence(inputs, chain=replace(chain, kappa=value * chain.kappa))
 
 
-def _sweeps(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
-    return _changed(inputs, "solver", sweeps=max(1, round(value * inputs.experiment.config.solver.sweeps)))
+def _sweeps(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
+    chain = inputs.settings.sequence.chain
+    return _sequence(inputs, chain=replace(chain, sweeps=max(1, round(value * chain.sweeps))))
 
 
-def _reset(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _reset(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     if value == 0:
         return inputs
     if value == 1:
-        return _changed(inputs, "solver", reset="rearrangement")
+        return _sequence(inputs, reset_to_zero=True)
     at = min(EVALUATED, len(inputs.frames) - 1)
-    return _changed(inputs, "solver", reset_frames=(*inputs.experiment.config.solver.reset_frames, at))
+    return _sequence(inputs, reset_frames=inputs.settings.sequence.reset_frames | {at})
 
 
-def _spacing(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _spacing(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     return select_frames(inputs, 0, int(value))
 
 
-def _first_frame(inputs: Inputs, value: float, rng: np.random.Generator) -> Inputs:
+def _first_frame(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
     return select_frames(inputs, min(int(value), len(inputs.frames) - 1), 1)
 
 
-def select_frames(inputs: Inputs, first: int, step: int) -> Inputs:
+def select_frames(inputs: VariedInputs, first: int, step: int) -> VariedInputs:
     """Inputs of every step-th of their photographs alone, from a first one on."""
     count = len(inputs.frames)
     place = {row: new for new, row in enumerate(range(first, count, step))}
-    solver = inputs.experiment.config.solver
-    inputs = _changed(
+    given = inputs.settings.sequence
+    inputs = _sequence(
         inputs,
-        "solver",
-        reset_frames=tuple(place[k] for k in solver.reset_frames if k in place),
-        kept_frames=tuple(place[k] for k in solver.kept_frames if k in place),
+        reset_frames=frozenset(place[k] for k in given.reset_frames if k in place),
+        kept_frames=frozenset(place[k] for k in given.kept_frames if k in place),
     )
     return replace(
         inputs,

@@ -10,7 +10,7 @@ prints them anew).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -19,17 +19,15 @@ from scipy.stats import qmc
 
 from solver.bodies.grains import Array
 from solver.contacts.pairs import Keys, recall
-from solver.contacts.verdicts import Verdicts
 from solver.sequence.frame_forces import FrameForces
 
-from ..experiment.experiment import Experiment
-from ..inference.inference import Inputs, Networks, infer
+from ..inference.inference import Inputs
 from ..progress import Progress, silent
 from ..results.checkpoint import Checkpoint
-from ..tracks import Tracks, WallTracks
 from .design import Case, vary
 from .execution import run_all
 from .factors import FACTORS
+from .networks import Networks, VariedInputs, infer
 
 # a and b of f_n, and of f_t
 DEVIATION = {"ensemble": ((0.72, 0.76), (0.83, 0.68)), "nlgs": ((1.4, 1.18), (1.43, 0.92))}
@@ -60,22 +58,12 @@ def make_members(count: int) -> list[Case]:
     return cases
 
 
-def calibrated_inputs(
-    experiment: Experiment, tracks: Tracks, walls: WallTracks, verdicts: Mapping[int, Verdicts]
-) -> Inputs:
-    """Inputs that need no further preparation: calibrated tracks and walls, tuned radii."""
-    config = experiment.config
-    settled = config.model_copy(
-        update={
-            "calibration": config.calibration.model_copy(update={"enabled": False}),
-            "contacts": config.contacts.model_copy(update={"coordination": None}),
-        }
-    )
-    frames = np.arange(tracks.frame_count)
-    return Inputs(replace(experiment, config=settled), tracks, walls, tracks.sigma, frames, verdicts)
+def calibrated_inputs(inputs: Inputs) -> VariedInputs:
+    """Inputs whose tracks and walls are calibrated and whose radii are tuned: members start from them as they are."""
+    return VariedInputs.of(replace(inputs, settings=inputs.settings.uncorrected()), inputs.tracks.sigma)
 
 
-def solve_member(inputs: Inputs, case: Case) -> Networks:
+def solve_member(inputs: VariedInputs, case: Case) -> Networks:
     """Solve one member. Centres that are not known exactly are off by an error that turns with the grain."""
     tracks = inputs.tracks
     if tracks.centre_sigma is not None:
@@ -88,7 +76,12 @@ def solve_member(inputs: Inputs, case: Case) -> Networks:
 
 
 def solve_members(
-    inputs: Inputs, count: int, checkpoint: Checkpoint | None = None, *, workers: int = 1, progress: Progress = silent
+    inputs: VariedInputs,
+    count: int,
+    checkpoint: Checkpoint | None = None,
+    *,
+    workers: int = 1,
+    progress: Progress = silent,
 ) -> list[Networks]:
     """All members; those kept in the checkpoint are not solved again."""
     cases = make_members(count)

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.statistics.agreement import Agreement, compare_forces
 
-from ..errors import InputError
-from ..inference.inference import Inputs, Networks, infer
+from ..inference.inference import CoordinationError, Inputs
 from ..progress import Progress, silent
+from ..results.results import Results, TruthContacts
 from .design import Case, vary
 from .execution import run_all
 from .factors import EVALUATED
+from .networks import Networks, VariedInputs, gather, infer
 
 Forces = tuple[NDArray[np.int64], Array]  # keys (c,) and forces (c, 2) [N]
 
@@ -33,9 +34,20 @@ Forces = tuple[NDArray[np.int64], Array]  # keys (c,) and forces (c, 2) [N]
 class Nominal:
     """The run that others are compared with."""
 
-    inputs: Inputs
+    inputs: VariedInputs
     networks: Networks
     truth: tuple[Forces, ...] | None  # of every photograph; None: not known
+
+    @classmethod
+    def of(cls, inputs: Inputs, results: Results, truth: TruthContacts | None) -> Nominal:
+        """The run that these inputs gave, with its truth where there is one."""
+        frames = np.arange(inputs.tracks.frame_count)
+        bodies = results.grains.count + results.walls.count
+        return cls(
+            VariedInputs.of(inputs, results.tracks.sigma),
+            gather(frames, results.frames, results.statistics),
+            None if truth is None else truth.by_frame(bodies, len(frames)),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +79,7 @@ def measure_case(nominal: Nominal, case: Case) -> Effect:
     """Run one case and compare it."""
     try:
         return compare(infer(vary(nominal.inputs, case)), nominal)
-    except InputError as error:
+    except CoordinationError as error:
         nothing: dict[str, Any] = {each.name: math.nan for each in fields(Effect)}
         return Effect(**(nothing | {"frames": 0, "failure": str(error)}))
 

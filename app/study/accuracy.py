@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from solver.dem.simulation import DemTruth
-from solver.sequence.frames import SequenceSettings, solve_sequence
 
-from ..experiment.config import ExperimentFile
-from ..inference.solver_input import sequence_settings, typical_overlap
+from ..inference.inference import infer_frames
 from ..progress import Progress, silent
-from .truths import agreement_of, observe, packing_of, simulate, starts_of
+from .truths import agreement_of, observe, simulate, starts_of
 
 WINDOW = 12  # photographs of one sequence
 SHOWN = (1, 3, 5, 10)  # frames of the table
@@ -39,28 +37,18 @@ class AccuracyRow:
     cpu: float  # [s] per frame
 
 
-def default_settings(truth: DemTruth, estimator: str) -> SequenceSettings:
-    """What `rodsight run` uses when nothing is set, but for the estimator."""
-    config = ExperimentFile.model_validate(
-        {"name": "study", "tracks": {"positions": "", "grains": "", "times": ""}, "solver": {"estimator": estimator}}
-    )
-    settings = sequence_settings(config, typical_overlap(config, truth.radius))
-    return replace(settings, chain=replace(settings.chain, keep="none"))
-
-
 def measure_accuracy(
     truths: Sequence[DemTruth], noise: float, estimator: str, *, window: int = WINDOW, progress: Progress = silent
 ) -> AccuracyRow:
     """Solve windows of all truths at one noise [m]."""
     runs, began, done = [], time.process_time(), 0
     for number, truth in enumerate(truths):
-        settings = default_settings(truth, estimator)
         for start in starts_of(truth, window):
             rng = np.random.default_rng([number, start, round(noise * 1e9)])
-            snapshots = observe(truth, range(start, start + window), noise, rng)
+            inputs = observe(truth, range(start, start + window), noise, rng, estimator=estimator)
             rows = []
-            for forces, _ in solve_sequence(packing_of(truth), snapshots, settings):
-                found = agreement_of(forces, truth, start + forces.frame)
+            for solved in infer_frames(inputs):
+                found = agreement_of(solved.forces, truth, start + solved.forces.frame)
                 rows.append((found.r_fn, found.r_ft, found.relative_l2, found.scale))
                 done += 1
                 progress(f"{noise * 1e6:.0f} µm", done, 2 * window * len(truths))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,14 +16,14 @@ from solver.contacts.pairs import align
 from solver.dem.simulation import DemTruth
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import SequenceSettings, solve_sequence
+from solver.sequence.frames import SequenceSettings
 from solver.statistics.agreement import pearson
 from solver.statistics.force_statistics import plateau_ratio, tail_exponent
 from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
 
+from ..inference.inference import Inputs, infer_frames
 from ..progress import Progress, silent
-from .accuracy import default_settings
-from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
+from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces, with_imposed_walls
 
 WINDOW = 14  # photographs of one sequence
 SETTLED_WITHIN = 0.01  # of the level of the last frames
@@ -55,9 +55,9 @@ def study_claims(
 ) -> list[Verdict]:
     """Print the table of the paper's claims."""
     truths = [simulate(seed, grains=grains, folder=folder, progress=progress) for seed in seeds]
-    ours = _solve_all(truths, lambda t: default_settings(t, "ensemble"), window, progress, "ensemble")
-    paper = _solve_all(truths, _paper_settings, window, progress, "paper")
-    fixed = _solve_all(truths, lambda t: default_settings(t, "ensemble"), window, progress, "imposed", loaded=False)
+    ours = _solve_all(truths, window, progress, "ensemble")
+    paper = _solve_all(truths, window, progress, "paper", _as_the_paper)
+    fixed = _solve_all(truths, window, progress, "imposed", with_imposed_walls)
     verdicts = [
         _settling(paper, ours),
         _boundaries(ours, fixed),
@@ -76,21 +76,28 @@ def study_claims(
     return verdicts
 
 
-def _paper_settings(truth: DemTruth) -> SequenceSettings:
+def _as_the_paper(inputs: Inputs) -> Inputs:
     """The paper's recipe to the letter: inertia alone, one step per interval, ε_f, reset to zero."""
     chain = ChainSettings(kappa=None, substeps=1, spin_up=1, sweeps=5000, force_change=1e-2, keep="none")
-    return replace(default_settings(truth, "nlgs"), chain=chain, reset_to_zero=True)
+    sequence = SequenceSettings(estimator="nlgs", chain=chain, reset_to_zero=True)
+    return replace(inputs, settings=replace(inputs.settings, sequence=sequence))
 
 
-def _solve_all(truths, settings, window, progress, label, *, loaded=True) -> list[_Sequence]:  # type: ignore[no-untyped-def]
+def _solve_all(
+    truths: Sequence[DemTruth],
+    window: int,
+    progress: Progress,
+    label: str,
+    changed: Callable[[Inputs], Inputs] = lambda inputs: inputs,
+) -> list[_Sequence]:
+    """Solve a window up and a window down of every truth, the inputs changed."""
     found, done = [], 0
     for number, truth in enumerate(truths):
         for start in starts_of(truth, window):
             rng = np.random.default_rng([number, start])
-            snapshots = observe(truth, range(start, start + window), NOISE, rng)
             frames = []
-            for forces, _ in solve_sequence(packing_of(truth, loaded=loaded), snapshots, settings(truth)):
-                frames.append(forces)
+            for solved in infer_frames(changed(observe(truth, range(start, start + window), NOISE, rng))):
+                frames.append(solved.forces)
                 done += 1
                 progress(label, done, 2 * window * len(truths))
             found.append(_Sequence(truth, start, frames))

@@ -17,20 +17,17 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import minimize
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Packing
+from solver.bodies.grains import Array
 from solver.contacts.pairs import Keys, recall
 from solver.dem.simulation import DemTruth
 from solver.sequence import judgement
 from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.frames import solve_sequence
 from solver.sequence.judgement import Evidence, trust
 from solver.statistics.agreement import compare_forces
 
+from ..inference.inference import Inputs, infer_frames
 from ..progress import Progress, silent
-from .accuracy import default_settings
-from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces
+from .truths import agreement_of, observe, simulate, starts_of, true_forces
 
 WINDOW = 12  # photographs of one sequence
 FAULTY_WINDOW = 6
@@ -192,13 +189,12 @@ def _change_relation(sample: StatusSample) -> tuple[float, float]:
 
 def _observe_window(truth: DemTruth, start: int, noise: float, fault: str, rng: np.random.Generator) -> StatusSample:
     window = FAULTY_WINDOW if fault else WINDOW
-    snapshots = observe(truth, range(start, start + window), noise, rng)
-    packing = packing_of(truth)
+    inputs = observe(truth, range(start, start + window), noise, rng)
     if fault:
-        packing, snapshots = _spoil(packing, snapshots, fault, rng)
-    settings = default_settings(truth, "ensemble")
+        inputs = _spoil(inputs, fault, rng)
     rows, errors, forces, spreads = [], [], [], []
-    for frame, state in solve_sequence(packing, snapshots, settings):
+    for solved in infer_frames(inputs):
+        frame, state = solved.forces, solved.state
         if frame.frame == 0:
             continue
         k = start + frame.frame
@@ -218,30 +214,27 @@ def _observe_window(truth: DemTruth, start: int, noise: float, fault: str, rng: 
     )  # fmt: skip
 
 
-def _spoil(
-    packing: Packing, snapshots: list[Snapshot], fault: str, rng: np.random.Generator
-) -> tuple[Packing, list[Snapshot]]:
+def _spoil(inputs: Inputs, fault: str, rng: np.random.Generator) -> Inputs:
     """Do to the inputs what goes wrong with real ones."""
-    n = packing.grains.count
+    tracks, material = inputs.tracks, inputs.material
+    n = tracks.grain_count
     some = rng.choice(n, max(n // 100, 2), replace=False)
     if fault.startswith("friction"):
         factor = {"friction 20 % low": 0.8, "friction 40 % low": 0.6, "friction 40 % high": 1.4}[fault]
-        material = packing.material
-        wrong = replace(material, friction=factor * material.friction, wall_friction=factor * material.wall_friction)
-        return replace(packing, material=wrong), snapshots
+        wrong = replace(material, friction=factor * material.friction, wall_friction=factor * material.at_walls())
+        return replace(inputs, material=wrong)
     if fault == "radii 1 % wrong":  # of one grain in a hundred, too small
-        radius = packing.grains.radius.copy()
+        radius = tracks.radius.copy()
         radius[some] *= 0.99
-        density = float(packing.grains.mass[0] / (np.pi * packing.grains.radius[0] ** 2 * packing.length))
-        return replace(packing, grains=Grains.of_rods(radius, density=density, length=packing.length)), snapshots
+        return replace(inputs, tracks=replace(tracks, radius=radius))
+    position, rotation = tracks.position.copy(), tracks.rotation.copy()
     if fault == "grains unseen":
-        seen = ~np.isin(np.arange(n), some[: max(len(some) // 2, 1)])
-        return packing, [replace(each, present=each.present & seen) for each in snapshots]
+        unseen = some[: max(len(some) // 2, 1)]
+        position[:, unseen], rotation[:, unseen] = np.nan, np.nan
+        return replace(inputs, tracks=replace(tracks, position=position, rotation=rotation))
     if fault == "tracks off":  # in one photograph, by a fifth of a millimetre
-        k = len(snapshots) // 2
-        position = snapshots[k].position.copy()
-        position[some] += 2e-4 * rng.standard_normal((len(some), 2))
-        return packing, [*snapshots[:k], replace(snapshots[k], position=position), *snapshots[k + 1 :]]
+        position[tracks.frame_count // 2, some] += 2e-4 * rng.standard_normal((len(some), 2))
+        return replace(inputs, tracks=replace(tracks, position=position))
     raise ValueError(f"no fault is called {fault!r}")
 
 

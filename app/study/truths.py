@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Material, Packing
+from solver.bodies.grains import Array
+from solver.bodies.packing import Packing
+from solver.bodies.rods import RodMaterial
 from solver.contacts.pairs import make_keys
 from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
+from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frames import SequenceSettings
 from solver.statistics.agreement import Agreement, compare_forces
 
 from ..atomic import replacing
+from ..inference.inference import Inputs
+from ..inference.settings import InferenceSettings
 from ..progress import Progress, silent
 from ..synthetic.packing import prepare_packing
+from ..tracks import Tracks, TrackStatus, WallTracks
 
 STEP = 0.25  # [°] of shear between photographs
 TURN = 15.0  # [°] at which the shear turns back
@@ -49,31 +54,46 @@ def simulate(seed: int, *, grains: int, folder: Path, turn: float = TURN, progre
     return truth
 
 
-def packing_of(truth: DemTruth, *, loaded: bool = True, friction: float | None = None) -> Packing:
-    """The mechanics of a truth. loaded: the top is a plate under pressure; otherwise its measured motion is imposed."""
-    settings = truth.settings
+def packing_of(truth: DemTruth) -> Packing:
+    """The mechanics of a truth, the top a plate under pressure."""
+    return _material_of(truth).pack(truth.radius, _pressure_of(truth))
+
+
+def observe(
+    truth: DemTruth, photographs: range, noise: float, rng: np.random.Generator, *, estimator: str = "ensemble"
+) -> Inputs:
+    """Photographs of a truth, tracked with Gaussian noise [m] on positions and noise / R [rad] on rotations.
+
+    Solved as `rodsight run` would, but for the estimator, and without calibration: nothing constant is wrong.
+    """
+    n, shape = len(truth.radius), (len(photographs), len(truth.radius))
+    position, rotation = np.empty((*shape, 2)), np.empty(shape)
+    for row, k in enumerate(photographs):
+        position[row] = truth.position[k] + noise * rng.standard_normal((n, 2))
+        rotation[row] = truth.rotation[k] + noise / truth.radius * rng.standard_normal(n)
+    tracks = Tracks(
+        np.arange(n), truth.radius, INTERVAL * np.array(photographs), position, rotation,
+        np.full(shape, max(noise, FINEST)), np.full(shape, np.nan), np.full(shape, TrackStatus.GIVEN, np.uint8),
+    )  # fmt: skip
+    walls = WallTracks(truth.wall_names, truth.endpoints[photographs], _pressure_of(truth))
+    sequence = SequenceSettings(estimator=estimator, chain=ChainSettings(keep="none"))  # type: ignore[arg-type]
+    return Inputs(tracks, walls, _material_of(truth), InferenceSettings(sequence, calibration=None))
+
+
+def with_imposed_walls(inputs: Inputs) -> Inputs:
+    """The same photographs with the measured motion of all walls imposed: no plate carries a pressure."""
+    pressure = np.full_like(inputs.walls.pressure, np.nan)
+    return replace(inputs, walls=replace(inputs.walls, pressure=pressure))
+
+
+def _material_of(truth: DemTruth) -> RodMaterial:
+    return RodMaterial(truth.settings.density, truth.settings.length, truth.settings.friction)
+
+
+def _pressure_of(truth: DemTruth) -> Array:
     pressure = np.full(len(truth.wall_names), np.nan)
-    if loaded:
-        pressure[truth.wall_names.index("top")] = settings.pressure
-    mu = settings.friction if friction is None else friction
-    grains = Grains.of_rods(truth.radius, density=settings.density, length=settings.length)
-    return Packing(grains, settings.length, Material(mu, mu), pressure)
-
-
-def observe(truth: DemTruth, frames: range, noise: float, rng: np.random.Generator) -> list[Snapshot]:
-    """Photographs of a truth, tracked with Gaussian noise [m] on positions and noise / R [rad] on rotations."""
-    n = len(truth.radius)
-    return [
-        Snapshot(
-            INTERVAL * k,
-            truth.position[k] + noise * rng.standard_normal((n, 2)),
-            truth.rotation[k] + noise / truth.radius * rng.standard_normal(n),
-            np.ones(n, np.bool_),
-            truth.endpoints[k],
-            max(noise, FINEST),
-        )
-        for k in frames
-    ]
+    pressure[truth.wall_names.index("top")] = truth.settings.pressure
+    return pressure
 
 
 def true_forces(truth: DemTruth, frame: int) -> tuple[NDArray[np.int64], Array]:

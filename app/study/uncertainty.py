@@ -20,8 +20,6 @@ from solver.bodies.grains import Array
 from solver.contacts.pairs import recall
 from solver.dem.simulation import DemTruth
 
-from ..experiment.config import ExperimentFile
-from ..experiment.experiment import Experiment
 from ..inference.inference import infer_frames
 from ..progress import Progress, silent
 from ..sensitivity.execution import available_cores
@@ -32,8 +30,7 @@ from ..sensitivity.spread import (
     solve_members,
     spread_around,
 )
-from ..tracks import Tracks, TrackStatus, WallTracks
-from .truths import observe, packing_of, simulate, starts_of, true_forces
+from .truths import observe, simulate, starts_of, true_forces
 
 WINDOW = 12  # photographs of one sequence
 NOISES = (1e-5, 2e-5, 4e-5)  # [m]
@@ -122,20 +119,8 @@ def coverage(error: Array, sigma: Array) -> tuple[float, float]:
 def _measure_window(
     truth: DemTruth, photographs: range, noise: float, members: int, estimator: str, rng: np.random.Generator
 ) -> ErrorBars:
-    snapshots = observe(truth, photographs, noise, rng)
-    experiment = _experiment_of(truth, estimator)
-    position = np.stack([each.position for each in snapshots])
-    shape = position.shape[:2]
-    tracks = Tracks(
-        np.arange(shape[1]), truth.radius, np.array([each.time for each in snapshots]), position,
-        np.stack([each.rotation for each in snapshots]), np.full(shape, snapshots[0].sigma), np.full(shape, np.nan),
-        np.full(shape, TrackStatus.GIVEN, np.uint8),
-    )  # fmt: skip
-    walls = WallTracks(
-        truth.wall_names, np.stack([each.endpoints for each in snapshots]), packing_of(truth).pressure
-    )  # fmt: skip
-    inputs = calibrated_inputs(experiment, tracks, walls, {})
-    nominal, _ = infer_frames(inputs)
+    inputs = calibrated_inputs(observe(truth, photographs, noise, rng, estimator=estimator))
+    nominal = [solved.forces for solved in infer_frames(inputs)]
     others = solve_members(inputs, members, workers=available_cores())
     errors, spreads, free = [], [], []
     for k, frame in enumerate(nominal[1:], start=1):
@@ -150,21 +135,6 @@ def _measure_window(
         free.append(np.column_stack([frame.fn_sd, frame.ft_sd])[told] / mean)
     error = np.concatenate(errors)
     return ErrorBars(np.full(len(error), noise), error, np.concatenate(spreads), np.concatenate(free))
-
-
-def _experiment_of(truth: DemTruth, estimator: str) -> Experiment:
-    settings = truth.settings
-    config = ExperimentFile.model_validate(
-        {
-            "name": "study",
-            "tracks": {"positions": "", "grains": "", "times": ""},
-            "solver": {"estimator": estimator},
-            "material": {
-                "density": settings.density, "length": settings.length, "friction": settings.friction,
-            },
-        }
-    )  # fmt: skip
-    return Experiment(Path("study"), config)
 
 
 def _coverage_table(title: str, sample: ErrorBars, in_use: Sequence[tuple[float, float]]) -> Table:

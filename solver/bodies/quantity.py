@@ -65,7 +65,7 @@ def _dtype(hint: Any) -> np.dtype:
     """The type of the numbers that a hint allows: of an array, a scalar, either of them or None."""
     if hasattr(hint, "array_type"):  # of jaxtyping, Float[Array, "n 2"]: the widest of the kind that it names
         widest = [name for name in ("float64", "int64") if name in hint.dtypes]
-        return np.dtype(*(widest or hint.dtypes[:1]))
+        return np.dtype((widest or hint.dtypes)[0])
     parts = [part for part in get_args(hint) if part is not type(None)]
     if get_origin(hint) is np.ndarray:  # ndarray[shape, dtype[number]]
         return np.dtype(get_args(parts[1])[0])

@@ -12,7 +12,8 @@ from __future__ import annotations
 import os
 import resource
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +22,9 @@ import rerun as rr
 from rich.console import Console
 from rodsight import pipeline
 from rodsight.cli.watching import watching
-from rodsight.experiment.experiment import load_experiment, make_packing, read_tracks, read_walls
-from rodsight.inference.solver_input import make_snapshots, sequence_settings
+from rodsight.experiment.experiment import load_experiment, read_tracks, read_walls
+from rodsight.inference.inference import Inputs, infer_frames
+from rodsight.inference.settings import material_of, settings_of
 from rodsight.recording.files.recorder import BATCHES, Recorder
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
@@ -33,10 +35,6 @@ from rodsight.recording.tabs.layout_property import send_layout
 from rodsight.recording.viewing.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
 from rodsight.sensitivity.execution import available_cores
 from rodsight.synthetic.experiment import synthesize
-
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import solve_sequence
-from solver.statistics.frame_statistics import FrameStatistics, frame_statistics
 
 pytestmark = pytest.mark.slow
 
@@ -142,17 +140,20 @@ def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[flo
     tracks = read_tracks(experiment)
     walls = read_walls(experiment, tracks.frame_count)
     assert walls is not None
-    packing = make_packing(experiment, tracks.radius, walls.pressure)
+    material = material_of(experiment.config)
+    settings = replace(settings_of(experiment.config), overlap=0.0).uncorrected()
     canvas = Canvas.around(tracks, None)
     stream = rr.RecordingStream("rodsight", batcher_config=BATCHES)
-    layout = Layout(canvas, packing.length, tracks.frame_count, photographs=False, truth=False, wall_count=walls.count)
+    layout = Layout(canvas, material.length, tracks.frame_count, photographs=False, truth=False, wall_count=walls.count)
     stream.save(path, default_blueprint=make_blueprint(layout))
     recorder, seconds, contacts = Recorder(stream, sweeps=choice), 0.0, 0
-    for forces, statistics in _solved(experiment, tracks, walls, packing):
+    for solved in infer_frames(Inputs(tracks, walls, material, settings)):
+        forces, statistics = solved.forces, solved.statistics
         begin = time.process_time()
         if forces.frame == 0:
             style = ForceStyle.on(canvas, ForceRange.of([forces]))
-            scene = Scene("benchmark", tracks, walls, packing.grains, packing.material.friction, "", canvas, style)
+            grains = material.pack(tracks.radius, walls.pressure).grains
+            scene = Scene("benchmark", tracks, walls, grains, material.friction, "", canvas, style)
             recorder.start(scene)
             send_layout(stream, layout)
         recorder.frame(forces, statistics)
@@ -162,14 +163,3 @@ def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[flo
     recorder.finish()
     stream.disconnect()
     return seconds + time.process_time() - begin, contacts / tracks.frame_count, recorder.network_rows
-
-
-def _solved(experiment, tracks, walls, packing) -> Iterator[tuple[FrameForces, FrameStatistics]]:  # type: ignore[no-untyped-def]
-    settings = sequence_settings(experiment.config, 0.0)
-    snapshots = make_snapshots(tracks, walls)
-    for forces, _ in solve_sequence(packing, snapshots, settings):
-        snapshot = snapshots[forces.frame]
-        yield forces, frame_statistics(
-            forces.contacts, forces.fn, forces.ft, forces.state, snapshot.position, snapshot.present,
-            packing.walls(snapshot.endpoints), packing.length, grains=packing.grains, material=packing.material,
-        )  # fmt: skip

@@ -121,7 +121,7 @@ def solve(poses: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
                 present,
                 poses["poses/endpoints"][k],
                 NOISE,
-            )  # fmt: skip
+            )
         )
     found: dict[str, np.ndarray] = {}
     for name, settings in SETTINGS.items():

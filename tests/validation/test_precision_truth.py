@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.study.accuracy import default_settings
-from rodsight.study.truths import agreement_of, observe, packing_of, simulate, starts_of
+from rodsight.inference.inference import infer_frames
+from rodsight.study.truths import agreement_of, observe, simulate, starts_of
 
 from solver.dem.simulation import DemTruth
-from solver.sequence.frames import solve_sequence
 
 GRAINS, SEED, TURN, WINDOW = 250, 41, 5.0, 8
 NOISE = 4e-5  # [m]
@@ -29,9 +28,9 @@ def truth(tmp_path_factory) -> DemTruth:
 def solved(truth: DemTruth, stated: float) -> tuple[float, str]:
     """Mean r(f_n), and what is said of the first frame."""
     start = starts_of(truth, WINDOW)[0]
-    snapshots = observe(truth, range(start, start + WINDOW), NOISE, np.random.default_rng(1))
-    snapshots = [replace(each, sigma=stated * each.sigma) for each in snapshots]
-    frames = [f for f, _ in solve_sequence(packing_of(truth), snapshots, default_settings(truth, "ensemble"))]
+    inputs = observe(truth, range(start, start + WINDOW), NOISE, np.random.default_rng(1))
+    inputs = replace(inputs, tracks=replace(inputs.tracks, sigma=stated * inputs.tracks.sigma))
+    frames = [solved.forces for solved in infer_frames(inputs)]
     return float(np.mean([agreement_of(f, truth, start + f.frame).r_fn for f in frames[1:]])), frames[0].reason
 
 

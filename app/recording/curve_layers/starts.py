@@ -25,7 +25,7 @@ from solver.nlgs.solve import NlgsSettings, solve
 from solver.nlgs.warm_start import ForceMemory
 from solver.sequence.frame_forces import FrameForces
 
-from ...inference.solver_input import make_snapshots
+from ...inference.snapshots import make_snapshots
 from ..look import entities
 from ..look.colours import SERIES
 from ..look.scene import Clock, Scene

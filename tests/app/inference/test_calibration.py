@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from rodsight.experiment.config import ExperimentFile
 from rodsight.experiment.scaling import make_scale
-from rodsight.inference.calibration import calibrate_tracks, radii_are_metres, radius_classes
+from rodsight.inference.calibration import calibrate_tracks, radius_classes
+from rodsight.inference.settings import radii_are_metres
 from rodsight.results.calibration_summary import calibration_facts, calibration_lines
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 from solver.calibration.calibrate import Calibration, calibrate
 from solver.calibration.gaps import MeasuredSequence
 from solver.calibration.priors import CalibrationPriors
+from solver.calibration.settings import CalibrationSettings
 
 RADIUS = 8e-3  # [m]
 
@@ -62,7 +64,7 @@ def test_classes_are_the_different_radii():
 @pytest.mark.parametrize("error", [-5e-3, 5e-3])
 def test_wrong_scale_of_tracks_is_corrected_and_walls_in_metres_stay(error):
     tracks, walls = square_lattice(scale=error)
-    better, moved, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    better, moved, found = calibrate_tracks(CalibrationSettings(), tracks, walls, 0.0)
     assert found is not None
     assert found.applied
     assert abs(found.pixel_size - error) < 1e-3  # the error that known radii may share
@@ -74,7 +76,7 @@ def test_wrong_scale_of_tracks_is_corrected_and_walls_in_metres_stay(error):
 
 def test_exact_tracks_pass_unchanged():
     tracks, walls = square_lattice()
-    better, moved, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    better, moved, found = calibrate_tracks(CalibrationSettings(), tracks, walls, 0.0)
     assert found is not None
     assert not found.applied
     np.testing.assert_array_equal(better.position, tracks.position)
@@ -86,7 +88,7 @@ def test_exact_tracks_pass_unchanged():
 
 def test_pixel_size_told_to_be_exact_is_kept():
     tracks, walls = square_lattice(scale=5e-3)
-    _, _, found = calibrate_tracks(config(calibration={"pixel_size": 0.0}), tracks, walls, 0.0)
+    _, _, found = calibrate_tracks(CalibrationSettings(pixel_size=0.0), tracks, walls, 0.0)
     assert found is not None
     assert found.pixel_size == 0.0
     assert found.pixel_size_sd == 0.0
@@ -95,14 +97,14 @@ def test_pixel_size_told_to_be_exact_is_kept():
 def test_understated_noise_is_raised_even_where_nothing_is_corrected():
     tracks, walls = square_lattice(noise=30e-6, frames=12)
     understated = replace(tracks, sigma=tracks.sigma / 4)
-    better, _, found = calibrate_tracks(config(), understated, walls, 0.0)
+    better, _, found = calibrate_tracks(CalibrationSettings(), understated, walls, 0.0)
     assert found is not None
     assert 2.0 < float(better.sigma[0, 0] / understated.sigma[0, 0]) < 5.0
 
 
 def test_too_few_photographs_are_left_alone():
     tracks, walls = square_lattice(frames=2)
-    better, _, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    better, _, found = calibrate_tracks(CalibrationSettings(), tracks, walls, 0.0)
     assert found is None
     assert better is tracks
 
@@ -110,7 +112,7 @@ def test_too_few_photographs_are_left_alone():
 @pytest.fixture
 def corrected() -> Calibration:
     tracks, walls = square_lattice(scale=5e-3)
-    _, _, found = calibrate_tracks(config(), tracks, walls, 0.0)
+    _, _, found = calibrate_tracks(CalibrationSettings(), tracks, walls, 0.0)
     assert found is not None
     return found
 

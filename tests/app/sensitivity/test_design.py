@@ -2,15 +2,17 @@
 
 import re
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rodsight.cli.cli_tools import sensitivity
 from rodsight.errors import InputError
-from rodsight.inference.inference import Inputs
+from rodsight.experiment.experiment import load_experiment
 from rodsight.sensitivity.design import Case, choose_factors, one_at_a_time, plan, space_filling, vary
 from rodsight.sensitivity.factors import FACTORS, Scale
+from rodsight.sensitivity.networks import VariedInputs
 
 FILE = Path("experiment.toml")
 KNOWN = {each.name: each for each in FACTORS}
@@ -20,7 +22,7 @@ def choose(*wanted: str, ranges: dict[str, tuple[float, float]] | None = None, c
     return choose_factors(wanted, ranges or {}, file=FILE, single_chain=chain)
 
 
-def varied(inputs: Inputs, name: str, value: float) -> Inputs:
+def varied(inputs: VariedInputs, name: str, value: float) -> VariedInputs:
     return vary(inputs, Case(((name, value),)))
 
 
@@ -44,23 +46,22 @@ def test_nothing_varied_is_the_nominal_run(nominal):
 
 
 def test_friction_of_grains_leaves_that_of_walls(nominal):
-    material = nominal.inputs.experiment.config.material
-    lower = varied(nominal.inputs, "friction", 0.8).experiment.config.material
+    material = nominal.inputs.material
+    lower = varied(nominal.inputs, "friction", 0.8).material
     assert lower.friction == 0.8 * material.friction
     assert lower.wall_friction == material.wall_friction
-    walls = varied(nominal.inputs, "wall_friction", 0.8).experiment.config.material
+    walls = varied(nominal.inputs, "wall_friction", 0.8).material
     assert walls.friction == material.friction
     assert walls.wall_friction == 0.8 * lower.wall_friction
 
 
 @pytest.mark.parametrize(
-    ("name", "section", "key"),
-    [("kappa", "solver", "kappa"), ("sweeps", "solver", "sweeps"), ("threshold", "contacts", "threshold_sigmas")],
+    ("name", "key"), [("kappa", "chain.kappa"), ("sweeps", "chain.sweeps"), ("threshold", "threshold_sigmas")]
 )
-def test_settings_are_multiplied(name, section, key, nominal):
-    before = getattr(getattr(nominal.inputs.experiment.config, section), key)
-    after = getattr(getattr(varied(nominal.inputs, name, 2.0).experiment.config, section), key)
-    assert after == 2 * before
+def test_settings_are_multiplied(name, key, nominal):
+    value = attrgetter(key)
+    before = value(nominal.inputs.settings.sequence)
+    assert value(varied(nominal.inputs, name, 2.0).settings.sequence) == 2 * before
 
 
 def test_twice_the_noise_is_the_same_noise_doubled(nominal):
@@ -83,17 +84,17 @@ def test_errors_of_radii_and_scale_have_the_stated_size(nominal):
 
 
 def test_photographs_that_are_left_out_are_left_out_everywhere(nominal):
-    config = nominal.inputs.experiment.config
-    config = config.model_copy(update={"solver": config.solver.model_copy(update={"reset_frames": (2, 3)})})
-    inputs = replace(nominal.inputs, experiment=replace(nominal.inputs.experiment, config=config))
+    settings = nominal.inputs.settings
+    sequence = replace(settings.sequence, reset_frames=frozenset({2, 3}))
+    inputs = replace(nominal.inputs, settings=replace(settings, sequence=sequence))
     every_other = varied(inputs, "spacing", 2)
     assert every_other.frames.tolist() == [0, 2, 4]
     assert every_other.tracks.time.tolist() == inputs.tracks.time[::2].tolist()
     assert len(every_other.walls.endpoints) == len(every_other.noise) == 3
-    assert every_other.experiment.config.solver.reset_frames == (1,)
+    assert every_other.settings.sequence.reset_frames == {1}
     later = varied(inputs, "first_frame", 3)
     assert later.frames.tolist() == [3, 4]
-    assert later.experiment.config.solver.reset_frames == (0,)
+    assert later.settings.sequence.reset_frames == {0}
 
 
 def test_one_at_a_time_gives_every_level_once():
@@ -162,8 +163,8 @@ def test_an_unknown_factor_of_the_experiment_file_is_refused():
         choose(ranges={"viscosity": (1.0, 2.0)})
 
 
-def test_samples_must_suffice_and_belong_to_a_design(nominal):
-    experiment = nominal.inputs.experiment
+def test_samples_must_suffice_and_belong_to_a_design(made_tracks):
+    experiment = load_experiment(made_tracks)
     with pytest.raises(InputError, match="at least 6"):
         plan(experiment, "sobol", ("kappa", "friction"), 5, 0)
     assert len(plan(experiment, "sobol", ("kappa", "friction"), 6, 0)[1]) == 6

@@ -15,8 +15,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from rodsight.cli.main import main
-from rodsight.inference.inference import infer
 from rodsight.sensitivity.design import Case
+from rodsight.sensitivity.networks import infer
 from rodsight.sensitivity.study import Diary, compare, measure_case, run_study
 
 from tests.app.sensitivity.conftest import FEW
@@ -103,10 +103,7 @@ def test_a_line_that_was_cut_short_is_passed_over(nominal, tmp_path):
 
 
 def test_a_run_that_is_not_possible_is_told_and_the_others_go_on(nominal):
-    config = nominal.inputs.experiment.config
-    contacts = config.contacts.model_copy(update={"coordination": 9.0})
-    config = config.model_copy(update={"contacts": contacts})
-    inputs = replace(nominal.inputs, experiment=replace(nominal.inputs.experiment, config=config))
+    inputs = replace(nominal.inputs, settings=replace(nominal.inputs.settings, coordination=9.0))
     effect = measure_case(replace(nominal, inputs=inputs), KAPPA)
     assert "cannot be met" in effect.failure
     assert math.isnan(effect.r_fn)

@@ -5,11 +5,10 @@ from io import StringIO
 import numpy as np
 import pytest
 from rich.console import Console
-from rodsight.study.accuracy import default_settings, measure_accuracy
+from rodsight.inference.inference import infer_frames
+from rodsight.study.accuracy import measure_accuracy
 from rodsight.study.claims import study_claims
-from rodsight.study.truths import agreement_of, observe, packing_of, simulate, starts_of
-
-from solver.sequence.frames import solve_sequence
+from rodsight.study.truths import agreement_of, observe, simulate, starts_of
 
 GRAINS, TURN, WINDOW = 30, 3.0, 7
 
@@ -47,9 +46,8 @@ def test_windows_lie_on_either_side_of_the_turn(truth):
 
 def test_true_forces_agree_perfectly_with_themselves(truth):
     start = starts_of(truth, WINDOW)[0]
-    snapshots = observe(truth, range(start, start + 2), 0.0, np.random.default_rng(0))
-    forces, _ = next(solve_sequence(packing_of(truth), snapshots, default_settings(truth, "nlgs")))
-    found = agreement_of(forces, truth, start)
+    inputs = observe(truth, range(start, start + 2), 0.0, np.random.default_rng(0), estimator="nlgs")
+    found = agreement_of(next(infer_frames(inputs)).forces, truth, start)
     assert found.contact_recall == 1.0
     assert -1.0 <= found.r_fn <= 1.0
 

@@ -1,0 +1,106 @@
+"""How tracks become forces: the settings of the whole road, and what an experiment file makes of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from solver.bodies.grains import Array
+from solver.bodies.rods import RodMaterial
+from solver.calibration.settings import CalibrationSettings
+from solver.nlgs.chain import ChainSettings
+from solver.sequence.frames import SequenceSettings
+
+from ..experiment.config import ExperimentFile
+
+SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
+
+
+@dataclass(frozen=True, slots=True)
+class InferenceSettings:
+    """How tracks become forces. The defaults are what `rodsight run` does where nothing is set."""
+
+    sequence: SequenceSettings = field(default_factory=SequenceSettings)
+    calibration: CalibrationSettings | None = field(default_factory=CalibrationSettings)  # None: as tracked
+    coordination: float | None = None  # change all radii alike until z without rattlers is this
+    overlap: float | None = None  # [m] of touching surfaces; None: 3e-4 mean diameters, or as the gaps show
+
+    def typical_overlap(self, radius: Array) -> float:
+        """How far touching surfaces overlap or stand apart by elasticity and roughness [m]; radius (n,) [m].
+
+        A missed contact costs far more than a false one, so it is rather too large than too small.
+        """
+        return SURFACE * 2.0 * float(radius.mean()) if self.overlap is None else self.overlap
+
+    def for_overlap(self, overlap: float) -> SequenceSettings:
+        """The solver's settings for surfaces that overlap by so much [m]."""
+        ensemble = self.sequence.ensemble
+        return replace(
+            self.sequence,
+            overlap=overlap,
+            measure_overlap=self.overlap is None,
+            ensemble=replace(ensemble, probability=replace(ensemble.probability, overlap=overlap)),
+        )
+
+    def uncorrected(self) -> InferenceSettings:
+        """The same for tracks that are corrected already: neither calibrated nor tuned."""
+        return replace(self, calibration=None, coordination=None)
+
+    def without_sweeps(self) -> InferenceSettings:
+        """The same where only the final forces are wanted: no sweep keeps its own."""
+        sequence = self.sequence
+        return replace(self, sequence=replace(sequence, chain=replace(sequence.chain, keep="none")))
+
+
+def material_of(config: ExperimentFile) -> RodMaterial:
+    """The rods of an experiment."""
+    return RodMaterial(**config.material.model_dump())
+
+
+def settings_of(config: ExperimentFile) -> InferenceSettings:
+    """The settings of an experiment."""
+    calibration, contacts = config.calibration, config.contacts
+    return InferenceSettings(
+        sequence=sequence_settings(config),
+        calibration=CalibrationSettings(
+            calibration.pixel_size, calibration.lens, calibration.radius_class, radii_are_metres(config)
+        )
+        if calibration.enabled
+        else None,
+        coordination=contacts.coordination,
+        overlap=contacts.overlap,
+    )
+
+
+def sequence_settings(config: ExperimentFile) -> SequenceSettings:
+    """The solver's settings of an experiment, but for the overlap of its surfaces."""
+    solver, contacts = config.solver, config.contacts
+    paper = solver.preset == "paper"
+    chain = ChainSettings(
+        kappa=None if paper else solver.kappa,
+        substeps=1 if paper else solver.substeps,
+        spin_up=1 if paper else solver.spin_up,
+        sweeps=solver.sweeps * (solver.substeps if paper else 1),
+        relaxation=solver.relaxation,
+        force_change=solver.force_change,
+        keep=config.recording.sweeps,
+    )
+    return SequenceSettings(
+        estimator="nlgs" if paper else solver.estimator,
+        chain=chain,
+        keep_members=solver.keep_members,
+        measure_precision=solver.precision == "measured" and not paper,
+        threshold_sigmas=contacts.threshold_sigmas,
+        threshold=contacts.threshold,
+        reset_frames=frozenset(solver.reset_frames),
+        kept_frames=frozenset(solver.kept_frames),
+        reset_to_zero=paper or solver.reset == "rearrangement",
+    )
+
+
+def radii_are_metres(config: ExperimentFile) -> bool:
+    """Whether radii are known by themselves, so that they tell the pixel size.
+
+    Radii that were seen in the photographs share the error of its pixel size and cannot tell it.
+    """
+    section = config.photographs
+    return section is None or (bool(section.radii) and section.grains is None)
