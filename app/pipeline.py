@@ -227,7 +227,7 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
 
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     """Write the recording of finished results, the truth beside them where there is one."""
-    from .recording.files.recorder import record as write_recording
+    from .recording.files.finished_run import record as write_recording
     from .recording.files.side_file import write_side_file
 
     since = time.perf_counter()

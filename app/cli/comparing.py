@@ -30,7 +30,7 @@ def compare(first: Path, second: Path | None, *, truth: bool, out: Path | None, 
         except DifferentPackingError as error:
             raise InputError(second, "", str(error)) from None
     target = out if out is not None else Path(f"compare-{names[0]}-{names[1]}.rrd")
-    from ..recording.comparison import record_comparison
+    from ..recording.comparison_layer import record_comparison
 
     size = record_comparison(comparison, target)
     _tell(comparison, console)

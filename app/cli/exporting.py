@@ -74,7 +74,7 @@ def _draw(
     progress: Progress,
 ) -> int:
     from ..recording.viewing.headless import NoPictureError
-    from ..recording.viewing.pictures import timeline_values, write_film, write_pictures
+    from ..recording.viewing.pictures import Shown, timeline_values, write_film, write_pictures
 
     if step < 1:
         raise InputError("--step", str(step), "is not a positive number")
@@ -86,18 +86,18 @@ def _draw(
         if times is not None and not first <= begin <= (last if end is None else end - 1) <= last:
             raise InputError("--frames", times, f"is not a range of {first}:{last + 1} on the timeline {timeline}")
         chosen = range(max(begin, first), last + 1 if end is None else end, step)
-        look = {"timeline": timeline, "tab": tab, "view": view, "size": _size(size)}
+        shown = Shown(timeline, tab, view, _size(size))
 
         def told(done: int, total: int) -> None:
             progress("drawing", done, total)
 
         if film:
             file = out if out is not None else recording.with_suffix(".mp4")
-            written = write_film(recording, file, chosen, rate=rate, progress=told, **look)  # type: ignore[arg-type]
+            written = write_film(recording, file, chosen, shown, rate=rate, progress=told)
             text = f"{file}: {len(chosen)} pictures, {1e-6 * written:.1f} MB."
         else:
             folder = out if out is not None else recording.parent / "pictures"
-            files = write_pictures(recording, folder, chosen, progress=told, **look)  # type: ignore[arg-type]
+            files = write_pictures(recording, folder, chosen, shown, progress=told)
             text = f"{folder}/: {len(files)} pictures, {files[0].name} … {files[-1].name}."
     except NoPictureError as error:
         raise InputError("export", "", str(error)) from None

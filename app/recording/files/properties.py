@@ -12,7 +12,7 @@ from solver.sequence.frame_forces import FrameStatus
 
 from ..look.scene import Scene
 from ..look.texts import printable
-from ..summary import FrameFacts
+from ..tabs.summary_tab import FrameFacts
 
 EXPERIMENT, OUTCOME, SETTINGS = "experiment", "outcome", "settings"
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...results.results import Results
-from ..curve_layers.statistics import statistic_values, wall_values
+from ..curve_layers.statistic_curves import statistic_values, wall_values
 from ..look import entities
 from ..packing_layers.changes import correlate_common
 

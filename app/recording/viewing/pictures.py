@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -11,28 +12,38 @@ import numpy as np
 from ...atomic import replacing, write_atomically
 from .headless import HeadlessViewer, NoPictureError
 
-Progress = Callable[[int, int], None]  # pictures done, pictures in all
+PictureProgress = Callable[[int, int], None]  # pictures done, pictures in all
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a picture is of."""
+
+    timeline: str = "frame"
+    tab: str | None = None  # None: the one in front
+    view: str | None = None  # of that tab; None: all of them
+    size: tuple[int, int] = (1600, 1000)  # [px]
+
+
+FRAMES_IN_FRONT = Shown()
 
 
 def write_pictures(
     recording: Path,
     folder: Path,
     times: Sequence[int],
+    shown: Shown = FRAMES_IN_FRONT,
     *,
-    timeline: str = "frame",
-    tab: str | None = None,
-    view: str | None = None,
-    size: tuple[int, int] = (1600, 1000),
-    progress: Progress | None = None,
+    progress: PictureProgress | None = None,
 ) -> list[Path]:
-    """Write a PNG for every value of a timeline, of a tab (default: the one in front) or of one view of it.
+    """Write a PNG for every one of the times on the timeline shown.
 
     Raises FileNotFoundError where there is no recording, NoPictureError where it cannot be drawn.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files = []
-    for value, picture in _pictures(recording, times, timeline, tab, view, size, progress):
-        files.append(folder / f"{timeline}_{value:06d}.png")
+    for value, picture in _pictures(recording, times, shown, progress):
+        files.append(folder / f"{shown.timeline}_{value:06d}.png")
         write_atomically(files[-1], picture)
     return files
 
@@ -41,15 +52,12 @@ def write_film(
     recording: Path,
     file: Path,
     times: Sequence[int],
+    shown: Shown = FRAMES_IN_FRONT,
     *,
-    timeline: str = "frame",
-    tab: str | None = None,
-    view: str | None = None,
-    size: tuple[int, int] = (1600, 1000),
     rate: float = 6.0,
-    progress: Progress | None = None,
+    progress: PictureProgress | None = None,
 ) -> int:
-    """Write an MP4 (MPEG-4 part 2) with a picture for every value of a timeline, `rate` a second; returns its size.
+    """Write an MP4 (MPEG-4 part 2) with a picture for every one of the times, `rate` a second; returns its size.
 
     Raises like write_pictures.
     """
@@ -60,7 +68,7 @@ def write_film(
         loose = part.with_name(f"{file.stem}.part.mp4")
         writer: cv2.VideoWriter | None = None
         try:
-            for _, picture in _pictures(recording, times, timeline, tab, view, size, progress):
+            for _, picture in _pictures(recording, times, shown, progress):
                 image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
                 assert image is not None
                 height, width = (side - side % 2 for side in image.shape[:2])  # films have even sides
@@ -95,17 +103,14 @@ def timeline_values(recording: Path, timeline: str) -> tuple[int, int]:
 def _pictures(
     recording: Path,
     times: Sequence[int],
-    timeline: str,
-    tab: str | None,
-    view: str | None,
-    size: tuple[int, int],
-    progress: Progress | None,
+    shown: Shown,
+    progress: PictureProgress | None,
 ) -> Iterator[tuple[int, bytes]]:
-    with HeadlessViewer(recording, width=size[0], height=size[1]) as viewer:
-        if tab is not None:
-            viewer.show_tab(tab)
+    with HeadlessViewer(recording, width=shown.size[0], height=shown.size[1]) as viewer:
+        if shown.tab is not None:
+            viewer.show_tab(shown.tab)
         for done, value in enumerate(times, 1):
-            viewer.set_time(timeline, value)
-            yield value, viewer.picture(view)
+            viewer.set_time(shown.timeline, value)
+            yield value, viewer.picture(shown.view)
             if progress is not None:
                 progress(done, len(times))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from rodsight.experiment.units import Scale
-from rodsight.recording.files.recorder import RecordingReport, record
+from rodsight.recording.files.finished_run import RecordingFile, record
 from rodsight.results.results import Results, TruthContacts
 
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
@@ -34,7 +34,7 @@ def truth(results) -> TruthContacts:
 
 
 @pytest.fixture(scope="session")
-def recording(results, truth, tmp_path_factory) -> RecordingReport:
+def recording(results, truth, tmp_path_factory) -> RecordingFile:
     """Everything that a recording can hold."""
     path: Path = tmp_path_factory.mktemp("recording") / "run.rrd"
     scale = Scale(PIXEL, SHAPE[0])

@@ -9,7 +9,7 @@ from rodsight import pipeline
 from rodsight.experiment.experiment import load_experiment
 from rodsight.recording.curve_layers.residual_plot import DECADES, envelope
 from rodsight.recording.curve_layers.starts import COLD_SWEEPS, StartGauge, Starts, contact_problem
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle

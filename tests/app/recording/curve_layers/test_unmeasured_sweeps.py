@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.look import entities
 
 from tests.app.recording.fake_results import make_results

@@ -15,7 +15,7 @@ from rodsight.recording.look.texts import printable
 from rodsight.recording.packing_layers.changes import correlate, correlate_common, gap_colours
 from rodsight.recording.packing_layers.packing import _spin_marks, grain_unbalance, last_seen
 from rodsight.recording.packing_layers.rods import turns_from_axis
-from rodsight.recording.packing_layers.truth import TruthWriter
+from rodsight.recording.packing_layers.true_forces import TruthWriter
 from rodsight.results.results import TruthContacts
 from rodsight.results.truth import score
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.recording.files.catalogue import can_serve, find_recordings, read_properties, serve, show_together
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 
 from tests.app.recording.fake_results import make_results, make_truth
 from tests.browser import open_when_served, wait_for_forces

@@ -8,8 +8,9 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 from rodsight.experiment.units import Scale
+from rodsight.recording.files.finished_run import _check_whole, record
 from rodsight.recording.files.readback import read_forces
-from rodsight.recording.files.recorder import Recorder, _check_whole, record
+from rodsight.recording.files.recorder import Recorder
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle

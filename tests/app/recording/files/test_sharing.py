@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.units import Scale
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.files.readback import read_forces
-from rodsight.recording.files.recorder import record
 from rodsight.recording.files.repair import repair_recording
 from rodsight.recording.files.share import share_recording
 from rodsight.recording.look import entities

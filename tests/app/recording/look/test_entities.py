@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.entities import SCHEMA, Condition, describe_schema

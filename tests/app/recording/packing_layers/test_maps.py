@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.packing import grain_unbalance
 from rodsight.recording.packing_layers.touching import probability_colours

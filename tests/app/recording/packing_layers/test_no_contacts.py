@@ -6,8 +6,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.files.readback import read_forces
-from rodsight.recording.files.recorder import record
 
 from solver.sequence.frame_forces import FrameForces
 from tests.app.recording.fake_results import make_results

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.files.share import share_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.force_style import ForceRange

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.recording.viewing.headless import HeadlessViewer, NoPictureError, vulkan_drivers
-from rodsight.recording.viewing.pictures import timeline_values, write_film
+from rodsight.recording.viewing.pictures import Shown, timeline_values, write_film
 
 from tests.browser import read_picture, warm_share
 
@@ -34,7 +34,7 @@ def test_tabs_and_views_are_pictured_at_any_time(recording):
 @needs_vulkan
 @pytest.mark.slow
 def test_a_film_has_one_picture_for_every_frame(recording, tmp_path):
-    size = write_film(recording.path, tmp_path / "run.mp4", range(4), view="Force network", size=(640, 480))
+    size = write_film(recording.path, tmp_path / "run.mp4", range(4), Shown(view="Force network", size=(640, 480)))
     assert (tmp_path / "run.mp4").stat().st_size == size
     film = cv2.VideoCapture(str(tmp_path / "run.mp4"))
     pictures = []

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.look.texts import _ALIKE, _RANGES, _SIGNS, printable
 from rodsight.recording.tabs.blueprint import Tab
 from rodsight.recording.viewing import viewer

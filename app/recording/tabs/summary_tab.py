@@ -15,10 +15,10 @@ from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.statistics.agreement import Agreement
 from solver.statistics.frame_statistics import FrameStatistics
 
-from .look import entities
-from .look.scene import Scene, setting
-from .look.texts import printable
-from .packing_layers.stack import STRONG, STRONG_SWEEPS
+from ..look import entities
+from ..look.scene import Scene, setting
+from ..look.texts import printable
+from ..packing_layers.stack import STRONG, STRONG_SWEEPS
 
 PACKAGES = ("rodsight", "numpy", "numba", "scipy", "rerun-sdk")
 

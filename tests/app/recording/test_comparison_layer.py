@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.cli.main import main
-from rodsight.recording.comparison import (
+from rodsight.recording.comparison_layer import (
     DIFFERENCE,
     FIRST,
     R_FN,

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from ..packing_layers.changes import gap_colours, gap_range
-from ..packing_layers.touching import probability_colours
-from ..packing_layers.unconverged import DECADES, doubt_colours
-from . import entities
-from .axes import log_texts
-from .canvas import Canvas
-from .colours import ADDED, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
-from .scene import Scene
+from ..look import entities
+from ..look.axes import log_texts
+from ..look.canvas import Canvas
+from ..look.colours import ADDED, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
+from ..look.scene import Scene
+from .changes import gap_colours, gap_range
+from .touching import probability_colours
+from .unconverged import DECADES, doubt_colours
 
 PIECES = 48
 TICKS_BELOW, NOTES_BELOW = 0.10, 0.42  # of the legend's height, from its line to the texts

@@ -25,10 +25,10 @@ from .look.axes import Axes, round_step
 from .look.canvas import Canvas
 from .look.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
 from .look.force_style import ForceRange, ForceStyle
-from .look.legends import PIECES, log_force_legend, log_ramp_legend
 from .look.scene import Clock, Scene
 from .look.texts import printable
 from .look.values import known, log_scalar
+from .packing_layers.legends import PIECES, log_force_legend, log_ramp_legend
 from .packing_layers.network import body_values
 from .packing_layers.packing import log_packing
 from .tabs.views import curve_view, drawn_view, packing_view

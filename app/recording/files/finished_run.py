@@ -1,0 +1,174 @@
+"""A finished run as one recording: as much of it as a size allows, in place only when it is whole."""
+
+from __future__ import annotations
+
+import os
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from ...experiment.units import Scale
+from ...results.results import Results, TruthContacts
+from ..look import entities
+from ..look.canvas import Canvas
+from ..look.force_style import ForceRange, ForceStyle
+from ..look.scene import Scene
+from ..packing_layers.network import SweepChoice
+from ..tabs.axis_ranges import find_extremes
+from ..tabs.blueprint import Layout, Tab, make_blueprint
+from ..tabs.layout_property import send_layout
+from .recorder import BATCHES, SWEEPS_KEPT, PhotographSource, Recorder
+
+FrameProgress = Callable[[int, int], None]  # frames done, frames in all
+
+# What is tried in turn to keep a recording below a size: sweeps per frame.
+THINNER = (40, 20, 10, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFile:
+    """A recording as it was written."""
+
+    path: Path
+    size: int  # [bytes]
+    seconds: float
+    frames: int
+    network_rows: int  # rows of widths and colours, the reported fields among them
+    sweeps: SweepChoice  # as written, which is less than asked for where the size was limited
+    sweeps_kept: int | None  # per frame at most, None: every visible one
+    clipped: int  # forces above the drawn range
+    notes: tuple[str, ...]  # sentences for the user
+
+
+def record(
+    results: Results,
+    path: Path | str,
+    *,
+    photograph: PhotographSource | None = None,
+    scale: Scale | None = None,
+    sweeps: SweepChoice | str = SweepChoice.LOG,
+    truth: TruthContacts | None = None,
+    progress: FrameProgress | None = None,
+    max_size: int | None = None,
+    tolerance: float | None = None,
+    active: Tab = Tab.EXPERIMENT,
+) -> RecordingFile:
+    """Write a run as a recording with its blueprint; an older file is replaced only when the new one is whole.
+
+    photograph: frame → grey picture (H, W) or None; needs `scale`. sweeps: see SweepChoice.
+    tolerance: stopping level of the residual, drawn into the plot. max_size [bytes]: fewer sweeps are
+    written where the file would be larger; what was left out is said in the report and the summary.
+    """
+    if photograph is not None and scale is None:
+        raise ValueError("photographs need the scale that says where the grains are in them")
+    path, begin = Path(path), time.perf_counter()
+    first = photograph(0) if photograph else None
+    canvas = Canvas.around(results.tracks, scale, None if first is None else (first.shape[0], first.shape[1]))
+    scene = Scene(
+        results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
+        ForceStyle.on(canvas, ForceRange.of(results.frames)), truth, tolerance, results.radius_tuning,
+    )  # fmt: skip
+    run = _Run(results, scene, photograph, active, progress)
+    part = path.with_name(path.name + ".part")
+    notes: tuple[str, ...] = ()
+    plans = _plans(SweepChoice(sweeps), limited=max_size is not None)
+    try:
+        for number, plan in enumerate(plans):
+            if number:
+                shown = f"{plan.kept} sweeps per frame" if plan.kept else "the reported fields only"
+                notes = (f"Limited to {_megabytes(max_size or 0)}: {shown} instead of sweeps = {sweeps}.",)
+            last = number == len(plans) - 1
+            recorder = _write(run, part, plan, notes, None if last else max_size)
+            if recorder is not None and (max_size is None or part.stat().st_size <= max_size or last):
+                break
+        else:
+            raise AssertionError("the last plan is always written")
+        if max_size is not None and part.stat().st_size > max_size:
+            notes = (*notes, f"Still larger than {_megabytes(max_size)}: the frames themselves need that much.")
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    return RecordingFile(
+        path, path.stat().st_size, time.perf_counter() - begin, len(results.frames), recorder.network_rows,
+        plan.sweeps, None if plan.sweeps is SweepChoice.ALL else plan.kept, recorder.clipped, notes,
+    )  # fmt: skip
+
+
+def layout_of(results: Results, scene: Scene, *, photographs: bool) -> Layout:
+    """What the blueprint must know of a finished run."""
+    return Layout(
+        scene.canvas, scene.rod_length, len(results.frames), photographs, scene.truth is not None, scene.walls.count,
+        scene.radius_tuning is not None, find_extremes(results),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What is written, however much of it."""
+
+    results: Results
+    scene: Scene
+    photograph: PhotographSource | None
+    active: Tab
+    progress: FrameProgress | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """How much is written."""
+
+    sweeps: SweepChoice
+    kept: int  # sweeps per frame at most
+
+
+def _plans(choice: SweepChoice, *, limited: bool) -> list[_Plan]:
+    """What to try in turn, fullest first."""
+    plans = [_Plan(choice, SWEEPS_KEPT)]
+    if choice is SweepChoice.NONE:
+        return [_Plan(choice, 0)]
+    if limited:
+        thinner = THINNER if choice is SweepChoice.ALL else THINNER[1:]
+        plans += [_Plan(SweepChoice.LOG if kept else SweepChoice.NONE, kept) for kept in thinner]
+    return plans
+
+
+def _write(run: _Run, part: Path, plan: _Plan, notes: tuple[str, ...], max_size: int | None) -> Recorder | None:
+    """Write the whole run to `part`; None, early, where it grows beyond max_size."""
+    results, photograph = run.results, run.photograph
+    stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
+    layout = layout_of(results, run.scene, photographs=photograph is not None)
+    stream.save(part, default_blueprint=make_blueprint(layout, active=run.active))
+    try:
+        recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept)
+        recorder.start(run.scene)
+        send_layout(stream, layout)
+        for done, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
+            recorder.frame(forces, statistics, photograph(forces.frame) if photograph else None)
+            if run.progress:
+                run.progress(done + 1, len(results.frames))
+            if max_size is not None and part.stat().st_size > max_size:
+                return None
+        recorder.finish(notes)
+    finally:
+        stream.disconnect()
+    _check_whole(part)
+    return recorder
+
+
+def _check_whole(part: Path) -> None:
+    """Raise OSError where the end of the file is not there: the stream writes in the background and does not tell."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # of a missing end: store() raises for it
+            RrdReader(str(part)).store()
+    except (RuntimeError, ValueError) as error:
+        raise OSError(f"the recording could not be written whole (is the disk full?): {error}") from error
+
+
+def _megabytes(size: int) -> str:
+    return f"{1e-6 * size:.3g} MB"
