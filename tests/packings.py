@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from solver.bodies.grains import Array, GrainMotion, Grains
-from solver.bodies.packing import Material
+from solver.bodies.packing import Material, Packing
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, detect_contacts
 from solver.nlgs.problem import ContactProblem, assemble
+from solver.nlgs.solve import NlgsSettings, solve
 
 LENGTH = 0.06  # [m]
 
@@ -59,3 +62,30 @@ def squeezed_heap(rng: np.random.Generator, columns: int = 6, rows: int = 6) -> 
     grains = rods(*rng.choice([0.0078, 0.0080, 0.0082], len(position)))
     state = motion(position, rng.normal(0, 1e-5, position.shape), rng.normal(0, 1e-3, len(position)))
     return grains, state, box(columns * pitch, rows * pitch, top_load=50.0)
+
+
+@dataclass(frozen=True)
+class Heap:
+    """Grains at rest under their weight, and the contact forces that keep them there."""
+
+    packing: Packing
+    state: GrainMotion
+    walls: Walls
+    contacts: Contacts
+    fn: Array  # (c,) [N]
+    ft: Array  # (c,) [N]
+
+
+def heap_at_rest(columns: int = 6, rows: int = 5) -> Heap:
+    """Equal discs stacked close in an open box: in exact balance, for nothing moves."""
+    radius, gravity = 0.008, (0.0, -9.81)
+    position = np.array([
+        (radius * (1 + 2 * column + row % 2), radius * (1 + row * np.sqrt(3.0)))
+        for row in range(rows) for column in range(columns - row % 2)
+    ])  # fmt: skip
+    grains, walls = rods(*np.full(len(position), radius)), box(2 * radius * columns, 1.0)
+    state = motion(position)
+    problem, contacts = problem_of(grains, state, walls, friction=0.3, gravity=gravity, threshold=1e-9)
+    found = solve(problem, NlgsSettings(sweeps=20_000, natural_map=1e-13, acceleration=5), every=50)
+    packing = Packing(grains, LENGTH, Material(0.3, 0.3, 0.0, gravity), np.full(4, np.nan))
+    return Heap(packing, state, walls, contacts, found.fn, found.ft)

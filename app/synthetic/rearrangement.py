@@ -9,6 +9,7 @@ from solver.bodies.walls import Walls
 from solver.contacts.contacts import measure_contacts
 from solver.contacts.pairs import are_among, make_keys
 from solver.dem.simulation import DemTruth
+from solver.statistics.balance import unbalances
 
 
 def measure_old_unbalance(truth: DemTruth) -> Array:
@@ -16,9 +17,9 @@ def measure_old_unbalance(truth: DemTruth) -> Array:
 
     Returns (f,), NaN at frame 0. Small while contacts last and turn slowly, large where strong contacts open.
     """
-    settings, n = truth.settings, len(truth.radius)
+    settings = truth.settings
     grains = Grains.of_rods(truth.radius, density=settings.density, length=settings.length)
-    bodies = n + len(truth.wall_names)
+    bodies, weight = grains.count + len(truth.wall_names), grains.weight(settings.gravity)
     result = np.full(truth.frame_count, np.nan)
     for k in range(1, truth.frame_count):
         old, new = (slice(int(truth.offset[m]), int(truth.offset[m + 1])) for m in (k - 1, k))
@@ -27,11 +28,7 @@ def measure_old_unbalance(truth: DemTruth) -> Array:
         i, j = truth.i[old][lasting], truth.j[old][lasting]
         contacts = measure_contacts(grains, truth.position[k], Walls.at_rest(truth.endpoints[k]), i, j)
         fn, ft = truth.fn[old][lasting], truth.ft[old][lasting]
-        force = fn[:, None] * contacts.normal + ft[:, None] * contacts.tangent
-        resultant = np.zeros((bodies, 2))
-        np.add.at(resultant, j, force)
-        np.subtract.at(resultant, i, force)
-        result[k] = np.linalg.norm(resultant[:n], axis=1).mean() / truth.fn[old].mean()
+        result[k] = unbalances(contacts, fn, ft, weight).mean() / truth.fn[old].mean()
     return result
 
 

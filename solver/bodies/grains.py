@@ -42,6 +42,10 @@ class Grains:
         """Moment of inertia of a solid rod about its axis, ½ m R² (n,) [kg m²]."""
         return 0.5 * self.mass * self.radius**2
 
+    def weight(self, gravity: tuple[float, float]) -> Array:
+        """Weight of every grain (n, 2) [N]; gravity [m/s²]."""
+        return self.mass[:, None] * np.asarray(gravity)
+
 
 @dataclass(frozen=True, slots=True)
 class GrainMotion:

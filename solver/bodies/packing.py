@@ -34,6 +34,11 @@ class Packing:
     material: Material
     pressure: Float[Array, " w"]  # [Pa] on plates, NaN where the motion is imposed
 
+    @property
+    def weight(self) -> Array:
+        """Weight of every grain (n, 2) [N]."""
+        return self.grains.weight(self.material.gravity)
+
     def load(self, endpoints: Array) -> Array:
         """Load on every wall (w,) [N] of given endpoints (w, 2, 2) [m]."""
         return self.pressure * np.linalg.norm(endpoints[:, 1] - endpoints[:, 0], axis=1) * self.length

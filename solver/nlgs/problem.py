@@ -85,7 +85,7 @@ def assemble(
     if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
         raise ValueError("a contact names a grain that is not present")
     compliance = 1.0 / impedance
-    weight = grains.mass[:, None] * np.asarray(material.gravity)
+    weight = grains.weight(material.gravity)
     weight[~motion.present] = 0.0
     body = np.zeros((n, 4))
     body[:, :2] = motion.velocity + weight * compliance[:, None]

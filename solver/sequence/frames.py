@@ -309,7 +309,7 @@ def _evidence(
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
         load_share=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
-        unbalance=worst_unbalance(packing, step.contacts, fn, ft, motion.grains.present),
+        unbalance=worst_unbalance(step.contacts, fn, ft, packing.weight, motion.grains.present),
         shear=shear_over(motion),
         frames_since_event=state.frames_since_event + 1,
         start_difference=start_difference,

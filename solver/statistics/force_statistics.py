@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
@@ -32,6 +33,12 @@ class StrongNetwork:
     contact_share: float  # of the contacts with force
     pressure_share: float  # of the mean stress
     deviator_share: float  # of the stress deviator along σ₁: above 1 where the weak network opposes it
+
+
+def mean_normal_force(fn: NDArray[np.floating]) -> float:
+    """Mean f_n of the contacts that bear force [N]; NaN where none does."""
+    bearing = fn[np.isfinite(fn) & (fn > 0.0)]
+    return float(bearing.mean()) if len(bearing) else float("nan")
 
 
 def force_density(force: Array) -> Array:

@@ -7,11 +7,12 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.statistics.force_statistics import mean_normal_force
 
 from ..look import entities
 from ..look.axes import Axes, log_texts
 from ..look.colours import INK, SERIES, packed_one
-from ..look.scene import Clock, mean_force
+from ..look.scene import Clock
 
 LARGEST = 8.0  # f_n / ⟨f_n⟩ at the right end of the axis
 BINS = 32
@@ -47,7 +48,7 @@ class ForceDensity:
     def log(self, clock: Clock, fn: Array, tail_exponent: float) -> None:
         """Log the density of one frame, with its exponential tail, and of all so far."""
         loaded = fn[np.isfinite(fn) & (fn > 0.0)]
-        counts = np.histogram(loaded / mean_force(fn), EDGES)[0] if len(loaded) else np.zeros(BINS)
+        counts = np.histogram(loaded / mean_normal_force(fn), EDGES)[0] if len(loaded) else np.zeros(BINS)
         self._pooled += counts
         self._total += len(loaded)
         clock.end()
@@ -69,7 +70,7 @@ class ForceDensity:
                 draw_order=10.0,
             ),
         )
-        self._log_tail(clock, loaded / mean_force(fn) if len(loaded) else loaded, tail_exponent)
+        self._log_tail(clock, loaded / mean_normal_force(fn) if len(loaded) else loaded, tail_exponent)
 
     def _log_tail(self, clock: Clock, share: Array, exponent: float) -> None:
         """Log the density S β exp(−β (x − 1)) above the mean, S the share of the forces (c,) that is there."""

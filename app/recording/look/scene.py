@@ -46,6 +46,13 @@ class Scene:
         length = setting(self.configuration, "material", "length")
         return float(length) if isinstance(length, (int, float)) and length > 0 else USUAL_ROD_LENGTH
 
+    @property
+    def weight(self) -> Array:
+        """Weight of every grain (n, 2) [N]: material.gravity of the configuration, none where it does not say."""
+        gravity = setting(self.configuration, "material", "gravity")
+        x, y = gravity if isinstance(gravity, list) else (0.0, 0.0)
+        return self.grains.weight((float(x), float(y)))
+
     def body_names(self, bodies: NDArray[np.integer]) -> list[str]:
         """Names of bodies by row: a grain's id, a wall's name."""
         n = self.grains.count
@@ -108,9 +115,3 @@ def setting(configuration: str, section: str, key: str) -> object | None:
     except tomllib.TOMLDecodeError:
         return None
     return part.get(key) if isinstance(part, dict) else None
-
-
-def mean_force(fn: Array) -> float:
-    """Mean of f_n over contacts that carry force [N]; NaN without any."""
-    loaded = fn[np.isfinite(fn) & (fn > 0.0)]
-    return float(loaded.mean()) if len(loaded) else float("nan")

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.sequence.frame_forces import FrameForces
+from solver.statistics.balance import grain_unbalance
 
 from ...tracks import TrackStatus
 from ..look import entities
 from ..look.colours import INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
-from ..look.scene import Clock, Scene, mean_force
+from ..look.scene import Clock, Scene
 from ..look.texts import printable
 from ..look.values import known
 
@@ -22,17 +23,6 @@ def log_packing(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     clock.start()
     _log_walls(clock, scene)
     _log_grains(clock, scene, forces)
-
-
-def grain_unbalance(forces: FrameForces, grain_count: int) -> Array:
-    """|ΣF| of the contact forces on every grain over the mean f_n (n,); NaN without forces."""
-    contacts = forces.contacts
-    force = forces.fn[:, None] * contacts.normal + forces.ft[:, None] * contacts.tangent  # of i on j
-    total = np.zeros((grain_count, 2))
-    np.add.at(total, contacts.i, -force)
-    both = ~contacts.with_wall
-    np.add.at(total, contacts.j[both], force[both])
-    return np.linalg.norm(total, axis=1) / mean_force(forces.fn)
 
 
 def last_seen(position: Array, frame: int) -> Array:
@@ -93,7 +83,9 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
             sigma_um=known((1e6 * tracks.sigma[frame]).astype(np.float32)),
             zncc=known(tracks.zncc[frame].astype(np.float32)),
             status=[TrackStatus(s).name.lower() for s in status.tolist()],
-            unbalance=known(grain_unbalance(forces, tracks.grain_count).astype(np.float32)),
+            unbalance=known(
+                grain_unbalance(forces.contacts, forces.fn, forces.ft, scene.weight, present).astype(np.float32)
+            ),
         ),
     )
     turned = tracks.rotation[frame] - _first_rotation(tracks.rotation)

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
 from solver.sequence.frame_forces import FrameForces
+from solver.statistics.balance import unbalances
+from solver.statistics.force_statistics import mean_normal_force
 
 from ..look import entities
 from ..look.colours import DOUBT_RAMP, OPEN, packed, packed_one
@@ -32,10 +32,10 @@ def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: Swe
     """Log both maps of one frame at no more than `kept` of its sweeps, and of the reported field."""
     thinned = SweepChoice.NONE if choice is SweepChoice.NONE else SweepChoice.LOG
     rows, fn, ft = visible_sweeps(forces, clock.last - clock.first, thinned, kept)
-    mean = _mean_forces(fn, forces.fn)
-    unbalance = unbalances(forces.contacts, fn, ft, scene.grains.count) / mean[:, None]
+    mean = mean_normal_force(forces.fn)  # of the reported field: what every row is measured by
+    unbalance = unbalances(forces.contacts, fn, ft, scene.weight) / mean
     change = np.full(fn.shape, np.nan)
-    change[1:] = np.hypot(np.diff(fn, axis=0), np.diff(ft, axis=0)) / mean[1:, None]
+    change[1:] = np.hypot(np.diff(fn, axis=0), np.diff(ft, axis=0)) / mean
     lost = ~scene.tracks.present[clock.frame]
     unbalance[:, lost] = np.nan
     clock.start()
@@ -69,15 +69,6 @@ def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: Swe
             clock.stream.send_columns(path, when, columns(colors=colours.ravel()).partition(lengths))
 
 
-def unbalances(contacts: Contacts, fn: NDArray[np.floating], ft: NDArray[np.floating], grain_count: int) -> Array:
-    """|ΣF| on every grain (r, n) [N] of forces fn, ft (r, c) [N] in r sweeps."""
-    sums = _summation(contacts, grain_count)
-    normal, tangent = contacts.normal, contacts.tangent
-    x = sums @ (fn * normal[:, 0] + ft * tangent[:, 0]).T
-    y = sums @ (fn * normal[:, 1] + ft * tangent[:, 1]).T
-    return np.hypot(x, y).T
-
-
 def doubt_colours(share: Array) -> NDArray[np.uint32]:
     """Colours of values over the mean force, from quiet (small) to loud on a logarithmic ramp; faint if unknown."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -85,18 +76,3 @@ def doubt_colours(share: Array) -> NDArray[np.uint32]:
     place = np.clip((power - DECADES[0]) / (DECADES[1] - DECADES[0]), 0.0, 1.0)
     level = np.round(np.nan_to_num(place) * (LEVELS - 1)).astype(np.int64)
     return np.where(np.isfinite(share), _RAMP[level], _OPEN).astype(np.uint32)
-
-
-def _summation(contacts: Contacts, grain_count: int) -> csr_matrix:
-    """Adds forces of contacts to forces on grains (n, c): −1 for the grain that exerts it, +1 for the other."""
-    both = np.flatnonzero(~contacts.with_wall)
-    grain = np.concatenate([contacts.i, contacts.j[both]])
-    contact = np.concatenate([np.arange(contacts.count), both])
-    sign = np.concatenate([-np.ones(contacts.count), np.ones(len(both))])
-    return csr_matrix((sign, (grain, contact)), shape=(grain_count, contacts.count))
-
-
-def _mean_forces(fn: NDArray[np.floating], reported: Array) -> Array:
-    """What every row is measured by (r,) [N]: the mean f_n of the reported field, NaN where it has none."""
-    loaded = reported[np.isfinite(reported) & (reported > 0.0)]
-    return np.full(len(fn), loaded.mean() if len(loaded) else np.nan)

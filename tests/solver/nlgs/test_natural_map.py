@@ -72,15 +72,3 @@ def test_what_is_heard_is_what_the_forces_say(heap):
         before = force
         if sweep.number == 10:
             break
-
-
-def test_unbalance_is_the_sum_of_forces_on_a_grain(heap):
-    grains, _, _, contacts, material, _ = heap
-    force = solve(assemble(*heap), NlgsSettings(sweeps=15)).force
-    vector = force[:, :1] * contacts.normal + force[:, 1:] * contacts.tangent
-    total = grains.mass[:, None] * np.asarray(material.gravity)
-    np.add.at(total, contacts.i, -vector)
-    inner = ~contacts.with_wall
-    np.add.at(total, contacts.j[inner], vector[inner])
-    size, mean = np.linalg.norm(total, axis=1), force[force[:, 0] > 0, 0].mean()
-    assert unbalance_of(assemble(*heap), force) == pytest.approx((size.max() / mean, size.mean() / mean), rel=ROUNDING)

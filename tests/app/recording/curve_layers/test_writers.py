@@ -13,13 +13,14 @@ from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.look.scene import Clock, Scene
 from rodsight.recording.look.texts import printable
 from rodsight.recording.packing_layers.changes import correlate, correlate_common, gap_colours
-from rodsight.recording.packing_layers.packing import _spin_marks, grain_unbalance, last_seen
+from rodsight.recording.packing_layers.packing import _spin_marks, last_seen
 from rodsight.recording.packing_layers.rods import turns_from_axis
 from rodsight.recording.packing_layers.true_forces import TruthWriter
 from rodsight.results.results import TruthContacts
 from rodsight.results.truth import score
 
 from solver.contacts.contacts import Contacts
+from solver.statistics.balance import grain_unbalance
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest
 
@@ -28,15 +29,12 @@ FLOAT32 = 1e-6
 
 
 def test_a_grain_pressed_from_both_sides_is_balanced():
-    forces = make_results(1).frames[0]
     contacts = Contacts(
         np.array([0, 1], np.int32), np.array([1, 2], np.int32), np.zeros(2), np.array([[1.0, 0.0], [1.0, 0.0]]),
         np.zeros((2, 2)), 3, 0,
     )  # fmt: skip
-    from dataclasses import replace
-
-    forces = replace(forces, contacts=contacts, fn=np.array([7.0, 7.0]), ft=np.array([1.0, 1.0]))
-    unbalance = grain_unbalance(forces, 3)
+    here = np.ones(3, bool)
+    unbalance = grain_unbalance(contacts, np.array([7.0, 7.0]), np.array([1.0, 1.0]), np.zeros((3, 2)), here)
     assert unbalance[1] == pytest.approx(0.0, abs=ROUNDING)
     assert np.allclose(unbalance[[0, 2]], np.hypot(7.0, 1.0) / 7.0, rtol=ROUNDING)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from rodsight.recording.files.finished_run import record
 from rodsight.recording.look import entities
-from rodsight.recording.packing_layers.packing import grain_unbalance
 from rodsight.recording.packing_layers.touching import probability_colours
-from rodsight.recording.packing_layers.unconverged import doubt_colours, unbalances
+from rodsight.recording.packing_layers.unconverged import doubt_colours
 
 from solver.contacts.contacts import Contacts
+from solver.statistics.balance import grain_unbalance, unbalances
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest, rows
 
@@ -20,11 +20,12 @@ ROUNDING = 1e-12
 def test_the_unbalance_of_every_sweep_is_that_of_its_own_forces():
     results = make_results(1, sweeps=5)
     forces = results.frames[0]
-    found = unbalances(forces.contacts, forces.history.fn, forces.history.ft, results.grains.count)
+    weightless, here = np.zeros((results.grains.count, 2)), np.ones(results.grains.count, bool)
+    found = unbalances(forces.contacts, forces.history.fn, forces.history.ft, weightless)
     for row in range(5):
-        of_row = replace(forces, fn=forces.history.fn[row].astype(float), ft=forces.history.ft[row].astype(float))
-        mean = of_row.fn[of_row.fn > 0].mean()
-        assert np.allclose(found[row] / mean, grain_unbalance(of_row, results.grains.count), rtol=ROUNDING)
+        fn, ft = forces.history.fn[row].astype(float), forces.history.ft[row].astype(float)
+        alone = grain_unbalance(forces.contacts, fn, ft, weightless, here)
+        assert np.allclose(found[row] / fn[fn > 0].mean(), alone, rtol=ROUNDING)
 
 
 def test_a_squeezed_grain_is_quiet_and_its_neighbours_glow():
@@ -32,7 +33,7 @@ def test_a_squeezed_grain_is_quiet_and_its_neighbours_glow():
         np.array([0, 1], np.int32), np.array([1, 2], np.int32), np.zeros(2), np.array([[1.0, 0.0], [1.0, 0.0]]),
         np.zeros((2, 2)), 3, 0,
     )  # fmt: skip
-    found = unbalances(contacts, np.array([[7.0, 7.0]]), np.zeros((1, 2)), 3)
+    found = unbalances(contacts, np.array([[7.0, 7.0]]), np.zeros((1, 2)), np.zeros((3, 2)))
     assert found.tolist() == [[7.0, 0.0, 7.0]]
     quiet, loud = doubt_colours(np.array([0.0, 1.0]))
     assert quiet != loud
@@ -61,7 +62,9 @@ def test_maps_follow_the_sweeps_and_end_with_the_reported_field(tmp_path):
     step = np.hypot(frame.fn - frame.history.fn[-1], frame.ft - frame.history.ft[-1]) / mean
     assert end == doubt_colours(step).tolist()
     grains = latest(path, entities.UNBALANCE_MAP, entities.FRAME, 0)["Points2D:colors"]
-    assert grains == doubt_colours(grain_unbalance(frame, results.grains.count)).tolist()
+    weightless, here = np.zeros((results.grains.count, 2)), results.tracks.present[0]
+    unbalance = grain_unbalance(frame.contacts, frame.fn, frame.ft, weightless, here)
+    assert grains == doubt_colours(unbalance).tolist()
 
 
 def test_probabilities_are_shown_per_contact_and_counted(tmp_path):
