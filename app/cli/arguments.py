@@ -1,4 +1,4 @@
-"""Arguments that several commands share: their names on the command line, and their help."""
+"""Arguments that several commands share: their names on the command line, their help, and what they mean."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+
+from ..errors import InputError
 
 ExperimentPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT")]
 Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the results; default runs/<name>")]
@@ -33,3 +35,16 @@ FullFrames = Annotated[
         metavar="FRAME", help="with --sweeps all: every sweep of these frames to a side file, others thinned"
     ),
 ]
+
+
+def parse_frames(text: str | None) -> tuple[int, int | None]:
+    """First frame and end (None: to the last) of a range A:B; either side may be left out. Raises InputError."""
+    if text is None:
+        return 0, None
+    first, colon, last = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return int(first or 0), int(last) if last else None
+    except ValueError:
+        raise InputError("--frames", text, "is not A:B, such as 0:12") from None

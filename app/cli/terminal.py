@@ -1,7 +1,8 @@
-"""Progress on a terminal: the stage, how far it is, the time left."""
+"""The terminal: tables as wide as it is, sentences that may be copied, progress with the time left."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -16,7 +17,9 @@ from rich.progress import (
 )
 from rich.progress import Progress as Bars
 
-from ..progress import Progress
+from ..progress import Progress, silent
+
+WIDE = 120  # columns of a table that goes to a file
 
 
 @contextmanager
@@ -40,3 +43,23 @@ def progress_bars() -> Iterator[Progress]:
 
     with bars:
         yield show
+
+
+@contextmanager
+def progress_of(quiet: bool) -> Iterator[Progress]:
+    """Bars on a terminal, silence elsewhere and where it was asked for."""
+    if quiet or not sys.stderr.isatty():
+        yield silent
+    else:
+        with progress_bars() as progress:
+            yield progress
+
+
+def table_console(width: int = WIDE, *, quiet: bool = False) -> Console:
+    """A console for tables: as wide as the terminal, or `width` columns where the output goes to a file."""
+    return Console(quiet=quiet) if sys.stdout.isatty() else Console(width=width, quiet=quiet)
+
+
+def tell(console: Console, sentence: str) -> None:
+    """Print a sentence as it is: no markup, no colours, no line break in a path or command to be copied."""
+    console.print(sentence, markup=False, highlight=False, soft_wrap=True)

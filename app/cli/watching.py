@@ -6,13 +6,15 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from ..experiment.scaling import make_scale
-from ..pipeline import Run
+from ..run_folder import Run
 from ..signals import answering
+from .terminal import tell
 
 if TYPE_CHECKING:
     from ..recording.files.live_process import LiveProcess
@@ -30,10 +32,7 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
         yield run, None
         return
 
-    def tell(sentence: str) -> None:
-        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
-
-    watch = _watch(run, viewer, tell)
+    watch = _watch(run, viewer, partial(tell, console))
     try:
         # A termination from outside ends the run as an interrupt does, so that it says what it leaves.
         with answering(signal.SIGTERM, signal.default_int_handler):
@@ -43,11 +42,11 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
     except BaseException:
         watch.close(whole=False)
         if watch.started and watch.path.is_file():
-            tell(f"What was solved so far: rodsight view {watch.path}")
+            tell(console, f"What was solved so far: rodsight view {watch.path}")
         raise
 
 
-def _watch(run: Run, viewer: str, tell: Callable[[str], None]) -> LiveProcess:
+def _watch(run: Run, viewer: str, say: Callable[[str], None]) -> LiveProcess:
     from ..recording.files.live_process import GreyPhotographs, LiveProcess
 
     config = run.experiment.config
@@ -57,4 +56,4 @@ def _watch(run: Run, viewer: str, tell: Callable[[str], None]) -> LiveProcess:
         photograph = GreyPhotographs(photographs, run.frames[0])
         scale = make_scale(config.photographs, photographs.shape[0])
     sweeps = "none" if config.recording.sweeps == "none" else "log"
-    return LiveProcess(run.file(LIVE), tell, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)
+    return LiveProcess(run.file(LIVE), say, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)

@@ -1,0 +1,245 @@
+"""Commands that make an experiment's results: run, check, track, solve, record."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from ..errors import InputError
+from .arguments import (
+    Ensemble,
+    ExperimentPath,
+    Frames,
+    FullFrames,
+    MaxSize,
+    Out,
+    Quiet,
+    Settings,
+    Sweeps,
+    parse_frames,
+)
+from .terminal import progress_of, tell
+
+if TYPE_CHECKING:
+    from ..run_folder import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """The arguments that commands on an experiment share, as the user gave them."""
+
+    experiment: Path
+    settings: tuple[str, ...] = ()
+    quiet: bool = False
+    out: Path | None = None
+    frames: str | None = None
+    max_size: float | None = None  # [MB] of the recording
+    full_frames: tuple[int, ...] = ()
+
+    @property
+    def console(self) -> Console:
+        return Console(quiet=self.quiet)
+
+    def laid_over(self, key: str, value: str | int | None) -> Request:
+        """The same with one more setting, where a value was given."""
+        return self if value is None else replace(self, settings=(*self.settings, f"{key}={json.dumps(value)}"))
+
+
+def run(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    view: Literal["none", "native", "web"] = "none",
+    sweeps: Sweeps = None,
+    max_size: MaxSize = None,
+    full_frames: FullFrames = (),
+    ensemble: Ensemble = None,
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Photographs to contact forces and a recording: the main job.
+
+    Example: rodsight run sample_data/shear --view web
+    """
+    from .. import pipeline
+    from ..results.summary import print_summary, save_summary, summarize
+    from ..results.truth import score as score_frames
+    from ..run_folder import SUMMARY
+    from .look import show
+    from .watching import watching
+
+    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames)
+    request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)
+    console = request.console
+    began = time.perf_counter()
+    with open_run(request) as plain, watching(plain, view, console) as (run, watch):
+        results = pipeline.solve(run)
+        truth = pipeline.load_truth(run, results)
+        agreement = score_frames(results, truth) if truth is not None else None
+        recording = pipeline.record(run, results, truth)
+    seconds = {**run.timings.seconds, "total": time.perf_counter() - began}
+    summary = summarize(results, agreement, seconds)
+    save_summary(run.file(SUMMARY), summary)
+    print_summary(console, summary)
+    console.print(f"Results in {run.folder}/ after {seconds['total']:.1f} s.", highlight=False)
+    _tell_notes(run, console)
+    watched = watch is not None and watch.started  # the viewer is open already
+    return show(recording, "none" if watched else view, console)
+
+
+def check(experiment: ExperimentPath, /, settings: Settings = (), quiet: Quiet = False) -> int:
+    """Validate an experiment without computing.
+
+    Example: rodsight check sample_data/shear
+    """
+    from .. import pipeline
+
+    request = Request(experiment, settings, quiet)
+    with open_run(request) as run:
+        tracks, walls = pipeline.check(run)
+    config = run.experiment.config
+    if tracks is not None:
+        what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
+    else:
+        what = f"{len(run.experiment.photographs())} photographs"
+    what += f", {walls.count} walls" if walls is not None else ", no walls: it can be tracked but not solved"
+    console = request.console
+    console.print(f"{config.name}: the input is good: {what}.", highlight=False)
+    _tell_notes(run, console)
+    return 0
+
+
+def track(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    frames: Frames = None,
+    report: Annotated[
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write DIR/tracking_report.html: how well it went")
+    ] = False,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Follow the grains through the photographs, no more.
+
+    Example: rodsight track sample_data/shear --report
+    """
+    from .. import pipeline
+    from ..run_folder import TRACKS
+
+    request = Request(experiment, settings, quiet, out, frames)
+    with open_run(request) as run:
+        if report and run.experiment.config.photographs is None:
+            raise InputError(run.experiment.file, "--report", "shows photographs, and these tracks come from a table")
+        tracks, walls = pipeline.track(run)
+        page = pipeline.report_tracking(run, tracks, walls) if report else None
+    console = request.console
+    lost = int((~tracks.present).sum())
+    renewed = f", {tracks.renewal_count} damaged grains with a new reference" if tracks.renewal_count else ""
+    where = run.file(TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
+    console.print(
+        f"{tracks.grain_count} grains over {tracks.frame_count} frames, {lost} poses lost{renewed}; tracks in {where}.",
+        highlight=False,
+    )
+    if page is not None:
+        console.print(f"How well it went: {page}", highlight=False)
+    return 0
+
+
+def solve(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    sweeps: Sweeps = None,
+    ensemble: Ensemble = None,
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Find contacts and forces, tracking first where that has not been done.
+
+    Example: rodsight solve sample_data/shear --set contacts.threshold_sigmas=5
+    """
+    from .. import pipeline
+    from ..results.summary import print_summary, save_summary, summarize
+    from ..results.truth import score as score_frames
+    from ..run_folder import SUMMARY
+
+    request = Request(experiment, settings, quiet, out, frames)
+    request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)
+    with open_run(request) as run:
+        results = pipeline.solve(run)
+        truth = pipeline.load_truth(run, results)
+    agreement = score_frames(results, truth) if truth is not None else None
+    summary = summarize(results, agreement, run.timings.seconds)
+    save_summary(run.file(SUMMARY), summary)
+    console = request.console
+    print_summary(console, summary)
+    _tell_notes(run, console)
+    return 0
+
+
+def record(
+    experiment: ExperimentPath,
+    /,
+    out: Out = None,
+    sweeps: Sweeps = None,
+    max_size: MaxSize = None,
+    full_frames: FullFrames = (),
+    frames: Frames = None,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Write the recording, solving first where that has not been done.
+
+    Example: rodsight record sample_data/shear --sweeps all
+    """
+    from .. import pipeline
+    from .look import show
+
+    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames)
+    request = request.laid_over("recording.sweeps", sweeps)
+    with open_run(request) as run:
+        results = pipeline.solve(run)
+        recording = pipeline.record(run, results, pipeline.load_truth(run, results))
+    console = request.console
+    _tell_notes(run, console)
+    return show(recording, "none", console)
+
+
+@contextmanager
+def open_run(request: Request) -> Iterator[Run]:
+    """The run that was asked for, with progress shown while it is open."""
+    from ..experiment.experiment import load_experiment
+    from ..run_folder import Run
+
+    experiment = load_experiment(request.experiment, request.settings)
+    folder = request.out if request.out is not None else Path("runs") / experiment.name
+    with progress_of(request.quiet) as progress:
+        yield Run(
+            experiment, folder, parse_frames(request.frames), progress, max_size=_bytes(request.max_size),
+            full_frames=request.full_frames,
+        )  # fmt: skip
+
+
+def _bytes(megabytes: float | None) -> int | None:
+    if megabytes is None:
+        return None
+    if not (math.isfinite(megabytes) and megabytes > 0.0):
+        raise InputError("--max-size", str(megabytes), "is not a positive number of megabytes")
+    return int(1e6 * megabytes)
+
+
+def _tell_notes(run: Run, console: Console) -> None:
+    for note in run.notes:
+        tell(console, note)
