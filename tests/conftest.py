@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from rodsight.synthetic.experiment import synthesize
 
@@ -14,6 +15,13 @@ from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
 from tests.shapes import check_shapes
 
 check_shapes("solver")
+
+# A failure must be the same everywhere: examples are drawn without chance, and a slow machine is no failure.
+settings.register_profile(
+    "rodsight", max_examples=25, deadline=None, derandomize=True, database=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)  # fmt: skip
+settings.load_profile("rodsight")
 
 
 @pytest.fixture(scope="session")

@@ -85,10 +85,10 @@ def motion_to(snapshot: Snapshot, seen: LastSeen, former_time: float, former_end
     seen: of the frames before; former_time [s], former_endpoints (w, 2, 2) [m]: of the frame before. A grain that
     was lost in between moves with its mean velocity since it was last seen; one never seen, like its neighbours.
     """
-    velocity, spin = _velocities(snapshot, seen)
     interval = snapshot.time - former_time
     if not interval > 0:
         raise ValueError(f"the time of a frame ({snapshot.time} s) is not after that of the frame before it")
+    velocity, spin = _velocities(snapshot, seen)
     grains = GrainMotion(snapshot.position, velocity, spin, snapshot.present)
     wall_velocity = (snapshot.endpoints - former_endpoints) / interval
     return FrameMotion(interval, grains, snapshot.endpoints, wall_velocity, True, snapshot.sigma)

@@ -1,11 +1,12 @@
 """Apply every mutant to a copy of the tree, run the nearest tests there, and tell which of them nothing notices.
 
 The copy keeps the files' times, so that compiled kernels that no mutant touches are found in their caches. A mutant of
-a compiled file is run without compilation: its lines are the same, and its callers could not know of it otherwise.
+a kernel is run without compilation: its lines are the same, and its callers could not know of it otherwise.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -39,9 +40,10 @@ class Verdict:
 def judge_mutants(mutants: Sequence[Mutant], folder: Path) -> Iterator[Verdict]:
     """Try mutants one by one in a copy of the tree in `folder`. Errors: StaleMutantError, UnsoundTestsError."""
     files = [mutant.locate(ROOT) for mutant in mutants]
+    kernel = [in_kernel(ROOT / file, mutant.old) for mutant, file in zip(mutants, files, strict=True)]
     tree = copy_tree(folder)
-    for tests, compiled in sorted({(m.tests, is_compiled(f)) for m, f in zip(mutants, files, strict=True)}):
-        code, told = run_tests(tree, tests, compile_kernels=not compiled)
+    for tests, interpreted in sorted({(m.tests, k) for m, k in zip(mutants, kernel, strict=True)}):
+        code, told = run_tests(tree, tests, compile_kernels=not interpreted)
         if code != 0:
             raise UnsoundTestsError(f"without a mutant {' '.join(tests)} do not pass: {told}")
     for mutant, file in zip(mutants, files, strict=True):
@@ -54,7 +56,8 @@ def judge(mutant: Mutant, file: Path, tree: Path) -> Verdict:
     text = (tree / file).read_text(encoding="utf-8")
     (tree / file).write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
     try:
-        code, told = run_tests(tree, mutant.tests, compile_kernels=not is_compiled(file))
+        kernel = in_kernel(ROOT / file, mutant.old)
+        code, told = run_tests(tree, mutant.tests, compile_kernels=not kernel)
     finally:
         shutil.copy2(ROOT / file, tree / file)
     if code > 1:  # neither passed nor failed: no test was run at all
@@ -72,8 +75,16 @@ def copy_tree(folder: Path) -> Path:
     return folder
 
 
-def is_compiled(file: Path) -> bool:
-    return "@njit" in (ROOT / file).read_text(encoding="utf-8")
+def in_kernel(file: Path, text: str) -> bool:
+    """Whether a text stands in a compiled function, or at the top of a file that has some."""
+    code = file.read_text(encoding="utf-8")
+    if "@njit" not in code:
+        return False
+    line = code[: code.index(text)].count("\n") + 1 + text[: len(text) - len(text.lstrip("\n"))].count("\n")
+    for node in ast.parse(code).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.lineno <= line <= (node.end_lineno or line):
+            return any("njit" in ast.unparse(decorator) for decorator in node.decorator_list)
+    return True
 
 
 def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool) -> tuple[int, str]:

@@ -3,6 +3,7 @@
 from tests.mutation.mutant import mutants_of
 
 SWEEPS = ("tests/reference/test_sweeps.py",)
+CHAIN = ("tests/golden/test_forces.py", "tests/solver/sequence/test_frames.py")
 MEASURES = ("tests/reference/test_measures.py",)
 
 MUTANTS = [
@@ -109,7 +110,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/nlgs/chain.py",
-        "tests/solver/nlgs",
+        CHAIN,
         ("pressure * packing.length * 2.0 *", "pressure * packing.length *"),
         ("motion.velocity_rms * reluctance", "0.0 * reluctance"),
         ("problem, contacts, _ = contacts_at(step / steps)", "problem, contacts, _ = contacts_at(1.0)"),

@@ -2,8 +2,8 @@
 
 from tests.mutation.mutant import mutants_of
 
-JUDGEMENT = "tests/solver/sequence/test_judgement.py"
-FRAMES = ("tests/golden", "tests/solver/sequence")
+JUDGEMENT = ("tests/solver/sequence/test_judgement.py", "tests/golden/test_forces.py")
+FRAMES = ("tests/golden/test_forces.py", "tests/solver/sequence")
 
 MUTANTS = [
     *mutants_of(

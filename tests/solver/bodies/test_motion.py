@@ -1,0 +1,154 @@
+"""Poses become motions, and motions places in between."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.bodies.grains import GrainMotion, Grains
+from solver.bodies.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
+from solver.bodies.packing import Material, Packing
+from solver.bodies.walls import Walls
+from tests.packings import LENGTH, box, rods
+
+WALLS = box(0.1, 0.05).endpoints
+START = np.array([[0.01, 0.01], [0.03, 0.01], [0.05, 0.01], [0.01, 0.03], [0.03, 0.03]])
+
+
+def snapshot(time, moved=(0.0, 0.0), turned=0.0, present=None, walls=WALLS, sigma=1e-6):
+    present = np.ones(len(START), bool) if present is None else np.array(present, bool)
+    return Snapshot(time, START + np.asarray(moved), np.full(len(START), turned), present, walls, sigma)
+
+
+def seen(*snapshots):
+    known = LastSeen.never(len(START))
+    for each in snapshots:
+        known = known.renewed(each)
+    return known
+
+
+def test_velocities_are_displacements_over_the_time_between():
+    first = snapshot(10.0)
+    walls = WALLS + np.array([0.004, -0.002])
+    motion = motion_to(snapshot(12.0, (0.002, -0.006), 0.1, walls=walls), seen(first), 10.0, first.endpoints)
+    assert motion.interval == 2.0
+    assert motion.spans
+    assert motion.grains.velocity == pytest.approx(np.tile([0.001, -0.003], (5, 1)))
+    assert motion.grains.spin == pytest.approx(np.full(5, 0.05))
+    assert motion.wall_velocity == pytest.approx(np.broadcast_to([0.002, -0.001], (4, 2, 2)))
+
+
+def test_a_grain_seen_again_moves_with_its_mean_velocity_since():
+    first, lost = snapshot(0.0), snapshot(1.0, (1e-3, 0.0), present=[1, 1, 0, 1, 1])
+    motion = motion_to(snapshot(2.0, (4e-3, 0.0), 0.2), seen(first, lost), 1.0, WALLS)
+    assert motion.grains.velocity[2, 0] == pytest.approx(2e-3)
+    assert motion.grains.velocity[0, 0] == pytest.approx(3e-3)
+    assert motion.grains.spin[2] == pytest.approx(0.1)
+    assert motion.grains.spin[0] == pytest.approx(0.2)
+
+
+def test_a_grain_never_seen_before_moves_like_the_mean_of_its_neighbours():
+    first = snapshot(0.0, present=[1, 1, 1, 1, 0])
+    moved = np.array([[0.0, 1e-3], [0.0, 2e-3], [0.0, 3e-3], [0.0, 6e-3], [0.0, 0.0]])
+    motion = motion_to(replace(snapshot(1.0), position=START + moved), seen(first), 0.0, WALLS)
+    assert motion.grains.velocity[4] == pytest.approx([0.0, 3e-3])
+    assert motion.grains.spin[4] == 0.0
+
+
+def test_between_photographs_everything_moves_evenly():
+    first = snapshot(0.0)
+    walls = WALLS + np.array([0.0, 8e-3])
+    motion = motion_to(snapshot(4.0, (8e-3, 0.0), walls=walls), seen(first), 0.0, WALLS)
+    for fraction in (0.25, 1.0):
+        grains, there = motion.at(fraction, np.full(4, np.nan))
+        assert grains.position == pytest.approx(START + np.array([8e-3 * fraction, 0.0]))
+        assert there.endpoints == pytest.approx(WALLS + np.array([0.0, 8e-3 * fraction]))
+        assert there.velocity == pytest.approx(np.broadcast_to([0.0, 2e-3], (4, 2, 2)))
+
+
+def test_the_first_frame_takes_the_motion_that_follows_and_has_no_instants_before_it():
+    following = snapshot(2.0, (2e-3, 0.0), 0.4, present=[1, 1, 1, 0, 1], walls=WALLS + 2e-3)
+    motion = motion_from(snapshot(0.0), following)
+    assert not motion.spans
+    assert motion.grains.velocity[:3] == pytest.approx(np.tile([1e-3, 0.0], (3, 1)))
+    assert motion.grains.velocity[3].tolist() == [0.0, 0.0]  # it is lost afterwards
+    assert motion.grains.spin.tolist() == pytest.approx([0.2, 0.2, 0.2, 0.0, 0.2])
+    assert motion.wall_velocity == pytest.approx(np.full((4, 2, 2), 1e-3))
+    grains, walls = motion.at(0.3, np.full(4, np.nan))
+    assert np.array_equal(grains.position, START)
+    assert np.array_equal(walls.endpoints, WALLS)
+
+
+def test_who_appears_only_in_the_following_frame_does_not_move_the_first():
+    motion = motion_from(snapshot(0.0, present=[1, 1, 1, 1, 0]), snapshot(1.0, (1e-3, 0.0)))
+    assert motion.grains.velocity[4].tolist() == [0.0, 0.0]
+
+
+def frame_motion(velocity, sigma, present=None):
+    n = len(velocity)
+    present = np.ones(n, bool) if present is None else present
+    return FrameMotion(
+        2.0, GrainMotion(START[:n], np.asarray(velocity, float), np.zeros(n), present), WALLS, 0 * WALLS, True, sigma
+    )
+
+
+def test_the_typical_velocity_is_the_rms_of_the_grains_that_are_there():
+    motion = frame_motion([[3.0, 4.0], [0.0, 0.0], [70.0, 0.0]], 1e-6, np.array([True, True, False]))
+    assert motion.velocity_rms == pytest.approx(np.sqrt(12.5))
+
+
+def test_the_typical_velocity_is_never_below_what_noise_makes():
+    assert frame_motion([[1e-9, 0.0]], 1e-6).velocity_rms == pytest.approx(5e-7)
+    assert no_motion(snapshot(0.0, sigma=0.0)).velocity_rms > 0.0
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0])
+def test_time_goes_forward(wrong):
+    with pytest.raises(ValueError, match="not after"):
+        motion_to(snapshot(wrong), seen(snapshot(0.0)), 0.0, WALLS)
+    with pytest.raises(ValueError, match="not after"):
+        motion_from(snapshot(0.0), snapshot(wrong))
+
+
+def test_shear_is_the_difference_of_the_principal_strains():
+    gradient = np.array([[1e-3, 4e-3], [0.0, -1e-3]])
+    motion = frame_motion(START @ gradient.T / 2.0, 0.0)
+    assert shear_over(motion) == pytest.approx(2.0 * np.hypot(1e-3, 2e-3))
+    turn = frame_motion(START @ np.array([[0.0, -1e-3], [1e-3, 0.0]]).T, 0.0)
+    assert shear_over(turn) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rods_weigh_what_their_section_and_length_say():
+    grains = Grains.of_rods(np.array([0.01, 0.02]), density=1000.0, length=0.5)
+    assert grains.mass == pytest.approx([0.05 * np.pi, 0.2 * np.pi])
+    assert grains.inertia == pytest.approx(0.5 * grains.mass * np.array([1e-4, 4e-4]))
+
+
+def test_a_wall_faces_away_from_the_packing_on_its_left():
+    walls = box(0.1, 0.05)
+    assert walls.outward == pytest.approx(np.array([[0, -1], [1, 0], [0, 1], [-1, 0]]))
+    assert walls.length == pytest.approx([0.1, 0.05, 0.1, 0.05])
+
+
+def test_a_wall_that_turns_moves_in_proportion_to_the_way_along_it():
+    velocity = np.zeros((4, 2, 2))
+    velocity[0] = [[0.0, 1.0], [0.5, 3.0]]
+    walls = Walls(WALLS, velocity, np.full(4, np.nan))
+    at = walls.velocity_at(np.zeros(3, np.int32), np.array([[0.0, 0.01], [0.025, 0.0], [0.1, 0.0]]))
+    assert at == pytest.approx(np.array([[0.0, 1.0], [0.125, 1.5], [0.5, 3.0]]))
+
+
+def test_a_plate_carries_its_pressure_times_its_face():
+    packing = Packing(rods(0.01), LENGTH, Material(0.3, 0.3), np.array([np.nan, np.nan, 5e4, np.nan]))
+    assert packing.load(WALLS) == pytest.approx([np.nan, np.nan, 5e4 * 0.1 * LENGTH, np.nan], nan_ok=True)
+    walls = packing.walls(WALLS)
+    assert np.all(walls.velocity == 0.0)
+    assert walls.loaded.tolist() == [False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"friction": -0.1}, {"wall_friction": -0.1}, {"formal_weight": 0.6}, {"formal_weight": -0.1}]
+)
+def test_impossible_materials_are_refused(wrong):
+    with pytest.raises(ValueError, match=r"friction|weight"):
+        Material(**{"friction": 0.3, "wall_friction": 0.3, **wrong})
