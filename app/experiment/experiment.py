@@ -19,6 +19,8 @@ from .photographs import Photographs
 from .tables import Table, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
+GRAIN_COLUMNS, POSE_COLUMNS = ("id", "radius"), ("frame", "id", "x", "y", "theta")
+TIME_COLUMNS, WALL_COLUMNS = ("frame", "time"), ("frame", "wall", "x1", "y1", "x2", "y2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,11 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
         return np.arange(frame_count, dtype=np.float64) * config.photographs.interval
     name = config.photographs.times if config.photographs is not None else config.tracks and config.tracks.times
     assert name is not None
-    table = read_table(experiment.folder / name, ("frame", "time"))
+    return arrange_times(read_table(experiment.folder / name, TIME_COLUMNS), frame_count)
+
+
+def arrange_times(table: Table, frame_count: int) -> Array:
+    """Time of every frame (f,) [s], ascending, from a table frame,time."""
     frame, time = table.integers("frame"), table.numbers("time")
     check_unique(table, "frame", frame)
     found = check_frames(table, frame)
@@ -109,30 +115,39 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
 
 
 def read_tracks(experiment: Experiment) -> Tracks:
-    """Grains tracked by another tool. A grain that has no row in a frame is lost there."""
+    """Grains tracked by another tool."""
     section = experiment.config.tracks
     assert section is not None
-    grains = read_table(experiment.folder / section.grains, ("id", "radius"))
+    grains = read_table(experiment.folder / section.grains, GRAIN_COLUMNS)
+    poses = read_table(experiment.folder / section.positions, POSE_COLUMNS)
+    times = read_table(experiment.folder / section.times, TIME_COLUMNS)
+    return arrange_tracks(grains, poses, times, section.precision)
+
+
+def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) -> Tracks:
+    """Tracks of tables id,radius and frame,id,x,y,theta and frame,time; precision [m] of a position.
+
+    A grain that has no row in a frame is lost there.
+    """
     ids, radius = grains.integers("id"), grains.numbers("radius")
     check_unique(grains, "id", ids)
     _all_positive(grains, "radius", radius)
-    table = read_table(experiment.folder / section.positions, ("frame", "id", "x", "y", "theta"))
-    frame, of = table.integers("frame"), table.integers("id")
-    check_unique(table, "id", frame, of)
-    frame_count = check_frames(table, frame)
-    row = rows_of(table, "id", of, ids)
+    frame, of = poses.integers("frame"), poses.integers("id")
+    check_unique(poses, "id", frame, of)
+    frame_count = check_frames(poses, frame)
+    row = rows_of(poses, "id", of, ids)
     shape = (frame_count, len(ids))
     position, rotation = np.full((*shape, 2), np.nan), np.full(shape, np.nan)
-    position[frame, row] = np.column_stack([table.numbers("x"), table.numbers("y")])
-    rotation[frame, row] = table.numbers("theta")
+    position[frame, row] = np.column_stack([poses.numbers("x"), poses.numbers("y")])
+    rotation[frame, row] = poses.numbers("theta")
     present = np.isfinite(rotation)
     return Tracks(
         id=ids,
         radius=radius,
-        time=read_times(experiment, frame_count),
+        time=arrange_times(times, frame_count),
         position=position,
         rotation=rotation,
-        sigma=np.where(present, section.precision, np.nan),
+        sigma=np.where(present, precision, np.nan),
         zncc=np.full(shape, np.nan),
         status=np.where(present, TrackStatus.GIVEN, TrackStatus.LOST).astype(np.uint8),
     )
@@ -159,31 +174,40 @@ def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
     section = experiment.config.walls
     if section is None:
         return None
-    table = read_table(experiment.folder / section.file, ("frame", "wall", "x1", "y1", "x2", "y2"))
+    table = read_table(experiment.folder / section.file, WALL_COLUMNS)
+    track = section.track
+    if track and experiment.config.photographs is None:
+        raise InputError(experiment.file, "key walls.track = true", "walls can be followed in photographs only")
+    if track is None:
+        track = experiment.config.photographs is not None and not np.any(table.integers("frame") > 0)
+    names, endpoints = arrange_walls(table, frame_count, followed=track)
+    for unknown in section.plates.keys() - set(names):
+        raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {section.file}")
+    pressure = np.array([section.plates[n].pressure if n in section.plates else None for n in names], np.float64)
+    return WallTracks(names, endpoints, pressure, _read_wall_forces(experiment, names, frame_count))
+
+
+def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> tuple[tuple[str, ...], Array]:
+    """Names (w,) and endpoints (f, w, 2, 2) [m] of a table frame,wall,x1,y1,x2,y2.
+
+    followed: frame 0 is enough; endpoints are NaN where the table has no row.
+    """
     frame, name = table.integers("frame"), table.text("wall")
     names = tuple(dict.fromkeys(name))
     row = np.array([names.index(each) for each in name])
     check_unique(table, "wall", frame, row)
-    track = section.track
-    found = int(frame.max()) + 1 if track and frame.min() == 0 else check_frames(table, frame)
-    if track and experiment.config.photographs is None:
-        raise InputError(experiment.file, "key walls.track = true", "walls can be followed in photographs only")
-    if track is None:
-        track = experiment.config.photographs is not None and found == 1
-    if found > frame_count or (found < frame_count and not track):
+    found = int(frame.max()) + 1 if followed and frame.min() == 0 else check_frames(table, frame)
+    if found > frame_count or (found < frame_count and not followed):
         raise InputError(table.file, "frame", f"there are walls of {found} frames, but {frame_count} frames")
-    for unknown in section.plates.keys() - set(names):
-        raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {section.file}")
     endpoints = np.full((frame_count, len(names), 2, 2), np.nan)
-    endpoints[frame, row] = np.column_stack([table.numbers(c) for c in ("x1", "y1", "x2", "y2")]).reshape(-1, 2, 2)
-    absent = np.argwhere(np.isnan(endpoints[: 1 if track else None, :, 0, 0]))
+    endpoints[frame, row] = np.column_stack([table.numbers(c) for c in WALL_COLUMNS[2:]]).reshape(-1, 2, 2)
+    absent = np.argwhere(np.isnan(endpoints[: 1 if followed else None, :, 0, 0]))
     if len(absent):
         raise InputError(table.file, f"frame {absent[0][0]}", f"has no row of wall {names[absent[0][1]]!r}")
     point = np.flatnonzero(np.all(endpoints[frame, row, 0] == endpoints[frame, row, 1], axis=1))
     if len(point):
         raise table.error(int(point[0]), "wall", "has no length: its two ends are the same point")
-    pressure = np.array([section.plates[n].pressure if n in section.plates else None for n in names], np.float64)
-    return WallTracks(names, endpoints, pressure, _read_wall_forces(experiment, names, frame_count))
+    return names, endpoints
 
 
 def _read_wall_forces(experiment: Experiment, names: tuple[str, ...], frame_count: int) -> Array | None:
