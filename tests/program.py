@@ -1,7 +1,82 @@
-"""The command in a process of its own."""
+"""The command, in this process and in one of its own."""
 
 from __future__ import annotations
 
+import pickle
+import subprocess
 import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rodsight.cli.main import main
+
+ROOT = Path(__file__).parents[1]
 
 RODSIGHT = (sys.executable, "-u", "-c", "from rodsight.cli.main import main; main()")
+
+# The same, which tells on standard error what it has just put beyond its own reach: the moment to stop it.
+TELLING = (
+    sys.executable, "-u", "-c",
+    f"import sys; sys.path.insert(0, {str(ROOT)!r}); from tests.program import run_telling; run_telling()",
+)  # fmt: skip
+KEPT, SENT = "kept", "sent frame"  # on the disk; on its way to the live recording
+
+
+def rodsight(*arguments: object) -> int:
+    """Run the command here; gives its exit status."""
+    with pytest.raises(SystemExit) as end:
+        main([str(each) for each in arguments])
+    return int(end.value.code or 0)
+
+
+def refuse(capsys: pytest.CaptureFixture, out: Path, *arguments: str) -> str:
+    """Run the command on bad input, which it names in one line, writing nothing; gives that line."""
+    assert rodsight(*arguments, "--out", out, "--quiet") == 2
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1
+    assert told.err.startswith("rodsight: ")
+    assert told.out == ""
+    assert not out.exists() or not any(out.iterdir())
+    return told.err
+
+
+def wait_until_told(process: subprocess.Popen[str], what: str, times: int) -> None:
+    """Read what a TELLING process says until it has told something so many times."""
+    assert process.stderr is not None
+    said = []
+    while said.count(what) < times:
+        line = process.stderr.readline()
+        assert line, f"the process ended, saying {said}"
+        said.append(line.strip())
+
+
+def run_telling() -> None:
+    """The process of TELLING."""
+    from rodsight.recording.files import live_process
+    from rodsight.results.checkpoint import Checkpoint
+    from rodsight.sensitivity.study import Diary
+
+    def tell(what: str) -> None:
+        print(what, file=sys.stderr, flush=True)
+
+    def telling(work: Any) -> Any:
+        def done(*given: Any) -> None:
+            work(*given)
+            tell(KEPT)
+
+        return done
+
+    class TellingPickle:
+        HIGHEST_PROTOCOL = pickle.HIGHEST_PROTOCOL
+
+        @staticmethod
+        def dump(message: tuple[str, Any], pipe: Any, protocol: int) -> None:
+            pickle.dump(message, pipe, protocol)
+            pipe.flush()
+            tell(f"sent {message[0]}")
+
+    Checkpoint.save = telling(Checkpoint.save)
+    Diary.write = telling(Diary.write)
+    live_process.pickle = TellingPickle  # type: ignore[assignment]
+    main()

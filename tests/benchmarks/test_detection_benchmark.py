@@ -22,7 +22,7 @@ from rodsight.tracking.detection.detect import Detection, DetectionSettings, det
 from scipy.spatial import KDTree
 
 from tests.app.tracking.detection.polydisperse import draw_discs, lay_discs
-from tests.app.tracking.detection.test_detect import HEIGHT, WIDTH, packing
+from tests.app.tracking.laid_rods import HEIGHT, WIDTH, lay_rods
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import grid_of_rods
 
@@ -74,7 +74,7 @@ def report(text: str) -> None:
 def test_speckled_packings(benchmark: Benchmark, classes: tuple[float, ...], cut: bool) -> None:
     def run() -> None:
         for seed in (10, 11):
-            rods = packing(seed, classes, cut=cut)
+            rods = lay_rods(seed, classes, cut=cut)
             found = detect_grains(rods.reference(), DetectionSettings(radii=classes))
             report(f"speckle {classes[0]:.0f} px: {score(found, rods.x, rods.y, rods.radius, (HEIGHT, WIDTH))}")
 
@@ -86,7 +86,7 @@ def test_speckled_packings(benchmark: Benchmark, classes: tuple[float, ...], cut
 def test_brown_packings_of_unknown_radius(benchmark: Benchmark, name: str) -> None:
     def run() -> None:
         for seed in (10, 11):
-            rods = packing(seed, (14.0, 20.0, 32.0), cut=True)
+            rods = lay_rods(seed, (14.0, 20.0, 32.0), cut=True)
             image = brown_photograph(
                 LABORATORIES[name], WIDTH, HEIGHT, rods.x, rods.y, rods.radius, 0.0 * rods.x,
                 pattern_seed=seed, noise_seed=seed,

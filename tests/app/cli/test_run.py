@@ -1,29 +1,20 @@
 """The commands end to end, on experiments small enough for every day."""
 
 import json
-import signal
 import subprocess
-import time
 from dataclasses import fields
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from rodsight.cli.main import main
 from rodsight.results.results import Results
 from rodsight.results.store import load_results
 
 from solver.sequence.frame_forces import FrameForces
-from tests.program import RODSIGHT
+from tests.program import KEPT, TELLING, rodsight, wait_until_told
 
 FEW = ("--set", "solver.sweeps=50")
-
-
-def rodsight(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main(list(arguments))
-    return int(stop.value.code or 0)
 
 
 def same_frames(a: Results, b: Results) -> bool:
@@ -117,31 +108,19 @@ def test_the_same_command_finds_everything_done(tracked, tmp_path, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.screen
 def test_a_killed_run_goes_on_where_it_stopped(tracked, tmp_path, capsys):
     slow = ("--set", "solver.sweeps=4000", "--set", "recording.sweeps=none")
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    assert rodsight("solve", str(tracked), "--out", str(whole), *slow) == 0
-    run = subprocess.Popen(
-        [
-            *RODSIGHT,
-            "solve",
-            str(tracked),
-            "--out",
-            str(cut),
-            *slow,
-        ],
-        stdout=subprocess.DEVNULL,
-    )
+    assert rodsight("solve", tracked, "--out", whole, *slow) == 0
+    command = [*TELLING, "solve", str(tracked), "--out", str(cut), *slow]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+        wait_until_told(run, KEPT, 2)
+        run.kill()
     kept = cut / ".unfinished" / "solving"
-    end = time.monotonic() + 60
-    while not (kept / "000001.npz").exists() and run.poll() is None and time.monotonic() < end:
-        time.sleep(0.002)
-    run.send_signal(signal.SIGKILL)
-    run.wait()
     assert not (cut / "results.h5").exists(), "the run ended before it could be killed"
-    stamps = {file.name: file.stat().st_mtime_ns for file in kept.glob("*.npz")}
-    assert stamps
-    assert rodsight("solve", str(tracked), "--out", str(cut), *slow) == 0
+    assert sorted(file.name for file in kept.glob("*.npz"))[:2] == ["000000.npz", "000001.npz"]
+    assert rodsight("solve", tracked, "--out", cut, *slow) == 0
     capsys.readouterr()
     assert same_frames(load_results(whole / "results.h5"), load_results(cut / "results.h5"))
     assert not kept.exists()

@@ -91,6 +91,7 @@ def test_the_truth_is_in_balance():
         assert np.linalg.norm(total, axis=1).mean() < BALANCE * fn[frame == k].mean()
 
 
+@pytest.mark.screen
 def test_the_sample_runs_to_trustworthy_forces_and_a_sound_recording(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["run", str(SAMPLE), "--out", str(tmp_path / "run")])

@@ -3,43 +3,9 @@
 from pathlib import Path
 
 import pytest
-from rodsight.cli.main import main
 
-
-def edit(file: Path, old: str, new: str) -> None:
-    text = file.read_text()
-    assert old in text, f"{old!r} is not in {file.name}"
-    file.write_text(text.replace(old, new, 1))
-
-
-def swap_row(file: Path, row: int, cells: dict[int, str]) -> None:
-    """Replace cells of a line (1 is the header)."""
-    lines = file.read_text().splitlines()
-    parts = lines[row - 1].split(",")
-    for at, text in cells.items():
-        parts[at] = text
-    lines[row - 1] = ",".join(parts)
-    file.write_text("\n".join(lines) + "\n")
-
-
-def refuse(capsys, out: Path, *arguments: str) -> str:
-    with pytest.raises(SystemExit) as stop:
-        main([*arguments, "--out", str(out), "--quiet"])
-    told = capsys.readouterr()
-    assert stop.value.code == 2
-    assert told.err.count("\n") == 1
-    assert told.err.startswith("rodsight: ")
-    assert told.out == ""
-    assert not out.exists() or not any(out.iterdir())
-    return told.err
-
-
-def scale_radii(file: Path, factor: float) -> None:
-    """Multiply every radius, the last column."""
-    head, *rows = file.read_text().splitlines()
-    cells = [row.rsplit(",", 1) for row in rows]
-    file.write_text("\n".join([head, *(f"{first},{float(last) * factor}" for first, last in cells)]) + "\n")
-
+from tests.app.experiment.tables import edit, scale_radii, swap_row
+from tests.program import refuse, rodsight
 
 TOML, TRACKS, WALLS, GRAINS, TIMES = "experiment.toml", "tracks.csv", "walls.csv", "grains.csv", "times.csv"
 
@@ -125,14 +91,10 @@ def test_no_experiment_is_named(tmp_path, capsys):
 
 def test_bad_input_leaves_finished_results_alone(tracked, tmp_path, capsys):
     out = tmp_path / "out"
-    with pytest.raises(SystemExit) as stop:
-        main(["solve", str(tracked), "--out", str(out), "--quiet", "--set", "solver.sweeps=5"])
-    assert stop.value.code == 0
+    assert rodsight("solve", str(tracked), "--out", str(out), "--quiet", "--set", "solver.sweeps=5") == 0
     before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
     swap_row(tracked / TRACKS, 8, {2: "nan"})
-    with pytest.raises(SystemExit) as stop:
-        main(["run", str(tracked), "--out", str(out), "--quiet"])
-    assert stop.value.code == 2
+    assert rodsight("run", str(tracked), "--out", str(out), "--quiet") == 2
     capsys.readouterr()
     assert before == {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
 
@@ -142,6 +104,4 @@ def test_an_experiment_without_walls_can_be_tracked_but_not_solved(tracked, tmp_
     edit(tracked / TOML, "[walls.top]\npressure = 50000.0\n", "")
     edit(tracked / TOML, 'truth = "truth_contacts.csv"\n', "")
     assert "walls" in refuse(capsys, tmp_path / "out", "run", str(tracked))
-    with pytest.raises(SystemExit) as stop:
-        main(["track", str(tracked), "--out", str(tmp_path / "out"), "--quiet"])
-    assert stop.value.code == 0
+    assert rodsight("track", str(tracked), "--out", str(tmp_path / "out"), "--quiet") == 0

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
-from rodsight.cli.main import main
 from rodsight.results.store import load_results
 from rodsight.review.command import open_reviewed, open_session
 from rodsight.review.server import ReviewServer
@@ -21,17 +20,12 @@ from rodsight.verdicts.log import VERDICTS
 from solver.bodies.grains import Array
 from solver.contacts.contacts import ContactSource
 from tests.browser import LIKE, picture_of, wait_for_colour, wait_until_still
+from tests.program import rodsight
 
 WIDTH, HEIGHT = 1280, 800
 NO_PICTURE = "HTMLCanvasElement.prototype.getContext = () => null;"  # a browser that cannot draw WebGL
 PINK, GREEN = (255, 84, 130), (40, 224, 150)  # of the marks of verdicts
 MARKED = {"least": 20, "reach": 14}  # [px] of a mark that is drawn
-
-
-def rodsight(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main(list(arguments))
-    return int(stop.value.code or 0)
 
 
 @pytest.fixture(scope="module")

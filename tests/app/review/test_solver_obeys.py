@@ -1,6 +1,7 @@
 """Verdicts reach the solver: forced contacts exist, forbidden ones bear nothing, flags are heard."""
 
 import json
+import shutil
 import signal
 import subprocess
 import urllib.request
@@ -8,31 +9,47 @@ import urllib.request
 import h5py
 import numpy as np
 import pytest
-from rodsight.cli.main import main
 from rodsight.results.store import load_results
 from rodsight.verdicts.decisions import Bodies, decide
 from rodsight.verdicts.log import VERDICTS, Entry, Flag, Verdict, VerdictLog
 
 from solver.contacts.contacts import ContactSource
 from solver.sequence.frame_forces import FrameStatus
-from tests.program import RODSIGHT
+from tests.program import RODSIGHT, rodsight
 
+ESTIMATORS = ("ensemble", "nlgs")
 FEW = ("--set", "solver.sweeps=50", "--quiet")
 
 
-def rodsight(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main(list(arguments))
-    return int(stop.value.code or 0)
+def solve_again(experiment, out, estimator):
+    """The command that solves a run again."""
+    return ("solve", str(experiment), "--out", str(out), "--set", f"solver.estimator={estimator}", *FEW)
 
 
-@pytest.fixture(params=["ensemble", "nlgs"])
-def solved(request, tracked, tmp_path):
+@pytest.fixture(scope="module")
+def made_runs(made_tracks, tmp_path_factory):
+    """A solved run of every estimator; not to be written to."""
+    folder = tmp_path_factory.mktemp("runs")
+    for estimator in ESTIMATORS:
+        assert rodsight(*solve_again(made_tracks, folder / estimator, estimator)) == 0
+    return folder
+
+
+def copy_run(made_runs, made_tracks, tmp_path, estimator):
+    out = shutil.copytree(made_runs / estimator, tmp_path / "out")
+    return out, solve_again(made_tracks, out, estimator)
+
+
+@pytest.fixture(params=ESTIMATORS)
+def solved(request, made_runs, made_tracks, tmp_path):
     """A solved run of either estimator: its folder, and the command that solves it again."""
-    out = tmp_path / "out"
-    again = ("solve", str(tracked), "--out", str(out), "--set", f"solver.estimator={request.param}", *FEW)
-    assert rodsight(*again) == 0
-    return out, again
+    return copy_run(made_runs, made_tracks, tmp_path, request.param)
+
+
+@pytest.fixture
+def solved_by_default(made_runs, made_tracks, tmp_path):
+    """The same of one estimator, where nothing depends on which."""
+    return copy_run(made_runs, made_tracks, tmp_path, ESTIMATORS[0])
 
 
 def strongest(results, frame):
@@ -111,8 +128,8 @@ def test_flags_are_heard(solved):
     assert "ignored" in frames[4].reason
 
 
-def test_ignoring_every_frame_is_refused(solved, capsys):
-    out, again = solved
+def test_ignoring_every_frame_is_refused(solved_by_default, capsys):
+    out, again = solved_by_default
     for frame in range(5):
         VerdictLog(out / VERDICTS).append(Entry(frame, "anna", flag=Flag.IGNORE))
     assert rodsight(*again) == 2
@@ -149,8 +166,8 @@ def test_a_spoiled_photograph_that_is_ignored_harms_no_other(tracked, tmp_path):
     assert left < 0.5 * harm  # measured: a small part of the harm is left
 
 
-def test_score_counts_the_detector_as_it_was_before_it_obeyed(solved, capsys):
-    out, again = solved
+def test_score_counts_the_detector_as_it_was_before_it_obeyed(solved_by_default, capsys):
+    out, again = solved_by_default
     results = load_results(out / "results.h5")
     bodies = Bodies.of(results.tracks, results.walls)
     log = VerdictLog(out / VERDICTS)
@@ -169,8 +186,8 @@ def test_score_counts_the_detector_as_it_was_before_it_obeyed(solved, capsys):
     assert scores[0]["frame"] == [3]
 
 
-def test_verdicts_on_unknown_bodies_are_counted_not_obeyed(solved):
-    out, _ = solved
+def test_verdicts_on_unknown_bodies_are_counted_not_obeyed(solved_by_default):
+    out, _ = solved_by_default
     results = load_results(out / "results.h5")
     log = VerdictLog(out / VERDICTS)
     log.append(Entry(0, "anna", 999999, 1, Verdict.CONTACT))
@@ -178,15 +195,16 @@ def test_verdicts_on_unknown_bodies_are_counted_not_obeyed(solved):
     assert (found.count, found.unknown) == (0, 1)
 
 
-def test_the_source_of_contacts_is_stored_by_name(solved):
-    out, _ = solved
+def test_the_source_of_contacts_is_stored_by_name(solved_by_default):
+    out, _ = solved_by_default
     with h5py.File(out / "results.h5") as store:
         names = h5py.check_enum_dtype(store["contacts/source"].dtype)
     assert set(names) == {"detected", "added_by_reviewer", "forbidden_by_reviewer"}
 
 
-def test_review_serves_until_it_is_interrupted(solved):
-    out, _ = solved
+@pytest.mark.screen
+def test_review_serves_until_it_is_interrupted(solved_by_default):
+    out, _ = solved_by_default
     command = [*RODSIGHT, "review", str(out), "--no-browser", "--reviewer", "anna"]
     page = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
@@ -203,8 +221,8 @@ def test_review_serves_until_it_is_interrupted(solved):
         page.stderr.close()
 
 
-def test_a_table_of_contacts_comes_in_and_the_threshold_is_refitted(solved, tmp_path, capsys):
-    out, _ = solved
+def test_a_table_of_contacts_comes_in_and_the_threshold_is_refitted(solved_by_default, tmp_path, capsys):
+    out, _ = solved_by_default
     assert rodsight("score", str(out), "--fit-threshold") == 2
     results = load_results(out / "results.h5")
     bodies = Bodies.of(results.tracks, results.walls)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from rodsight.cli.main import main
 from rodsight.results.checkpoint import Checkpoint
 from rodsight.results.store import load_results
 from rodsight.sensitivity import spread
@@ -13,14 +12,9 @@ from rodsight.sensitivity.design import Case
 from rodsight.sensitivity.spread import DEVIATION, RANGES, make_members, solve_member, solve_members, spread_around
 
 from tests.app.sensitivity.conftest import FEW
+from tests.program import rodsight
 
 SET = tuple(part for setting in FEW for part in ("--set", setting))
-
-
-def rodsight(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(each) for each in arguments])
-    return int(stop.value.code or 0)
 
 
 def test_the_spread_counts_absent_contacts_as_zero():

@@ -7,30 +7,22 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from rodsight.cli.main import main
 from rodsight.sensitivity.design import Case
 from rodsight.sensitivity.networks import infer
 from rodsight.sensitivity.study import Diary, compare, measure_case, run_study
 
 from tests.app.sensitivity.conftest import FEW
-from tests.program import RODSIGHT
+from tests.program import KEPT, TELLING, rodsight, wait_until_told
 
 KAPPA = Case((("kappa", 2.0),))
 FRICTION = Case((("friction", 0.8),))
 SET = tuple(part for setting in FEW for part in ("--set", setting))
-
-
-def rodsight(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as stop:
-        main([str(each) for each in arguments])
-    return int(stop.value.code or 0)
 
 
 def test_the_nominal_inputs_give_the_nominal_forces_bit_for_bit(nominal):
@@ -140,6 +132,7 @@ def test_a_design_divides_the_variance(made_tracks, tmp_path, capsys):
     assert (out / "sensitivity.csv").read_text().splitlines()[0].startswith("friction,kappa,")
 
 
+@pytest.mark.screen
 def test_two_workers_find_what_one_finds(nominal, tmp_path):
     cases = [KAPPA, FRICTION, Case((("position_noise", 1.0),), seed=4)]
     one = run_study(nominal, cases, Diary(tmp_path / "one.jsonl", "x"))
@@ -147,19 +140,16 @@ def test_two_workers_find_what_one_finds(nominal, tmp_path):
     assert one == two
 
 
+@pytest.mark.screen
 def test_ctrl_c_ends_the_study_and_the_same_command_goes_on(made_tracks, tmp_path, capsys):
     out = tmp_path / "out"
     command = ("sensitivity", made_tracks, "--out", out, *SET, "--factors", "kappa=0.5:2", "sweeps=0.1:2000")
     study = subprocess.Popen(
-        [*RODSIGHT, *(str(each) for each in command), "--workers", "2"],
+        [*TELLING, *(str(each) for each in command), "--workers", "2"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     diary = out / "sensitivity_runs.jsonl"
-    # Once × 0.1 and κ are done, × 2000 goes on for minutes.
-    deadline = time.monotonic() + 120
-    while not (diary.exists() and diary.read_text().count("\n") == 3) and time.monotonic() < deadline:
-        assert study.poll() is None, study.communicate()
-        time.sleep(0.1)
+    wait_until_told(study, KEPT, 3)  # × 0.1 and κ; × 2000 goes on for minutes
     os.killpg(study.pid, signal.SIGINT)  # as a terminal does: the workers hear it, too
     told, errors = study.communicate(timeout=60)
     assert study.returncode == 130

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from rodsight.synthetic.speckle import SpeckleSettings
-from rodsight.tracking.detection.grains import Detection
+from rodsight.tracking.detection.detect import Detection
 from scipy.spatial import KDTree
 
 from solver.bodies.grains import Array

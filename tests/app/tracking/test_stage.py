@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import shutil
 from pathlib import Path
 
 import cv2
@@ -12,10 +11,11 @@ import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.lens import OpenCVLens
 from rodsight.experiment.tables import read_table
-from rodsight.results.store import load_tracks
-from rodsight.tracks import Tracks, TrackStatus, WallTracks
+from rodsight.tracks import Tracks, TrackStatus
 
-from tests.app.experiment.test_bad_input import edit, refuse
+from tests.app.experiment.tables import edit
+from tests.app.tracking.photographed import Tracked, cut_walls, off_walls, track
+from tests.program import refuse
 
 SEEN_ALLOWED = 0.1 * 2.5e-4  # [m] rms, a tenth of a pixel: what outlines are exact to
 WALL_ALLOWED = 5e-6  # [m] along the normal
@@ -23,52 +23,15 @@ LENS = OpenCVLens(fx=900.0, fy=900.0, cx=260.0, cy=300.0, k1=-0.12, k2=0.03, p1=
 LENS_TABLE = "lens = { fx = 900, cx = 260, cy = 300, k1 = -0.12, k2 = 0.03, p1 = 4e-4, p2 = -3e-4 }\n"
 
 
-@pytest.fixture
-def photographed(made_photographs: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(made_photographs, tmp_path / "photographed"))
+def test_walls_of_the_first_photograph_are_enough(followed: Tracked) -> None:
+    assert np.abs(off_walls(followed.walls.endpoints, followed.true_walls)).max() < WALL_ALLOWED
+    table = read_table(followed.out / "tracked_walls.csv", ("frame", "wall", "x1", "y1", "x2", "y2", "sigma1"))
+    assert len(table) == followed.true_walls.shape[0] * 4
 
 
-def track(experiment: Path, out: Path, *more: str) -> tuple[Tracks, WallTracks | None]:
-    with pytest.raises(SystemExit) as stop:
-        main(["track", str(experiment), "--out", str(out), "--quiet", *more])
-    assert stop.value.code == 0
-    return load_tracks(out / "tracks.h5")
-
-
-def cut_walls(experiment: Path) -> np.ndarray:
-    """Leave the walls of frame 0 alone in their table; returns those of all frames (f, w, 2, 2) [m]."""
-    file = experiment / "walls.csv"
-    table = read_table(file, ("frame", "x1", "y1", "x2", "y2"))
-    ends = np.column_stack([table.numbers(name) for name in ("x1", "y1", "x2", "y2")]).reshape(-1, 4, 2, 2)
-    file.write_text("\n".join(file.read_text().splitlines()[:5]) + "\n")
-    return ends
-
-
-def off_walls(found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    along = true[:, :, 1] - true[:, :, 0]
-    normal = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=-1, keepdims=True)
-    return np.einsum("fwek,fwk->fwe", found - true, normal)
-
-
-def test_walls_of_the_first_photograph_are_enough(photographed: Path, tmp_path: Path) -> None:
-    true = cut_walls(photographed)
-    _, walls = track(photographed, tmp_path / "out")
-    assert walls is not None
-    assert np.abs(off_walls(walls.endpoints, true)).max() < WALL_ALLOWED
-    table = read_table(tmp_path / "out" / "tracked_walls.csv", ("frame", "wall", "x1", "y1", "x2", "y2", "sigma1"))
-    assert len(table) == true.shape[0] * 4
-
-
-def test_rows_of_later_frames_are_kept_when_walls_are_followed(photographed: Path, tmp_path: Path) -> None:
-    file = photographed / "walls.csv"
-    lines = file.read_text().splitlines()
-    told = next(line for line in lines if line.startswith("2,top"))
-    cut_walls(photographed)
-    file.write_text(file.read_text() + told + "\n")
-    edit(photographed / "experiment.toml", '[walls]\nfile = "walls.csv"', '[walls]\nfile = "walls.csv"\ntrack = true')
-    _, walls = track(photographed, tmp_path / "out")
-    assert walls is not None
-    assert walls.endpoints[2, walls.name.index("top")].ravel() == pytest.approx([float(v) for v in told.split(",")[2:]])
+def test_rows_of_later_frames_are_kept_when_walls_are_followed(partly_told: Tracked) -> None:
+    walls, top = partly_told.walls, partly_told.walls.name.index("top")
+    assert walls.endpoints[2, top] == pytest.approx(partly_told.true_walls[2, top])
 
 
 def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
@@ -86,9 +49,9 @@ def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsy
     assert "patches of texture" in told
 
 
-def test_found_grains_can_be_edited_and_given_back(photographed: Path, tmp_path: Path) -> None:
-    first, _ = track(photographed, tmp_path / "one")
-    with (tmp_path / "one" / "detections.csv").open(newline="") as stream:
+def test_found_grains_can_be_edited_and_given_back(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
+    first = plain.tracks
+    with (plain.out / "detections.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [int(row["id"]) for row in rows] == list(first.id)
     kept = [dict(row, id=str(100 + int(row["id"]))) for row in rows if row["id"] != "3"]
@@ -106,8 +69,8 @@ def test_found_grains_can_be_edited_and_given_back(photographed: Path, tmp_path:
     assert np.nanmax(np.abs(np.diff(again.position, axis=0) - np.diff(first.position[:, same], axis=0))) < 1e-5
 
 
-def test_corrections_are_honoured(photographed: Path, tmp_path: Path) -> None:
-    first, _ = track(photographed, tmp_path / "one")
+def test_corrections_are_honoured(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
+    first = plain.tracks
     (photographed / "corrections.csv").write_text("frame,id,x,y,theta\n2,4,lost,,\n1,7,200.5,210.25,0.25\n")
     edit(photographed / "experiment.toml", "interval =", 'corrections = "corrections.csv"\ninterval =')
     tracks, _ = track(photographed, tmp_path / "two")
@@ -141,8 +104,8 @@ def test_a_wrong_correction_is_named(
         assert part in told
 
 
-def test_a_lens_is_taken_out_of_the_tracks(photographed: Path, tmp_path: Path) -> None:
-    straight, _ = track(photographed, tmp_path / "straight")
+def test_a_lens_is_taken_out_of_the_tracks(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
+    straight = plain.tracks.frames(0, 2)
     for file in sorted((photographed / "photos").iterdir()):
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         row, column = np.mgrid[: image.shape[0], : image.shape[1]].astype(np.float64)
@@ -152,9 +115,9 @@ def test_a_lens_is_taken_out_of_the_tracks(photographed: Path, tmp_path: Path) -
         file.unlink()
         cv2.imwrite(str(file.with_suffix(".png")), bent)
     edit(photographed / "experiment.toml", "photos/*.jpg", "photos/*.png")
-    ignored, _ = track(photographed, tmp_path / "ignored")
+    ignored, _ = track(photographed, tmp_path / "ignored", "--frames", "0:2")
     edit(photographed / "experiment.toml", "interval =", LENS_TABLE + "interval =")
-    seen, _ = track(photographed, tmp_path / "seen")
+    seen, _ = track(photographed, tmp_path / "seen", "--frames", "0:2")
 
     def error(tracks: Tracks) -> float:
         near = np.argmin(np.linalg.norm(tracks.position[0][None] - straight.position[0][:, None], axis=2), axis=1)
@@ -166,10 +129,9 @@ def test_a_lens_is_taken_out_of_the_tracks(photographed: Path, tmp_path: Path) -
     assert error(ignored) > 4 * SEEN_ALLOWED
 
 
-def test_the_report_is_one_page_with_its_pictures_in_it(photographed: Path, tmp_path: Path) -> None:
-    tracks, _ = track(photographed, tmp_path / "out", "--report")
-    page = (tmp_path / "out" / "tracking_report.html").read_text()
-    assert page.count("<circle") >= tracks.grain_count
+def test_the_report_is_one_page_with_its_pictures_in_it(plain: Tracked) -> None:
+    page = (plain.out / "tracking_report.html").read_text()
+    assert page.count("<circle") >= plain.tracks.grain_count
     assert page.count("data:image/png;base64,") > 10
     assert "http://" not in page.replace("http://www.w3.org", "")
     assert "https://" not in page

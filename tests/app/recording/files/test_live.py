@@ -6,7 +6,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,7 @@ from rodsight.recording.files.repair import repair_recording
 
 from tests.app.recording.fake_results import make_results
 from tests.browser import forces_drawn, open_when_served, picture_of, wait_for_colour, wait_for_forces
-from tests.program import RODSIGHT
+from tests.program import SENT, TELLING, wait_until_told
 
 CANVAS = (13, 14, 18)  # behind a packing
 
@@ -84,6 +83,7 @@ def test_a_viewer_where_there_is_no_display_is_only_told_about(results, tmp_path
     assert "--connect" in live.hint
 
 
+@pytest.mark.screen
 def test_a_watched_run_ends_with_the_full_recording_alone(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     with pytest.raises(SystemExit) as end:
@@ -129,30 +129,19 @@ def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
     assert not live.path.exists()
 
 
+@pytest.mark.screen
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
 def test_a_run_that_is_stopped_leaves_a_recording_that_opens_and_no_server(tracked, tmp_path, number):
     out = tmp_path / "out"
-    command = [
-        *RODSIGHT,
-        "run",
-        str(tracked),
-        "--out",
-        str(out),
-    ]
-    command += ["--view", "web", "--set", "solver.sweeps=20000"]
+    command = [*TELLING, "run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=20000"]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert run.stdout is not None
-    hint = run.stdout.readline()
-    ports = ports_of(hint)
-    kept, end = out / ".unfinished" / "solving", time.monotonic() + 60
-    while not (kept / "000002.npz").exists() and run.poll() is None and time.monotonic() < end:
-        time.sleep(0.005)
-    if number == signal.SIGKILL:  # what is under way to the recording is lost
-        recording = out / "recording-live.rrd"
-        wait_until(lambda: recording.exists() and recorded_frames(recording, tmp_path) >= 2)
+    ports = ports_of(run.stdout.readline())
+    wait_until_told(run, SENT, 2)  # what is still under way to the recording is lost with a killed run
     os.killpg(run.pid, number)  # as a terminal does: to all of its processes
-    told, said = run.communicate(timeout=60)
-    wait_until(lambda: not any(answers(port) for port in ports))
+    told, said = run.communicate(timeout=60)  # its servers' processes have ended too, or these pipes were still open
+    assert len(ports) == 2
+    assert not any(answers(port) for port in ports)
     assert len(read_forces(out / "recording-live.rrd")) >= 2
     assert not (out / "recording.rrd").exists()
     if number == signal.SIGKILL:
@@ -172,22 +161,6 @@ def answers(port: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def recorded_frames(recording, folder) -> int:
-    copy = folder / "copy.rrd"  # of a file that is still written
-    copy.write_bytes(recording.read_bytes())
-    try:
-        return repair_recording(copy, folder / "mended.rrd").frames
-    except (OSError, RuntimeError):  # nothing is in it yet
-        return 0
-
-
-def wait_until(condition, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.02)
 
 
 @pytest.mark.screen

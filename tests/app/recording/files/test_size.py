@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
-from rodsight.cli.main import main
+from tests.program import rodsight
 
 FEW = ("--set", "solver.sweeps=300", "--set", "solver.estimator=nlgs")
-
-
-def rodsight(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as end:
-        main(list(arguments))
-    return int(end.value.code or 0)
 
 
 def test_a_budget_is_kept_and_what_it_cost_is_said(tracked, tmp_path, capsys):

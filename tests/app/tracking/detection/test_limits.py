@@ -11,7 +11,7 @@ from rodsight.tracking.detection.outlines import Outliner
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 
-SIDE = 420  # [px]
+SIDE = 300  # [px]
 BLUR_ALLOWED = 0.12  # [px] texture takes part in the fit
 RADIUS_ALLOWED = 0.15  # [px] median; the steepest point of a blurred circle lies .05 inside
 CENTRE_ALLOWED = 0.12  # [px] rms, where rims are shaded by half on one side
@@ -24,10 +24,10 @@ def rods_on_a_grid(radius: float, pitch: float, seed: int = 0) -> tuple[np.ndarr
     return x, y, np.full(len(x), radius)
 
 
-def photograph(laboratory: Laboratory, x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    image = brown_photograph(
-        laboratory, SIDE, SIDE, x, y, radius, np.zeros(len(x)), pattern_seed=1, noise_seed=1
-    )  # fmt: skip
+def photograph(
+    laboratory: Laboratory, x: np.ndarray, y: np.ndarray, radius: np.ndarray, *, side: int = SIDE
+) -> np.ndarray:
+    image = brown_photograph(laboratory, side, side, x, y, radius, np.zeros(len(x)), pattern_seed=1, noise_seed=1)
     return np.ascontiguousarray(image.astype(np.float32) @ LUMA, dtype=np.float32)
 
 
@@ -58,7 +58,7 @@ def test_sizes_one_to_eight_are_found_when_nothing_is_told() -> None:
     x = np.array([110.0, 300.3, 300.0, 60.5, 120.2, 180.0, 240.0, 389.0, 224.0])
     y = np.array([110.0, 90.4, 270.0, 300.0, 260.6, 320.0, 390.0, 389.0, 190.0])
     radius = np.array([96.0, 72.0, 80.0, 30.0, 22.0, 16.0, 14.0, 12.0, 12.0])
-    found = detect_grains(photograph(Laboratory(grain=14.0, lathe=10.0), x, y, radius))
+    found = detect_grains(photograph(Laboratory(grain=14.0, lathe=10.0), x, y, radius, side=420))
     near = np.hypot(found.x[:, None] - x, found.y[:, None] - y)
     assert found.count == len(x)
     assert near.min(axis=0).max() < 0.5
@@ -79,12 +79,12 @@ def test_one_sided_shadow_is_told_in_sigma() -> None:
 
 
 def test_a_circle_hardly_in_view_is_not_guessed() -> None:
-    x, y, radius = np.array([210.0, -18.0]), np.array([210.0, 200.0]), np.array([60.0, 60.0])
+    x, y, radius = np.array([150.0, -18.0]), np.array([150.0, 140.0]), np.array([60.0, 60.0])
     image = photograph(Laboratory(), x, y, radius)
     found = detect_grains(image)
     assert found.count >= 1
     assert (found.sigma < np.maximum(1.0, 0.05 * found.radius)).all()
-    assert np.hypot(found.x - 210.0, found.y - 210.0).min() < 0.5
+    assert np.hypot(found.x - 150.0, found.y - 150.0).min() < 0.5
 
 
 def test_half_the_resolution_finds_the_same_rods() -> None:

@@ -12,10 +12,11 @@ from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus
 
-from tests.app.tracking.detection.test_detect import HEIGHT, WIDTH, match, packing
+from tests.app.tracking.laid_rods import HEIGHT, WIDTH, lay_rods, match
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 from tests.app.tracking.speckled import Rods
 
+SIDE = 420  # [px]
 CLASSES = (14.0, 20.0, 28.0)  # [px]
 CENTRE_ALLOWED = 0.1  # [px] rms
 FOLLOWED_ALLOWED = 0.06  # [px] rms; noise of 2 grey on a dull texture of 6, softened by 1.4 px, leaves .04
@@ -29,7 +30,15 @@ def photographed(
 ) -> np.ndarray:  # fmt: skip
     file = folder / f"{noise_seed}.png"
     image = brown_photograph(
-        laboratory, WIDTH, HEIGHT, rods.x + dx, rods.y + dy, rods.radius, turn, pattern_seed=1, noise_seed=noise_seed
+        laboratory,
+        rods.width,
+        rods.height,
+        rods.x + dx,
+        rods.y + dy,
+        rods.radius,
+        turn,
+        pattern_seed=1,
+        noise_seed=noise_seed,
     )
     cv2.imwrite(str(file), image)
     return read_photograph(file)
@@ -42,7 +51,7 @@ def laboratory(request: pytest.FixtureRequest) -> Laboratory:
 
 @pytest.fixture(scope="module")
 def rods() -> Rods:
-    return packing(0, CLASSES)
+    return lay_rods(0, CLASSES, width=SIDE, height=SIDE)
 
 
 @pytest.fixture(scope="module")
@@ -78,12 +87,15 @@ def test_brown_rods_are_followed_over_thirteen_pixels_and_five_degrees(
     assert (poses.status != TrackStatus.SUSPECT).mean() > 0.97
 
 
-def test_circles_at_the_border_do_not_run_away_and_swallow_others(laboratory: Laboratory, tmp_path: Path) -> None:
-    rods = packing(3, CLASSES, cut=True)
+@pytest.mark.parametrize("size", [(SIDE, SIDE), pytest.param((WIDTH, HEIGHT), marks=pytest.mark.screen)])
+def test_circles_at_the_border_do_not_run_away_and_swallow_others(
+    laboratory: Laboratory, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    rods = lay_rods(3, CLASSES, cut=True, width=size[0], height=size[1])
     image = photographed(tmp_path, laboratory, rods, 0.0, 0.0, np.zeros(rods.count), 1)
     found = detect_grains(image, DetectionSettings(radius_range=(11.0, 36.0)))
     index, near = match(found, rods)
-    whole = (rods.x > rods.radius) & (rods.x < WIDTH - rods.radius) & (rods.y < HEIGHT - rods.radius)
+    whole = (rods.x > rods.radius) & (rods.x < rods.width - rods.radius) & (rods.y < rods.height - rods.radius)
     assert near[whole].all()
     assert found.radius.max() < 40.0
     assert np.abs(found.radius[index] - rods.radius)[whole].max() < 1.0

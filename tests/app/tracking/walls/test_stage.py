@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import cv2
@@ -11,22 +10,14 @@ import numpy as np
 import pytest
 from rodsight.experiment.tables import read_table
 
-from tests.app.experiment.test_bad_input import edit
-from tests.app.tracking.test_stage import cut_walls, off_walls, track
+from tests.app.tracking.photographed import Tracked, off_walls, track
 
 BEYOND = 140  # [px] of backing added on the right of every photograph
 FACTOR = 4.0  # standard deviations that cover every error of few endpoints
 
 
-@pytest.fixture
-def photographed(made_photographs: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(made_photographs, tmp_path / "photographed"))
-
-
-def test_how_well_followed_walls_are_known_is_stored_with_them(photographed: Path, tmp_path: Path) -> None:
-    true = cut_walls(photographed)
-    _, walls = track(photographed, tmp_path / "out")
-    assert walls is not None
+def test_how_well_followed_walls_are_known_is_stored_with_them(followed: Tracked) -> None:
+    walls, true = followed.walls, followed.true_walls
     assert walls.sigma is not None
     assert walls.sigma.shape == true.shape[:2]
     assert np.isnan(walls.sigma[0]).all()  # told by the table
@@ -34,39 +25,31 @@ def test_how_well_followed_walls_are_known_is_stored_with_them(photographed: Pat
     assert (walls.sigma[1:] > 0.0).all()
     assert (off < FACTOR * walls.sigma[1:]).all()
     assert walls.frames(1, 3).sigma == pytest.approx(walls.sigma[1:3])
-    with h5py.File(tmp_path / "out" / "tracks.h5") as store:
+    with h5py.File(followed.out / "tracks.h5") as store:
         assert store["walls/sigma"].attrs["unit"] == "m"
 
 
-def test_a_wall_told_in_a_later_frame_has_no_sigma_there(photographed: Path, tmp_path: Path) -> None:
-    file = photographed / "walls.csv"
-    told = next(line for line in file.read_text().splitlines() if line.startswith("2,top"))
-    cut_walls(photographed)
-    file.write_text(file.read_text() + told + "\n")
-    edit(photographed / "experiment.toml", '[walls]\nfile = "walls.csv"', '[walls]\nfile = "walls.csv"\ntrack = true')
-    _, walls = track(photographed, tmp_path / "out")
-    assert walls is not None
+def test_a_wall_told_in_a_later_frame_has_no_sigma_there(partly_told: Tracked) -> None:
+    walls = partly_told.walls
     assert walls.sigma is not None
     top = walls.name.index("top")
     assert np.isfinite(walls.sigma[:, top]).tolist() == [False, True, False, True]
 
 
-def test_walls_of_a_table_have_no_sigma(photographed: Path, tmp_path: Path) -> None:
-    _, walls = track(photographed, tmp_path / "out")
-    assert walls is not None
-    assert walls.sigma is None
+def test_walls_of_a_table_have_no_sigma(plain: Tracked) -> None:
+    assert plain.walls.sigma is None
 
 
 def test_round_things_beyond_the_walls_are_no_grains(photographed: Path, tmp_path: Path) -> None:
     table = read_table(photographed / "grains.csv", ("id", "radius"))  # of the truth: the experiment detects
     x, y = _add_a_wheel(photographed, float(np.median(table.numbers("radius"))))
-    tracks, _ = track(photographed, tmp_path / "with")
+    tracks, _ = track(photographed, tmp_path / "with", "--frames", "0:2")
     assert tracks.grain_count == len(table)
     assert np.hypot(*(_found(tmp_path / "with") - (x, y)).T).min() > 20.0
     # It is the walls that keep it out: without them it is found.
     text = (photographed / "experiment.toml").read_text()
     (photographed / "experiment.toml").write_text(_without_walls(text))
-    track(photographed, tmp_path / "without")
+    track(photographed, tmp_path / "without", "--frames", "0:2")
     assert np.hypot(*(_found(tmp_path / "without") - (x, y)).T).min() < 1.0
 
 
