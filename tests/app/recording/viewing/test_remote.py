@@ -7,11 +7,11 @@ import re
 import shutil
 import socket
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import pytest
 from playwright.sync_api import Page
@@ -23,7 +23,7 @@ from tests.program import RODSIGHT
 pytestmark = pytest.mark.screen
 
 HERE, THERE, SSH_PORT = "10.231.87.1", "10.231.87.2", 2222
-SECONDS = 60.0
+CONNECTED = "connected"  # what the tunnel says once it is there
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,12 @@ class Machine:
 
     def tunnel(self, *ports: int) -> list[str]:
         forwards = [part for port in ports for part in ("-L", f"{port}:localhost:{port}")]
-        return [
-            "ssh", "-N", "-p", str(SSH_PORT), "-i", str(self.key), "-o", "StrictHostKeyChecking=no", "-o",
-            "UserKnownHostsFile=/dev/null", "-o", "ExitOnForwardFailure=yes", "-o", "BatchMode=yes", *forwards,
-            f"root@{THERE}",
-        ]  # fmt: skip
+        options = (
+            "StrictHostKeyChecking=no", "UserKnownHostsFile=/dev/null", "ExitOnForwardFailure=yes", "BatchMode=yes",
+            "PermitLocalCommand=yes", f"LocalCommand=echo {CONNECTED}",
+        )  # fmt: skip
+        told = [part for option in options for part in ("-o", option)]
+        return ["ssh", "-N", "-p", str(SSH_PORT), "-i", str(self.key), *told, *forwards, f"root@{THERE}"]
 
 
 def ip(*arguments: str) -> None:
@@ -84,7 +85,7 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
             stack.callback(shutil.rmtree, run)
         server = made.start(sshd, "-D", "-e", "-f", sshd_config(tmp_path), stderr=subprocess.PIPE, text=True)
         stack.callback(end, server)
-        wait_for(lambda: reaches(THERE, SSH_PORT), "sshd", server)
+        wait_until_said(server.stderr, "Server listening on")
         yield made
 
 
@@ -112,12 +113,15 @@ def reaches(host: str, port: int) -> bool:
     return True
 
 
-def wait_for(condition, what: str, process: subprocess.Popen) -> None:
-    give_up = time.monotonic() + SECONDS
-    while not condition():
-        assert process.poll() is None, f"{what} ended: {process.stderr.read() if process.stderr else ''}"
-        assert time.monotonic() < give_up, f"{what} does not answer"
-        time.sleep(0.1)
+def wait_until_said(lines: IO[str] | None, part: str) -> None:
+    """Read what a process says until a line has some part."""
+    assert lines is not None
+    said = []
+    for line in lines:
+        said.append(line)
+        if part in line:
+            return
+    pytest.fail(f"it ended, saying {said}")
 
 
 def end(process: subprocess.Popen) -> None:
@@ -145,14 +149,8 @@ def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(
 ):
     experiment = tmp_path / "far"
     synthesize(experiment, grains=120, frames=12, photographs=False, noise=1e-5, seed=1)
-    command = [
-        *RODSIGHT,
-        "run",
-        experiment,
-        "--view",
-        "web",
-    ]
-    command += ["--out", tmp_path / "out", "--set", "solver.sweeps=60000"]  # long enough to be watched
+    command = [*RODSIGHT, "run", experiment, "--view", "web", "--out", tmp_path / "out"]
+    command += ["--set", "solver.sweeps=60000"]  # long enough to be watched
     with running(machine.start(*command, stdout=subprocess.PIPE, text=True)) as run:
         assert run.stdout is not None
         told = run.stdout.readline()
@@ -163,7 +161,8 @@ def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(
             if reaches("127.0.0.1", port):
                 pytest.skip(f"port {port} of this machine is taken: the tunnel needs it")
             assert not reaches(THERE, port)  # nothing is served to the network
-        with running(subprocess.Popen(machine.tunnel(*ports), stderr=subprocess.PIPE, text=True)) as tunnel:
+        with running(subprocess.Popen(machine.tunnel(*ports), stdout=subprocess.PIPE, text=True)) as tunnel:
+            wait_until_said(tunnel.stdout, CONNECTED)
             open_when_served(page, f"{address}&renderer=webgl")
             assert tunnel.poll() is None
             wait_for_forces(page)
