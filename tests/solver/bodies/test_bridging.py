@@ -53,3 +53,12 @@ def test_nothing_changes_where_nothing_is_lost():
     np.testing.assert_array_equal(frame.position, window[2].position)
     assert not bridged.any()
     np.testing.assert_array_equal(window[1].position[4], 99.0)
+
+
+def test_the_way_between_is_shared_by_the_time_on_either_side():
+    first, lost, last = moving_lattice({1: [7]}, frames=3)
+    late = Snapshot(48.0, lost.position, lost.rotation, lost.present, lost.endpoints, lost.sigma)
+    frame, _ = bridge_lost([first, late, last], 1)
+    start = first.position[7]
+    np.testing.assert_allclose(frame.position[7], start + 48.0 / 60.0 * (last.position[7] - start), atol=EXACT)
+    np.testing.assert_allclose(frame.rotation[7], 48.0 / 60.0 * 0.02, atol=EXACT)

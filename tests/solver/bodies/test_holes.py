@@ -44,3 +44,32 @@ def test_gaps_between_great_grains_are_no_holes():
 def test_too_few_grains_have_no_holes():
     grains, position, walls = lattice()
     assert len(find_holes(grains, position, np.arange(81) < 3, walls)) == 0
+
+
+def test_a_hole_is_told_once_however_wide_it_is():
+    """Two neighbours are gone: their places make one wide hole or two, but no two of them lie on one another."""
+    grains, position, walls = lattice()
+    present = ~np.isin(np.arange(81), [HOLE, HOLE + 1])
+    found = find_holes(grains, np.where(present[:, None], position, np.nan), present, walls)
+    assert len(found) == 2
+    assert np.hypot(*(found[0] - found[1])) >= 0.97 * R
+
+
+def test_a_hole_too_narrow_for_the_smallest_rod_is_none():
+    """A seat for a rod of .8 R."""
+    radius = np.full(81, R)
+    grains, position, walls = lattice(radius)
+    position = position.copy()
+    around = np.argsort(np.hypot(*(position - position[HOLE]).T))[1:7]
+    present = np.arange(81) != HOLE
+    toward = position[around] - position[HOLE]
+    position[around] -= 0.2 * R * toward / np.hypot(*toward.T)[:, None]
+    assert len(find_holes(grains, np.where(present[:, None], position, np.nan), present, walls)) == 0
+
+
+def test_a_rod_as_large_as_its_neighbours_fits_a_natural_measure():
+    """Where small rods are among great ones, what a great one leaves is a hole, too."""
+    radius = np.where(np.arange(81) == 0, 0.7 * R, R)
+    grains, position, walls = lattice(radius)
+    present = np.arange(81) != HOLE
+    assert len(find_holes(grains, np.where(present[:, None], position, np.nan), present, walls)) == 1

@@ -2,12 +2,15 @@ import numpy as np
 import pytest
 
 from solver.bodies.grains import Grains
+from solver.bodies.motion import Snapshot
 from solver.bodies.walls import Walls
 from solver.detection.touch_probability import (
     ContactProbabilitySettings,
     find_candidates,
+    probable_contacts,
     smooth_gaps,
     touch_probability,
+    window_of,
 )
 
 SIGMA = 14e-6  # m, of a gap
@@ -195,3 +198,43 @@ def test_a_lost_grain_has_no_gap():
     assert touches.any()
     assert np.all(np.isnan(found.gap[0, touches]))
     assert np.all(np.isfinite(found.gap[1]))
+
+
+def test_a_pair_is_a_candidate_up_to_what_noise_overlap_and_radii_may_do():
+    grains, position, walls = three_grains()
+    sigma = np.full((2, 3), 1e-5)
+    position = np.repeat(position[1:], 2, axis=0)
+    settings = ContactProbabilitySettings(overlap=4e-6, radius_sd=5e-6, margin=20e-6, reach=6.0)
+    # 6 · √(σ² + overlap²/2) + margin + 3 · 5 µm
+    reach = 6.0 * np.sqrt(1e-10 + 0.5 * 16e-12) + 20e-6 + 15e-6
+    for gap, found in ((0.999 * reach, True), (1.001 * reach, False)):
+        position[:, 2] = [0.03, 0.03 + gap]
+        named = find_candidates(grains, position, np.ones((2, 3), bool), sigma, walls, settings)
+        assert ((1, 2) in zip(named.i.tolist(), named.j.tolist(), strict=True)) is found
+
+
+def test_a_frame_is_judged_by_four_photographs_before_and_three_after_it():
+    assert list(window_of(10, 40)) == [6, 7, 8, 9, 10, 11, 12, 13]
+    assert list(window_of(1, 40)) == [0, 1, 2, 3, 4]
+    assert list(window_of(38, 40)) == [34, 35, 36, 37, 38, 39]
+
+
+def test_improbable_pairs_and_those_of_a_lost_grain_are_left_out():
+    grains, position, walls = three_grains()
+    position = np.repeat(position[1:], 3, axis=0)
+    position[:, 2, 1] += 5e-5
+    window = [
+        Snapshot(float(f), position[f], np.zeros(3), np.ones(3, bool), walls[0].endpoints, 1e-5) for f in range(3)
+    ]
+    everything = ContactProbabilitySettings(least=0.0)
+    contacts, touch = probable_contacts(grains, window, 1, everything)
+    pairs = list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))
+    assert pairs == [(0, 1), (0, 3), (1, 2), (1, 3)]
+    doubtful = touch[pairs.index((1, 2))]
+    assert 0.0 < doubtful < 0.3
+    fewer, kept = probable_contacts(grains, window, 1, ContactProbabilitySettings(least=1.01 * doubtful))
+    assert fewer.count == 3
+    assert np.array_equal(np.delete(touch, pairs.index((1, 2))), kept)
+    gone = Snapshot(1.0, position[1], np.zeros(3), np.array([True, False, True]), walls[0].endpoints, 1e-5)
+    contacts, _ = probable_contacts(grains, [window[0], gone, window[2]], 1, everything)
+    assert list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True)) == [(0, 3)]

@@ -131,3 +131,41 @@ def test_holes_lower_the_trust_and_are_named():
 def test_a_single_chain_is_trusted_less_the_farther_its_threshold_reaches():
     chain = replace(SOUND, disagreement=math.nan)
     assert trust(replace(chain, reach=0.015)) < trust(replace(chain, reach=0.004)) < trust(chain)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "expected"),
+    [
+        # 1 − .83 D^2.65 − .42 ε^.73, powers from a table
+        ({"correction": 0.1, "disagreement": 0.2}, 1.0 - 0.83 * 0.014052 - 0.42 * 0.186209),
+        ({"correction": 0.02, "disagreement": 0.5}, 1.0 - 0.83 * 0.159320 - 0.42 * 0.057511),
+        # of a single chain: 1 − .95 ε^.8 − 4.45 reach
+        ({"correction": 0.1, "disagreement": math.nan, "reach": 0.01}, 1.0 - 0.95 * 0.158489 - 0.0445),
+        # one hole among 60 grains takes a tenth
+        ({"correction": 0.0, "disagreement": 0.0, "holes": 1, "grains": 60}, 0.9),
+        ({"correction": 0.0, "disagreement": 0.0, "holes": 60, "grains": 60}, 0.0),
+    ],
+)
+def test_trust_is_what_was_fitted(evidence, expected):
+    assert trust(replace(SOUND, **evidence)) == pytest.approx(expected, abs=2e-6)
+
+
+def test_standard_deviations_are_what_was_fitted():
+    fn, spread = np.array([1.0, 3.0]), np.array([0.4, 0.0])  # mean f_n: 2
+    # ⟨f⟩ √(a² + b² f/⟨f⟩ + (c s/⟨f⟩)²)
+    normal = 2.0 * np.sqrt([9e-6 + 0.5 * 0.088**2 + (0.985 * 0.2) ** 2, 9e-6 + 1.5 * 0.088**2])
+    tangential = 2.0 * np.sqrt([1e-6 + 0.5 * 0.008**2 + (1.206 * 0.2) ** 2, 1e-6 + 1.5 * 0.008**2])
+    chain = 2.0 * np.sqrt([0.071**2 + 0.5 * 0.239**2, 0.071**2 + 1.5 * 0.239**2])
+    assert free_standard_deviation(fn, spread) == pytest.approx(normal)
+    assert tangential_standard_deviation(fn, 0.25, spread) == pytest.approx(tangential)
+    assert free_standard_deviation(fn) == pytest.approx(chain)
+
+
+def test_levels_are_what_was_fitted():
+    assert (SUSPECT_CORRECTION, SUSPECT_PRESSURE_JUMP, UNBALANCED, CHAIN_UNBALANCED) == (0.25, 0.15, 0.05, 0.15)
+    assert (LOAD_SHARES, SETTLED_CORRECTION, SETTLED_DIFFERENCE, SETTLING_FRAMES) == ((0.62, 2.5), 0.15, 0.04, 2)
+    # ū scales with the power 3/2 of the shear between photographs, within bounds
+    assert rearranging_level(SHEAR) == pytest.approx(0.037)
+    assert rearranging_level(2.0 * SHEAR) == pytest.approx(0.037 * 2.0**1.5)
+    assert rearranging_level(0.01 * SHEAR) == pytest.approx(0.4 * 0.037)
+    assert rearranging_level(100.0 * SHEAR) == pytest.approx(4.0 * 0.037)

@@ -158,3 +158,31 @@ def test_a_packing_without_contacts_has_statistics():
     assert (found.chain_count, found.chain_grain_share, found.strong_share) == (0, 0.0, 0.0)
     assert found.fn_density.shape == (FORCE_BINS,)
     assert found.wall_force.shape == (4, 2)
+
+
+def test_only_bearing_contacts_count():
+    contacts, fn, position, walls = square_of_four(2e4, 5e4)
+    pair = np.flatnonzero(~contacts.with_wall)
+    open_rows = [pair[0], np.flatnonzero(contacts.with_wall)[0]]
+    fn = fn.copy()
+    fn[open_rows] = 0.0
+    state = np.where(fn > 0, ContactState.STICKING, ContactState.OPEN).astype(np.uint8)
+    sliding = np.flatnonzero(fn > 0)[:3]
+    state[sliding] = ContactState.SLIDING
+    found = frame_statistics(
+        contacts, fn, np.zeros_like(fn), state, position, np.ones(4, bool), walls, LENGTH,
+        grains=rods(0.01, 0.01, 0.01, 0.01), material=Material(0.25, 0.5),
+    )  # fmt: skip
+    bearing = fn > 0
+    assert found.contact_count == bearing.sum() == len(fn) - 2
+    assert found.mean_fn == pytest.approx(fn[bearing].mean())
+    assert found.max_fn == fn.max()
+    assert found.sliding_fraction == pytest.approx(3 / bearing.sum())
+    assert found.pressure == pytest.approx(0.5 * (found.sigma_1 + found.sigma_2))
+    normal = contacts.normal[bearing]
+    assert found.fabric == pytest.approx(normal.T @ normal / len(normal))
+    # Anisotropies are of the pairs: one of the horizontal or vertical ones is open, and those with walls do not count.
+    left = contacts.normal[bearing & ~contacts.with_wall]
+    cosine = left[:, 0] ** 2 - left[:, 1] ** 2
+    assert found.contact_anisotropy == pytest.approx(abs(2.0 * cosine.mean()), abs=EXACT)
+    assert found.contact_anisotropy > 0.5

@@ -1,0 +1,43 @@
+"""Two networks are compared contact by contact, what one lacks counting as no force."""
+
+import numpy as np
+import pytest
+
+from solver.statistics.agreement import align_forces, compare_forces, pearson, relative_change
+
+TRUE_KEY, TRUE = np.array([1, 4, 6, 9]), np.array([[3.0, 0.5], [1.0, -0.2], [0.0, 0.0], [2.0, 0.0]])
+KEY, FORCE = np.array([1, 5, 9]), np.array([[2.0, 0.5], [1.0, 0.3], [2.5, 0.1]])
+
+
+def test_an_absent_contact_is_one_without_force():
+    ours, true = align_forces(KEY, FORCE, TRUE_KEY, TRUE)
+    assert ours[:, 0].tolist() == [2.0, 0.0, 1.0, 0.0, 2.5]
+    assert true[:, 0].tolist() == [3.0, 1.0, 0.0, 0.0, 2.0]
+
+
+def test_agreement_is_judged_over_the_union():
+    found = compare_forces(KEY, FORCE, TRUE_KEY, TRUE)
+    ours, true = align_forces(KEY, FORCE, TRUE_KEY, TRUE)
+    assert found.r_fn == pytest.approx(np.corrcoef(ours[:, 0], true[:, 0])[0, 1])
+    assert found.r_ft == pytest.approx(np.corrcoef(ours[:, 1], true[:, 1])[0, 1])
+    assert found.relative_l2 == pytest.approx(np.linalg.norm(ours - true) / np.linalg.norm(true))
+    assert found.scale == pytest.approx(5.5 / 6.0)
+    assert found.contact_precision == pytest.approx(2 / 3)  # 1 and 9 of the three listed
+    assert found.contact_recall == pytest.approx(2 / 3)  # 1 and 9 of the three that bear: 6 does not
+
+
+def test_precision_is_over_what_is_listed_and_recall_over_what_bears():
+    found = compare_forces(np.array([1]), np.array([[1.0, 0.0]]), TRUE_KEY, TRUE)
+    assert (found.contact_precision, found.contact_recall) == (1.0, pytest.approx(1 / 3))
+
+
+def test_a_change_is_relative_to_what_was():
+    assert relative_change(KEY, FORCE, KEY, 1.5 * FORCE) == pytest.approx(0.5)
+    assert relative_change(KEY, FORCE, KEY, 0.0 * FORCE) == 1.0
+    assert relative_change(KEY, 0.0 * FORCE, KEY, FORCE) == 0.0
+
+
+def test_what_does_not_vary_has_no_correlation():
+    assert np.isnan(pearson(np.ones(3), np.arange(3.0)))
+    assert np.isnan(pearson(np.ones(1), np.ones(1)))
+    assert pearson(np.arange(3.0), -np.arange(3.0)) == pytest.approx(-1.0)
