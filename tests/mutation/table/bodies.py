@@ -10,6 +10,7 @@ MUTANTS = [
         TESTS,
         ("density * length * np.pi * radius**2", "density * length * np.pi * radius"),
         ("return 0.5 * self.mass * self.radius**2", "return 0.4 * self.mass * self.radius**2"),
+        ("self.mass[:, None] * np.asarray(gravity)", "self.radius[:, None] * np.asarray(gravity)"),
     ),
     *mutants_of(
         "solver/bodies/walls.py",

@@ -57,8 +57,20 @@ MUTANTS = [
         "solver/contacts/verdicts.py",
         (TESTS, "tests/app/review/test_solver_obeys.py"),
         ("DETECTED = 0.5", "DETECTED = 0.0"),
-        ("np.union1d(np.setdiff1d(contacts.key, verdicts.forbidden), forced)", "np.union1d(contacts.key, forced)"),
-        ("here[verdicts.forced // bodies] & here[verdicts.forced % bodies]", "here[verdicts.forced // bodies]"),
+        (
+            "join_keys(contacts.key[~are_among(contacts.key, verdicts.forbidden)], forced)",
+            "join_keys(contacts.key, forced)",
+        ),
+        ("verdicts.forced[are_there(verdicts.forced, present, contacts.body_count)]", "verdicts.forced"),
         ("position=(1.0 - share) * one.position + share * two.position", "position=one.position"),
+    ),
+    *mutants_of(
+        "solver/contacts/pairs.py",
+        TESTS,
+        ("return here[i] & here[j]", "return here[i] | here[j]"),
+        ("return row, former[row] == key", "return row, former[row] >= key"),
+        ("np.asarray(i).astype(np.int64) * bodies + j", "np.asarray(i).astype(np.int32) * np.int32(bodies) + j"),
+        ("found[known] = value[row[known]]", "found[known] = value[: known.sum()]"),
+        ("one[np.searchsorted(union, key)] = value", "one[: len(value)] = value"),
     ),
 ]

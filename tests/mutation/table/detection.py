@@ -63,9 +63,9 @@ MUTANTS = [
         DETECTION,
         ("np.maximum(0.0, np.log10(SURE / touch[keep]))", "np.maximum(0.0, np.log(SURE / touch[keep]))"),
         ("(1.0 - fraction) * self.start.of(key) + fraction * self.end.of(key)", "self.end.of(key)"),
-        ("keep = (touch > LEAST) & here[i] & here[j]", "keep = (touch > LEAST) & here[i]"),
+        ("keep = (touch > LEAST) & are_there(key, state.present, grains.count + walls.count)", "keep = touch > LEAST"),
         ("SURE = 0.3", "SURE = 0.9"),
-        ("np.union1d(self.start.key, self.end.key) if fraction < 1.0 else self.end.key", "self.end.key"),
+        ("join_keys(self.start.key, self.end.key) if fraction < 1.0 else self.end.key", "self.end.key"),
     ),
     *mutants_of(
         "solver/detection/precision.py",

@@ -74,7 +74,7 @@ MUTANTS = [
         ("body[:, 2] = motion.spin * grains.radius", "body[:, 2] = motion.spin"),
         ("-walls.load[walls.loaded] * plate_compliance", "walls.load[walls.loaded] * plate_compliance"),
         ("grains.mass / grains.mass.mean()", "grains.radius / grains.radius.mean()"),
-        ("weight = grains.mass[:, None] *", "weight = grains.radius[:, None] *"),
+        ("weight = grains.weight(material.gravity)", "weight = 0.0 * grains.weight(material.gravity)"),
         ("1.0 / (3.0 * wall_w),", "1.0 / wall_w,"),
         ("contacts.normal[rows_wall]) + closing[rows_wall]", "contacts.normal[rows_wall])"),
         ('np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall])', "np.zeros(len(rows_wall))"),
@@ -122,12 +122,18 @@ MUTANTS = [
         "solver/nlgs/sweep_record.py",
         "tests/solver/nlgs/test_sweep_record.py",
         ("yield wanted + 1 - count", "yield wanted - count"),
-        ("key[place] == contacts.key", "key[place] >= contacts.key"),
+        ("find_rows(contacts.key, self.contacts.key[self.problem.rows])", "find_rows(contacts.key, self.contacts.key)"),
     ),
     *mutants_of(
         "solver/nlgs/warm_start.py",
         "tests/solver/nlgs",
-        ("known = self.key[place] == contacts.key", "known = self.key[place] >= contacts.key"),
-        ("unseen = ~(seen[i] & seen[j])", "unseen = ~(seen[i] | seen[j])"),
+        (
+            "return ForceMemory(key[order], np.concatenate([self.force[unseen], force])[order])",
+            "return ForceMemory(key[order], np.concatenate([self.force[unseen], force]))",
+        ),
+        (
+            "unseen = ~are_there(self.key, present, contacts.body_count)",
+            "unseen = are_there(self.key, present, contacts.body_count)",
+        ),
     ),
 ]

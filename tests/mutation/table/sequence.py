@@ -28,7 +28,7 @@ MUTANTS = [
         "solver/sequence",
         FRAMES,
         ("NEGLIGIBLE_KAPPA = 1e-5", "NEGLIGIBLE_KAPPA = 1e5"),
-        ("age[here] = state.age[there] + 1", "age[here] = state.age[there]"),
+        ("state.age, fill=-1) + np.int32(1)", "state.age, fill=0) + np.int32(1)"),
         ("friction * fn * (1.0 - SLIDING_TOLERANCE)", "0.5 * friction * fn"),
         ("step.solution.mean_unbalance / step.kappa", "step.solution.unbalance / step.kappa"),
     ),
@@ -37,7 +37,10 @@ MUTANTS = [
         FRAMES,
         ("stiffer: float = 2.0", "stiffer: float = 4.0"),
         ("np.average(members, axis=0, weights=worth)", "np.average(members, axis=0)"),
-        ("np.isin(contacts.key, verdicts.forced), 1.0, told)", "np.isin(contacts.key, verdicts.forced), told, told)"),
+        (
+            "are_among(contacts.key, verdicts.forced), 1.0, told)",
+            "are_among(contacts.key, verdicts.forced), told, told)",
+        ),
         (
             "return np.sqrt(np.average((member - mean) ** 2, axis=0, weights=worth))",
             "return np.average(np.abs(member - mean), axis=0, weights=worth)",

@@ -8,10 +8,10 @@ MUTANTS = [
     *mutants_of(
         "solver/statistics/balance.py",
         STATISTICS,
-        ("np.subtract.at(total, contacts.i, force)", "np.add.at(total, contacts.i, force)"),
-        ("packing.grains.mass[:, None] * np.asarray(packing.material.gravity)", "np.zeros((packing.grains.count, 2))"),
-        ("fn[bearing].mean())", "fn.mean())"),
-        ("contacts, fn, ft)[present]", "contacts, fn, ft)"),
+        ("np.subtract.at(sums, i, force.ravel())", "np.add.at(sums, i, force.ravel())"),
+        ("sums = np.tile(weight[:, axis], len(start))", "sums = np.tile(0.0 * weight[:, axis], len(start))"),
+        ("fn * normal[:, axis] + ft * tangent[:, axis]", "fn * normal[:, axis] - ft * tangent[:, axis]"),
+        ("unbalances(contacts, fn, ft, weight)[present].max", "unbalances(contacts, fn, ft, weight).max"),
     ),
     *mutants_of(
         "solver/statistics/stress.py",
