@@ -26,6 +26,7 @@ from .experiment.corrections import read_corrections
 from .experiment.experiment import read_grain_guess, read_times, read_tracks, read_walls
 from .experiment.plausibility import check_inside, check_radii, rods_beyond_ends
 from .experiment.scaling import make_scale
+from .experiment.unused_keys import refuse_unused_keys
 from .inference.inference import (
     CoordinationError,
     CorrectedSequence,
@@ -159,6 +160,7 @@ def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inp
     decisions = decide(log, bodies, first_frame=run.frames[0], frame_count=tracks.frame_count)
     if decisions.flags and all(Flag.IGNORE in decisions.flags.get(k, ()) for k in range(tracks.frame_count)):
         raise InputError(log.file, "flag ignore", "is set on every frame: nothing is left to solve")
+    refuse_unused_keys(config, run.experiment.file)
     return Inputs(tracks, walls, material_of(config), settings_of(config), decisions.for_solver())
 
 

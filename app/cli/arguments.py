@@ -14,7 +14,11 @@ Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the re
 Settings = Annotated[
     tuple[str, ...],
     tyro.conf.UseAppendAction,
-    tyro.conf.arg(name="set", metavar="KEY=VALUE", help="lay a setting over experiment.toml, e.g. solver.kappa=0.1"),
+    tyro.conf.arg(
+        name="set",
+        metavar="KEY=VALUE",
+        help="lay a setting over experiment.toml, e.g. solver.kappa=0.1; rodsight settings lists them",
+    ),
 ]
 Frames = Annotated[str | None, tyro.conf.arg(metavar="A:B", help="only the frames A … B − 1")]
 Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]

@@ -16,6 +16,7 @@ from .export import export, share
 from .look import compare, review, score, view
 from .make import import_, synth
 from .run import check, record, run, solve, track
+from .settings import settings
 from .study import sensitivity, study
 
 COMMANDS: tuple[Callable[..., int], ...] = (
@@ -34,6 +35,7 @@ COMMANDS: tuple[Callable[..., int], ...] = (
     compare,
     export,
     import_,
+    settings,
 )
 
 

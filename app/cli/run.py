@@ -168,7 +168,7 @@ def solve(
 ) -> int:
     """Find contacts and forces, tracking first where that has not been done.
 
-    Example: rodsight solve sample_data/shear --set contacts.threshold_sigmas=5
+    Example: rodsight solve sample_data/shear --set material.friction=0.3
     """
     from .. import pipeline
     from ..results.summary import print_summary, save_summary, summarize
@@ -221,9 +221,11 @@ def record(
 def open_run(request: Request) -> Iterator[Run]:
     """The run that was asked for, with progress shown while it is open."""
     from ..experiment.experiment import load_experiment
+    from ..experiment.unused_keys import refuse_unused_keys
     from ..run_folder import Run
 
     experiment = load_experiment(request.experiment, request.settings)
+    refuse_unused_keys(experiment.config, experiment.file)
     folder = request.out if request.out is not None else Path("runs") / experiment.name
     with progress_of(request.quiet) as progress:
         yield Run(

@@ -179,7 +179,7 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
     if fitted is not None:
         console.print(
             f"Recommended from {fitted.contacts} contacts and {fitted.others} others: threshold "
-            f"{1e6 * fitted.threshold:.1f} µm (contacts.threshold={fitted.threshold:.4g}, or "
+            f"{1e6 * fitted.threshold:.1f} µm (with estimator nlgs contacts.threshold={fitted.threshold:.4g}, or "
             f"contacts.threshold_sigmas={fitted.threshold_sigmas:.3g}). Radius correction "
             f"{1e6 * fitted.radius_change:+.2f} ± {1e6 * fitted.radius_change_sd:.2f} µm on every grain; with it the "
             f"threshold is {1e6 * fitted.threshold_with_change:.1f} µm.",

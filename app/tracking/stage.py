@@ -112,10 +112,8 @@ def _detect(experiment: Experiment, first: Image, scale: Scale, walls: WallTrack
         # Its own radius is what the user measured on this photograph, so the lens bent it too.
         return ReferenceGrains(guess.id, detection, detection.radius * scale.size_at(centres))
     classes = np.array(section.radii)
-    # What the user did not set is left to detection, which knows the size of the photograph.
-    limits = tuning.radius_range if "radius_range" in tuning.model_fields_set else None
     try:
-        settings = DetectionSettings(tuple(classes / scale.mean_size), limits)
+        settings = DetectionSettings(tuple(classes / scale.mean_size), tuning.radius_range)
     except ValueError as error:
         raise InputError(experiment.file, f"key photographs.radii = {list(section.radii)}", str(error)) from None
     detection = detect_grains(first, settings)

@@ -188,7 +188,9 @@ def test_check_says_what_it_found_and_writes_nothing(tracked, capsys, monkeypatc
     assert not Path("runs").exists()
 
 
-@pytest.mark.parametrize("command", ["run", "check", "track", "solve", "record", "view", "score", "synth", "study"])
+@pytest.mark.parametrize(
+    "command", ["run", "check", "track", "solve", "record", "view", "score", "synth", "study", "settings"]
+)
 def test_every_command_has_help_with_an_example(command, capsys):
     assert rodsight(command, "--help") == 0
     assert f"Example: rodsight {command}" in " ".join(capsys.readouterr().out.split())

@@ -1,0 +1,168 @@
+"""Sections of the experiment file that say what the rods are and how they are treated.
+
+The solver's own settings hold their defaults; these keys take them from there.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from solver.bodies.rods import RodMaterial
+from solver.calibration.settings import CalibrationSettings
+from solver.sequence.frames import SequenceSettings
+
+from .section import AtLeastOne, Finite, Frame, NotNegative, Positive, Section, key
+
+RODS, CALIBRATION, SEQUENCE = RodMaterial(), CalibrationSettings(), SequenceSettings()
+CHAIN = SEQUENCE.chain
+
+
+class MaterialSection(Section):
+    """What all rods have in common."""
+
+    density: Positive = key("Density of the rods.", unit="kg/m³", default=RODS.density)
+    length: Positive = key("Length of the rods, by which pressures become forces.", unit="m", default=RODS.length)
+    friction: NotNegative = key(
+        "Coefficient of friction between grains. Measure it: too low a friction is the worst error you can make here.",
+        default=RODS.friction,
+    )
+    wall_friction: NotNegative | None = key(
+        "Coefficient of friction at walls; absent: as friction.", default=RODS.wall_friction
+    )
+    formal_weight: Annotated[float, Field(ge=0, le=0.5)] = key(
+        "Formal weight η of the paper: impedances grow by 1 / (1 − η). Leave it unless you study the method.",
+        default=RODS.formal_weight,
+    )
+    gravity: tuple[Finite, Finite] = key(
+        "Gravity in the plane of the photographs, x to the right, y up; rods that lie flat have none.",
+        unit="m/s²",
+        default=RODS.gravity,
+    )
+
+
+class TrackingSection(Section):
+    """Tuning of the tracker."""
+
+    workers: AtLeastOne = key("Threads that correlate; as many as there are cores.", default=2)
+    radius_range: tuple[Positive, Positive] | None = key(
+        "Radii of grains looked for when they are not known; absent: any size, from 4 px where small discs are seen. "
+        "Narrow it where dirt is taken for grains.",
+        unit="px",
+        default=None,
+    )
+    search_window: Positive = key(
+        "Half width of the widest search for a grain that has jumped. Widen it where an avalanche loses grains.",
+        unit="px",
+        default=60.0,
+    )
+
+    @model_validator(mode="after")
+    def _ascending(self) -> TrackingSection:
+        if self.radius_range is not None and not 3.0 < self.radius_range[0] < self.radius_range[1]:
+            raise ValueError(f"radius_range value {list(self.radius_range)!r}: must ascend and exceed 3 px")
+        return self
+
+
+class CalibrationSection(Section):
+    """Self-calibration of centres, radii, walls and pixel size from persistent contacts."""
+
+    enabled: bool = key("Look for constant errors and correct them; false: tracks are taken as they are.", default=True)
+    pixel_size: NotNegative = key(
+        "Relative standard deviation of the given scale; 0: it is exact.", default=CALIBRATION.pixel_size
+    )
+    lens: bool = key("Look for what is left of the lens's radial distortion.", default=CALIBRATION.lens)
+    radius_class: NotNegative = key(
+        "Relative error that the rods of a known radius may share; 0: none.", default=CALIBRATION.radius_class
+    )
+
+
+class ContactsSection(Section):
+    """Tuning of contact detection."""
+
+    threshold_sigmas: Positive = key(
+        "Gap below which a single chain takes a pair for a contact, in standard deviations of a position. The "
+        "ensemble weighs probabilities instead.",
+        unit="σ",
+        default=SEQUENCE.threshold_sigmas,
+    )
+    threshold: Finite | None = key(
+        "The same gap as a length, in place of threshold_sigmas. The ensemble weighs probabilities instead.",
+        unit="m",
+        default=SEQUENCE.threshold,
+    )
+    coordination: Positive | None = key(
+        "Change all radii alike until the coordination number without rattlers is this (the paper: near 4). For radii "
+        "that are known badly.",
+        default=None,
+    )
+    overlap: NotNegative | None = key(
+        "Typical elastic overlap and roughness of touching surfaces; absent: 3e-4 mean diameters, or what the gaps "
+        "show. A missed contact costs more than a false one.",
+        unit="m",
+        default=None,
+    )
+
+
+class SolverSection(Section):
+    """Tuning of the force solver."""
+
+    estimator: Literal["ensemble", "nlgs"] = key(
+        "ensemble: two Gauss-Seidel chains and five convex programs, brought into balance; nlgs: one chain, much "
+        "faster and less exact.",
+        default=SEQUENCE.estimator,
+    )
+    preset: Literal["rodsight", "paper"] = key(
+        "paper: the recipe of 2013 to the letter, one chain with inertia alone, one step per interval, reset to zero.",
+        default="rodsight",
+    )
+    kappa: Positive = key(
+        "Kinematic number: how much the measured motion weighs against the contact forces. Smaller trusts it less.",
+        default=CHAIN.kappa,
+    )
+    substeps: AtLeastOne = key("Steps of the chain between two photographs.", default=CHAIN.substeps)
+    spin_up: AtLeastOne = key("Steps of the chain where there are no former forces.", default=CHAIN.spin_up)
+    sweeps: AtLeastOne = key(
+        "Gauss-Seidel sweeps of a sub-step. They regularise: more of them make the forces of a sequence worse.",
+        default=CHAIN.sweeps,
+    )
+    relaxation: Annotated[float, Field(gt=0, lt=2)] = key(
+        "Factor of every sweep's correction; above 1 it selects another solution.", default=CHAIN.relaxation
+    )
+    force_change: Positive | None = key(
+        "Stop a sub-step when the forces change by less than this share, the paper's ε_f; absent: never early.",
+        default=CHAIN.force_change,
+    )
+    keep_members: bool = key("Store the forces of every member of the ensemble, too.", default=SEQUENCE.keep_members)
+    precision: Literal["measured", "stated"] = key(
+        "Which precision of positions to believe: measured, where the gaps of touching rods contradict what is stated.",
+        default="measured" if SEQUENCE.measure_precision else "stated",
+    )
+    ensemble_size: Annotated[int, Field(ge=0)] = key(
+        "Sequences solved again with resampled inputs for the error bars, as --ensemble does; 0: the free formula.",
+        default=0,
+    )
+    reset: Literal["never", "rearrangement"] = key(
+        "When to go back to zero forces by itself.", default="rearrangement" if SEQUENCE.reset_to_zero else "never"
+    )
+    reset_frames: tuple[Frame, ...] = key(
+        "Frames that start from zero forces whatever is found: after an interruption of the test.", default=()
+    )
+    kept_frames: tuple[Frame, ...] = key("Frames that are never reset at a rearrangement.", default=())
+
+
+class SensitivitySection(Section):
+    """Ranges of the robustness study, by factor."""
+
+    ranges: dict[str, tuple[Finite, Finite]] = key(
+        "Low and high value of factors that `rodsight sensitivity` varies, such as friction = [0.7, 1.3].", default={}
+    )
+
+
+class RecordingSection(Section):
+    """Tuning of the recording."""
+
+    sweeps: Literal["all", "log", "none"] = key(
+        "Sweeps whose forces are kept: log keeps 1, 2, 4, … of every sub-step, all is large.", default=CHAIN.keep
+    )
