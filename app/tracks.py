@@ -116,7 +116,9 @@ class WallTracks:
     endpoints: Annotated[
         Array, Quantity("ends; packing to the left of 0 → 1", "m", "frame wall end xy", essential=True)
     ]
-    pressure: Annotated[Array, Quantity("pressure on the wall, NaN where its motion is imposed", "Pa", "wall")]
+    pressure: Annotated[
+        Array, Quantity("pressure on the wall, NaN where its motion is imposed", "Pa", "wall", essential=True)
+    ]
     force: Annotated[
         Array | None, Quantity("recorded force of the packing on the wall, NaN: none", "N", "frame wall xy")
     ] = None

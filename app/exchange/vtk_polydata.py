@@ -1,5 +1,5 @@
 """Results for ParaView: VTK PolyData files (.vtp, XML, ASCII), one of grains and one of contacts per frame, and a
-collection (.pvd) of each that carries the times.
+collection (.pvd) of each that carries the times. The single numbers of a frame are field data of both.
 
 Format: The VTK User's Guide, "VTK File Formats", PolyData. Lengths in metres, forces in newtons, z = 0.
 """
@@ -13,12 +13,14 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from solver.bodies.grains import Array
+from solver.bodies.quantity import quantities
 from solver.contacts.contacts import Contacts
+from solver.sequence.frame_forces import FrameForces
 
 from ..atomic import write_atomically
 from ..results.results import Results
 
-UNKNOWN = -1.0  # a probability that was not computed: readers of ASCII files stumble over NaN
+UNKNOWN = -1.0  # a probability that was not computed
 
 _TYPES = {"f": "Float64", "i": "Int64", "u": "Int64"}
 
@@ -49,9 +51,12 @@ def _grains(results: Results, frame: int) -> str:
         "rotation": tracks.rotation[frame, here],
         "status": tracks.status[frame, here],
         "loaded_contacts": count[: tracks.grain_count][here],
+        **_columns(forces, "grain", here),
     }
     vertices = np.arange(len(here))[:, None]
-    return _polydata(tracks.position[frame, here], "Verts", vertices, point_data=data)
+    return _polydata(
+        tracks.position[frame, here], "Verts", vertices, point_data=data, field_data=_numbers(results, frame)
+    )
 
 
 def _contacts(results: Results, frame: int) -> str:
@@ -64,12 +69,33 @@ def _contacts(results: Results, frame: int) -> str:
     points = np.concatenate([position[contacts.i], far])
     lines = np.column_stack([np.arange(contacts.count), np.arange(contacts.count) + contacts.count])
     ids = np.concatenate([results.tracks.id, -1 - np.arange(results.walls.count)])  # walls: −1, −2, …
-    data = {
-        "i": ids[contacts.i], "j": ids[contacts.j], "fn": forces.fn, "ft": forces.ft, "gap": contacts.gap,
-        "fn_sd": forces.fn_sd, "probability": np.nan_to_num(forces.probability, nan=UNKNOWN),
-        "state": forces.state, "age": forces.age,
-    }  # fmt: skip
-    return _polydata(points, "Lines", lines, cell_data=data)
+    data = {"i": ids[contacts.i], "j": ids[contacts.j], "gap": contacts.gap, **_columns(forces, "contact", slice(None))}
+    return _polydata(points, "Lines", lines, cell_data=data, field_data=_numbers(results, frame))
+
+
+def _columns(forces: FrameForces, dimension: str, rows: np.ndarray | slice) -> dict[str, np.ndarray]:
+    """What the frame has a number of for every contact, or for every grain, on some rows of these."""
+    found = {}
+    for each in quantities(type(forces)):
+        if each.quantity.dims != dimension or getattr(forces, each.name) is None:
+            continue
+        values = getattr(forces, each.name)[rows]
+        if each.name == "probability":
+            values = np.nan_to_num(values, nan=UNKNOWN)
+        if not np.isnan(values).any():  # readers of ASCII files stumble over NaN
+            found[each.name] = values
+    return found
+
+
+def _numbers(results: Results, frame: int) -> dict[str, np.ndarray]:
+    """The single numbers of a frame, those that are known."""
+    found = {}
+    for whole in (results.frames[frame], results.statistics[frame]):
+        for each in quantities(type(whole)):
+            value = np.asarray(getattr(whole, each.name))
+            if not each.quantity.dims and each.dtype.kind != "O" and np.isfinite(value):
+                found[each.name] = value.reshape(1)
+    return found
 
 
 def _bodies(contacts: Contacts, kept: np.ndarray) -> np.ndarray:
@@ -83,8 +109,12 @@ def _polydata(
     *,
     point_data: Mapping[str, np.ndarray] | None = None,
     cell_data: Mapping[str, np.ndarray] | None = None,
+    field_data: Mapping[str, np.ndarray] | None = None,
 ) -> str:
-    """One piece: points (p, 2) [m], cells (k, s) of point numbers as Verts or Lines, data by name."""
+    """One piece: points (p, 2) [m], cells (k, s) of point numbers as Verts or Lines, data by name.
+
+    field_data: single numbers of the whole.
+    """
     offsets = (np.arange(len(cells)) + 1) * cells.shape[1]
     spatial = np.column_stack([points, np.zeros(len(points))])
     count = {name: len(cells) if name == kind else 0 for name in ("Verts", "Lines")}
@@ -92,6 +122,7 @@ def _polydata(
         '<?xml version="1.0"?>',
         '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian">',
         "<PolyData>",
+        *_data("FieldData", field_data),
         f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="{count["Verts"]}" NumberOfLines="{count["Lines"]}" '
         'NumberOfStrips="0" NumberOfPolys="0">',
         "<Points>", _array("points", spatial), "</Points>",
@@ -111,8 +142,9 @@ def _array(name: str, values: np.ndarray) -> str:
     values = np.asarray(values)
     kind = _TYPES[values.dtype.kind]
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 and name == "points" else ""
+    count = f' NumberOfTuples="{len(values)}"' if values.ndim == 1 else ""  # nobody else says it of field data
     text = " ".join(map(repr, values.astype(float if kind == "Float64" else int).ravel().tolist()))
-    return f'<DataArray type="{kind}" Name={quoteattr(name)}{width} format="ascii">{text}</DataArray>'
+    return f'<DataArray type="{kind}" Name={quoteattr(name)}{width}{count} format="ascii">{text}</DataArray>'
 
 
 def _collection(names: list[str], time: Array) -> str:

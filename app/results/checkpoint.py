@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import io
 import shutil
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
@@ -73,18 +75,32 @@ def flatten(value: Any, prefix: str = "") -> list[tuple[str, np.ndarray]]:
     return result
 
 
-def restore(kind: type[T], arrays: Any, prefix: str) -> T:
-    """Make the dataclass again from what `flatten` named."""
-    hints = get_type_hints(kind)
+def restore(kind: type[T], named: Mapping[str, Any], prefix: str) -> T:
+    """Make the dataclass again from what `flatten` named; what has no name gets its default, or None."""
+    hints = _hints(kind)
     values: dict[str, Any] = {}
     for each in fields(kind):  # type: ignore[arg-type]
         hint, name = hints[each.name], f"{prefix}{each.name}"
         if is_dataclass(hint):
-            values[each.name] = restore(hint, arrays, f"{name}.")  # type: ignore[arg-type]
-        elif name not in arrays:
+            values[each.name] = restore(hint, named, f"{name}.")  # type: ignore[arg-type]
+        elif name in named:
+            values[each.name] = _typed(hint, named[name])
+        elif each.default is MISSING and each.default_factory is MISSING:
             values[each.name] = None
-        elif hint in (int, float, bool, str) or (isinstance(hint, type) and issubclass(hint, IntEnum)):
-            values[each.name] = hint(np.asarray(arrays[name])[()])
-        else:
-            values[each.name] = arrays[name]
     return kind(**values)
+
+
+def _typed(hint: Any, value: Any) -> Any:
+    if get_origin(hint) is tuple:
+        return tuple(np.asarray(value).tolist())
+    if hint not in (int, float, bool, str) and not (isinstance(hint, type) and issubclass(hint, IntEnum)):
+        return value
+    value = np.asarray(value)[()]
+    if hint is int and value != value:
+        return float("nan")  # a number that was not stored
+    return hint(value)
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)

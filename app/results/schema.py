@@ -1,73 +1,184 @@
-"""Names and units of results.h5: which fields become which datasets."""
+"""Every dataset of results.h5: path, dimensions, type, unit and meaning, gathered from the fields that hold it.
+
+A field with a `Quantity` becomes a dataset; nothing else lists it. What has no field is declared here: where the rows
+of a frame begin and end, the names of dimensions, the attributes of the file.
+"""
 
 from __future__ import annotations
 
-SCHEMA_VERSION = 1
-SCHEMA = "schema_version"
+from collections.abc import Iterator
+from dataclasses import dataclass, is_dataclass
+from typing import Any, get_type_hints
 
-# Scalars of a frame: dataset under frames/ and attribute of FrameForces.
-FRAME_SCALARS = (
-    "sweeps",
-    "natural_map",
-    "unbalance",
-    "kappa",
-    "correction",
-    "old_unbalance",
-    "trust",
-    "frames_since_reset",
-)
-# Likewise, but unknown to results that earlier versions wrote.
-LATER_FRAME_SCALARS = ("start_difference", "unseen_grains", "hidden_share")
-TRACK_OPTIONS = ("second_zncc", "reference_frame")  # attributes of Tracks that may be unknown: under tracks/
-GEOMETRY = ("i", "j", "gap", "normal", "point")  # attributes of Contacts
-CONTACT_COLUMNS = ("un", "ut", "state", "age", "source", "probability")
-FORCE_COLUMNS = ("fn", "ft", "nlgs_fn", "nlgs_ft", "fn_sd", "ft_sd")
-HISTORY_COLUMNS = ("force_change", "natural_map", "unbalance")
-UNITS = {
-    "calibration/offset": "m",
-    "calibration/offset_sd": "m",
-    "calibration/lens": "m",
-    "calibration/lens_sd": "m",
-    "calibration/radius": "m",
-    "calibration/radius_sd": "m",
-    "calibration/wall": "m",
-    "calibration/wall_sd": "m",
-    "calibration/wall_tilt": "rad",
-    "calibration/wall_tilt_sd": "rad",
-    "contacts/gap": "m",
-    "contacts/point": "m",
-    "contacts/un": "m/s",
-    "contacts/ut": "m/s",
-    "forces/fn": "N",
-    "forces/fn_sd": "N",
-    "forces/ft": "N",
-    "forces/ft_sd": "N",
-    "forces/nlgs_fn": "N",
-    "forces/nlgs_ft": "N",
-    "frames/time": "s",
-    "grains/mass": "kg",
-    "grains/radius": "m",
-    "statistics/anisotropy_direction": "rad",
-    "statistics/area": "m2",
-    "statistics/friction_angle": "rad",
-    "statistics/friction_angle_of_anisotropies": "rad",
-    "statistics/max_fn": "N",
-    "statistics/mean_fn": "N",
-    "statistics/pressure": "Pa",
-    "statistics/principal_direction": "rad",
-    "statistics/sigma_1": "Pa",
-    "statistics/sigma_2": "Pa",
-    "statistics/stress": "Pa",
-    "statistics/wall_force": "N",
-    "statistics/wall_ratio_angle": "rad",
-    "members/force": "N",
-    "sweeps/fn": "N",
-    "sweeps/ft": "N",
-    "tracks/position": "m",
-    "tracks/rotation": "rad",
-    "tracks/sigma": "m",
-    "walls/endpoints": "m",
-    "walls/force": "N",
-    "walls/pressure": "Pa",
-    "walls/sigma": "m",
+import numpy as np
+
+from solver.bodies.grains import Array, Grains
+from solver.bodies.quantity import Declared, Quantity, quantities
+from solver.calibration.calibrate import Calibration
+from solver.contacts.radius_tuning import RadiusTuning
+from solver.convex.friction_check import FrictionCheck
+from solver.sequence.ensemble import MEMBERS
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
+from solver.statistics.frame_statistics import FrameStatistics
+
+from ..tracks import Tracks, WallTracks
+
+SCHEMA_VERSION = 2
+SCHEMA = "schema_version"
+RAGGED = ("contact", "sweep", "kept_sweep")  # as many rows as a frame happens to have: laid end to end over frames
+
+# The class whose fields each part of a file holds, and whether there is one of it per frame.
+PARTS: dict[str, type] = {
+    "tracks": Tracks,
+    "walls": WallTracks,
+    "grains": Grains,
+    "frames": FrameForces,
+    "statistics": FrameStatistics,
+    "calibration": Calibration,
+    "friction_check": FrictionCheck,
+    "radius_tuning": RadiusTuning,
 }
+PER_FRAME = ("frames", "statistics")
+GROUP_OF_PART = {"contacts": "contacts", "history": "sweeps"}  # of parts of a frame: attribute and group
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One dataset."""
+
+    path: str
+    dims: tuple[str, ...]
+    dtype: np.dtype  # object: text
+    quantity: Quantity
+    absent: Any  # where a file has none: a value for all, or None
+    part: str  # of PARTS; empty: says where rows are
+    attribute: str  # of the part's class, dotted where it is nested
+
+    @property
+    def name(self) -> str:
+        return self.attribute.rsplit(".", 1)[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """What the rows of a dimension are, and their labels: fixed, those of a dataset, or none."""
+
+    meaning: str
+    labels: tuple[str, ...] | Array | None = None
+    labelled_by: str = ""  # path of a dataset
+
+
+def _middles(edges: Array) -> Array:
+    return 0.5 * (edges[1:] + edges[:-1])
+
+
+DIMENSIONS = {
+    "frame": Dimension("frames of the run, from 0"),
+    "frame_edge": Dimension("where frames begin and end: the rows of frame k are offset[k] : offset[k + 1]"),
+    "grain": Dimension("grains, labelled by their names", labelled_by="grains/id"),
+    "wall": Dimension("walls, labelled by their names", labelled_by="walls/name"),
+    "contact": Dimension("contacts, frame after frame; contacts/offset says whose"),
+    "sweep": Dimension("sweeps that were measured, frame after frame; sweeps/offset says whose"),
+    "kept_sweep": Dimension("sweeps whose forces are kept, frame after frame; sweeps/recorded_offset says whose"),
+    "kept_force": Dimension("contacts of each kept sweep, sweep after sweep, frame after frame"),
+    "xy": Dimension("components of a vector", ("x", "y")),
+    "axis": Dimension("second components of a tensor", ("x", "y")),
+    "end": Dimension("ends of a wall"),
+    "member": Dimension("members of the ensemble", MEMBERS),
+    "component": Dimension("components of a contact's force", ("fn", "ft")),
+    "anisotropy": Dimension("kinds of anisotropy", ("contact", "branch", "normal", "tangential")),
+    "force_bin": Dimension("bins of f / ⟨f⟩, labelled by their middles", _middles(FORCE_EDGES)),
+    "mobilisation_bin": Dimension("bins of |f_t| / (μ f_n), labelled by their middles", _middles(MOBILISATION_EDGES)),
+    "radius_change": Dimension("changes of radius that were tried"),
+    "friction_trial": Dimension("frictions that were tried"),
+}
+
+
+def _rows(path: str, dims: str, meaning: str) -> Entry:
+    quantity = Quantity(meaning, dims=dims, essential=path == "contacts/offset", absent=None)
+    return Entry(path, tuple(dims.split()), np.dtype(np.int64), quantity, None, "", path)
+
+
+CONTACT_OFFSET = _rows("contacts/offset", "frame_edge", "rows of contacts")
+SWEEP_COUNT = _rows("sweeps/count", "frame", "sweeps done")
+SWEEP_OFFSET = _rows("sweeps/offset", "frame_edge", "rows of sweeps that were measured")
+SWEEP_NUMBER = _rows("sweeps/number", "sweep", "which sweep of its frame, from 0")
+KEPT_OFFSET = _rows("sweeps/recorded_offset", "frame_edge", "rows of sweeps whose forces are kept")
+ROWS = (CONTACT_OFFSET, SWEEP_COUNT, SWEEP_OFFSET, SWEEP_NUMBER, KEPT_OFFSET)
+
+
+def entries(*parts: str) -> tuple[Entry, ...]:
+    """The datasets of these parts, of all without any; of a path that two parts hold, that of the later one."""
+    found: dict[str, Entry] = {} if parts else {each.path: each for each in ROWS}
+    for part in parts or PARTS:
+        for each in _gather(part, PARTS[part], part, ""):
+            unknown = [name for name in each.dims if name not in DIMENSIONS]
+            if unknown:
+                raise ValueError(f"dimension {unknown[0]} of {each.path} is not among DIMENSIONS")
+            found[each.path] = each
+    return tuple(found.values())
+
+
+def _gather(part: str, kind: type, group: str, prefix: str) -> Iterator[Entry]:
+    for declared in quantities(kind):
+        dims = tuple(declared.quantity.dims.split())
+        if part in PER_FRAME:
+            dims = _dims_over_frames(dims)
+        path = declared.quantity.path or f"{_group(declared, group)}/{declared.name}"
+        attribute = f"{prefix}{declared.name}"
+        yield Entry(path, dims, declared.dtype, declared.quantity, declared.absent, part, attribute)
+    for name, hint in get_type_hints(kind).items():
+        if is_dataclass(hint):
+            below = GROUP_OF_PART.get(name, f"{group}/{name}")
+            yield from _gather(part, hint, below, f"{prefix}{name}.")  # type: ignore[arg-type]
+
+
+def _group(declared: Declared, group: str) -> str:
+    """Columns of contacts are with the contacts, those in newtons with the forces."""
+    if group != "frames" or declared.quantity.dims.split()[:1] != ["contact"]:
+        return group
+    return "forces" if declared.quantity.unit == "N" else "contacts"
+
+
+def _dims_over_frames(dims: tuple[str, ...]) -> tuple[str, ...]:
+    """Dimensions of what all frames have together."""
+    if dims == ("kept_sweep", "contact"):
+        return ("kept_force",)
+    return dims if dims[:1] and dims[0] in RAGGED else ("frame", *dims)
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """An attribute of the file, or of one of its datasets."""
+
+    name: str
+    kind: str
+    meaning: str
+    of: tuple[str, ...] = ()  # paths of datasets; none: of the file
+    since: int = 1
+
+
+DEVIATIONS = ("forces/fn_sd", "forces/ft_sd")
+ATTRIBUTES = (
+    Attribute(SCHEMA, "integer", "version of this table"),
+    Attribute("rodsight_version", "text", "version of Rodsight that wrote the file"),
+    Attribute("created", "text", "when, ISO 8601, UTC"),
+    Attribute("name", "text", "name of the experiment"),
+    Attribute("fingerprint", "text", "SHA-256 of the input and of the settings that matter"),
+    Attribute("experiment", "text", "path of the experiment file"),
+    Attribute("frames", "two integers", "frames of the experiment that are in the file: first, and end or −1"),
+    Attribute("configuration", "text", "the resolved configuration, TOML"),
+    Attribute("friction", "number", "friction that was used"),
+    Attribute("source", "text", "where the standard deviation comes from", DEVIATIONS),
+    Attribute("ensemble_size", "integer", "sequences solved again for it, 0: none", DEVIATIONS),
+    Attribute("member", "texts", "names of the members", ("members/force",)),
+)
+
+
+def unit_of(path: str) -> str:
+    """The unit of a dataset; empty: none."""
+    return _BY_PATH[path].quantity.unit
+
+
+_BY_PATH = {each.path: each for each in entries()}

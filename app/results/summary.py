@@ -61,7 +61,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "lost_poses": int(lost.sum()),
         "suspect_poses": int((tracks.status == TrackStatus.SUSPECT).sum()),
         "position_sigma": _plain(tracks.position_sigma.tolist()),
-        "worst_unbalance": worst.unbalance,
+        "worst_unbalance": _plain([worst.unbalance])[0],
         "worst_unbalance_frame": worst.frame,
         "natural_map": _plain([frame.natural_map for frame in frames]),
         "correction": _plain([frame.correction for frame in frames]),
@@ -111,9 +111,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     lost = f"{summary['lost_poses']} poses of {summary['lost_grains']} grains lost" if summary["lost_poses"] else ""
     doubtful = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
     tracked = ", ".join(part for part in (lost, doubtful) if part) or "every grain has a pose in every frame"
+    worst = _cell(summary["worst_unbalance"], ".3f")
     lines.append(
-        f"Worst grain unbalance {summary['worst_unbalance']:.3f} of the mean force (frame "
-        f"{summary['worst_unbalance_frame']}); {tracked}."
+        f"Worst grain unbalance {worst} of the mean force (frame {summary['worst_unbalance_frame']}); {tracked}."
     )
     trusted = [t for t, s in zip(summary["trust"], summary["status"], strict=True) if s == "settled" and t is not None]
     if trusted:

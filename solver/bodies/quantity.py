@@ -27,6 +27,7 @@ class Quantity:
     essential: bool = False  # without it the rest means nothing
     absent: Any = float("nan")  # value where an earlier version stored none; a default of the field goes before
     path: str | None = None  # where it is stored, if not with the rest of its class
+    formerly: str | None = None  # its path in earlier versions of the stored schema
     names: type[IntEnum] | None = None  # of its values
 
 

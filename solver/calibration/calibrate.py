@@ -47,8 +47,18 @@ class Calibration:
 
     offset: Annotated[Array, Quantity("from measured to true centre, turning with the grain", "m", "grain xy")]
     radius: Annotated[Array, Quantity("from given to true radius", "m", "grain")]
-    wall: Annotated[Array, Quantity("of a wall outward, at its middle", "m", "wall")]
-    wall_tilt: Annotated[Array, Quantity("of a wall about its middle, counter-clockwise", "rad", "wall")]
+    # A dataset must not be called as a dimension is: netCDF would take it for the labels of that.
+    wall: Annotated[
+        Array,
+        Quantity(
+            "correction of a wall outward, at its middle",
+            "m",
+            "wall",
+            path="calibration/wall_outward",
+            formerly="calibration/wall",
+        ),
+    ]
+    wall_tilt: Annotated[Array, Quantity("correction of a wall about its middle, counter-clockwise", "rad", "wall")]
     pixel_size: Annotated[float, Quantity("true distances are (1 + pixel_size) times the measured ones")]
     lens: Annotated[float, Quantity("outward shift of the farthest corner by the lens", "m")]
     walls_follow: Annotated[bool, Quantity("the walls are corrected by the pixel size, too", absent=False)]
@@ -56,7 +66,7 @@ class Calibration:
         Array, Quantity("standard deviation of offset, the prior's without neighbours", "m", "grain xy")
     ]
     radius_sd: Annotated[Array, Quantity("standard deviation of radius", "m", "grain")]
-    wall_sd: Annotated[Array, Quantity("standard deviation of wall", "m", "wall")]
+    wall_sd: Annotated[Array, Quantity("standard deviation of wall_outward", "m", "wall")]
     wall_tilt_sd: Annotated[Array, Quantity("standard deviation of wall_tilt", "rad", "wall")]
     pixel_size_sd: Annotated[float, Quantity("standard deviation of pixel_size")]
     lens_sd: Annotated[float, Quantity("standard deviation of lens", "m")]
@@ -67,7 +77,7 @@ class Calibration:
     after: GapStatistics  # with the corrections, whether they are applied or not
     rounds: Annotated[int, Quantity("times that contacts were looked for again", absent=0)]
     applied: Annotated[bool, Quantity("whether the corrections were applied; if not, all are zero", absent=True)]
-    verdict: Annotated[str, Quantity("why, in a sentence for the user", absent="")]
+    verdict: Annotated[str, Quantity("why it was applied or not, for the user", absent="")]
 
     def position_sd(self, sigma: float) -> float:
         """Standard deviation [m] of a position for contact detection: stated noise `sigma` [m] and what is left.

@@ -24,13 +24,23 @@ FINEST_SURFACE = 1e-5  # of the mean radius: below this no real grain is round
 class CalibrationPriors:
     """Standard deviations of the constant errors before the gaps are looked at. Zero: known exactly."""
 
-    centre: Annotated[float, Quantity("prior standard deviation of each component of a centre", "m")]
-    radius: Annotated[float, Quantity("… of a radius, independent from grain to grain", "m")]
-    wall: Annotated[float, Quantity("… of a wall along its normal", "m")] = 0.0
-    wall_tilt: Annotated[float, Quantity("… of a wall about its middle", "rad")] = 0.0
-    pixel_size: Annotated[float, Quantity("… of the pixel size, relative")] = 0.0
-    lens: Annotated[float, Quantity("… of the displacement by radial distortion at the farthest corner", "m")] = 0.0
-    radius_class: Annotated[float, Quantity("… of the error that all grains of a class share", "m")] = 0.0
+    centre: Annotated[float, Quantity("prior standard deviation of a component of a centre", "m")]
+    radius: Annotated[float, Quantity("prior standard deviation of a radius, grain by grain", "m")]
+    wall: Annotated[
+        float,
+        Quantity(
+            "prior standard deviation of a wall along its normal",
+            "m",
+            path="calibration/priors/wall_outward",
+            formerly="calibration/priors/wall",
+        ),
+    ] = 0.0
+    wall_tilt: Annotated[float, Quantity("prior standard deviation of a wall about its middle", "rad")] = 0.0
+    pixel_size: Annotated[float, Quantity("prior standard deviation of the pixel size, relative")] = 0.0
+    lens: Annotated[
+        float, Quantity("prior standard deviation of the shift of the farthest corner by the lens", "m")
+    ] = 0.0
+    radius_class: Annotated[float, Quantity("prior standard deviation of the error that a class shares", "m")] = 0.0
 
     def __post_init__(self) -> None:
         given = (

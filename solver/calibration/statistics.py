@@ -21,8 +21,8 @@ class GapStatistics:
 
     spread: Annotated[float, Quantity("rms gap of grains that touch once corrected", "m")]
     wall_spread: Annotated[float, Quantity("rms gap of grains that touch walls", "m")]
-    width: Annotated[float, Quantity("standard deviation of these gaps, from their overlapping side", "m")]
-    wall_width: Annotated[float, Quantity("the same at walls", "m")]
+    width: Annotated[float, Quantity("standard deviation of the gaps of touching grains", "m")]
+    wall_width: Annotated[float, Quantity("standard deviation of the gaps of grains that touch walls", "m")]
     impossible: Annotated[float, Quantity("share of overlaps deeper than 4 standard deviations of the noise")]
 
 

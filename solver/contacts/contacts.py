@@ -26,7 +26,8 @@ class Contacts:
 
     i: Annotated[Int32[NDArray[np.int32], " c"], Quantity("row of a grain", dims="contact", essential=True)]
     j: Annotated[
-        Int32[NDArray[np.int32], " c"], Quantity("row of a grain, j > i; then walls", dims="contact", essential=True)
+        Int32[NDArray[np.int32], " c"],
+        Quantity("row of a grain, j > i, or grain count + row of a wall", dims="contact", essential=True),
     ]
     gap: Annotated[
         Float[Array, " c"], Quantity("distance of the two surfaces, negative: overlap", "m", "contact", essential=True)

@@ -38,9 +38,11 @@ class RadiusTuning:
 
     change: Annotated[Array, Quantity("change of all radii δR, ascending", "m", "radius_change")]
     coordination_number: Annotated[Array, Quantity("without rattlers, the mean over frames", dims="radius_change")]
-    frame_coordination_number: Annotated[Array, Quantity("the same in every frame", dims="radius_change frame")]
+    frame_coordination_number: Annotated[
+        Array, Quantity("without rattlers, in every frame", dims="radius_change frame")
+    ]
     wanted: Annotated[float, Quantity("coordination number that was asked for")]
-    found: Annotated[float, Quantity("δR that gives it; NaN where the curve does not meet it", "m")]
+    found: Annotated[float, Quantity("δR that gives the wanted number; NaN: none does", "m")]
     reached: Annotated[float, Quantity("coordination number at `found`, NaN without one")]
 
     @property

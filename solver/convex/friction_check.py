@@ -32,10 +32,10 @@ class FrictionCheck:
     given: Annotated[float, Quantity("friction that was given")]
     measured: Annotated[float, Quantity("friction that the motion shows; NaN where nothing slides")]
     low: Annotated[float, Quantity("lower end of the interval of two standard deviations")]
-    high: Annotated[float, Quantity("upper end")]
+    high: Annotated[float, Quantity("upper end of that interval")]
     first: Annotated[int, Quantity("first of the frames looked at", absent=0)]
-    last: Annotated[int, Quantity("last of them", absent=0)]
-    enclosed: Annotated[bool, Quantity("whether it lies within the trials", absent=False)]
+    last: Annotated[int, Quantity("last of the frames looked at", absent=0)]
+    enclosed: Annotated[bool, Quantity("whether the friction lies within the trials", absent=False)]
     trial: Annotated[Array, Quantity("factors on the given friction that were tried", dims="friction_trial")]
     gap: Annotated[Array, Quantity("relative power gap of every trial", dims="friction_trial")]
 

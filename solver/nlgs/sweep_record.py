@@ -110,8 +110,8 @@ class SweepHistory:
     natural_map: Annotated[Array, Quantity("relative natural-map residual", dims="sweep")]
     unbalance: Annotated[Array, Quantity("worst |ΣF| on a grain / mean f_n", dims="sweep")]
     recorded: Annotated[NDArray[np.int64], Quantity("sweeps, from 0, whose forces are kept", dims="kept_sweep")]
-    fn: Annotated[NDArray[np.float32], Quantity("f_n after each of these sweeps", "N", "kept_sweep contact")]
-    ft: Annotated[NDArray[np.float32], Quantity("f_t after each of these sweeps", "N", "kept_sweep contact")]
+    fn: Annotated[NDArray[np.float32], Quantity("f_n after each kept sweep", "N", "kept_sweep contact")]
+    ft: Annotated[NDArray[np.float32], Quantity("f_t after each kept sweep", "N", "kept_sweep contact")]
 
     @property
     def count(self) -> int:

@@ -36,9 +36,9 @@ class FrameForces:
     fn: Annotated[Array, Quantity("normal force, compression positive", "N", "contact", essential=True)]
     ft: Annotated[Array, Quantity("tangential force of i on j", "N", "contact", essential=True)]
     nlgs_fn: Annotated[Array, Quantity("f_n of the chain whose sweeps are recorded", "N", "contact")]
-    nlgs_ft: Annotated[Array, Quantity("f_t of the same chain", "N", "contact")]
-    un: Annotated[Array, Quantity("measured relative velocity, positive: opens", "m/s", "contact")]
-    ut: Annotated[Array, Quantity("… along the tangent", "m/s", "contact")]
+    nlgs_ft: Annotated[Array, Quantity("f_t of the chain whose sweeps are recorded", "N", "contact")]
+    un: Annotated[Array, Quantity("measured relative velocity along the normal, opening", "m/s", "contact")]
+    ut: Annotated[Array, Quantity("measured relative velocity along the tangent", "m/s", "contact")]
     state: Annotated[
         NDArray[np.uint8],
         Quantity("how the contact bears its force", dims="contact", essential=True, names=ContactState),

@@ -47,8 +47,8 @@ class FrameStatistics:
     wall_ratio_angle: Annotated[float, Quantity("atan(|T|/N) on the loaded plate, NaN without one", "rad")]
     principal_direction: Annotated[float, Quantity("direction of σ₁, in (−π/2, π/2]", "rad")]
     coordination_number: Annotated[float, Quantity("contacts with force per grain, walls counted once")]
-    coordination_number_without_rattlers: Annotated[float, Quantity("the same among the grains that are no rattlers")]
-    rattler_count: Annotated[int, Quantity("grains with fewer than two contacts that carry force")]
+    coordination_number_without_rattlers: Annotated[float, Quantity("contacts with force per grain that is no rattler")]
+    rattler_count: Annotated[int, Quantity("grains that cannot be in balance: fewer than two contacts")]
     contact_count: Annotated[int, Quantity("contacts carrying force")]
     sliding_fraction: Annotated[float, Quantity("share of the contacts carrying force that slide")]
     mean_fn: Annotated[float, Quantity("mean f_n over contacts carrying force", "N")]
@@ -63,20 +63,24 @@ class FrameStatistics:
     branch_anisotropy: Annotated[float, Quantity("a_l of branch lengths")]
     normal_force_anisotropy: Annotated[float, Quantity("a_n of normal forces")]
     tangential_force_anisotropy: Annotated[float, Quantity("a_t of tangential forces")]
-    anisotropy_direction: Annotated[Array, Quantity("of each, in (−π/2, π/2]", "rad", "anisotropy")]
-    friction_angle_of_anisotropies: Annotated[float, Quantity("that the four add up to, near friction_angle", "rad")]
+    anisotropy_direction: Annotated[
+        Array, Quantity("direction of each anisotropy, in (−π/2, π/2]", "rad", "anisotropy")
+    ]
+    friction_angle_of_anisotropies: Annotated[
+        float, Quantity("friction angle that the four anisotropies add up to", "rad")
+    ]
     mobilisation: Annotated[float, Quantity("mean of |f_t| / (μ f_n)")]
     mobilisation_density: Annotated[Array, Quantity("P(|f_t| / (μ f_n))", dims="mobilisation_bin")]
     fn_density: Annotated[Array, Quantity("P(f_n / ⟨f_n⟩)", dims="force_bin")]
     ft_density: Annotated[Array, Quantity("P(|f_t| / ⟨|f_t|⟩)", dims="force_bin")]
     tail_exponent: Annotated[float, Quantity("β of P(f_n) ∝ exp(−β f_n/⟨f_n⟩) above the mean, NaN: no tail")]
-    tail_exponent_sd: Annotated[float, Quantity("its standard error")]
+    tail_exponent_sd: Annotated[float, Quantity("standard error of tail_exponent")]
     plateau_ratio: Annotated[float, Quantity("1: P(f_n) flat below the mean; above 1: more of the weakest")]
-    plateau_ratio_sd: Annotated[float, Quantity("its standard error")]
+    plateau_ratio_sd: Annotated[float, Quantity("standard error of plateau_ratio")]
     strong_share: Annotated[float, Quantity("share of the contacts with more than the mean normal force")]
     strong_pressure_share: Annotated[float, Quantity("share of the pressure that the strong contacts carry")]
     strong_deviator_share: Annotated[
-        float, Quantity("share of the deviator that they carry; above 1: the weak oppose it")
+        float, Quantity("share of the deviator of the strong contacts; above 1: the weak oppose it")
     ]
     chain_count: Annotated[int, Quantity("force chains, Peters et al. 2005")]
     chain_grain_share: Annotated[float, Quantity("share of the grains present that belong to a force chain")]

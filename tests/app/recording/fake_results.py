@@ -14,6 +14,7 @@ from solver.contacts.contacts import Contacts, ContactState, detect_contacts
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.nlgs.sweep_record import SweepHistory
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
 from solver.statistics.frame_statistics import FrameStatistics
 
 RADIUS = 0.008  # [m]
@@ -165,6 +166,8 @@ def _statistics(forces: FrameForces, grain_count: int) -> FrameStatistics:
         "strong_deviator_share": 0.95, "chain_count": 7, "chain_grain_share": 0.4,
     }  # fmt: skip
     unread = {field.name: np.nan for field in fields(FrameStatistics)}  # quantities that a recording does not show
+    unread |= {"fn_density": np.full(FORCE_BINS, np.nan), "ft_density": np.full(FORCE_BINS, np.nan)}
+    unread |= {"mobilisation_density": np.full(MOBILISATION_BINS, np.nan), "anisotropy_direction": np.full(4, np.nan)}
     return FrameStatistics(**(unread | known))
 
 

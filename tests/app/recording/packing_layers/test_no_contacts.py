@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rodsight.recording.files.finished_run import record
 from rodsight.recording.files.readback import read_forces
 
+from solver.bodies.quantity import columns
 from solver.sequence.frame_forces import FrameForces
 from tests.app.recording.fake_results import make_results
 
 
 def without_contacts(frame: FrameForces) -> FrameForces:
     none = np.zeros(frame.contacts.count, bool)
-    columns = {
-        each.name: value[none] for each in fields(frame) if isinstance(value := getattr(frame, each.name), np.ndarray)
-    }
+    nothing = {name: getattr(frame, name)[none] for name in columns(FrameForces, "contact") if name != "member_force"}
     history = replace(frame.history, fn=frame.history.fn[:, none], ft=frame.history.ft[:, none])
-    return replace(frame, contacts=frame.contacts.select(none), history=history, **columns)
+    return replace(frame, contacts=frame.contacts.select(none), history=history, **nothing)
 
 
 @pytest.mark.parametrize("empty", [{0}, {2}, {0, 1, 2, 3}])

@@ -1,0 +1,94 @@
+"""Invented results in which every dataset of results.h5 has something to hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from rodsight.results.results import Results
+
+from solver.calibration.calibrate import Calibration
+from solver.calibration.priors import CalibrationPriors
+from solver.calibration.statistics import GapStatistics
+from solver.convex.friction_check import FrictionCheck
+from solver.sequence.ensemble import MEMBERS
+from solver.sequence.frame_forces import FrameForces
+from tests.app.recording.fake_results import make_results, make_tuning
+
+WORLD = {"columns": 4, "rows": 3, "sweeps": 6}
+
+
+def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results:
+    """A small run; every value differs from its neighbours, so that none can be taken for another."""
+    rng = np.random.default_rng(seed)
+    results = make_results(frame_count, seed=seed, **(WORLD | options))
+    f, n, w = results.tracks.frame_count, results.grains.count, results.walls.count
+    tracks = replace(
+        results.tracks,
+        id=rng.permutation(n).astype(np.int64) + 100,
+        sigma=rng.random((f, n)),
+        zncc=rng.random((f, n)),
+        centre_sigma=rng.random(n),
+        second_zncc=rng.random((f, n)),
+        reference_frame=rng.integers(0, f, (f, n)).astype(np.int32),
+        status=rng.integers(0, 7, (f, n)).astype(np.uint8),
+    )
+    walls = replace(results.walls, force=rng.random((f, w, 2)), sigma=rng.random((f, w)))
+    tuning = make_tuning()
+    tuning = replace(tuning, frame_coordination_number=np.repeat(tuning.frame_coordination_number, f, axis=1))
+    return replace(
+        results,
+        tracks=tracks,
+        walls=walls,
+        frames=[_full_frame(frame, rng) for frame in results.frames],
+        statistics=[_varied(each, rng) for each in results.statistics],
+        calibration=_calibration(n, w, rng),
+        friction_check=FrictionCheck(0.25, 0.24, 0.2, 0.28, 0, f - 1, True, rng.random(5), rng.random(5)),
+        radius_tuning=tuning,
+        ensemble_size=2,
+    )
+
+
+def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
+    c = frame.contacts.count
+    history = frame.history
+    residuals = {name: getattr(history, name).copy() for name in ("force_change", "natural_map", "unbalance")}
+    for values in residuals.values():
+        values[1::2] = np.nan  # measured every other sweep
+    return replace(
+        frame,
+        history=replace(history, **residuals),
+        **{name: rng.random(c) for name in ("nlgs_fn", "nlgs_ft", "un", "ut", "probability", "fn_sd", "ft_sd")},
+        age=rng.integers(0, 9, c).astype(np.int32),
+        source=rng.integers(0, 3, c).astype(np.uint8),
+        member_force=rng.random((c, len(MEMBERS), 2)),
+        start_difference=float(rng.random()),
+        unseen_grains=int(rng.integers(1, 9)),
+        hidden_share=float(rng.random()),
+    )
+
+
+def _varied(statistics, rng: np.random.Generator):
+    named = {name: np.asarray(getattr(statistics, name)) for name in statistics.__dataclass_fields__}
+    return replace(
+        statistics,
+        **{
+            name: int(rng.integers(100)) if value.dtype.kind == "i" else _like(value, rng)
+            for name, value in named.items()
+        },
+    )
+
+
+def _like(value: np.ndarray, rng: np.random.Generator):
+    return rng.random(value.shape) if value.ndim else float(rng.random())
+
+
+def _calibration(n: int, w: int, rng: np.random.Generator) -> Calibration:
+    return Calibration(
+        offset=rng.random((n, 2)), radius=rng.random(n), wall=rng.random(w), wall_tilt=rng.random(w), pixel_size=0.01,
+        lens=0.02, walls_follow=True, offset_sd=rng.random((n, 2)), radius_sd=rng.random(n), wall_sd=rng.random(w),
+        wall_tilt_sd=rng.random(w), pixel_size_sd=0.03, lens_sd=0.04, gap_sd=0.05,
+        priors=CalibrationPriors(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7), noise_factor=1.5,
+        before=GapStatistics(*rng.random(5).tolist()), after=GapStatistics(*rng.random(5).tolist()), rounds=3,
+        applied=True, verdict="was applied: it is “better” ≤ ½",
+    )  # fmt: skip

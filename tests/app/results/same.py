@@ -1,0 +1,38 @@
+"""Whether two results are the same, number for number and type for type."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from rodsight.results.checkpoint import flatten
+from rodsight.results.results import Results
+
+
+def differences(one: Results, other: Results) -> list[str]:
+    """Names of what differs."""
+    found: list[str] = []
+    for each in fields(Results):
+        a, b = getattr(one, each.name), getattr(other, each.name)
+        if isinstance(a, list | tuple):
+            found += [] if len(a) == len(b) else [f"number of {each.name}"]
+            for k, (x, y) in enumerate(zip(a, b, strict=False)):
+                found += _parts(f"{each.name}[{k}]", x, y)
+        elif isinstance(a, str | int | float) or a is None:
+            found += [] if a == b else [each.name]
+        else:
+            found += _parts(each.name, a, b)
+    return found
+
+
+def _parts(name: str, one: Any, other: Any) -> list[str]:
+    if other is None or type(one) is not type(other):
+        return [name]
+    a, b = dict(flatten(one)), dict(flatten(other))
+    return [f"{name}.{key}" for key in a.keys() | b.keys() if key not in a or key not in b or not _same(a[key], b[key])]
+
+
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
+    alike = one.dtype.kind == other.dtype.kind == "U" or one.dtype == other.dtype
+    return alike and np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
