@@ -82,7 +82,8 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
 
 
 def save_summary(file: Path, summary: dict[str, Any]) -> None:
-    write_atomically(file, (json.dumps(summary, indent=1, ensure_ascii=False) + "\n").encode())
+    text = json.dumps(_finite(summary), indent=1, ensure_ascii=False, allow_nan=False)
+    write_atomically(file, (text + "\n").encode())
 
 
 def print_summary(console: Console, summary: dict[str, Any]) -> None:
@@ -128,9 +129,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     friction = summary["friction"]
     if friction is not None and friction["enclosed"]:
         verdict = "agrees with" if friction["agrees"] else "[bold red]contradicts[/]"
+        measured, low, high = (_cell(friction[key], ".2f") for key in ("measured", "low", "high"))
         lines.append(
-            f"Friction from the motion: {friction['measured']:.2f} ({friction['low']:.2f} to {friction['high']:.2f}), "
-            f"which {verdict} the given {friction['given']:g}."
+            f"Friction from the motion: {measured} ({low} to {high}), which {verdict} the given {friction['given']:g}."
         )
     if summary["wall_force_error"]:
         told = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
@@ -238,6 +239,15 @@ def _friction(results: Results) -> dict[str, Any] | None:
 
 def _listed(frames: list[int]) -> str:
     return ", ".join(str(k) for k in frames[:8]) + (f" and {len(frames) - 8} more" if len(frames) > 8 else "")
+
+
+def _finite(value: Any) -> Any:
+    """The same with None for numbers that are not known: JSON has no NaN."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _plain(values: list[float]) -> list[float | None]:

@@ -24,8 +24,8 @@ FINEST_SURFACE = 1e-5  # of the mean radius: below this no real grain is round
 class CalibrationPriors:
     """Standard deviations of the constant errors before the gaps are looked at. Zero: known exactly."""
 
-    centre: Annotated[float, Quantity("prior standard deviation of a component of a centre", "m")]
-    radius: Annotated[float, Quantity("prior standard deviation of a radius, grain by grain", "m")]
+    centre: Annotated[float, Quantity("prior standard deviation of a component of a centre", "m", absent=0.0)]
+    radius: Annotated[float, Quantity("prior standard deviation of a radius, grain by grain", "m", absent=0.0)]
     wall: Annotated[
         float,
         Quantity(
