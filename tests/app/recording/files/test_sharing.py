@@ -89,6 +89,7 @@ def test_a_file_with_nothing_in_it_cannot_be_mended(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["noise.rrd"]
 
 
+@pytest.mark.screen
 def test_the_command_writes_a_small_file_and_a_page_and_tells_their_size(recording, tmp_path, capsys):
     folder = tmp_path / "shear"
     folder.mkdir()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.recording.files.recorder import record
+from rodsight.recording.files.finished_run import record
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.unconverged import doubt_colours
 from rodsight.results.results import Results
