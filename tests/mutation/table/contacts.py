@@ -55,7 +55,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/contacts/verdicts.py",
-        (TESTS, "tests/app/review/test_solver_obeys.py"),
+        TESTS,
         ("DETECTED = 0.5", "DETECTED = 0.0"),
         (
             "join_keys(contacts.key[~are_among(contacts.key, verdicts.forbidden)], forced)",

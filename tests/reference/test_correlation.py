@@ -1,0 +1,228 @@
+"""The compiled loops of correlation against the plain ones.
+
+SINGLE: photographs, spline weights and sums of a search are in single precision, seven digits of some hundred grey
+levels; what is derived from them keeps four to five.
+"""
+
+import numpy as np
+import pytest
+from rodsight.tracking.correlation import kernels
+from rodsight.tracking.correlation.interpolation import interpolate, interpolate_finely, sample
+from rodsight.tracking.correlation.search import disc, search_patch, turns_to_try
+from rodsight.tracking.correlation.search_parts import search_parts
+from rodsight.tracking.correlation.splines import fine_coefficients, spline_coefficients
+from rodsight.tracking.detection.edges import sample_rays
+from scipy.ndimage import gaussian_filter
+
+from tests.reference.correlation import (
+    best_places,
+    cut_patch,
+    fit_plainly,
+    pixels_within,
+    search_plainly,
+    tukey_fixed_point,
+)
+from tests.reference.splines import value, values
+
+SINGLE = 2e-5
+CENTRE, REACH = (30.3, 27.8), 9.2
+
+
+@pytest.fixture(scope="module")
+def picture():
+    """A speckled photograph (h, w) [grey]."""
+    noise = np.random.default_rng(8).normal(size=(60, 64))
+    return (110.0 + 320.0 * gaussian_filter(noise, 1.6)).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def patch(picture):
+    return cut_patch(picture, spline_coefficients(picture), *CENTRE, REACH)
+
+
+def fill(picture, coefficients=None):
+    data = np.empty((kernels.count_pixels(*CENTRE, REACH), 6), np.float32)
+    inverse, facts = np.empty((3, 3)), np.empty(3)
+    coefficients = spline_coefficients(picture) if coefficients is None else coefficients
+    good = kernels.fill_patch(picture, coefficients, *CENTRE, REACH, data, inverse, facts)
+    return good, data, inverse, facts
+
+
+def moved(picture, shift, turn, gain=1.3, level=-20.0):
+    """The picture turned about the patch's centre and shifted, under another light; and the pose to be found."""
+    c, s = np.cos(turn), np.sin(turn)
+    fine = fine_coefficients(np.pad(picture, 12, mode="reflect"))
+    y, x = np.nonzero(np.ones(picture.shape, bool))
+    dx, dy = x - CENTRE[0] - shift[0], y - CENTRE[1] - shift[1]
+    result = values(fine, CENTRE[0] + c * dx + s * dy + 12, CENTRE[1] - s * dx + c * dy + 12, 5)
+    result = (level + gain * result.reshape(picture.shape)).astype(np.float32)
+    return result, np.array([CENTRE[0] + shift[0], CENTRE[1] + shift[1], turn])
+
+
+def test_between_the_pixels_lies_the_spline(picture):
+    at = np.random.default_rng(1).uniform([4.0, 4.0], [58.0, 54.0], (40, 2))
+    for coefficients, read, degree in (
+        (spline_coefficients(picture), interpolate, 3),
+        (fine_coefficients(picture), interpolate_finely, 5),
+    ):
+        found = [read(coefficients, int(x), int(y), np.float32(x - int(x)), np.float32(y - int(y))) for x, y in at]
+        expected = [value(coefficients, x, y, degree) for x, y in at]
+        assert found == pytest.approx(expected, rel=SINGLE)
+
+
+def test_points_and_rays_are_read_within_the_photograph_alone(picture):
+    coefficients = spline_coefficients(picture)
+    x, y = np.array([0.99, 1.0, 30.5, 61.99, 62.0, 20.0]), np.array([5.0, 1.0, 20.25, 57.9, 5.0, 58.0])
+    out = np.empty(6)
+    sample(coefficients, x, y, out)
+    inside = [False, True, True, True, False, False]
+    assert (~np.isnan(out)).tolist() == inside
+    assert out[inside] == pytest.approx(
+        [value(coefficients, *xy, 3) for xy in zip(x[inside], y[inside], strict=True)], rel=SINGLE
+    )
+    angle, first, step = np.array([0.3, 2.5, 4.0]), 20.0, 0.75
+    rays = np.empty((3, 30), np.float32)
+    sample_rays(coefficients, 31.0, 29.0, angle, first, step, rays)
+    for p in range(3):
+        for k in range(30):
+            r = first + step * k
+            px, py = 31.0 + r * np.cos(angle[p]), 29.0 + r * np.sin(angle[p])
+            if 1.0 <= px < 62.0 and 1.0 <= py < 58.0:
+                assert rays[p, k] == pytest.approx(value(coefficients, px, py, 3), rel=SINGLE)
+            else:
+                assert np.isnan(rays[p, k])
+    assert np.isnan(rays).any()
+
+
+def test_a_patch_is_what_its_pixels_say(picture, patch):
+    good, data, inverse, facts = fill(picture)
+    assert good
+    assert len(data) == len(patch.f) == len(pixels_within(*CENTRE, REACH))
+    assert data[:, 0] == pytest.approx(patch.dx, abs=1e-5)
+    assert data[:, 1] == pytest.approx(patch.dy, abs=1e-5)
+    assert data[:, 2] == pytest.approx(patch.f, abs=SINGLE)
+    assert data[:, 3:] == pytest.approx(patch.descent, abs=SINGLE * np.abs(patch.descent).max())
+    assert inverse == pytest.approx(np.linalg.inv(patch.descent.T @ patch.descent), rel=1e-3, abs=1e-6)
+    assert facts == pytest.approx([patch.norm, patch.mean, patch.correlation_length], rel=SINGLE)
+
+
+def test_a_patch_without_texture_is_none():
+    assert not fill(np.full((60, 64), 90.0, np.float32))[0]
+
+
+@pytest.mark.parametrize(("shift", "turn"), [((0.37, -0.61), 0.05), ((-1.4, 1.1), -0.12)])
+def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
+    image, true = moved(picture, shift, turn)
+    coefficients = fine_coefficients(image)
+    _, data, inverse, _ = fill(picture)
+    pose, fit = np.array([*CENTRE, 0.0]), np.zeros(kernels.FIT_COLUMNS)
+    kernels.fit_rigid(coefficients, data, inverse, REACH, 4.0, 0.0, 1e-3, 40, pose, fit)
+    expected, zncc, residual, gain, offset = fit_plainly(coefficients, patch, REACH, np.array([*CENTRE, 0.0]))
+    assert fit[kernels.CODE] == kernels.CONVERGED
+    # Either stops at steps below a thousandth of a pixel.
+    assert pose == pytest.approx(expected, abs=1e-3)
+    assert pose == pytest.approx(true, abs=0.02)
+    assert fit[kernels.ZNCC] == pytest.approx(zncc, abs=1e-5)
+    assert fit[kernels.RESIDUAL] == pytest.approx(residual, rel=0.02)
+    assert fit[[kernels.GAIN, kernels.OFFSET]] == pytest.approx([gain, offset], rel=1e-4)
+    # With no step allowed it only looks.
+    still, look = true.copy(), np.zeros(kernels.FIT_COLUMNS)
+    kernels.fit_rigid(coefficients, data, inverse, REACH, 4.0, 0.0, 1e-3, 0, still, look)
+    assert np.array_equal(still, true)
+    assert look[kernels.CODE] == kernels.UNFINISHED
+    assert look[kernels.ZNCC] > 0.99
+
+
+def test_a_fit_gives_up_where_it_should(picture):
+    image, _ = moved(picture, (0.4, 0.2), 0.0)
+    coefficients = fine_coefficients(image)
+    _, data, inverse, _ = fill(picture)
+
+    def code(start, *, leash=4.0, hopeless=0.0, limit=40):
+        fit = np.zeros(kernels.FIT_COLUMNS)
+        kernels.fit_rigid(
+            coefficients, data, inverse, REACH, leash, hopeless, 1e-3, limit, np.array([*start, 0.0]), fit
+        )
+        return fit[kernels.CODE]
+
+    assert code((11.0, 28.0)) == kernels.LEFT_IMAGE
+    assert code(CENTRE, leash=0.2) == kernels.WANDERED
+    assert code((CENTRE[0] + 6.0, CENTRE[1] - 5.0), leash=50.0, hopeless=0.99) == kernels.WANDERED
+    assert code(CENTRE, limit=1) == kernels.UNFINISHED
+    assert code(CENTRE) == kernels.CONVERGED
+
+
+def test_a_robust_fit_ends_where_tukeys_weights_leave_it(picture, patch):
+    image, true = moved(picture, (0.3, -0.2), 0.03)
+    image[:, 35:] = 240.0  # something bright covers a part
+    coefficients = fine_coefficients(image)
+    _, data, _, _ = fill(picture)
+    pose, fit, covariance = true.copy(), np.zeros(kernels.FIT_COLUMNS), np.zeros((3, 3))
+    noise, gain, offset = 1.0, 1.3 * patch.norm, 1.3 * patch.mean - 20.0
+    kernels.fit_robust(coefficients, data, REACH, 3.0, noise, gain, offset, 60, pose, fit, covariance)
+    assert fit[kernels.CODE] == kernels.CONVERGED
+    assert pose == pytest.approx(true, abs=0.05)
+    step, spread, a, b, kept, residual = tukey_fixed_point(
+        coefficients, patch, pose, fit[kernels.GAIN], fit[kernels.OFFSET], noise
+    )
+    assert np.abs(step[:2]).sum() + REACH * abs(step[2]) < 0.005  # the fit's own measure of standing still
+    assert (a, b) == pytest.approx((fit[kernels.GAIN], fit[kernels.OFFSET]), rel=0.01)
+    assert fit[kernels.KEPT] == pytest.approx(kept, abs=0.01)
+    assert kept < 0.9
+    assert fit[kernels.RESIDUAL] == pytest.approx(residual, rel=0.05)
+    assert covariance == pytest.approx(spread, rel=0.06, abs=1e-3 * np.abs(spread).max())
+
+
+def test_a_robust_fit_gives_up_what_is_covered_altogether(picture, patch):
+    image = picture.copy()
+    image[:, 25:] = np.random.default_rng(3).uniform(0, 255, image[:, 25:].shape)
+    _, data, _, _ = fill(picture)
+    fit = np.zeros(kernels.FIT_COLUMNS)
+    kernels.fit_robust(
+        fine_coefficients(image), data, REACH, 3.0, 1.0, patch.norm, patch.mean, 60, np.array([*CENTRE, 0.0]), fit,
+        np.zeros((3, 3)),
+    )  # fmt: skip
+    assert fit[kernels.CODE] == kernels.WANDERED
+    kernels.fit_robust(
+        fine_coefficients(image), data, REACH, 3.0, 1.0, patch.norm, patch.mean, 60, np.array([9.0, 28.0, 0.0]), fit,
+        np.zeros((3, 3)),
+    )  # fmt: skip
+    assert fit[kernels.CODE] == kernels.LEFT_IMAGE
+
+
+def test_a_disc_has_its_quarters_one_after_the_other():
+    x, y, start = disc(6.3)
+    assert sorted(zip(x.tolist(), y.tolist(), strict=True)) == sorted(pixels_within(0.0, 0.0, 6.3))
+    quarters = [
+        lambda a, b: a >= 0 and b >= 0,
+        lambda a, b: a < 0 <= b,
+        lambda a, b: a < 0 and b < 0,
+        lambda a, b: b < 0 <= a,
+    ]
+    for q, belongs in enumerate(quarters):
+        rows = slice(start[q], start[q + 1])
+        assert start[q] < start[q + 1]
+        assert all(belongs(a, b) for a, b in zip(x[rows], y[rows], strict=True))
+
+
+@pytest.mark.parametrize(("search", "parts"), [(search_patch, False), (search_parts, True)])
+@pytest.mark.parametrize("sweep", [0.5, np.pi])
+def test_a_search_finds_what_trying_everything_finds(picture, search, parts, sweep):
+    reach, origin, spacing, window = 5.0, (22.3, 24.6), 3.0, 6.0
+    image, _ = moved(picture, (2.0, -1.0), 0.2)
+    image[:, 38:] = 250.0
+    reference = spline_coefficients(picture)
+    turns, sectors = turns_to_try(0.1, reach, sweep)
+    assert np.abs(np.diff(turns)).max() * reach <= 1.2 + 1e-9
+    places = [(x, y) for y in range(20, 33) for x in range(25, 38)]
+    scores = search_plainly(reference, image, origin, reach, places, turns, parts=parts)
+    expected = best_places(scores, places, turns, sectors, spacing, 4)
+    best = np.empty((4, 4))
+    search(reference, image, *origin, reach, 31.0, 26.0, 0.1, window, sweep, spacing, best)
+    assert best == pytest.approx(np.array(expected), abs=1e-4)
+
+
+def test_a_search_beyond_the_photograph_finds_nothing(picture):
+    best = np.empty((2, 4))
+    search_patch(spline_coefficients(picture), picture, 22.0, 24.0, 5.0, -30.0, 24.0, 0.0, 6.0, 0.3, 3.0, best)
+    assert best[:, 3].tolist() == [-1.0, -1.0]
