@@ -24,6 +24,8 @@ from tests.reference.correlation import (
 )
 from tests.reference.splines import value, values
 
+pytestmark = pytest.mark.unit
+
 SINGLE = 2e-5
 CENTRE, REACH = (30.3, 27.8), 9.2
 
