@@ -45,7 +45,7 @@ from .sensitivity.execution import available_cores
 from .sensitivity.spread import calibrated_inputs, solve_members, with_spread
 from .sensitivity.study import Nominal
 from .tracking.report.page import tracking_report
-from .tracking.stage import DETECTIONS, gather_report, track_photographs, write_tables
+from .tracking.stage import DETECTIONS, gather_report, track_photographs, write_found_tables
 from .tracks import Tracks, WallTracks
 from .verdicts.decisions import Bodies, decide
 from .verdicts.log import VERDICTS, Flag, VerdictLog
@@ -104,7 +104,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         _check_packing(run, tracks, walls)
         walls = walls.frames(start, stop)
     tracks = tracks.frames(start, stop)
-    write_tables(run.folder, tables)
+    write_found_tables(run.folder, tables)
     save_tracks(run.file(TRACKS), experiment.name, tracks, walls, origin)
     for stage in ("tracking", "walls"):
         Checkpoint(unfinished / stage, origin.fingerprint).clear()
@@ -229,7 +229,7 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
 
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     """Write the recording of finished results, the truth beside them where there is one."""
-    from .recording.files.finished_run import record as write_recording
+    from .recording.files.finished_run import write_recording
     from .recording.files.side_file import write_side_file
 
     since = time.perf_counter()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, Page, expect, sync_playwright
-from rodsight.synthetic.experiment import synthesize
+from rodsight.synthetic.synthesis import synthesize
 
 from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
 from tests.shapes import check_shapes

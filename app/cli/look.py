@@ -15,7 +15,7 @@ from ..errors import InputError
 from .terminal import table_console, tell
 
 if TYPE_CHECKING:
-    from ..recording.files.catalogue import Entry
+    from ..recording.files.catalogue import CatalogueRow
     from ..results.comparison import Comparison
     from ..results.results import Results
     from ..results.store import Provenance
@@ -108,8 +108,8 @@ def score(
     from ..results.summary import print_summary, summarize
     from ..results.truth import accuracy, correlations
     from ..results.truth import score as score_frames
-    from ..review import scoring
-    from ..review.command import Reviewed
+    from ..review.judging import scoring
+    from ..review.reviewed import Reviewed
     from ..run_folder import RESULTS, Run
 
     file = results / RESULTS if results.is_dir() else results
@@ -221,7 +221,7 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
     return 0
 
 
-def _list_entries(folder: Path, entries: list[Entry], console: Console) -> None:
+def _list_entries(folder: Path, entries: list[CatalogueRow], console: Console) -> None:
     """Print the recordings of a folder with their properties as columns."""
     shown = [column for column in COLUMNS if any(column[1] in (entry.properties or ()) for entry in entries)]
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))

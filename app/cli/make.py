@@ -40,7 +40,7 @@ def synth(
 
     Example: rodsight synth my_test --preset small --seed 3
     """
-    from ..synthetic.experiment import synthesize
+    from ..synthetic.synthesis import synthesize
 
     with progress_of(quiet) as progress:
         made = synthesize(

@@ -10,7 +10,7 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
 from ..errors import InputError
-from .input_sections import GivenTracks, Photographs, WallsSection
+from .input_sections import GivenTracks, PhotographsSection, WallsSection
 from .keys import find_key, nearest_key
 from .section import Section, key
 from .tuning_sections import (
@@ -31,7 +31,7 @@ class ExperimentFile(Section):
     name: Annotated[str, Field(pattern=r"^[\w][\w .+-]*$")] = key(
         "Name of the experiment: of its results' folder, too."
     )
-    photographs: Photographs | None = key("Photographs to be tracked. Give these or tracks.", default=None)
+    photographs: PhotographsSection | None = key("Photographs to be tracked. Give these or tracks.", default=None)
     tracks: GivenTracks | None = key("Grains that any other tool has tracked. Give these or photographs.", default=None)
     walls: WallsSection | None = key("The walls; without them grains are tracked but not solved.", default=None)
     material: MaterialSection = key("What all rods have in common.", default=MaterialSection())

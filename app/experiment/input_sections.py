@@ -66,7 +66,7 @@ class KnownDistance(Section):
         return self
 
 
-class Photographs(Section):
+class PhotographsSection(Section):
     """Where the photographs are and what a pixel is."""
 
     files: str = key("Pattern of the photographs, relative to the experiment; taken in natural order of their names.")
@@ -97,7 +97,7 @@ class Photographs(Section):
     )
 
     @model_validator(mode="after")
-    def _one_scale(self) -> Photographs:
+    def _one_scale(self) -> PhotographsSection:
         if self.pixel_size is None and self.distance is None:
             raise ValueError("pixel_size is missing: give it or distance = {start, end, metres}")
         if self.pixel_size is not None and self.distance is not None:
@@ -105,7 +105,7 @@ class Photographs(Section):
         return self
 
     @model_validator(mode="after")
-    def _one_clock(self) -> Photographs:
+    def _one_clock(self) -> PhotographsSection:
         if (self.interval is None) == (self.times is None):
             raise ValueError("give either interval or times")
         return self

@@ -9,12 +9,12 @@ import numpy as np
 
 from solver.calibration.calibrate import Calibration
 
-from .config import Photographs
+from .config import PhotographsSection
 from .lens import BrownLens, Lens, OpenCVLens
 from .units import Scale, pixel_size_between
 
 
-def make_scale(section: Photographs, height: int, calibration: Calibration | None = None) -> Scale:
+def make_scale(section: PhotographsSection, height: int, calibration: Calibration | None = None) -> Scale:
     """The scale of photographs of `height` [px] rows; calibration: what corrects the given pixel size."""
     given = _given_scale(section, height)
     correction = 0.0 if calibration is None else calibration.pixel_size
@@ -22,7 +22,7 @@ def make_scale(section: Photographs, height: int, calibration: Calibration | Non
     return replace(given, pixel_size=(1.0 + correction) * given.pixel_size, pixel_height=pixel_height)
 
 
-def _given_scale(section: Photographs, height: int) -> Scale:
+def _given_scale(section: PhotographsSection, height: int) -> Scale:
     lens = make_lens(section)
     if section.distance is not None:
         start, end = np.array(section.distance.start), np.array(section.distance.end)
@@ -33,7 +33,7 @@ def _given_scale(section: Photographs, height: int) -> Scale:
     return Scale(section.pixel_size, height, None, lens)
 
 
-def make_lens(section: Photographs) -> Lens | None:
+def make_lens(section: PhotographsSection) -> Lens | None:
     """The lens of the photographs; None where none is told."""
     told = section.lens
     if told is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import getpass
 import webbrowser
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -13,55 +12,14 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from ..errors import InputError
-from ..experiment.experiment import CONFIG_NAME, Experiment, load_experiment
 from ..experiment.photographs import Photographs
 from ..experiment.scaling import make_scale
-from ..results.results import Results
-from ..results.store import load_results, read_origin
-from ..verdicts.decisions import Bodies
-from ..verdicts.log import VERDICTS, VerdictLog
 from ..verdicts.table import export_verdicts, import_verdicts
-from .candidates import find_candidates
-from .picture import Picture
-from .server import ReviewServer
-from .session import ReviewSession
-
-RESULTS = "results.h5"
-
-
-@dataclass(frozen=True, slots=True)
-class Reviewed:
-    """Results on disk with what belongs to them."""
-
-    file: Path
-    results: Results
-    experiment: Experiment
-    first_frame: int  # of the experiment
-
-    @property
-    def log(self) -> VerdictLog:
-        return VerdictLog(self.file.parent / VERDICTS)
-
-    @property
-    def bodies(self) -> Bodies:
-        return Bodies.of(self.results.tracks, self.results.walls)
-
-    @property
-    def threshold(self) -> float | None:
-        """The gap threshold [m] that the experiment names; None: six standard deviations of a position."""
-        return self.experiment.config.contacts.threshold
-
-
-def open_reviewed(path: Path) -> Reviewed:
-    """Open the results of an experiment (its default folder), of a run's folder, or results.h5 itself."""
-    if path.is_dir() and not (path / RESULTS).exists() and (path / CONFIG_NAME).exists():
-        path = Path("runs") / load_experiment(path).name
-    file = path / RESULTS if path.is_dir() else path
-    if not file.exists():
-        raise InputError(file, "", "there are no results: run `rodsight run` on the experiment first")
-    results, origin = load_results(file), read_origin(file)
-    assert origin is not None
-    return Reviewed(file, results, load_experiment(Path(origin.experiment)), origin.frames[0])
+from .judging.candidate_pairs import find_candidate_pairs
+from .reviewed import Reviewed, open_reviewed
+from .service.picture import Picture
+from .service.server import ReviewServer
+from .service.session import ReviewSession
 
 
 def open_session(reviewed: Reviewed) -> ReviewSession:
@@ -104,7 +62,7 @@ def review(path: Path, *, port: int, browser: bool, reviewer: str | None) -> int
 def import_table(path: Path, file: Path, *, reviewer: str | None, complete: bool) -> int:
     """Append a table of verdicts, or of contacts, to the log."""
     reviewed = open_reviewed(path)
-    found = [find_candidates(reviewed.results, k, reviewed.threshold) for k in range(len(reviewed.results.frames))]
+    found = [find_candidate_pairs(reviewed.results, k, reviewed.threshold) for k in range(len(reviewed.results.frames))]
     pairs = {each.frame: list(zip(each.contacts.i.tolist(), each.contacts.j.tolist(), strict=True)) for each in found}
     count = import_verdicts(
         reviewed.log, file, reviewed.bodies, reviewer or file.stem, first_frame=reviewed.first_frame,

@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from ..errors import InputError
 from ..experiment.experiment import Experiment
-from .factors import FACTORS, Factor, Scale
+from .factors import FACTORS, Factor, Reading
 from .networks import VariedInputs
 
 Design = Literal["oat", "sobol"]
@@ -119,13 +119,13 @@ def _ranged(factor: Factor, low: float, high: float, source: str, where: str) ->
     problem = ""
     if not (np.isfinite(low) and np.isfinite(high) and low <= high):
         problem = "must be two finite numbers, ascending"
-    elif factor.scale is Scale.TIMES and not low > 0:
+    elif factor.reading is Reading.TIMES and not low > 0:
         problem = "multiplies what was given: must be positive"
-    elif factor.scale is Scale.NOISE and low < 0:
+    elif factor.reading is Reading.NOISE and low < 0:
         problem = "counts standard deviations: must not be negative"
-    elif factor.scale is Scale.SHARE and not max(abs(low), abs(high)) <= LARGEST_SHARE:
+    elif factor.reading is Reading.SHARE and not max(abs(low), abs(high)) <= LARGEST_SHARE:
         problem = f"is a relative error: within ±{LARGEST_SHARE}"
-    elif factor.scale is Scale.COUNT:
+    elif factor.reading is Reading.COUNT:
         most = len(factor.text) - 1 if factor.text else np.inf
         if not (low == int(low) and high == int(high) and factor.nominal <= low and high <= most):
             upper = f" to {most}" if factor.text else " on"

@@ -18,7 +18,7 @@ from .networks import VariedInputs
 EVALUATED = 5  # photographs from which on forces are compared: those before still settle
 
 
-class Scale(Enum):
+class Reading(Enum):
     """How the values of a factor are to be read."""
 
     TIMES = "times"  # multiplies what was given; nominal 1, ranges are even on a logarithmic scale
@@ -36,7 +36,7 @@ class Factor:
 
     name: str
     meaning: str  # for the user
-    scale: Scale
+    reading: Reading
     low: float
     high: float
     apply: Apply
@@ -48,7 +48,9 @@ class Factor:
     @property
     def ends(self) -> tuple[float, float]:
         """Between which a design varies it: noise and whole numbers from the nominal value on."""
-        one_sided = self.scale in (Scale.NOISE, Scale.COUNT) or (self.scale is Scale.SHARE and self.low > self.nominal)
+        one_sided = self.reading in (Reading.NOISE, Reading.COUNT) or (
+            self.reading is Reading.SHARE and self.low > self.nominal
+        )
         return (min(self.nominal, self.low) if one_sided else self.low), self.high
 
     @property
@@ -59,9 +61,9 @@ class Factor:
     def value_at(self, part: float) -> float:
         """Value at a part (0 … 1) of the way between its ends."""
         low, high = self.ends
-        if self.scale is Scale.TIMES:
+        if self.reading is Reading.TIMES:
             return float(low * (high / low) ** part)
-        if self.scale is Scale.COUNT:
+        if self.reading is Reading.COUNT:
             return float(low + min(int(part * (high - low + 1)), int(high - low)))
         return float(low + (high - low) * part)
 
@@ -71,16 +73,16 @@ class Factor:
         if low == high:
             return 0.0
         return float(
-            np.log(value / low) / np.log(high / low) if self.scale is Scale.TIMES else (value - low) / (high - low)
+            np.log(value / low) / np.log(high / low) if self.reading is Reading.TIMES else (value - low) / (high - low)
         )
 
     def label(self, value: float) -> str:
         """A value as the user reads it."""
-        if self.scale is Scale.TIMES:
+        if self.reading is Reading.TIMES:
             return f"× {value:.3g}"
-        if self.scale is Scale.SHARE:
+        if self.reading is Reading.SHARE:
             return f"{100.0 * value:+.3g} %"
-        if self.scale is Scale.NOISE:
+        if self.reading is Reading.NOISE:
             return f"+ {value:.3g} σ"
         return self.text[int(value)] if self.text else self.form.format(value)
 
@@ -196,21 +198,21 @@ def select_frames(inputs: VariedInputs, first: int, step: int) -> VariedInputs:
 
 # In the order in which they are applied: those that leave out photographs come last.
 FACTORS: tuple[Factor, ...] = (
-    Factor("friction", "coefficient of friction between grains", Scale.TIMES, 0.8, 1.2, _friction, 1.0),
-    Factor("wall_friction", "coefficient of friction at walls", Scale.TIMES, 0.8, 1.2, _friction_of_walls, 1.0),
-    Factor("precision", "stated precision of positions, by which pairs are judged", Scale.TIMES, 0.5, 2.0,
+    Factor("friction", "coefficient of friction between grains", Reading.TIMES, 0.8, 1.2, _friction, 1.0),
+    Factor("wall_friction", "coefficient of friction at walls", Reading.TIMES, 0.8, 1.2, _friction_of_walls, 1.0),
+    Factor("precision", "stated precision of positions, by which pairs are judged", Reading.TIMES, 0.5, 2.0,
            _precision, 1.0),
-    Factor("overlap", "overlap or roughness of touching surfaces", Scale.TIMES, 0.5, 2.0, _overlap, 1.0),
-    Factor("threshold", "gap threshold of contacts", Scale.TIMES, 0.5, 2.0, _threshold, 1.0, chain_only=True),
-    Factor("position_noise", "positions scatter more than they do", Scale.NOISE, 1.0, 2.0, _position_noise, 0.0),
-    Factor("rotation_noise", "rotations scatter more than they do", Scale.NOISE, 1.0, 2.0, _rotation_noise, 0.0),
-    Factor("radius_scatter", "error of every radius by itself (rms)", Scale.SHARE, 5e-4, 1e-3, _radius_scatter, 0.0),
-    Factor("radius_error", "common error of all radii", Scale.SHARE, -5e-4, 5e-4, _radius_error, 0.0),
-    Factor("pixel_size", "pixel size, walls and radii as given", Scale.SHARE, -5e-4, 5e-4, _pixel_size, 0.0),
-    Factor("kappa", "kinematic number: how much measured motion counts", Scale.TIMES, 0.5, 2.0, _kappa, 1.0),
-    Factor("sweeps", "sweeps of a sub-step", Scale.TIMES, 0.5, 2.0, _sweeps, 1.0),
-    Factor("reset", "go back to zero forces", Scale.COUNT, 1, 2, _reset, 0,
+    Factor("overlap", "overlap or roughness of touching surfaces", Reading.TIMES, 0.5, 2.0, _overlap, 1.0),
+    Factor("threshold", "gap threshold of contacts", Reading.TIMES, 0.5, 2.0, _threshold, 1.0, chain_only=True),
+    Factor("position_noise", "positions scatter more than they do", Reading.NOISE, 1.0, 2.0, _position_noise, 0.0),
+    Factor("rotation_noise", "rotations scatter more than they do", Reading.NOISE, 1.0, 2.0, _rotation_noise, 0.0),
+    Factor("radius_scatter", "error of every radius by itself (rms)", Reading.SHARE, 5e-4, 1e-3, _radius_scatter, 0.0),
+    Factor("radius_error", "common error of all radii", Reading.SHARE, -5e-4, 5e-4, _radius_error, 0.0),
+    Factor("pixel_size", "pixel size, walls and radii as given", Reading.SHARE, -5e-4, 5e-4, _pixel_size, 0.0),
+    Factor("kappa", "kinematic number: how much measured motion counts", Reading.TIMES, 0.5, 2.0, _kappa, 1.0),
+    Factor("sweeps", "sweeps of a sub-step", Reading.TIMES, 0.5, 2.0, _sweeps, 1.0),
+    Factor("reset", "go back to zero forces", Reading.COUNT, 1, 2, _reset, 0,
            text=("never", "at rearrangements", "at the first compared")),
-    Factor("spacing", "use every so many photographs", Scale.COUNT, 2, 2, _spacing, 1, form="1 in {:.0f}"),
-    Factor("first_frame", "begin so many photographs later", Scale.COUNT, 1, 3, _first_frame, 0, form="{:.0f} later"),
+    Factor("spacing", "use every so many photographs", Reading.COUNT, 2, 2, _spacing, 1, form="1 in {:.0f}"),
+    Factor("first_frame", "begin so many photographs later", Reading.COUNT, 1, 3, _first_frame, 0, form="{:.0f} later"),
 )  # fmt: skip

@@ -137,7 +137,7 @@ def as_json(findings: Findings) -> dict[str, Any]:
                 "low": ends[name].low,
                 "high": ends[name].high,
                 "nominal": ends[name].nominal,
-                "scale": ends[name].scale.value,
+                "scale": ends[name].reading.value,
             }
             for name, strength in findings.ranking()
         ],

@@ -31,7 +31,7 @@ NOISE = 1e-5  # [m], the precision the paper states
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class ClaimVerdict:
     claim: str
     measured: str
     verdict: str
@@ -52,7 +52,7 @@ def study_claims(
     console: Console,
     progress: Progress = silent,
     window: int = WINDOW,
-) -> list[Verdict]:
+) -> list[ClaimVerdict]:
     """Print the table of the paper's claims."""
     truths = [simulate(seed, grains=grains, folder=folder, progress=progress) for seed in seeds]
     ours = _solve_all(truths, window, progress, "ensemble")
@@ -115,9 +115,9 @@ def _settled_at(r: Array) -> int:
     return int(off[-1]) + 1 if len(off) else 0
 
 
-def _settling(paper: list[_Sequence], ours: list[_Sequence]) -> Verdict:
+def _settling(paper: list[_Sequence], ours: list[_Sequence]) -> ClaimVerdict:
     theirs, here = _r(paper), _r(ours)
-    return Verdict(
+    return ClaimVerdict(
         "settles in about five photographs",
         f"paper's recipe: r {theirs[:, 1].mean():.2f} at the first pair, level {theirs[:, -4:].mean():.2f}, reached at "
         f"frame {_settled_at(theirs)}; default: {here[:, 1].mean():.3f}, level {here[:, -4:].mean():.3f}, "
@@ -126,7 +126,7 @@ def _settling(paper: list[_Sequence], ours: list[_Sequence]) -> Verdict:
     )
 
 
-def _boundaries(loaded: list[_Sequence], imposed: list[_Sequence]) -> Verdict:
+def _boundaries(loaded: list[_Sequence], imposed: list[_Sequence]) -> ClaimVerdict:
     r, factor = [], []
     for one, other in zip(loaded, imposed, strict=True):
         factors = []
@@ -135,7 +135,7 @@ def _boundaries(loaded: list[_Sequence], imposed: list[_Sequence]) -> Verdict:
             r.append(pearson(fa, fb))
             factors.append(fb.sum() / fa.sum())
         factor.append(np.std(factors) / np.mean(factors))
-    return Verdict(
+    return ClaimVerdict(
         "both boundary conditions agree up to one factor",
         f"pattern: r {np.mean(r):.3f} (least {np.min(r):.3f}); the factor varies by {100 * np.mean(factor):.0f} % "
         "between frames",
@@ -160,26 +160,28 @@ def _stresses(sequences: list[_Sequence]) -> tuple[list[Array], list[Array]]:
     return inferred, true
 
 
-def _friction_angles(sequences: list[_Sequence]) -> Verdict:
+def _friction_angles(sequences: list[_Sequence]) -> ClaimVerdict:
     inferred, true = _stresses(sequences)
     error = np.rad2deg([friction_angle(a) - friction_angle(b) for a, b in zip(inferred, true, strict=True)])
     rms = float(np.sqrt(np.mean(error**2)))
-    return Verdict(
+    return ClaimVerdict(
         "macroscopic friction angles about the same",
         f"rms error {rms:.2f}° (mean {error.mean():+.2f}°)",
         "yes" if rms < 1.5 else "no",
     )
 
 
-def _directions(sequences: list[_Sequence]) -> Verdict:
+def _directions(sequences: list[_Sequence]) -> ClaimVerdict:
     inferred, true = _stresses(sequences)
     error = [principal_stresses(a)[2] - principal_stresses(b)[2] for a, b in zip(inferred, true, strict=True)]
     error = np.rad2deg((np.array(error) + np.pi / 2) % np.pi - np.pi / 2)
     rms = float(np.sqrt(np.mean(error**2)))
-    return Verdict("principal directions of the stress agree", f"rms error {rms:.2f}°", "yes" if rms < 3.0 else "no")
+    return ClaimVerdict(
+        "principal directions of the stress agree", f"rms error {rms:.2f}°", "yes" if rms < 3.0 else "no"
+    )
 
 
-def _distribution(sequences: list[_Sequence]) -> Verdict:
+def _distribution(sequences: list[_Sequence]) -> ClaimVerdict:
     ours, true = [], []
     for s in sequences:
         for forces in s.frames[3:]:
@@ -192,7 +194,7 @@ def _distribution(sequences: list[_Sequence]) -> Verdict:
     grid = np.linspace(0, 6, 601)
     distance = np.abs(np.searchsorted(a, grid) / len(a) - np.searchsorted(b, grid) / len(b)).max()
     tail, plateau = tail_exponent(a), plateau_ratio(a)
-    return Verdict(
+    return ClaimVerdict(
         "P(f_n): 0 to 5 means, exponential tail, plateau of weak forces",
         f"greatest {a[-1]:.1f} means (99.9 %: {np.quantile(a, 0.999):.1f}); tail exponent {tail.value:.2f} "
         f"(true {tail_exponent(b).value:.2f}); plateau {plateau.value:.2f} (true {plateau_ratio(b).value:.2f}); "

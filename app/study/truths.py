@@ -22,7 +22,7 @@ from ..atomic import replacing
 from ..inference.inference import Inputs
 from ..inference.settings import InferenceSettings
 from ..progress import Progress, silent
-from ..synthetic.packing import prepare_packing
+from ..synthetic.dense_packing import prepare_packing
 from ..tracks import Tracks, TrackStatus, WallTracks
 
 STEP = 0.25  # [°] of shear between photographs

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .speckle_kernels import FINE, SMOOTHING, collect
+from .speckle_kernels import FINE, SMOOTHING, collect_light
 
 TILE = 192  # [px], the largest square drawn at once: its sub-pixels fit in a processor's cache
 TAIL = 4.0  # the blur is cut off at this many standard deviations
@@ -69,7 +69,7 @@ class Camera:
                     margin,
                 )
                 yield tile
-                collect(self.light, self.covered, tile.glow, tile.share, self._taps, top, left, self._columns)
+                collect_light(self.light, self.covered, tile.glow, tile.share, self._taps, top, left, self._columns)
 
 
 def pixel_response(blur: float) -> NDArray[np.float64]:

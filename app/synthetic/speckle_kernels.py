@@ -78,7 +78,7 @@ def draw_bar(glow, share, x, y, along, length, thickness, dots, metal, black):
 
 
 @njit(cache=True)
-def collect(light, covered, glow, share, taps, top, left, columns):
+def collect_light(light, covered, glow, share, taps, top, left, columns):
     """Add a tile's sub-pixels, weighted by `taps` about each pixel's centre, to its pixels from (top, left) on."""
     fine_rows, fine_columns = glow.shape
     count = taps.shape[0]

@@ -75,7 +75,7 @@ def track_photographs(
     return tracks, walls, tables
 
 
-def write_tables(folder: Path, tables: dict[str, Columns]) -> None:
+def write_found_tables(folder: Path, tables: dict[str, Columns]) -> None:
     """Write what the stage found beside the results."""
     for name, columns in tables.items():
         with replacing(folder / name) as part:
@@ -85,7 +85,7 @@ def write_tables(folder: Path, tables: dict[str, Columns]) -> None:
 def gather_report(
     experiment: Experiment, folder: Path, tracks: Tracks, walls: WallTracks | None, first_frame: int
 ) -> Tracked:
-    """What a report needs of finished tracks; folder: where `write_tables` left the grains of photograph 0."""
+    """What a report needs of finished tracks; folder: where `write_found_tables` left the grains of photograph 0."""
     assert experiment.config.photographs is not None
     photographs = experiment.photographs()
     table = read_table(folder / DETECTIONS, ("id", "x", "y", "radius", "quality"))

@@ -45,7 +45,7 @@ def cohen_kappa(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> tuple[fl
     return observed, (observed - chance) / (1.0 - chance), error
 
 
-def agreements(log: VerdictLog, detected: Mapping[Pair, bool]) -> list[Kappa]:
+def reviewer_kappas(log: VerdictLog, detected: Mapping[Pair, bool]) -> list[Kappa]:
     """Compare all reviewers with each other and with the detector.
 
     detected: what the detector said of pairs, named as `canonical` does; of a pair that is not there it saw no contact.

@@ -34,7 +34,7 @@ from rodsight.recording.tabs.blueprint import Layout, make_blueprint
 from rodsight.recording.tabs.layout_property import send_layout
 from rodsight.recording.viewing.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
 from rodsight.sensitivity.execution import available_cores
-from rodsight.synthetic.experiment import synthesize
+from rodsight.synthetic.synthesis import synthesize
 
 pytestmark = pytest.mark.slow
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rodsight.synthetic.packing import prepare_packing
+from rodsight.synthetic.dense_packing import prepare_packing
 
 from solver.bodies.grains import Grains
 from solver.bodies.motion import Snapshot

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.synthetic.packing import prepare_packing
+from rodsight.synthetic.dense_packing import prepare_packing
 
 from solver.calibration.calibrate import calibrate, expected_priors
 from solver.calibration.equations import move_walls, rotate_offsets

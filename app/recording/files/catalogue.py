@@ -35,7 +35,7 @@ Value = str | int | float
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CatalogueRow:
     """One recording of a folder."""
 
     file: Path
@@ -49,14 +49,14 @@ def find_recordings(folder: Path | str) -> list[Path]:
     return sorted([*loose, *folder.glob(f"*/{RECORDING}")])
 
 
-def read_entries(files: Sequence[Path]) -> list[Entry]:
+def read_entries(files: Sequence[Path]) -> list[CatalogueRow]:
     """The properties of recordings; none of those that cannot be read."""
     entries = []
     for file in files:
         try:
-            entries.append(Entry(file, read_properties(file)))
+            entries.append(CatalogueRow(file, read_properties(file)))
         except OSError:
-            entries.append(Entry(file, None))
+            entries.append(CatalogueRow(file, None))
     return entries
 
 

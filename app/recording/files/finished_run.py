@@ -45,7 +45,7 @@ class RecordingFile:
     notes: tuple[str, ...]  # sentences for the user
 
 
-def record(
+def write_recording(
     results: Results,
     path: Path | str,
     *,

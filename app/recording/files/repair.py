@@ -13,7 +13,7 @@ from .share import run_tool
 
 
 @dataclass(frozen=True, slots=True)
-class RepairReport:
+class MendedRecording:
     """What could be saved."""
 
     path: Path
@@ -22,7 +22,7 @@ class RepairReport:
     frames: int  # whose reported forces are there
 
 
-def repair_recording(damaged: Path | str, target: Path | str) -> RepairReport:
+def repair_recording(damaged: Path | str, target: Path | str) -> MendedRecording:
     """Write all that can be read of a damaged recording to a new file that every viewer opens.
 
     Raises FileNotFoundError where there is no such file, OSError where nothing in it can be read.
@@ -36,7 +36,7 @@ def repair_recording(damaged: Path | str, target: Path | str) -> RepairReport:
         if frames == 0:
             raise OSError("no frame of it could be read; there is nothing to save")
         run_tool("verify", part)
-    return RepairReport(target, target.stat().st_size, damaged.stat().st_size, frames)
+    return MendedRecording(target, target.stat().st_size, damaged.stat().st_size, frames)
 
 
 def _frames_of(path: Path) -> int:

@@ -23,7 +23,7 @@ JPEG_QUALITY = 70  # of photographs made smaller
 
 
 @dataclass(frozen=True, slots=True)
-class ShareReport:
+class SharedRecording:
     """What was written."""
 
     path: Path
@@ -34,7 +34,7 @@ class ShareReport:
 
 def share_recording(
     source: Path | str, target: Path | str, *, first: int = 0, stop: int | None = None, scale: float = 1.0
-) -> ShareReport:
+) -> SharedRecording:
     """Write the frames first … stop − 1 of a recording, photographs made smaller by `scale` (0 … 1], to a new file.
 
     Frames and sweeps keep their numbers. Raises ValueError for a scale or frames that do not fit, OSError where the
@@ -66,7 +66,7 @@ def share_recording(
         finally:
             stream.disconnect()
             loose.unlink(missing_ok=True)
-    return ShareReport(target, target.stat().st_size, source.stat().st_size, stop - first)
+    return SharedRecording(target, target.stat().st_size, source.stat().st_size, stop - first)
 
 
 def run_tool(command: str, *arguments: Path | str) -> None:

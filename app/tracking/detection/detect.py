@@ -21,7 +21,7 @@ from solver.bodies.grains import Array
 from ...experiment.photographs import Image
 from .discs import OVERLAP, find_discs
 from .outlines import Measured, Outliner
-from .rings import Candidates, find_circles, without_overlap
+from .rings import Circles, find_circles, without_overlap
 
 # Rings leave the centre uncertain by this much [px], besides the difference of two classes' radii.
 RING_UNCERTAINTY = 3.0
@@ -192,7 +192,7 @@ def _judge_discs(outliner: Outliner, table: Array, smallest: float, quality_leas
 
 
 def _judge(
-    outliner: Outliner, rough: Candidates, table: Array, known: bool, quality_least: float, overlap: float = 0.15
+    outliner: Outliner, rough: Circles, table: Array, known: bool, quality_least: float, overlap: float = 0.15
 ) -> Array:
     """The table x, y, radius, quality (c, 4) with those candidates that prove grains and overlap no better one.
 
@@ -216,7 +216,7 @@ def _judge(
         table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=overlap)]
 
 
-def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp], tree: KDTree | None) -> Array:
+def _alternatives(outliner: Outliner, rough: Circles, chosen: NDArray[np.intp], tree: KDTree | None) -> Array:
     """x, y, radius, quality (c, 4) of every chosen circle, and of the circles of other known radii around it.
 
     tree: of all rough centres where radii are known, else None. Which of the circles is the grain is told by those
@@ -239,7 +239,7 @@ def _alternatives(outliner: Outliner, rough: Candidates, chosen: NDArray[np.intp
     return np.array(rows).reshape(-1, 4)
 
 
-def _around(rough: Candidates, tree: KDTree, k: int) -> NDArray[np.intp]:
+def _around(rough: Circles, tree: KDTree, k: int) -> NDArray[np.intp]:
     """The most convincing circle of every radius about circle k."""
     widest = float(rough.radius.max() - rough.radius.min())
     near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + RING_UNCERTAINTY)))

@@ -16,7 +16,7 @@ import numpy as np
 from solver.bodies.grains import Array
 
 from ...experiment.photographs import Image
-from .rings import Candidates, without_overlap
+from .rings import Circles, without_overlap
 
 # Distances are measured on a photograph enlarged by this factor, unless it has more pixels than that: memory.
 ENLARGED = 2
@@ -34,7 +34,7 @@ RIM = 0.7
 class Discs:
     """What a photograph's bright consists of."""
 
-    candidates: Candidates  # the largest first
+    candidates: Circles  # the largest first
     area: float  # [px²] of the bright that is not narrower than the smallest disc looked for
     covered: float  # share of it that the discs cover
     spread: float  # of its light in the middle, between the twentieth parts at both ends: 0 is even, 1 full contrast
@@ -69,7 +69,7 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     _paint_discs(bright, column, row, radius, 2)
     covered = int((wide & (bright == 2)).sum())
     place = [(axis + 0.5) / factor - 0.5 for axis in (column, row)]
-    candidates = Candidates(place[0], place[1], radius / factor, np.ones(len(radius)))
+    candidates = Circles(place[0], place[1], radius / factor, np.ones(len(radius)))
     return Discs(candidates, area / factor**2, covered / max(area, 1), spread)
 
 

@@ -23,7 +23,7 @@ LARGEST_LOCAL = 80.0
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
+class Circles:
     """Circles that might be grains, the most convincing first."""
 
     x: Array  # (c,) [px]
@@ -32,7 +32,7 @@ class Candidates:
     score: Array  # (c,) mean inward slope along the circle, as a share of a full edge's
 
 
-def find_circles(image: Image, radii: Array, *, score_least: float) -> Candidates:
+def find_circles(image: Image, radii: Array, *, score_least: float) -> Circles:
     """Local maxima over position of the mean inward slope along circles of every radius (k,) [px].
 
     Slopes are measured against the local contrast and cut off at that of a full edge, so neither uneven
@@ -52,7 +52,7 @@ def find_circles(image: Image, radii: Array, *, score_least: float) -> Candidate
     table = np.concatenate(found)
     # A mean over a longer circle is the more significant at the same value.
     table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
-    return Candidates(table[:, 0], table[:, 1], table[:, 2], table[:, 3])
+    return Circles(table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
 
 def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.ndarray:

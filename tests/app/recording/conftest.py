@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from rodsight.experiment.units import Scale
-from rodsight.recording.files.finished_run import RecordingFile, record
+from rodsight.recording.files.finished_run import RecordingFile, write_recording
 from rodsight.results.results import Results, TruthContacts
 
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
@@ -39,4 +39,4 @@ def recording(results, truth, tmp_path_factory) -> RecordingFile:
     path: Path = tmp_path_factory.mktemp("recording") / "run.rrd"
     scale = Scale(PIXEL, SHAPE[0])
     tuned = replace(results, radius_tuning=make_tuning())
-    return record(tuned, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)
+    return write_recording(tuned, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 from rodsight.results.store import load_results
-from rodsight.review.command import open_reviewed, open_session
-from rodsight.review.server import ReviewServer
-from rodsight.review.session import ReviewSession
+from rodsight.review.command import open_session
+from rodsight.review.reviewed import open_reviewed
+from rodsight.review.service.server import ReviewServer
+from rodsight.review.service.session import ReviewSession
 from rodsight.verdicts.decisions import Bodies
 from rodsight.verdicts.log import VERDICTS
 
@@ -104,7 +105,7 @@ def lines(out):
 
 def missed_gap(session, frame):
     """Two neighbours that are no candidate, close enough for a click, far from every candidate."""
-    from rodsight.review.picking import NEAR, WIDEST_GAP, near_pairs
+    from rodsight.review.service.picking import NEAR, WIDEST_GAP, near_pairs
 
     mean = float(session.results.grains.radius.mean())
     pairs = near_pairs(session.results, frame, WIDEST_GAP * mean)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from rodsight.review.candidates import Candidates
-from rodsight.review.estimate import NO, UNJUDGED, YES, estimate
-from rodsight.review.queue import STRATUM_COUNT, frame_queue, sampled_queue, strata
-from rodsight.review.threshold import fit_threshold, threshold_curve
+from rodsight.review.judging.candidate_pairs import CandidatePairs
+from rodsight.review.judging.estimate import NO, UNJUDGED, YES, estimate_detector
+from rodsight.review.judging.queue import STRATUM_COUNT, frame_queue, sampled_queue, strata
+from rodsight.review.judging.threshold import fit_threshold, threshold_curve
 from rodsight.verdicts.log import Entry, Verdict, VerdictLog
-from rodsight.verdicts.reviewers import DETECTOR, agreements, cohen_kappa
+from rodsight.verdicts.reviewers import DETECTOR, cohen_kappa, reviewer_kappas
 
 from solver.contacts.contacts import Contacts
 
@@ -18,7 +18,7 @@ def candidates(frame, probability):
     contacts = Contacts(
         i, np.arange(1, c + 1, dtype=np.int32), np.zeros(c), np.zeros((c, 2)), np.zeros((c, 2)), c + 1, 0
     )
-    return Candidates(frame, contacts, np.ones(c), probability, probability >= 0.5, 1e-4)
+    return CandidatePairs(frame, contacts, np.ones(c), probability, probability >= 0.5, 1e-4)
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(frames):
         true = (rng.random(len(probability)) < probability)[order]
         outcome = np.full(queue.count, UNJUDGED)
         outcome[:300] = np.where(true[:300], YES, NO)
-        told = estimate(queue.stratum, queue.detected, queue.probability, outcome, outcome != UNJUDGED, 0, rng)
+        told = estimate_detector(queue.stratum, queue.detected, queue.probability, outcome, outcome != UNJUDGED, 0, rng)
         precision = true[queue.detected].mean()
         recall = queue.detected[true].mean()
         held += [told.precision.low <= precision <= told.precision.high, told.recall.low <= recall <= told.recall.high]
@@ -81,7 +81,7 @@ def test_once_all_are_judged_the_interval_is_a_point(frames):
     queue = frame_queue(frames[0])
     true = np.random.default_rng(0).random(queue.count) < 0.7
     outcome = np.where(true, YES, NO)
-    told = estimate(
+    told = estimate_detector(
         queue.stratum,
         queue.detected,
         queue.probability,
@@ -100,8 +100,10 @@ def test_picked_pairs_say_nothing_of_the_rest(frames):
     outcome = np.full(queue.count, UNJUDGED)
     outcome[queue.detected] = np.where(np.arange(queue.detected.sum()) < 10, NO, UNJUDGED)
     rng = np.random.default_rng(1)
-    picked = estimate(queue.stratum, queue.detected, queue.probability, outcome, np.zeros(queue.count, bool), 0, rng)
-    drawn = estimate(queue.stratum, queue.detected, queue.probability, outcome, outcome != UNJUDGED, 0, rng)
+    picked = estimate_detector(
+        queue.stratum, queue.detected, queue.probability, outcome, np.zeros(queue.count, bool), 0, rng
+    )
+    drawn = estimate_detector(queue.stratum, queue.detected, queue.probability, outcome, outcome != UNJUDGED, 0, rng)
     assert picked.precision.high > drawn.precision.high
 
 
@@ -122,7 +124,7 @@ def test_people_are_compared_with_each_other_and_with_the_detector(tmp_path):
         log.append(Entry(0, "anna", 1, b, Verdict.CONTACT if b % 2 else Verdict.NO_CONTACT))
         log.append(Entry(0, "ben", b, 1, Verdict.CONTACT if b % 2 else Verdict.NO_CONTACT))
     log.append(Entry(0, "ben", 1, 2, Verdict.UNSURE))
-    found = {(each.first, each.second): each for each in agreements(log, {(0, 1, b): True for b in range(2, 12)})}
+    found = {(each.first, each.second): each for each in reviewer_kappas(log, {(0, 1, b): True for b in range(2, 12)})}
     assert set(found) == {("anna", "ben"), ("anna", DETECTOR), ("ben", DETECTOR)}
     assert found["anna", "ben"].count == 9
     assert found["anna", "ben"].kappa == pytest.approx(1.0)

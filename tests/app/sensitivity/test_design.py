@@ -11,7 +11,7 @@ from rodsight.cli.study import sensitivity
 from rodsight.errors import InputError
 from rodsight.experiment.experiment import load_experiment
 from rodsight.sensitivity.design import Case, choose_factors, one_at_a_time, plan, space_filling, vary
-from rodsight.sensitivity.factors import FACTORS, Scale
+from rodsight.sensitivity.factors import FACTORS, Reading
 from rodsight.sensitivity.networks import VariedInputs
 
 FILE = Path("experiment.toml")
@@ -33,7 +33,7 @@ def test_the_help_names_every_factor_and_its_range():
         groups |= dict.fromkeys(re.findall(r"\w+", names), span)
     for factor in FACTORS:
         span = groups[factor.name]
-        unit = 100.0 if factor.scale is Scale.SHARE else 1.0
+        unit = 100.0 if factor.reading is Reading.SHARE else 1.0
         numbers = {"second": 2.0, "rearrangements": 1.0, "one": 2.0}  # of the whole numbers that are told in words
         found = {numbers.get(word) or float(word) for word in re.findall(r"[\d.]+|second|rearrangements|one", span)}
         assert found == {unit * abs(factor.low), unit * abs(factor.high)}, factor.name
@@ -121,7 +121,7 @@ def test_a_space_filling_design_fills_the_ranges():
         assert place.min() >= 0.0
         assert place.max() <= 1.0
         halves = np.histogram(place, [0.0, 0.5, 1.0 + 1e-9])[0]
-        if factor.scale is not Scale.COUNT:
+        if factor.reading is not Reading.COUNT:
             assert halves.tolist() == [32, 32]  # Sobol points halve every axis
     again = space_filling(factors, 64, seed=0)
     assert [case.key for case in again] == [case.key for case in cases]

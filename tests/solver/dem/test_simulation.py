@@ -7,7 +7,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
-from rodsight.synthetic.packing import prepare_packing
+from rodsight.synthetic.dense_packing import prepare_packing
 
 from solver.bodies.grains import Grains
 from solver.bodies.walls import Walls

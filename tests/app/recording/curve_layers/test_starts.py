@@ -9,7 +9,7 @@ from rodsight import pipeline
 from rodsight.experiment.experiment import load_experiment
 from rodsight.recording.curve_layers.residual_plot import DECADES, envelope
 from rodsight.recording.curve_layers.starts import COLD_SWEEPS, StartGauge, Starts, contact_problem
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
@@ -72,7 +72,7 @@ def test_the_sweeps_saved_lie_between_those_that_bracket_the_warm_start():
 
 
 def test_the_recording_has_warm_cold_and_reached_of_every_frame(solved: Results, tmp_path: Path):
-    path = record(solved, tmp_path / "run.rrd").path
+    path = write_recording(solved, tmp_path / "run.rrd").path
     gauge = StartGauge(scene_of(solved))
     for forces in solved.frames:
         starts = gauge.measure(forces)

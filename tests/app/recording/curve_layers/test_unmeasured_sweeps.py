@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 
 from tests.app.recording.fake_results import make_results
@@ -21,7 +21,7 @@ def test_sweeps_that_were_not_measured_leave_no_gap_in_the_curves(tmp_path):
         name: np.where(known, getattr(history, name), np.nan) for name in ("force_change", "natural_map", "unbalance")
     }
     frame = replace(results.frames[0], history=replace(history, **some))
-    path = record(replace(results, frames=[frame]), tmp_path / "run.rrd").path
+    path = write_recording(replace(results, frames=[frame]), tmp_path / "run.rrd").path
     for entity, name in (
         (entities.SWEEP_FORCE_CHANGE, "force_change"),
         (entities.SWEEP_NATURAL_MAP, "natural_map"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.recording.files.catalogue import can_serve, find_recordings, read_properties, serve, show_together
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 
 from tests.app.recording.fake_results import make_results, make_truth
 from tests.browser import open_when_served, wait_for_forces
@@ -25,9 +25,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory):
     for name in ("soft", "stiff"):
         (runs / name).mkdir()
     results = make_results(3, sweeps=20)
-    record(results, runs / "soft" / "recording.rrd", truth=make_truth(results, np.random.default_rng(3)))
-    record(make_results(4, 5, 4, sweeps=20), runs / "stiff" / "recording.rrd")
-    record(make_results(1, sweeps=20), runs / "one.rrd")
+    write_recording(results, runs / "soft" / "recording.rrd", truth=make_truth(results, np.random.default_rng(3)))
+    write_recording(make_results(4, 5, 4, sweeps=20), runs / "stiff" / "recording.rrd")
+    write_recording(make_results(1, sweeps=20), runs / "one.rrd")
     (runs / "stiff" / "recording-sweeps.rrd").write_bytes(b"")
     (runs / "recording-live.rrd").write_bytes(b"")
     return runs

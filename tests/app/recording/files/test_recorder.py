@@ -8,7 +8,7 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 from rodsight.experiment.units import Scale
-from rodsight.recording.files.finished_run import _check_whole, record
+from rodsight.recording.files.finished_run import _check_whole, write_recording
 from rodsight.recording.files.readback import read_forces
 from rodsight.recording.files.recorder import Recorder
 from rodsight.recording.look import entities
@@ -37,17 +37,17 @@ def test_the_viewers_own_check_accepts_the_file(recording):
 def test_the_same_run_recorded_twice_is_the_same(results, truth, tmp_path):
     paths = [tmp_path / "first.rrd", tmp_path / "second.rrd"]
     for path in paths:
-        record(results, path, photograph=photograph, scale=Scale(PIXEL, SHAPE[0]), truth=truth)
+        write_recording(results, path, photograph=photograph, scale=Scale(PIXEL, SHAPE[0]), truth=truth)
     done = rerun("rrd", "compare", "--unordered", *paths)
     assert done.returncode == 0, done.stderr
 
 
 def test_the_comparison_sees_a_force_that_differs(results, tmp_path):
-    record(results, tmp_path / "first.rrd")
+    write_recording(results, tmp_path / "first.rrd")
     fn = results.frames[1].fn.copy()
     fn[0] *= 1.001
     frames = [results.frames[0], replace(results.frames[1], fn=fn), *results.frames[2:]]
-    record(replace(results, frames=frames), tmp_path / "second.rrd")
+    write_recording(replace(results, frames=frames), tmp_path / "second.rrd")
     assert rerun("rrd", "compare", "--unordered", tmp_path / "first.rrd", tmp_path / "second.rrd").returncode != 0
 
 
@@ -58,7 +58,7 @@ def test_the_file_embeds_its_blueprint(recording):
 
 def test_an_interrupted_recording_leaves_the_former_file_untouched(results, tmp_path):
     path = tmp_path / "run.rrd"
-    record(results, path)
+    write_recording(results, path)
     former = path.read_bytes()
 
     def interrupt(done: int, total: int) -> None:
@@ -66,14 +66,14 @@ def test_an_interrupted_recording_leaves_the_former_file_untouched(results, tmp_
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        record(results, path, progress=interrupt)
+        write_recording(results, path, progress=interrupt)
     assert path.read_bytes() == former
     assert [child.name for child in tmp_path.iterdir()] == ["run.rrd"]
 
 
 def test_progress_is_told_after_every_frame(results, tmp_path):
     told = []
-    record(results, tmp_path / "run.rrd", progress=lambda done, total: told.append((done, total)))
+    write_recording(results, tmp_path / "run.rrd", progress=lambda done, total: told.append((done, total)))
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
@@ -104,14 +104,14 @@ def test_a_recorder_that_was_not_started_says_so(results):
 
 def test_a_size_limit_thins_the_sweeps_and_says_so(tmp_path):
     results = make_results(3, 10, 10, sweeps=400)
-    full = record(results, tmp_path / "full.rrd", sweeps="all")
-    least = record(results, tmp_path / "least.rrd", sweeps="none")
+    full = write_recording(results, tmp_path / "full.rrd", sweeps="all")
+    least = write_recording(results, tmp_path / "least.rrd", sweeps="none")
     limit = (full.size + least.size) // 2
-    report = record(results, tmp_path / "limited.rrd", sweeps="all", max_size=limit)
+    report = write_recording(results, tmp_path / "limited.rrd", sweeps="all", max_size=limit)
     assert report.size <= limit < full.size
     assert report.sweeps is SweepChoice.LOG
     assert "Limited" in report.notes[0]
-    hopeless = record(results, tmp_path / "hopeless.rrd", sweeps="all", max_size=1000)
+    hopeless = write_recording(results, tmp_path / "hopeless.rrd", sweeps="all", max_size=1000)
     assert hopeless.sweeps is SweepChoice.NONE
     assert "Still larger" in hopeless.notes[-1]
     assert len(read_forces(hopeless.path)) == 3
@@ -132,7 +132,7 @@ def test_frames_without_contacts_or_forces_are_recorded_too(tmp_path):
     nothing = replace(
         results.statistics[1], stress=np.full((2, 2), np.nan), pressure=np.nan, friction_angle=np.nan, mean_fn=np.nan
     )
-    report = record(
+    report = write_recording(
         replace(
             results, frames=[results.frames[0], bare, failed], statistics=[results.statistics[0], nothing, nothing]
         ),
@@ -144,12 +144,12 @@ def test_frames_without_contacts_or_forces_are_recorded_too(tmp_path):
 
 def test_photographs_need_a_scale(results, tmp_path):
     with pytest.raises(ValueError, match="scale"):
-        record(results, tmp_path / "run.rrd", photograph=photograph)
+        write_recording(results, tmp_path / "run.rrd", photograph=photograph)
 
 
 def test_an_unknown_tab_is_refused(results, tmp_path):
     with pytest.raises(ValueError, match="Truth"):
-        record(results, tmp_path / "run.rrd", active=Tab.TRUTH)
+        write_recording(results, tmp_path / "run.rrd", active=Tab.TRUTH)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -166,7 +166,7 @@ def test_a_side_file_opens_as_one_recording_with_every_sweep(tmp_path):
     from rodsight.recording.files.side_file import record_side_file
 
     results = make_results(3, sweeps=200)
-    main = record(results, tmp_path / "run.rrd", sweeps="log").path
+    main = write_recording(results, tmp_path / "run.rrd", sweeps="log").path
     size = record_side_file(results, main, tmp_path / "side.rrd", [1])
     assert size == (tmp_path / "side.rrd").stat().st_size
     entries = [RrdReader(str(path)).recordings()[0] for path in (main, tmp_path / "side.rrd")]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.units import Scale
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.readback import read_forces
 from rodsight.recording.files.repair import repair_recording
 from rodsight.recording.files.share import share_recording
@@ -71,7 +71,7 @@ def test_what_cannot_be_shared_is_refused(recording, tmp_path, wrong):
 
 def test_a_cut_recording_is_mended_as_far_as_it_goes(tmp_path):
     results = make_results(20, sweeps=30)
-    path = record(results, tmp_path / "run.rrd").path
+    path = write_recording(results, tmp_path / "run.rrd").path
     whole = path.read_bytes()
     cut = tmp_path / "cut.rrd"
     cut.write_bytes(whole[: int(0.7 * len(whole))])
@@ -114,7 +114,7 @@ def test_wrong_arguments_end_with_status_2_and_one_line(recording, arguments, ca
 @pytest.mark.screen
 def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_path, page):
     # Frames that all look alike: whichever the playing viewer shows, the forces must be there.
-    path = record(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
+    path = write_recording(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
     file = tmp_path / "run.html"
     write_single_page(path, file, title="<shear> & test")
     page.goto(f"file://{file}?renderer=webgl")

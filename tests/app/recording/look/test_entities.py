@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.entities import SCHEMA, Condition, describe_schema
@@ -39,7 +39,7 @@ def test_a_full_recording_holds_exactly_what_the_schema_says(recording):
 
 
 def test_a_bare_recording_holds_the_unconditional_part_of_the_schema(tmp_path):
-    report = record(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
+    report = write_recording(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
     # The only frame is a reset, so that something is flagged.
     absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
     assert written(report.path) == expected(*absent)
@@ -67,7 +67,7 @@ def test_every_frame_begins_with_geometry_width_colour_and_values_in_one_row(rec
 
 def test_both_timelines_end_a_frame_with_the_reported_field(tmp_path):
     results = make_results(3, sweeps=50)
-    path = record(results, tmp_path / "run.rrd").path
+    path = write_recording(results, tmp_path / "run.rrd").path
     style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(results.frames))
     end = -1
     for forces in results.frames:
@@ -81,7 +81,7 @@ def test_both_timelines_end_a_frame_with_the_reported_field(tmp_path):
 
 def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path):
     results = make_results(2, sweeps=30)
-    path = record(results, tmp_path / "run.rrd").path
+    path = write_recording(results, tmp_path / "run.rrd").path
     assert len(latest(path, entities.SLIDING, entities.SWEEP, 30)["Points2D:positions"]) > 0
     assert len(latest(path, entities.SLIDING, entities.SWEEP, 31)["Points2D:positions"]) == 0
     assert len(latest(path, entities.SLIDING, entities.FRAME, 1)["Points2D:positions"]) > 0
@@ -89,7 +89,7 @@ def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path)
 
 def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
     results = make_results(3, sweeps=50, recorded=np.array([0, 10, 49]))
-    path = record(results, tmp_path / "run.rrd", sweeps="none").path
+    path = write_recording(results, tmp_path / "run.rrd", sweeps="none").path
     logged = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
     found = [row for row in logged if "sweep" in row]
     assert [row["sweep"] for row in found] == [
@@ -118,7 +118,7 @@ def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, result
 def test_the_chain_s_own_last_sweep_is_shown_before_the_reported_field(tmp_path):
     results = make_results(2, sweeps=50)
     other = [replace(frame, fn=0.5 * frame.fn) for frame in results.frames]  # reported by something else
-    path = record(replace(results, frames=other), tmp_path / "run.rrd").path
+    path = write_recording(replace(results, frames=other), tmp_path / "run.rrd").path
     style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(other))
     frame = other[0]
     chain = latest(path, entities.FORCES, entities.SWEEP, 49)["LineStrips2D:radii"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.unconverged import doubt_colours
 from rodsight.results.results import Results
@@ -46,7 +46,7 @@ def results_of(heap: Heap) -> Results:
 
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(results_of(heap_at_rest()), tmp_path_factory.mktemp("heap") / "run.rrd").path
+    return write_recording(results_of(heap_at_rest()), tmp_path_factory.mktemp("heap") / "run.rrd").path
 
 
 def test_a_click_on_a_grain_of_a_heap_at_rest_says_balance(shown: Path) -> None:

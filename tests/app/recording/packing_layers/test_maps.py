@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.touching import probability_colours
 from rodsight.recording.packing_layers.unconverged import doubt_colours
@@ -52,7 +52,7 @@ def test_louder_colours_are_lighter_and_the_unknown_is_faint():
 
 def test_maps_follow_the_sweeps_and_end_with_the_reported_field(tmp_path):
     results = make_results(2, sweeps=40)
-    path = record(results, tmp_path / "run.rrd").path
+    path = write_recording(results, tmp_path / "run.rrd").path
     frame = results.frames[0]
     early = latest(path, entities.CHANGE_MAP, entities.SWEEP, 1)["LineStrips2D:colors"]
     late = latest(path, entities.CHANGE_MAP, entities.SWEEP, 39)["LineStrips2D:colors"]
@@ -71,7 +71,9 @@ def test_probabilities_are_shown_per_contact_and_counted(tmp_path):
     results = make_results(1)
     frame = results.frames[0]
     probability = np.linspace(0.0, 1.0, frame.contacts.count)
-    path = record(replace(results, frames=[replace(frame, probability=probability)]), tmp_path / "run.rrd").path
+    path = write_recording(
+        replace(results, frames=[replace(frame, probability=probability)]), tmp_path / "run.rrd"
+    ).path
     shown = latest(path, entities.PROBABILITY, entities.FRAME, 0)
     assert shown["LineStrips2D:colors"] == probability_colours(probability).tolist()
     assert np.allclose(shown["probability"], probability, atol=1e-7)  # float32

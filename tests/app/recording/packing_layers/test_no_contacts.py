@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.readback import read_forces
 
 from solver.bodies.quantity import columns
@@ -25,6 +25,6 @@ def without_contacts(frame: FrameForces) -> FrameForces:
 def test_a_frame_without_contacts_is_recorded(empty, tmp_path):
     results = make_results()
     frames = [without_contacts(frame) if frame.frame in empty else frame for frame in results.frames]
-    record(replace(results, frames=frames), tmp_path / "run.rrd")
+    write_recording(replace(results, frames=frames), tmp_path / "run.rrd")
     found = read_forces(tmp_path / "run.rrd")
     assert [len(found[k].fn) == 0 for k in range(4)] == [k in empty for k in range(4)]

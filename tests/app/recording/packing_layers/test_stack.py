@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.share import share_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.force_style import ForceRange
@@ -55,7 +55,7 @@ def test_a_shared_recording_has_the_layers_of_its_frames_alone(recording, tmp_pa
 
 def test_the_stacks_cost_little(tmp_path):
     results = make_results(6, 16, 14, sweeps=300)
-    path = record(results, tmp_path / "run.rrd").path
+    path = write_recording(results, tmp_path / "run.rrd").path
     stacked = sum(
         np.asarray(row[name]).nbytes
         for entity in (entities.STACK_SWEEPS, *(f"{entities.STACK_LAYERS}/{k}" for k in range(6)))

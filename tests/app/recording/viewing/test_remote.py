@@ -15,7 +15,7 @@ from typing import IO
 
 import pytest
 from playwright.sync_api import Page
-from rodsight.synthetic.experiment import synthesize
+from rodsight.synthetic.synthesis import synthesize
 
 from tests.browser import open_when_served, wait_for_forces
 from tests.program import RODSIGHT

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.recording.files.finished_run import record
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look.texts import _ALIKE, _RANGES, _SIGNS, printable
 from rodsight.recording.tabs.blueprint import Tab
 from rodsight.recording.viewing import viewer
@@ -66,7 +66,7 @@ def test_the_viewer_draws_the_forces_and_every_printable_character(results, tmp_
     assert printable(characters) == characters
     named = replace(results, name="all", configuration=characters)
     frames = [replace(forces, reason=characters) for forces in results.frames]
-    path = record(replace(named, frames=frames), tmp_path / "all.rrd", active=Tab.SUMMARY).path
+    path = write_recording(replace(named, frames=frames), tmp_path / "all.rrd", active=Tab.SUMMARY).path
     with HeadlessViewer(path) as viewer:
         front = viewer.picture()
         viewer.show_tab(Tab.SUMMARY)

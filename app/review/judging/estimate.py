@@ -32,7 +32,7 @@ class Interval:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class DetectorEstimate:
     """How well the detector does, as far as the verdicts tell."""
 
     precision: Interval  # of the detected, the share that are contacts
@@ -42,7 +42,7 @@ class Estimate:
     total: int
 
 
-def estimate(
+def estimate_detector(
     stratum: NDArray[np.int64],
     detected: NDArray[np.bool_],
     probability: Array,
@@ -50,7 +50,7 @@ def estimate(
     chosen: NDArray[np.bool_],
     missed: int,
     rng: np.random.Generator,
-) -> Estimate:
+) -> DetectorEstimate:
     """Estimate precision and recall over a population of candidates (c,).
 
     probability (c,): P(touch) by the detector; outcome (c,): UNJUDGED, NO or YES; chosen (c,): judged because the
@@ -73,7 +73,7 @@ def estimate(
     precision = true[1] / found_count
     recall = true[1] / np.maximum(true.sum(axis=0), 1.0)
     f1 = 2.0 * true[1] / np.maximum(detected.sum() + true.sum(axis=0), 1.0)
-    return Estimate(
+    return DetectorEstimate(
         _interval(precision), _interval(recall), _interval(f1), int((outcome != UNJUDGED).sum()), len(outcome)
     )
 

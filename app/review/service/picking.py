@@ -7,15 +7,15 @@ import numpy as np
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts, detect_contacts
 
-from ..results.results import Results
-from .candidates import Candidates, walls_at
+from ...results.results import Results
+from ..judging.candidate_pairs import CandidatePairs, walls_at
 
 NEAR = 0.45  # [mean radius] how far from a candidate's point a click may be
 WIDEST_GAP = 0.25  # [mean radius] between two bodies that a click can join
 BESIDE = 0.35  # [mean radius] how far from the middle of such a gap a click may be
 
 
-def nearest_candidate(candidates: Candidates, point: Array, mean_radius: float) -> int | None:
+def nearest_candidate(candidates: CandidatePairs, point: Array, mean_radius: float) -> int | None:
     """Row of the candidate that a click at point (2,) [m] means; None if none is near."""
     if candidates.count == 0:
         return None

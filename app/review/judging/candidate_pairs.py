@@ -14,7 +14,7 @@ from solver.contacts.contacts import Contacts, ContactSource, detect_contacts, m
 from solver.contacts.pairs import are_among, are_there, join_keys, recall
 from solver.contacts.verdicts import DETECTED
 
-from ..results.results import Results
+from ...results.results import Results
 
 REACH = 4.0  # [σ of a gap] beyond the threshold
 UNLISTED = 3e-3  # P(touch) that a pair which the detector left out has at most
@@ -22,7 +22,7 @@ THRESHOLD_SIGMAS = 6.0  # of a position: the threshold where the configuration n
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
+class CandidatePairs:
     """Candidates of one frame, ordered by key."""
 
     frame: int  # of the run
@@ -46,7 +46,7 @@ class Candidates:
         return 1.0 - np.abs(2.0 * self.probability - 1.0)
 
 
-def find_candidates(results: Results, frame: int, threshold: float | None = None) -> Candidates:
+def find_candidate_pairs(results: Results, frame: int, threshold: float | None = None) -> CandidatePairs:
     """Find every pair that is detected or whose gap is below threshold + 4 σ of the gap.
 
     frame: of the run; threshold [m]: that of the detector, 6 σ of a position unless given.
@@ -66,7 +66,7 @@ def find_candidates(results: Results, frame: int, threshold: float | None = None
     contacts = measure_pairs(results.grains, position, walls, key[are_there(key, present, near.body_count)])
     sigma = gap_sigma(contacts, deviation)
     probability, detected = _detection(results, frame, contacts, sigma, threshold)
-    return Candidates(frame, contacts, sigma, probability, detected, threshold)
+    return CandidatePairs(frame, contacts, sigma, probability, detected, threshold)
 
 
 def walls_at(results: Results, frame: int) -> Walls:

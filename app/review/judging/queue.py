@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from .candidates import Candidates
+from .candidate_pairs import CandidatePairs
 
 DOUBT_EDGES = np.array([0.002, 0.02, 0.1, 0.3, 0.6])  # between strata
 STRATUM_COUNT = 2 * (len(DOUBT_EDGES) + 1)
@@ -55,19 +55,19 @@ class Queue:
         return None
 
 
-def strata(candidates: Candidates) -> NDArray[np.int64]:
+def strata(candidates: CandidatePairs) -> NDArray[np.int64]:
     """Stratum of every candidate (c,); 0 and 1 hold the most doubtful, the odd ones those detected."""
     doubt = len(DOUBT_EDGES) - np.searchsorted(DOUBT_EDGES, candidates.doubt, side="right")
     return 2 * doubt + candidates.detected
 
 
-def frame_queue(candidates: Candidates) -> Queue:
+def frame_queue(candidates: CandidatePairs) -> Queue:
     """Queue a whole frame, most doubtful first."""
     stratum = strata(candidates)
     return _queue([candidates], [stratum], np.lexsort((_random(candidates), stratum)))
 
 
-def sampled_queue(frames: Sequence[Candidates]) -> Queue:
+def sampled_queue(frames: Sequence[CandidatePairs]) -> Queue:
     """Queue the candidates of many frames in rounds that sample every stratum."""
     stratum = [strata(each) for each in frames]
     drawn = np.concatenate([_random(each) for each in frames])
@@ -94,11 +94,11 @@ def _allocation(stratum: NDArray[np.int64], probability: Array) -> NDArray[np.in
     return np.ceil(ROUND * weight / total).astype(np.int64) if total > 0 else np.zeros(STRATUM_COUNT, np.int64)
 
 
-def _random(candidates: Candidates) -> Array:
+def _random(candidates: CandidatePairs) -> Array:
     return np.random.default_rng([_SEED, candidates.frame]).random(candidates.count)
 
 
-def _queue(frames: Sequence[Candidates], stratum: Sequence[NDArray[np.int64]], order: NDArray[np.int64]) -> Queue:
+def _queue(frames: Sequence[CandidatePairs], stratum: Sequence[NDArray[np.int64]], order: NDArray[np.int64]) -> Queue:
     return Queue(
         np.concatenate([np.full(each.count, each.frame, np.int64) for each in frames])[order],
         np.concatenate([each.key for each in frames])[order],

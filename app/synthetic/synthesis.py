@@ -15,8 +15,8 @@ from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
 
 from ..errors import InputError
 from ..experiment.units import Scale
-from . import tables
-from .packing import prepare_packing
+from . import experiment_files
+from .dense_packing import prepare_packing
 from .rearrangement import choose_window, measure_old_unbalance
 from .speckle import SpeckleSettings, render_photograph
 
@@ -107,10 +107,10 @@ def synthesize(
     event = int(np.nanargmax(old_unbalance)) if truth.frame_count > 1 else 0
 
     out.mkdir(parents=True, exist_ok=True)
-    tables.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
-    tables.write_wall_forces(out / "wall_forces.csv", truth)
-    tables.write_truth_contacts(out / "truth_contacts.csv", truth)
-    tables.write_tracks(out / "truth_tracks.csv", truth.position, truth.rotation)
+    experiment_files.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
+    experiment_files.write_wall_forces(out / "wall_forces.csv", truth)
+    experiment_files.write_truth_contacts(out / "truth_contacts.csv", truth)
+    experiment_files.write_tracks(out / "truth_tracks.csv", truth.position, truth.rotation)
     if photographs:
         source, shape = _write_photographs(
             out, truth, speckle, seed, plan.step_degrees, jpeg_quality, progress or _silent
@@ -118,7 +118,7 @@ def synthesize(
     else:
         source, shape = _write_tracks(out, truth, noise, seed, plan.step_degrees), None
     # Last, so that a folder that was left unfinished is not an experiment.
-    tables.write_experiment(
+    experiment_files.write_experiment(
         out / "experiment.toml",
         name=out.resolve().name,
         remark=_remark(preset, seed, truth, old_unbalance, event),
@@ -207,7 +207,9 @@ def _write_photographs(
             raise OSError(f"{name}: the photograph could not be written")
         progress("photograph", k + 1, truth.frame_count)
     scale = Scale(pixel, height)
-    tables.write_grains_in_pixels(out / "grains.csv", scale.to_pixels(truth.position[0]), truth.radius / pixel)
+    experiment_files.write_grains_in_pixels(
+        out / "grains.csv", scale.to_pixels(truth.position[0]), truth.radius / pixel
+    )
     classes = ", ".join(f"{radius:g}" for radius in np.unique(truth.radius))
     source = f"""[photographs]
 files = "photos/*.{suffix}"
@@ -224,9 +226,11 @@ def _write_tracks(out: Path, truth: DemTruth, noise: float, seed: int, step_degr
     rng = np.random.default_rng([seed, 1])
     position = truth.position + noise * rng.standard_normal(truth.position.shape)
     rotation = truth.rotation + noise / truth.radius * rng.standard_normal(truth.rotation.shape)
-    tables.write_tracks(out / "tracks.csv", position, rotation)
-    tables.write_grains(out / "grains.csv", truth.radius)
-    tables.write_times(out / "times.csv", step_degrees / SHEAR_RATE * np.arange(truth.frame_count, dtype=np.float64))
+    experiment_files.write_tracks(out / "tracks.csv", position, rotation)
+    experiment_files.write_grains(out / "grains.csv", truth.radius)
+    experiment_files.write_times(
+        out / "times.csv", step_degrees / SHEAR_RATE * np.arange(truth.frame_count, dtype=np.float64)
+    )
     return f"""[tracks]
 positions = "tracks.csv"
 grains = "grains.csv"

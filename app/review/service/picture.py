@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from ..experiment.units import Scale
-from ..recording.look.canvas import Canvas
-from ..recording.review_layer import Backdrop, Chosen, Marked, ReviewLayer
-from ..results.results import Results
+from ...experiment.units import Scale
+from ...recording.look.canvas import Canvas
+from ...recording.review_layer import Backdrop, Chosen, Marked, ReviewLayer
+from ...results.results import Results
 
 Photograph = NDArray[np.uint8]  # (H, W) grey
 PhotographSource = Callable[[int], Photograph]

@@ -15,9 +15,9 @@ from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..errors import InputError
-from ..recording.viewing.web_viewer import WebViewer, read_web_viewer
-from ..verdicts.log import Flag, Origin, Verdict
+from ...errors import InputError
+from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
+from ...verdicts.log import Flag, Origin, Verdict
 from .gate import SAFE_HEADERS, Gate
 from .session import BadRequest, ReviewSession, Viewpoint
 
@@ -50,7 +50,7 @@ class ReviewServer:
         self._http = ThreadingHTTPServer(("127.0.0.1", port), Handler)
         self._http.daemon_threads = True
         self.gate = Gate(self._http.server_address[1])
-        page = files(__name__.rpartition(".")[0]) / "page"
+        page = files(__name__.rsplit(".", 2)[0]) / "page"
         self.assets = {path: (page.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
         self._viewer: WebViewer | None = None
         self._packed: bytes | None = None

@@ -14,11 +14,11 @@ from solver.bodies.grains import Array
 from solver.contacts.contacts import measure_pairs
 from solver.contacts.pairs import are_among, are_there, join_keys, recall
 
-from ..errors import InputError
-from ..verdicts.decisions import Decisions, decide
-from .candidates import Candidates, find_candidates, walls_at
-from .command import Reviewed
-from .estimate import NO, UNJUDGED, YES, Estimate, estimate
+from ...errors import InputError
+from ...verdicts.decisions import Decisions, decide
+from ..reviewed import Reviewed
+from .candidate_pairs import CandidatePairs, find_candidate_pairs, walls_at
+from .estimate import NO, UNJUDGED, YES, DetectorEstimate, estimate_detector
 from .queue import strata
 from .threshold import ThresholdCurve, ThresholdFit, even_thresholds, fit_threshold, threshold_curve
 
@@ -86,7 +86,7 @@ class JudgedPairs:
 class VerdictScore:
     frames: list[FrameScore]  # those with a verdict
     total: FrameScore
-    estimate: Estimate  # over all candidates of those frames, judged or not
+    estimate: DetectorEstimate  # over all candidates of those frames, judged or not
     pairs: JudgedPairs
     curve: ThresholdCurve
     disputed: int
@@ -103,7 +103,7 @@ def score_verdicts(reviewed: Reviewed) -> VerdictScore | None:
         return None
     frames, parts = [], []
     for frame in sorted({k for k, _ in decisions.contact | decisions.no_contact}):
-        pairs = _pairs_of(reviewed, find_candidates(results, frame, reviewed.threshold), decisions)
+        pairs = _pairs_of(reviewed, find_candidate_pairs(results, frame, reviewed.threshold), decisions)
         yes, no = pairs.outcome == YES, pairs.outcome == NO
         seen = pairs.detected
         counts = (int(each.sum()) for each in (yes & seen, no & seen, yes & ~seen, no & ~seen))
@@ -112,7 +112,7 @@ def score_verdicts(reviewed: Reviewed) -> VerdictScore | None:
     pairs = JudgedPairs(*(np.concatenate([getattr(p, name) for p in parts]) for name in JudgedPairs.__slots__))
     total = FrameScore(-1, *(sum(getattr(f, name) for f in frames) for name in ("hits", "false", "missed", "rejected")))
     known = pairs.stratum >= 0
-    estimated = estimate(
+    estimated = estimate_detector(
         pairs.stratum[known], pairs.detected[known], pairs.probability[known], pairs.outcome[known],
         pairs.outcome[known] != UNJUDGED, int((pairs.outcome[~known] == YES).sum()), np.random.default_rng(_SEED),
     )  # fmt: skip
@@ -188,7 +188,7 @@ def print_score(console: Console, score: VerdictScore, fitted: ThresholdFit | No
         )
 
 
-def _pairs_of(reviewed: Reviewed, candidates: Candidates, decisions: Decisions) -> JudgedPairs:
+def _pairs_of(reviewed: Reviewed, candidates: CandidatePairs, decisions: Decisions) -> JudgedPairs:
     results, frame = reviewed.results, candidates.frame
     yes, no = decisions.forced(frame), decisions.forbidden(frame)
     key = join_keys(candidates.key, yes, no)

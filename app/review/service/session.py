@@ -11,8 +11,8 @@ import numpy as np
 from solver.contacts.contacts import Contacts, measure_pairs
 from solver.contacts.pairs import split_key
 
-from .. import __version__
-from ..recording.review_layer import (
+from ... import __version__
+from ...recording.review_layer import (
     CONTACT,
     DETECTED,
     HIDDEN,
@@ -21,15 +21,15 @@ from ..recording.review_layer import (
     UNSURE,
     Marked,
 )
-from ..results.results import Results
-from ..verdicts.decisions import Bodies
-from ..verdicts.log import Entry, Flag, Origin, Pair, Verdict, VerdictLog, canonical
-from ..verdicts.reviewers import agreements
-from .candidates import Candidates, find_candidates, gap_sigma, walls_at
-from .estimate import NO, UNJUDGED, YES, estimate
+from ...results.results import Results
+from ...verdicts.decisions import Bodies
+from ...verdicts.log import Entry, Flag, Origin, Pair, Verdict, VerdictLog, canonical
+from ...verdicts.reviewers import reviewer_kappas
+from ..judging.candidate_pairs import CandidatePairs, find_candidate_pairs, gap_sigma, walls_at
+from ..judging.estimate import NO, UNJUDGED, YES, estimate_detector
+from ..judging.queue import Queue, frame_queue, sampled_queue
 from .picking import gap_at, nearest_candidate
 from .picture import Picture
-from .queue import Queue, frame_queue, sampled_queue
 
 _KINDS = {Verdict.CONTACT: CONTACT, Verdict.NO_CONTACT: NO_CONTACT, Verdict.UNSURE: UNSURE}
 _OUTCOMES = {Verdict.CONTACT: YES, Verdict.NO_CONTACT: NO, Verdict.UNSURE: UNJUDGED}
@@ -62,7 +62,7 @@ class ReviewSession:
         self.bodies = Bodies.of(results.tracks, results.walls)
         self._rows = self.bodies.rows()
         self._threshold = threshold
-        self._candidates: dict[int, Candidates] = {}
+        self._candidates: dict[int, CandidatePairs] = {}
         self._queues: dict[int | None, tuple[Queue, dict[tuple[int, int], int]]] = {}
         self._detections: dict[int, dict[Pair, bool]] = {}
         self._lock = threading.RLock()
@@ -99,7 +99,7 @@ class ReviewSession:
         for frame in {pair[0] - self.first_frame for pair, _ in self.log.verdicts()}:
             if 0 <= frame < len(self.results.frames):
                 detected |= self._detection(frame)
-        return [_finite(asdict(each)) for each in agreements(self.log, detected)]
+        return [_finite(asdict(each)) for each in reviewer_kappas(self.log, detected)]
 
     def following(self, view: Viewpoint, after: tuple[int, int] | None = None) -> dict[str, Any] | None:
         """The next doubtful candidate, None when all are judged."""
@@ -219,10 +219,10 @@ class ReviewSession:
         """Contact point of a pair (2,) [m]."""
         return self._measure(frame, key).point[0]
 
-    def candidates(self, frame: int) -> Candidates:
+    def candidates(self, frame: int) -> CandidatePairs:
         with self._lock:
             if frame not in self._candidates:
-                self._candidates[frame] = find_candidates(self.results, frame, self._threshold)
+                self._candidates[frame] = find_candidate_pairs(self.results, frame, self._threshold)
             return self._candidates[frame]
 
     def _queue(self, view: Viewpoint) -> tuple[Queue, dict[tuple[int, int], int]]:
@@ -273,7 +273,7 @@ class ReviewSession:
             elif entry.verdict is Verdict.CONTACT and (frame is None or pair[0] == frame):
                 missed += 1
         rng = np.random.default_rng(_ESTIMATE_SEED)
-        return asdict(estimate(queue.stratum, queue.detected, queue.probability, outcome, chosen, missed, rng))
+        return asdict(estimate_detector(queue.stratum, queue.detected, queue.probability, outcome, chosen, missed, rng))
 
     def _measured(self, frame: int, key: int, pair: Contacts) -> dict[str, Any]:
         candidates = self.candidates(frame)

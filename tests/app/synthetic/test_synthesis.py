@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from rodsight.errors import InputError
 from rodsight.experiment.units import Scale
-from rodsight.synthetic.experiment import Synthesis, synthesize
-from rodsight.synthetic.packing import RADIUS_CLASSES, choose_radii
+from rodsight.synthetic.dense_packing import RADIUS_CLASSES, choose_radii
 from rodsight.synthetic.rearrangement import choose_window
+from rodsight.synthetic.synthesis import Synthesis, synthesize
 
 # A packing takes some ten thousand steps to prepare: minutes without compilation.
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
