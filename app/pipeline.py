@@ -21,12 +21,12 @@ from solver.statistics.frame_statistics import FrameStatistics
 
 from .atomic import write_atomically
 from .errors import InputError
-from .experiment.config import as_toml
+from .experiment.config.experiment_file import as_toml
+from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
 from .experiment.experiment import read_grain_guess, read_times, read_tracks, read_walls
 from .experiment.plausibility import check_inside, check_radii, rods_beyond_ends
 from .experiment.scaling import make_scale
-from .experiment.unused_keys import refuse_unused_keys
 from .inference.inference import (
     CoordinationError,
     CorrectedSequence,

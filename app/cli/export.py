@@ -159,7 +159,7 @@ def _scale_of(results: Results, pixel_size: float | None) -> Scale:
     """The scale of the photographs; their height, where it is not known, puts the packing just inside."""
     import tomllib
 
-    from ..experiment.config import ExperimentFile
+    from ..experiment.config.experiment_file import ExperimentFile
     from ..experiment.units import Scale
 
     if pixel_size is None:

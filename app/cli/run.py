@@ -220,8 +220,8 @@ def record(
 @contextmanager
 def open_run(request: Request) -> Iterator[Run]:
     """The run that was asked for, with progress shown while it is open."""
+    from ..experiment.config.unused_keys import refuse_unused_keys
     from ..experiment.experiment import load_experiment
-    from ..experiment.unused_keys import refuse_unused_keys
     from ..run_folder import Run
 
     experiment = load_experiment(request.experiment, request.settings)

@@ -12,7 +12,7 @@ from .terminal import table_console
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..experiment.keys import Key, KeySection
+    from ..experiment.config.keys import Key, KeySection
 
 
 def settings(
@@ -28,9 +28,9 @@ def settings(
 
     Example: rodsight settings solver
     """
-    from ..experiment.config import ExperimentFile
-    from ..experiment.keys import find_key, list_sections, nearest_key
-    from ..experiment.settings_page import settings_page
+    from ..experiment.config.experiment_file import ExperimentFile
+    from ..experiment.config.keys import find_key, list_sections, nearest_key
+    from ..experiment.config.settings_page import settings_page
 
     if markdown:
         print(settings_page(), end="")

@@ -14,7 +14,7 @@ from solver.bodies.grains import Array
 
 from ..errors import InputError
 from ..tracks import Tracks, TrackStatus, WallTracks
-from .config import ExperimentFile, load_config
+from .config.experiment_file import ExperimentFile, load_config
 from .photographs import Photographs
 from .tables import Table, check_frames, check_unique, read_table
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.calibration.calibrate import Calibration
 
-from .config import PhotographsSection
+from .config.experiment_file import PhotographsSection
 from .lens import BrownLens, Lens, OpenCVLens
 from .units import Scale, pixel_size_between
 

@@ -10,7 +10,7 @@ from solver.calibration.settings import CalibrationSettings
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frames import SequenceSettings
 
-from ..experiment.config import ExperimentFile
+from ..experiment.config.experiment_file import ExperimentFile
 
 SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 

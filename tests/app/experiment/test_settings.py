@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rodsight.cli.main import main
 from rodsight.errors import InputError
-from rodsight.experiment.config import ExperimentFile, as_toml, load_config
-from rodsight.experiment.keys import find_key, list_keys, list_sections, nearest_key
-from rodsight.experiment.settings_page import FIRST_LINE, settings_page
-from rodsight.experiment.unused_keys import refuse_unused_keys, unused_keys
+from rodsight.experiment.config.experiment_file import ExperimentFile, as_toml, load_config
+from rodsight.experiment.config.keys import find_key, list_keys, list_sections, nearest_key
+from rodsight.experiment.config.settings_page import FIRST_LINE, settings_page
+from rodsight.experiment.config.unused_keys import refuse_unused_keys, unused_keys
 from rodsight.inference.settings import InferenceSettings, material_of, settings_of
 from rodsight.tracking.detection.detect import DetectionSettings
 from rodsight.tracking.settings import TrackingSettings

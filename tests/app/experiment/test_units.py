@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.errors import InputError
-from rodsight.experiment.config import load_config
+from rodsight.experiment.config.experiment_file import load_config
 from rodsight.experiment.lens import BrownLens, OpenCVLens, invert
 from rodsight.experiment.scaling import make_scale
 from rodsight.experiment.units import Scale, pixel_size_between

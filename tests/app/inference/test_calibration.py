@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.experiment.config import ExperimentFile
+from rodsight.experiment.config.experiment_file import ExperimentFile
 from rodsight.experiment.scaling import make_scale
 from rodsight.inference.calibration import calibrate_tracks, radius_classes
 from rodsight.inference.settings import radii_are_metres

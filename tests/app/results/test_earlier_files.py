@@ -121,7 +121,7 @@ def test_an_essential_dataset_that_is_missing_is_named(path, file):
         load_results(file)
 
 
-@pytest.mark.parametrize("path", [path for path in (*ESSENTIAL, "frames/trust", "sweeps/fn", "calibration/offset")])
+@pytest.mark.parametrize("path", [*ESSENTIAL, "frames/trust", "sweeps/fn", "calibration/offset"])
 def test_a_dataset_of_another_shape_is_named(path, file):
     with h5py.File(file, "a") as store:
         values, kind = store[path][()], store[path].dtype

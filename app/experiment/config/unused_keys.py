@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ...errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from .config import ExperimentFile
+    from .experiment_file import ExperimentFile
 
 ENSEMBLE = 'has no effect on the ensemble, which weighs probabilities: leave it out, or set solver.estimator = "nlgs"'
 ONE_CHAIN = 'has no effect on estimator "nlgs", a single chain without members: leave it out, or set "ensemble"'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .config import ExperimentFile
+from .experiment_file import ExperimentFile
 from .keys import Key, KeySection, list_sections
 
 FIRST_LINE = "<!-- Generated: rodsight settings --markdown > app/docs/settings.md -->"

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from ..errors import InputError
+from ...errors import InputError
 from .input_sections import GivenTracks, PhotographsSection, WallsSection
 from .keys import find_key, nearest_key
 from .section import Section, key
