@@ -109,7 +109,7 @@ def score(
     from ..results.truth import accuracy, correlations
     from ..results.truth import score as score_frames
     from ..review.judging import scoring
-    from ..review.reviewed import Reviewed
+    from ..review.reviewed_run import Reviewed
     from ..run_folder import RESULTS, Run
 
     file = results / RESULTS if results.is_dir() else results

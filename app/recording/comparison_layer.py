@@ -28,9 +28,9 @@ from .look.force_style import ForceRange, ForceStyle
 from .look.scene import Clock, Scene
 from .look.texts import printable
 from .look.values import known, log_scalar
+from .packing_layers.grains_and_walls import log_grains_and_walls
 from .packing_layers.legends import PIECES, log_force_legend, log_ramp_legend
 from .packing_layers.network import body_values
-from .packing_layers.packing import log_packing
 from .tabs.views import curve_view, drawn_view, packing_view
 
 APPLICATION_ID = "rodsight-compare"  # its own, so that a user's layout of runs is not used for comparisons
@@ -189,7 +189,7 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
 def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -> None:
     k, stream = clock.frame, clock.stream
     a, b = comparison.first.frames[k], comparison.second.frames[k]
-    log_packing(clock, scene, comparison.base.frames[k])
+    log_grains_and_walls(clock, scene, comparison.base.frames[k])
     clock.end()
     for path, field in ((FIRST, a), (SECOND, b)):
         _log_network(clock, scene, path, field)

@@ -16,7 +16,7 @@ from ..experiment.photographs import Photographs
 from ..experiment.scaling import make_scale
 from ..verdicts.table import export_verdicts, import_verdicts
 from .judging.candidate_pairs import find_candidate_pairs
-from .reviewed import Reviewed, open_reviewed
+from .reviewed_run import Reviewed, open_reviewed
 from .service.picture import Picture
 from .service.server import ReviewServer
 from .service.session import ReviewSession

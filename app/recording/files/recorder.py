@@ -28,11 +28,11 @@ from ..look.scene import Clock, Scene
 from ..look.texts import printable
 from ..packing_layers.backdrop import log_photograph
 from ..packing_layers.changes import log_changes
+from ..packing_layers.grains_and_walls import log_grains_and_walls
 from ..packing_layers.legends import log_legends
 from ..packing_layers.network import SweepChoice, chosen_sweeps, log_network
-from ..packing_layers.packing import log_packing
 from ..packing_layers.reviewed import log_reviewed
-from ..packing_layers.rods import log_rods
+from ..packing_layers.rods_in_3d import log_rods
 from ..packing_layers.stack import StackWriter
 from ..packing_layers.touching import log_touching, log_touching_styles
 from ..packing_layers.true_forces import TruthWriter
@@ -123,7 +123,7 @@ class Recorder:
         self._next_sweep += span
         if photograph is not None:
             log_photograph(clock, scene.canvas, photograph)
-        log_packing(clock, scene, forces)
+        log_grains_and_walls(clock, scene, forces)
         self.network_rows += log_network(clock, scene, forces, self._sweeps, self._kept)
         starts = self._gauge.measure(forces) if self._gauge else UNKNOWN
         log_starts(clock, starts)

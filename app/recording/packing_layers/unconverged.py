@@ -18,8 +18,8 @@ from solver.statistics.force_statistics import mean_normal_force
 from ..look import entities
 from ..look.colours import DOUBT_RAMP, OPEN, packed, packed_one
 from ..look.scene import Clock, Scene
+from .grains_and_walls import last_seen
 from .network import SweepChoice, visible_sweeps
-from .packing import last_seen
 
 DECADES = (-4.0, 0.0)  # log10 of the mean f_n: the ends of the colour ramp
 LEVELS = 33  # colours that are told apart: few of them keep the file small

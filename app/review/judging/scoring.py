@@ -16,7 +16,7 @@ from solver.contacts.pairs import are_among, are_there, join_keys, recall
 
 from ...errors import InputError
 from ...verdicts.decisions import Decisions, decide
-from ..reviewed import Reviewed
+from ..reviewed_run import Reviewed
 from .candidate_pairs import CandidatePairs, find_candidate_pairs, walls_at
 from .estimate import NO, UNJUDGED, YES, DetectorEstimate, estimate_detector
 from .queue import strata

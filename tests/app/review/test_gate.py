@@ -7,7 +7,7 @@ import threading
 import pytest
 from rodsight.cli.main import main
 from rodsight.review.command import open_session
-from rodsight.review.reviewed import open_reviewed
+from rodsight.review.reviewed_run import open_reviewed
 from rodsight.review.service.server import ReviewServer
 from rodsight.verdicts.log import VERDICTS
 

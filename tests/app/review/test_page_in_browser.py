@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from rodsight.results.store import load_results
 from rodsight.review.command import open_session
-from rodsight.review.reviewed import open_reviewed
+from rodsight.review.reviewed_run import open_reviewed
 from rodsight.review.service.server import ReviewServer
 from rodsight.review.service.session import ReviewSession
 from rodsight.verdicts.decisions import Bodies

@@ -18,7 +18,7 @@ from ..look.texts import printable
 from ..look.values import known
 
 
-def log_packing(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+def log_grains_and_walls(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log walls and grains of one frame."""
     clock.start()
     _log_walls(clock, scene)
