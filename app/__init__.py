@@ -7,8 +7,18 @@ so that a user's own app.py is never taken for it.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .errors import InputError
+    from .notebook.run import Run, run
+    from .notebook.run import open_run as open
+    from .notebook.solve import solve
+
+__all__ = ["InputError", "Run", "__version__", "open", "run", "solve"]
 
 __version__ = "0.1.0"
 
@@ -28,3 +38,25 @@ def _load_own_solver() -> None:
 
 
 _load_own_solver()
+
+# Public names, loaded when they are first asked for: their module, and what they are called there.
+_LAZY = {
+    "InputError": ("errors", "InputError"),
+    "Run": ("notebook.run", "Run"),
+    "open": ("notebook.run", "open_run"),
+    "run": ("notebook.run", "run"),
+    "solve": ("notebook.solve", "solve"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _LAZY[name]
+    value = getattr(import_module(f".{module}", __name__), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

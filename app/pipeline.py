@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,9 @@ from .inference.settings import material_of, settings_of
 from .results.checkpoint import Checkpoint
 from .results.results import Results, TruthContacts
 from .results.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
-from .results.truth import read_truth, true_names
-from .run_folder import RECORDING, REPORT, RESULTS, SIDE, TRACKS, UNFINISHED, Run
+from .results.summary import save_summary, summarize
+from .results.truth import read_truth, score, true_names
+from .run_folder import RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, UNFINISHED, Run
 from .sensitivity.execution import available_cores
 from .sensitivity.spread import calibrated_inputs, solve_members, with_spread
 from .sensitivity.study import Nominal
@@ -260,6 +262,17 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
         run.notes.append(write_side_file(results, file, run.file(SIDE), run.full_frames))
     run.timings.add("recording", since)
     return file
+
+
+def conclude(run: Run, results: Results, truth: TruthContacts | None, since: float) -> dict[str, Any]:
+    """Summarise a run, its accuracy where there is a truth, and store that beside the results.
+
+    since: when it began, of time.perf_counter.
+    """
+    agreement = score(results, truth) if truth is not None else None
+    summary = summarize(results, agreement, {**run.timings.seconds, "total": time.perf_counter() - since})
+    save_summary(run.file(SUMMARY), summary)
+    return summary
 
 
 def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthContacts | None:

@@ -72,9 +72,7 @@ def run(
     Example: rodsight run sample_data/shear --view web
     """
     from .. import pipeline
-    from ..results.summary import print_summary, save_summary, summarize
-    from ..results.truth import score as score_frames
-    from ..run_folder import SUMMARY
+    from ..results.summary import print_summary
     from .look import show
     from .watching import watching
 
@@ -85,13 +83,10 @@ def run(
     with open_run(request) as plain, watching(plain, view, console) as (run, watch):
         results = pipeline.solve(run)
         truth = pipeline.load_truth(run, results)
-        agreement = score_frames(results, truth) if truth is not None else None
         recording = pipeline.record(run, results, truth)
-    seconds = {**run.timings.seconds, "total": time.perf_counter() - began}
-    summary = summarize(results, agreement, seconds)
-    save_summary(run.file(SUMMARY), summary)
+    summary = pipeline.conclude(run, results, truth, began)
     print_summary(console, summary)
-    console.print(f"Results in {run.folder}/ after {seconds['total']:.1f} s.", highlight=False)
+    console.print(f"Results in {run.folder}/ after {summary['timings']['total']:.1f} s.", highlight=False)
     _tell_notes(run, console)
     watched = watch is not None and watch.started  # the viewer is open already
     return show(recording, "none" if watched else view, console)
@@ -171,18 +166,15 @@ def solve(
     Example: rodsight solve sample_data/shear --set material.friction=0.3
     """
     from .. import pipeline
-    from ..results.summary import print_summary, save_summary, summarize
-    from ..results.truth import score as score_frames
-    from ..run_folder import SUMMARY
+    from ..results.summary import print_summary
 
     request = Request(experiment, settings, quiet, out, frames)
     request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)
+    began = time.perf_counter()
     with open_run(request) as run:
         results = pipeline.solve(run)
         truth = pipeline.load_truth(run, results)
-    agreement = score_frames(results, truth) if truth is not None else None
-    summary = summarize(results, agreement, run.timings.seconds)
-    save_summary(run.file(SUMMARY), summary)
+    summary = pipeline.conclude(run, results, truth, began)
     console = request.console
     print_summary(console, summary)
     _tell_notes(run, console)

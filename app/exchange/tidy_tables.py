@@ -1,4 +1,4 @@
-"""Results as tidy tables, one row per observation, CSV or Parquet: contacts, grains and frames. SI units."""
+"""Results as tidy tables, one row per observation, CSV or Parquet: contacts, grains, frames, walls. SI units."""
 
 from __future__ import annotations
 
@@ -27,6 +27,11 @@ IDENTITY = {
     "y": "m",
     "theta": "rad",
     "radius": "m",
+    "x1": "m",
+    "y1": "m",
+    "x2": "m",
+    "y2": "m",
+    "pressure": "Pa",
 }  # units of columns that every table begins with
 SAID = ("time", "i", "j", "point", "normal", "position", "rotation")  # among these, or by other names
 SPREAD = ("xy", "axis", "wall", "anisotropy", "member", "component")  # dimensions that become columns
@@ -45,11 +50,12 @@ def make_tables(results: Results) -> dict[str, pa.Table]:
         "contacts": _table(_contacts(results) | _stored_columns(results, stored, ("contact",))),
         "grains": _table(_grains(results) | _stored_columns(results, stored, ("frame", "grain"))),
         "frames": _table(_frames(results) | _stored_columns(results, stored, ("frame",))),
+        "walls": _table(_walls(results) | _stored_columns(results, stored, ("frame", "wall"))),
     }
 
 
 def write_tables(results: Results, folder: Path, kind: Kind = "csv") -> list[Path]:
-    """Write contacts, grains and frames to a folder; returns the files."""
+    """Write contacts, grains, frames and walls to a folder; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name, table in make_tables(results).items():
@@ -96,6 +102,19 @@ def _frames(results: Results) -> dict[str, Column]:
     return _identity(frame=np.arange(len(results.frames)), time=results.tracks.time)
 
 
+def _walls(results: Results) -> dict[str, Column]:
+    walls = results.walls
+    f, w = walls.endpoints.shape[:2]
+    ends = walls.endpoints.reshape(f * w, 4)
+    return _identity(
+        frame=np.repeat(np.arange(f), w),
+        time=np.repeat(results.tracks.time, w),
+        wall=list(walls.name) * f,
+        x1=ends[:, 0], y1=ends[:, 1], x2=ends[:, 2], y2=ends[:, 3],
+        pressure=np.tile(walls.pressure, f),
+    )  # fmt: skip
+
+
 def _identity(**values: object) -> dict[str, Column]:
     return {name: Column(each, IDENTITY.get(name, "")) for name, each in values.items()}
 
@@ -104,7 +123,7 @@ def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tu
     """Everything in results.h5 that has one value, or a few with names, for each of these rows."""
     labels = {name: tuple(map(str, DIMENSIONS[name].labels or ())) for name in SPREAD} | {"wall": results.walls.name}
     columns: dict[str, Column] = {}
-    for each in entries("tracks", "frames", "statistics"):
+    for each in entries("tracks", "walls", "frames", "statistics"):
         rest = each.dims[len(rows) :]
         if each.name in SAID or each.path not in stored or each.dims != rows + rest or not set(rest) <= set(SPREAD):
             continue

@@ -10,7 +10,7 @@ from solver.calibration.settings import CalibrationSettings
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frames import SequenceSettings
 
-from ..experiment.config.experiment_file import ExperimentFile
+from ..experiment.config.experiment_file import ExperimentFile, InferenceSections
 
 SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 
@@ -51,13 +51,13 @@ class InferenceSettings:
         return replace(self, sequence=replace(sequence, chain=replace(sequence.chain, keep="none")))
 
 
-def material_of(config: ExperimentFile) -> RodMaterial:
+def material_of(config: InferenceSections) -> RodMaterial:
     """The rods of an experiment."""
     return RodMaterial(**config.material.model_dump())
 
 
-def settings_of(config: ExperimentFile) -> InferenceSettings:
-    """The settings of an experiment."""
+def settings_of(config: InferenceSections) -> InferenceSettings:
+    """The settings of an experiment, or of a call."""
     calibration, contacts = config.calibration, config.contacts
     return InferenceSettings(
         sequence=sequence_settings(config),
@@ -71,7 +71,7 @@ def settings_of(config: ExperimentFile) -> InferenceSettings:
     )
 
 
-def sequence_settings(config: ExperimentFile) -> SequenceSettings:
+def sequence_settings(config: InferenceSections) -> SequenceSettings:
     """The solver's settings of an experiment, but for the overlap of its surfaces."""
     solver, contacts = config.solver, config.contacts
     paper = solver.preset == "paper"
@@ -97,10 +97,10 @@ def sequence_settings(config: ExperimentFile) -> SequenceSettings:
     )
 
 
-def radii_are_metres(config: ExperimentFile) -> bool:
+def radii_are_metres(config: InferenceSections) -> bool:
     """Whether radii are known by themselves, so that they tell the pixel size.
 
     Radii that were seen in the photographs share the error of its pixel size and cannot tell it.
     """
-    section = config.photographs
+    section = config.photographs if isinstance(config, ExperimentFile) else None
     return section is None or (bool(section.radii) and section.grains is None)

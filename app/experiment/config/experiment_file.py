@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
@@ -24,9 +25,21 @@ from .tuning_sections import (
 )
 from .unused_keys import unused_keys
 
+S = TypeVar("S", bound="InferenceSections")
 
-class ExperimentFile(Section):
-    """Name and truth of an experiment; everything else stands in sections."""
+
+class InferenceSections(Section):
+    """The sections that say how tracks become forces, wherever the tracks come from."""
+
+    material: MaterialSection = key("What all rods have in common.", default=MaterialSection())
+    calibration: CalibrationSection = key("Self-calibration from persistent contacts.", default=CalibrationSection())
+    contacts: ContactsSection = key("Tuning of contact detection.", default=ContactsSection())
+    solver: SolverSection = key("Tuning of the force solver.", default=SolverSection())
+    recording: RecordingSection = key("Tuning of the recording.", default=RecordingSection())
+
+
+class InputSections(Section):
+    """The sections that say what was measured, and how photographs become tracks."""
 
     name: Annotated[str, Field(pattern=r"^[\w][\w .+-]*$")] = key(
         "Name of the experiment: of its results' folder, too."
@@ -34,12 +47,12 @@ class ExperimentFile(Section):
     photographs: PhotographsSection | None = key("Photographs to be tracked. Give these or tracks.", default=None)
     tracks: GivenTracks | None = key("Grains that any other tool has tracked. Give these or photographs.", default=None)
     walls: WallsSection | None = key("The walls; without them grains are tracked but not solved.", default=None)
-    material: MaterialSection = key("What all rods have in common.", default=MaterialSection())
     tracking: TrackingSection = key("Tuning of the tracker.", default=TrackingSection())
-    calibration: CalibrationSection = key("Self-calibration from persistent contacts.", default=CalibrationSection())
-    contacts: ContactsSection = key("Tuning of contact detection.", default=ContactsSection())
-    solver: SolverSection = key("Tuning of the force solver.", default=SolverSection())
-    recording: RecordingSection = key("Tuning of the recording.", default=RecordingSection())
+
+
+class ExperimentFile(InferenceSections, InputSections):
+    """All of an experiment."""
+
     sensitivity: SensitivitySection = key("Ranges of the robustness study.", default=SensitivitySection())
     truth: str | None = key("Table frame,i,j,fn,ft of true contact forces, to be compared with.", default=None)
     truth_tracks: str | None = key(
@@ -53,7 +66,7 @@ class ExperimentFile(Section):
         return self
 
 
-def load_config(file: Path, settings: list[str] | tuple[str, ...] = ()) -> ExperimentFile:
+def load_config(file: Path, settings: Sequence[str] = ()) -> ExperimentFile:
     """Read an experiment file and lay KEY=VALUE settings over it; raises InputError naming file, key and value."""
     try:
         data = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -63,10 +76,19 @@ def load_config(file: Path, settings: list[str] | tuple[str, ...] = ()) -> Exper
         raise InputError(file, "", f"cannot be read ({error})") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(file, "", f"is not TOML: {error}") from None
+    return _validated(ExperimentFile, file, data, settings)
+
+
+def load_sections(settings: Sequence[str]) -> InferenceSections:
+    """Defaults with KEY=VALUE settings laid over; raises InputError naming key and value."""
+    return _validated(InferenceSections, "settings", {}, settings)
+
+
+def _validated(kind: type[S], file: Path | str, data: dict[str, Any], settings: Sequence[str]) -> S:
     for setting in settings:
         _lay_over(data, setting)
     try:
-        return ExperimentFile.model_validate(data)
+        return kind.model_validate(data)
     except ValidationError as error:
         raise _explain(file, error) from None
 
@@ -87,7 +109,7 @@ def _lay_over(data: dict[str, Any], setting: str) -> None:
     data[last] = value
 
 
-def _explain(file: Path, error: ValidationError) -> InputError:
+def _explain(file: Path | str, error: ValidationError) -> InputError:
     first = error.errors()[0]
     name = ".".join(str(part) for part in first["loc"] if part not in ("plates",))
     where = f"key {name}" if name else ""
@@ -108,7 +130,7 @@ def _meaning(name: str) -> str:
     return "" if found is None else f" ({found.summary})"
 
 
-def as_toml(config: ExperimentFile) -> str:
+def as_toml(config: InferenceSections) -> str:
     """The resolved configuration, defaults included, as TOML that reads back to the same.
 
     Defaults that the chosen estimator does not use are left out: the text is an experiment file that is accepted.

@@ -9,7 +9,7 @@ from ...errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from .experiment_file import ExperimentFile
+    from .experiment_file import InferenceSections
 
 ENSEMBLE = 'has no effect on the ensemble, which weighs probabilities: leave it out, or set solver.estimator = "nlgs"'
 ONE_CHAIN = 'has no effect on estimator "nlgs", a single chain without members: leave it out, or set "ensemble"'
@@ -21,7 +21,7 @@ OF_THE_PAPER = {
 }  # fmt: skip
 
 
-def unused_keys(config: ExperimentFile) -> dict[str, str]:
+def unused_keys(config: InferenceSections) -> dict[str, str]:
     """Keys that change nothing in this configuration, and why."""
     solver, contacts = config.solver, config.contacts
     paper = solver.preset == "paper"
@@ -42,7 +42,7 @@ def unused_keys(config: ExperimentFile) -> dict[str, str]:
     return found
 
 
-def refuse_unused_keys(config: ExperimentFile, file: Path) -> None:
+def refuse_unused_keys(config: InferenceSections, file: Path | str) -> None:
     """Raise InputError if a key was set that changes nothing; a default is never complained about."""
     for name, why in unused_keys(config).items():
         section, key = name.split(".")

@@ -1,0 +1,129 @@
+"""Arrays or data frames in, a run out, nothing on disk: for tracks that any other code made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..errors import InputError
+from ..experiment.config.experiment_file import as_toml, load_sections
+from ..experiment.config.unused_keys import refuse_unused_keys
+from ..experiment.experiment import (
+    GRAIN_COLUMNS,
+    POSE_COLUMNS,
+    TIME_COLUMNS,
+    WALL_COLUMNS,
+    arrange_tracks,
+    arrange_walls,
+)
+from ..experiment.tables import Table
+from ..inference.inference import CoordinationError, Inputs, correct_sequence, solve_frames
+from ..inference.settings import material_of, settings_of
+from ..progress import Progress, silent
+from ..results.results import Results
+from ..tracks import Tracks, WallTracks
+from .run import Run
+from .settings import as_texts
+
+Columns = pd.DataFrame | Mapping[str, Any]  # of equal length, by name
+WHOLE = ("frame", "id")  # columns of whole numbers, which data frames like to make floats of
+
+
+def solve(
+    tracks: Columns,
+    walls: Columns,
+    material: Mapping[str, object] | None = None,
+    *,
+    pressure: Mapping[str, float] | None = None,
+    precision: float = 1e-5,
+    settings: Mapping[str, object] | None = None,
+    progress: Progress = silent,
+) -> Run:
+    """Contact forces from tracks that are in memory.
+
+    tracks: columns frame, id, x, y [m], theta [rad], radius [m] and time [s], y up, angles counter-clockwise; a grain
+    that has no row in a frame is lost there; without times frames are a second apart, which matters to forces only
+    where inertia does. walls: columns frame, wall, x1, y1, x2, y2 [m], the packing to the left of 1 → 2. material: keys
+    of the experiment file's section (density, length, friction, …), with its defaults. pressure [Pa]: by wall, of those
+    that are pressed; the others move as they were measured. precision [m]: standard deviation of a position. settings:
+    by the keys of experiment.toml, {"solver.kappa": 0.1}; the defaults are those of `rodsight run`.
+    Raises InputError naming column, row and value.
+    """
+    texts = as_texts({f"material.{key}": value for key, value in (material or {}).items()} | dict(settings or {}))
+    sections = load_sections(texts)
+    refuse_unused_keys(sections, "settings")
+    followed = _arrange_tracks(pd.DataFrame(tracks), precision)
+    bounded = _arrange_walls(pd.DataFrame(walls), followed.frame_count, pressure or {})
+    try:
+        sequence = correct_sequence(Inputs(followed, bounded, material_of(sections), settings_of(sections)))
+    except CoordinationError as error:
+        raise InputError("settings", f"key contacts.coordination = {error.wanted}", str(error)) from None
+    solved = []
+    for frame in solve_frames(sequence):
+        solved.append(frame)
+        progress("solving", len(solved), followed.frame_count)
+    frames, packing = [each.forces for each in solved], sequence.packing
+    unsolved = Results(
+        "solved", sequence.tracks, sequence.walls, packing.grains, packing.material.friction, (), (),
+        as_toml(sections), calibration=sequence.calibration, radius_tuning=sequence.tuning,
+    )  # fmt: skip
+    statistics = [each.statistics for each in solved]
+    return Run(replace(unsolved, frames=frames, statistics=statistics, friction_check=sequence.check_friction(frames)))
+
+
+def _arrange_tracks(tracks: pd.DataFrame, precision: float) -> Tracks:
+    if not (np.isfinite(precision) and precision > 0):
+        raise InputError("precision", repr(precision), "is not a positive number of metres")
+    poses = _table("tracks", tracks, POSE_COLUMNS)
+    if "radius" not in tracks:
+        raise InputError("tracks", "column radius", "there is no such column")
+    _check_constant(tracks, "id", "radius")
+    grains = tracks.drop_duplicates("id")
+    if "time" in tracks:
+        _check_constant(tracks, "frame", "time")
+        times = tracks.drop_duplicates("frame")
+    else:
+        frames = sorted(tracks["frame"].unique())
+        times = pd.DataFrame({"frame": frames, "time": np.asarray(frames, np.float64)})
+    return arrange_tracks(
+        _table("tracks", grains, GRAIN_COLUMNS), poses, _table("tracks", times, TIME_COLUMNS), precision
+    )
+
+
+def _arrange_walls(walls: pd.DataFrame, frame_count: int, pressure: Mapping[str, float]) -> WallTracks:
+    names, endpoints = arrange_walls(_table("walls", walls, WALL_COLUMNS), frame_count)
+    for name, value in pressure.items():
+        if name not in names:
+            raise InputError("pressure", repr(name), f"is not the name of a wall: there are {', '.join(names)}")
+        if not (np.isfinite(value) and value > 0):
+            raise InputError("pressure", f"{name} = {value!r}", "is not a positive number of pascals")
+    return WallTracks(names, endpoints, np.array([pressure.get(name, np.nan) for name in names], np.float64))
+
+
+def _check_constant(frame: pd.DataFrame, by: str, column: str) -> None:
+    """One value of a column for each of another; the complaint names the first that has two."""
+    changing = frame.groupby(by)[column].nunique(dropna=False) > 1
+    if changing.any():
+        raise InputError("tracks", f"{by} = {changing.idxmax()}", f"has more than one {column}")
+
+
+def _table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
+    """Columns as a table that was read, so that the same checks say what is wrong with them."""
+    for column in columns:
+        if column not in frame:
+            raise InputError(name, f"column {column}", f"there is no such column among {', '.join(map(str, frame))}")
+    if frame.empty:
+        raise InputError(name, "", "has no rows")
+    return Table(Path(name), {column: _texts(column, frame[column]) for column in columns}, list(range(len(frame))))
+
+
+def _texts(column: str, values: Iterable[Any]) -> list[str]:
+    array = np.asarray(values)
+    if column in WHOLE and array.dtype.kind == "f" and np.all(array == np.floor(array)):
+        array = array.astype(np.int64)
+    return [str(each) for each in array.tolist()]
