@@ -20,7 +20,7 @@ TELLING = (
     sys.executable, "-u", "-c",
     f"import sys; sys.path.insert(0, {str(ROOT)!r}); from tests.program import run_telling; run_telling()",
 )  # fmt: skip
-KEPT, SENT = "kept", "sent frame"  # on the disk; on its way to the live recording
+KEPT, DONE, SENT = "kept frame", "done case", "sent frame"  # on the disk, twice; on its way to the live recording
 
 
 def rodsight(*arguments: object) -> int:
@@ -60,12 +60,12 @@ def run_telling() -> None:
     def tell(what: str) -> None:
         print(what, file=sys.stderr, flush=True)
 
-    def telling(work: Any) -> Any:
-        def done(*given: Any) -> None:
+    def telling(work: Any, what: str) -> Any:
+        def worked(*given: Any) -> None:
             work(*given)
-            tell(KEPT)
+            tell(what)
 
-        return done
+        return worked
 
     class TellingPickle:
         HIGHEST_PROTOCOL = pickle.HIGHEST_PROTOCOL
@@ -76,7 +76,7 @@ def run_telling() -> None:
             pipe.flush()
             tell(f"sent {message[0]}")
 
-    Checkpoint.save = telling(Checkpoint.save)
-    Diary.write = telling(Diary.write)
+    Checkpoint.save = telling(Checkpoint.save, KEPT)
+    Diary.write = telling(Diary.write, DONE)
     live_process.pickle = TellingPickle  # type: ignore[assignment]
     main()

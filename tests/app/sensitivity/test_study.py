@@ -18,7 +18,7 @@ from rodsight.sensitivity.networks import infer
 from rodsight.sensitivity.study import Diary, compare, measure_case, run_study
 
 from tests.app.sensitivity.conftest import FEW
-from tests.program import KEPT, TELLING, rodsight, wait_until_told
+from tests.program import DONE, TELLING, rodsight, wait_until_told
 
 KAPPA = Case((("kappa", 2.0),))
 FRICTION = Case((("friction", 0.8),))
@@ -149,7 +149,7 @@ def test_ctrl_c_ends_the_study_and_the_same_command_goes_on(made_tracks, tmp_pat
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     diary = out / "sensitivity_runs.jsonl"
-    wait_until_told(study, KEPT, 3)  # × 0.1 and κ; × 2000 goes on for minutes
+    wait_until_told(study, DONE, 3)  # × 0.1 and κ; × 2000 goes on for minutes
     os.killpg(study.pid, signal.SIGINT)  # as a terminal does: the workers hear it, too
     told, errors = study.communicate(timeout=60)
     assert study.returncode == 130
