@@ -12,8 +12,8 @@ from rich.console import Console
 from rodsight.errors import InputError
 from rodsight.exchange.tidy_tables import make_tables
 from rodsight.exchange.vtk_polydata import write_polydata
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.readback import read_forces
-from rodsight.recording.files.recorder import record
 from rodsight.results.results import Results
 from rodsight.results.schema import entries
 from rodsight.results.store import load_results, read_origin
@@ -58,7 +58,7 @@ def test_a_file_of_any_schema_opens_records_and_exports(schema, tmp_path):
         assert np.array_equal(results.calibration.wall, store[moved][()])
         assert results.calibration.priors.wall == store[moved.replace("wall", "priors/wall", 1)][()]
     use(results, tmp_path)
-    record(results, tmp_path / "run.rrd")
+    write_recording(results, tmp_path / "run.rrd")
     shown = read_forces(tmp_path / "run.rrd")
     assert [len(shown[k].fn) for k in range(3)] == [frame.contacts.count for frame in results.frames]
 
@@ -105,7 +105,7 @@ def test_a_file_of_nothing_but_essentials_opens_records_and_exports(file, tmp_pa
             del store[path]
     results = load_results(file)
     use(results, tmp_path)
-    record(results, tmp_path / "run.rrd")
+    write_recording(results, tmp_path / "run.rrd")
     assert results.calibration is None
     assert results.frames[0].member_force is None
     assert np.isnan(results.frames[0].probability).all()
