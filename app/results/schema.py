@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, is_dataclass
+from functools import cache
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -128,10 +129,13 @@ def _gather(part: str, kind: type, group: str, prefix: str) -> Iterator[Entry]:
         path = declared.quantity.path or f"{_group(declared, group)}/{declared.name}"
         attribute = f"{prefix}{declared.name}"
         yield Entry(path, dims, declared.dtype, declared.quantity, declared.absent, part, attribute)
-    for name, hint in get_type_hints(kind).items():
-        if is_dataclass(hint):
-            below = GROUP_OF_PART.get(name, f"{group}/{name}")
-            yield from _gather(part, hint, below, f"{prefix}{name}.")  # type: ignore[arg-type]
+    for name, below in _nested(kind):
+        yield from _gather(part, below, GROUP_OF_PART.get(name, f"{group}/{name}"), f"{prefix}{name}.")
+
+
+@cache
+def _nested(kind: type) -> tuple[tuple[str, type], ...]:
+    return tuple((name, hint) for name, hint in get_type_hints(kind).items() if is_dataclass(hint))  # type: ignore[misc]
 
 
 def _group(declared: Declared, group: str) -> str:

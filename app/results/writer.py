@@ -6,12 +6,14 @@ names and labels of its dimensions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import h5py
 import numpy as np
 
+from solver.bodies.quantity import columns
+from solver.nlgs.sweep_record import SweepHistory
 from solver.sequence.frame_forces import FrameForces
 
 from .checkpoint import flatten
@@ -48,34 +50,34 @@ def columns_of_results(results: Results) -> Columns:
     for part in ("tracks", "walls", "grains", "calibration", "friction_check", "radius_tuning"):
         columns |= columns_of(part, getattr(results, part))
     for part in PER_FRAME:
-        columns |= _over_frames(part, [dict(flatten(each)) for each in getattr(results, part)])
+        columns |= _over_frames(part, getattr(results, part))
     return columns | _rows(results.frames)
 
 
-def _over_frames(part: str, frames: Sequence[Mapping[str, np.ndarray]]) -> Columns:
+def _over_frames(part: str, frames: Sequence[Any]) -> Columns:
     """What every frame has (where one lacks it, none has it), laid end to end or stacked."""
-    measured = [_measured(frame) for frame in frames]
-    columns: Columns = {}
+    named = [dict(flatten(frame)) for frame in frames]
+    laid: Columns = {}
     for each in entries(part):
-        if not all(each.attribute in frame for frame in frames):
+        if not all(each.attribute in frame for frame in named):
             continue
-        values = [frame[each.attribute] for frame in frames]
+        values = [frame[each.attribute] for frame in named]
         if each.dims == ("sweep",):
-            values = [value[rows] for value, rows in zip(values, measured, strict=True)]
+            values = [value[_measured(frame.history)] for value, frame in zip(values, frames, strict=True)]
         if each.dims == ("kept_force",):
             values = [value.ravel() for value in values]
         column = np.stack(values) if each.dims[0] == "frame" else np.concatenate(values)
         if column.dtype.kind != "f" or each.dtype.kind == "f":
-            columns[each.path] = column
+            laid[each.path] = column
         elif np.isfinite(column).all():  # NaN in place of whole numbers: an earlier version did not store them
-            columns[each.path] = column.astype(each.dtype)
-    return columns
+            laid[each.path] = column.astype(each.dtype)
+    return laid
 
 
 def _rows(frames: Sequence[FrameForces]) -> Columns:
     """Which rows belong to which frame, and which sweeps were measured."""
     histories = [frame.history for frame in frames]
-    measured = [_measured(dict(flatten(frame))) for frame in frames]
+    measured = [_measured(history) for history in histories]
     return {
         CONTACT_OFFSET.path: _offset(frame.contacts.count for frame in frames),
         SWEEP_COUNT.path: np.array([history.count for history in histories], np.int64),
@@ -85,10 +87,10 @@ def _rows(frames: Sequence[FrameForces]) -> Columns:
     }
 
 
-def _measured(frame: Mapping[str, np.ndarray]) -> np.ndarray:
+def _measured(history: SweepHistory) -> np.ndarray:
     """Sweeps of a frame, from 0, whose residuals were measured."""
-    rows = [frame[each.attribute] for each in entries("frames") if each.dims == ("sweep",) and each.attribute in frame]
-    return np.flatnonzero(~np.isnan(np.stack(rows)).all(axis=0)) if rows else np.empty(0, np.int64)
+    rows = np.stack([getattr(history, name) for name in columns(SweepHistory, "sweep")])
+    return np.flatnonzero(~np.isnan(rows).all(axis=0))
 
 
 def _offset(counts: Iterable[int]) -> np.ndarray:
