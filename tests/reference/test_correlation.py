@@ -115,6 +115,7 @@ def test_a_patch_without_texture_is_none():
 @pytest.mark.parametrize(("shift", "turn"), [((0.37, -0.61), 0.05), ((-1.4, 1.1), -0.12)])
 def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
     image, true = moved(picture, shift, turn)
+    image += np.random.default_rng(9).normal(0.0, 2.0, image.shape).astype(np.float32)
     coefficients = fine_coefficients(image)
     _, data, inverse, _ = fill(picture)
     pose, fit = np.array([*CENTRE, 0.0]), np.zeros(kernels.FIT_COLUMNS)
@@ -123,7 +124,7 @@ def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
     assert fit[kernels.CODE] == kernels.CONVERGED
     # Either stops at steps below a thousandth of a pixel.
     assert pose == pytest.approx(expected, abs=1e-3)
-    assert pose == pytest.approx(true, abs=0.02)
+    assert pose == pytest.approx(true, abs=0.05)
     assert fit[kernels.ZNCC] == pytest.approx(zncc, abs=1e-5)
     assert fit[kernels.RESIDUAL] == pytest.approx(residual, rel=0.02)
     assert fit[[kernels.GAIN, kernels.OFFSET]] == pytest.approx([gain, offset], rel=1e-4)
@@ -208,7 +209,7 @@ def test_a_disc_has_its_quarters_one_after_the_other():
 
 
 @pytest.mark.parametrize(("search", "parts"), [(search_patch, False), (search_parts, True)])
-@pytest.mark.parametrize("sweep", [0.5, np.pi])
+@pytest.mark.parametrize("sweep", [0.4, 1.0])
 def test_a_search_finds_what_trying_everything_finds(picture, search, parts, sweep):
     reach, origin, spacing, window = 5.0, (22.3, 24.6), 3.0, 6.0
     image, _ = moved(picture, (2.0, -1.0), 0.2)
