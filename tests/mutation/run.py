@@ -1,15 +1,16 @@
 """Apply every mutant to a copy of the tree, run the nearest tests there, and tell which of them nothing notices.
 
 The copy keeps the files' times, so that compiled kernels that no mutant touches are found in their caches. A mutant of
-a kernel is run without compilation: its lines are the same, and its callers could not know of it otherwise.
+a kernel is run without compilation: its lines are the same, and its callers could not know of it otherwise. Every run
+is a fork of one process that has imported other people's libraries already, which takes longer than most tests.
 """
 
 from __future__ import annotations
 
 import ast
+import multiprocessing
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,12 @@ from tests.mutation.mutant import Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("app", "solver", "tests", "sample_data", ".editable", "pyproject.toml", "README.md")
+OWN = ("tests", "solver", "rodsight", "app")  # packages that every run must import from its copy
+# Not pytest's plugins: it wants to import those itself.
+PRELOADED = (
+    "numpy", "numba", "scipy.spatial", "scipy.sparse.csgraph", "scipy.linalg", "scipy.stats", "scipy.ndimage",
+    "h5py", "clarabel", "cv2", "pydantic", "pytest", "playwright.sync_api",
+)  # fmt: skip
 TIME_LIMIT = 300.0  # seconds; a mutant that never ends is noticed, too
 GREATEST_SURVIVAL = 0.10  # share of the mutants that may survive
 
@@ -56,8 +63,7 @@ def judge(mutant: Mutant, file: Path, tree: Path) -> Verdict:
     text = (tree / file).read_text(encoding="utf-8")
     (tree / file).write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
     try:
-        kernel = in_kernel(ROOT / file, mutant.old)
-        code, told = run_tests(tree, mutant.tests, compile_kernels=not kernel)
+        code, told = run_tests(tree, mutant.tests, compile_kernels=not in_kernel(ROOT / file, mutant.old))
     finally:
         shutil.copy2(ROOT / file, tree / file)
     if code > 1:  # neither passed nor failed: no test was run at all
@@ -80,7 +86,7 @@ def in_kernel(file: Path, text: str) -> bool:
     code = file.read_text(encoding="utf-8")
     if "@njit" not in code:
         return False
-    line = code[: code.index(text)].count("\n") + 1 + text[: len(text) - len(text.lstrip("\n"))].count("\n")
+    line = code[: code.index(text)].count("\n") + 1
     for node in ast.parse(code).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.lineno <= line <= (node.end_lineno or line):
             return any("njit" in ast.unparse(decorator) for decorator in node.decorator_list)
@@ -88,25 +94,43 @@ def in_kernel(file: Path, text: str) -> bool:
 
 
 def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool) -> tuple[int, str]:
-    """pytest's exit code, and its last words; without compilation only tests that can do without."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": f"{tree / '.editable'}{os.pathsep}{tree}",
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no"]
-    if not compile_kernels:
-        environment["NUMBA_DISABLE_JIT"] = "1"
-        command += ["-m", "unit and not slow"]
-    try:
-        done = subprocess.run(
-            [*command, *tests], cwd=tree, env=environment, capture_output=True, text=True, timeout=TIME_LIMIT
-        )
-    except subprocess.TimeoutExpired:
+    """pytest's exit code, and the test that failed; without compilation only tests that can do without."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(PRELOADED))
+    report = tree / "report.txt"
+    run = context.Process(target=_run_here, args=(tree, tuple(tests), compile_kernels, report))
+    run.start()
+    run.join(TIME_LIMIT)
+    if run.is_alive():
+        run.kill()
+        run.join()
         return 1, "ran out of time"
-    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    last = (failed or done.stdout.splitlines() or done.stderr.splitlines() or [""])[-1]
-    return done.returncode, last.removeprefix("FAILED ").split(" - ")[0]
+    lines = report.read_text(encoding="utf-8", errors="replace").splitlines()
+    failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
+    last = (failed or lines or [""])[-1]
+    return run.exitcode or 0, last.removeprefix("FAILED ").split(" - ")[0]
+
+
+def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, report: Path) -> None:
+    """Be a process that knows nothing but the copy of the tree."""
+    import numba
+    import pytest
+
+    handle = os.open(report, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    for stream in (1, 2):
+        os.dup2(handle, stream)
+    for name in [name for name in sys.modules if name.split(".")[0] in OWN]:
+        del sys.modules[name]
+    sys.dont_write_bytecode = True
+    theirs = [path for path in sys.path if path and Path(path) not in (ROOT, ROOT / ".editable")]
+    sys.path[:] = [str(tree / ".editable"), str(tree), *theirs]
+    os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])
+    os.chdir(tree)
+    asked = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", *tests]
+    if not compile_kernels:
+        numba.config.DISABLE_JIT = True
+        asked += ["-m", "unit and not slow"]
+    sys.exit(pytest.main(asked))
 
 
 def format_table(verdicts: Sequence[Verdict]) -> str:

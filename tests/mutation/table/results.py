@@ -2,40 +2,67 @@
 
 from tests.mutation.mutant import mutants_of
 
-STORE = "tests/app/results"
+STORE = ("tests/app/results/test_store.py", "tests/app/results/test_earlier_files.py")
+COMPARISON = "tests/app/results/test_comparison.py"
 
 MUTANTS = [
     *mutants_of(
-        "app/results",
+        "app/results/writer.py",
         STORE,
-        ("counts = [f.contacts.count for f in frames]", "counts = [f.contacts.count - 1 for f in frames]"),
-        ("every[number] = values", "every[: len(number)] = values"),
-        ("rows = [getattr(h, key)[m] for h, m", "rows = [getattr(h, key)[: len(m)] for h, m"),
-        ('store.attrs["friction"] = results.friction', 'store.attrs["friction"] = 0.0'),
-        ('f"forces/{key}", np.concatenate([getattr(f, key) for f', 'f"forces/{key}", np.concatenate([f.fn for f'),
-        ("if store.attrs.get(SCHEMA) != SCHEMA_VERSION:", "if store.attrs.get(SCHEMA) is None:"),
-        ('store[path].attrs["unit"] = unit', 'store[path].attrs["unit"] = ""'),
-        ("(first, -1 if stop is None else stop)", "(first, first if stop is None else stop)"),
-        ("~np.isnan(rows).all(axis=0)", "~np.isnan(rows).any(axis=0)"),
+        (
+            "CONTACT_OFFSET.path: _offset(frame.contacts.count for",
+            "CONTACT_OFFSET.path: _offset(frame.contacts.count - 1 for",
+        ),
+        ("values = [value[rows] for value, rows in", "values = [value[: len(rows)] for value, rows in"),
+        ("np.concatenate([[0], np.cumsum(list(counts))])", "np.concatenate([np.cumsum(list(counts)), [0]])"),
+        ("KEPT_OFFSET.path: _offset(len(history.recorded)", "KEPT_OFFSET.path: _offset(history.count"),
+        ("~np.isnan(np.stack(rows)).all(axis=0)", "~np.isnan(np.stack(rows)).any(axis=0)"),
+        ('dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit', 'dataset.attrs["unit"] = ""'),
+        (
+            "member.name.lower(): member.value for member in quantity.names}",
+            "member.name.lower(): 0 for member in quantity.names}",
+        ),
+        ("if len(shape) != len(each.dims) or shape != agreed:", "if len(shape) != len(each.dims):"),
     ),
     *mutants_of(
-        "app/results",
+        "app/results/reader.py",
         STORE,
+        ("every[self.number[rows]] = values[rows]", "every[: len(values[rows])] = values[rows]"),
+        ("values[self.contact[k] : self.contact[k + 1]]", "values[self.contact[k] : self.contact[k + 1] - 1]"),
+        (
+            "values[self.force[k] : self.force[k + 1]].reshape(shape)",
+            "values[self.force[k] : self.force[k + 1]].reshape(shape[::-1]).T",
+        ),
+        ("np.cumsum(np.diff(kept) * np.diff(contact))", "np.cumsum(np.diff(kept) + np.diff(contact))"),
+        ("renumbered[values == number] = ours[named[number]]", "renumbered[values == number] = number"),
+        ("if entry.quantity.essential:", "if False:"),
+        ("if dataset.shape != shape:", "if len(dataset.shape) != len(shape):"),
+        ("if values[0] != 0 or np.any(np.diff(values) < 0):", "if values[0] != 0:"),
+        (
+            "if np.any(number >= np.repeat(count, np.diff(sweep))):",
+            "if np.any(number > np.repeat(count, np.diff(sweep))):",
+        ),
+    ),
+    *mutants_of(
+        "app/results/store.py",
+        STORE,
+        ("(first, -1 if stop is None else stop)", "(first, first if stop is None else stop)"),
+        ("not 1 <= found <= SCHEMA_VERSION", "not 1 <= found"),
+        ('store.attrs["friction"] = results.friction', 'store.attrs["friction"] = 0.0'),
+        ("int(stop) if stop >= 0 else None", "int(stop)"),
+    ),
+    *mutants_of(
+        "app/results/comparison.py",
+        COMPARISON,
         ("np.minimum(i, j)[known], np.maximum(i, j)[known]", "i[known], j[known]"),
         ("rows[a.tracks.id[rows] != b.tracks.id] = -1", "pass"),
         ("forces = b.frames[k - offset]", "forces = b.frames[k - first]"),
         ("CLOSE = 0.5  # of a radius: two", "CLOSE = 50.0  # of a radius: two"),
     ),
     *mutants_of(
-        "app/results",
-        STORE,
+        "app/results/checkpoint.py",
+        "tests/app/results/test_checkpoint.py",
         ("mark.read_text() != fingerprint", "False"),
         ("while self._file(count).exists():", "while self._file(count + 1).exists():"),
-    ),
-    *mutants_of(
-        "app/results",
-        STORE,
-        ('"forces/fn": "N"', '"forces/fn": "kN"'),
-        ('"walls/pressure": "Pa"', '"walls/pressure": "kPa"'),
     ),
 ]

@@ -1,0 +1,90 @@
+"""One interval of the Gauss-Seidel chain: its scales, its sub-steps and what it hands on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.bodies.motion import FrameMotion
+from solver.bodies.packing import Material, Packing
+from solver.detection.networks import NearPairs, PairProbability, ProbablePairs
+from solver.nlgs.chain import ChainSettings, advance_chain, force_scale
+from solver.nlgs.warm_start import ForceMemory
+from tests.packings import LENGTH, squeezed_heap
+
+GRAINS, STATE, WALLS = squeezed_heap(np.random.default_rng(8), columns=4, rows=4)
+PACKING = Packing(GRAINS, LENGTH, Material(0.3, 0.3, 0.2), np.array([np.nan, np.nan, 5e4, np.nan]))
+MOTION = FrameMotion(2.0, STATE, WALLS.endpoints, WALLS.velocity, True, 1e-6)
+NEAR = NearPairs(2e-4)
+SETTINGS = ChainSettings(sweeps=6, substeps=3, spin_up=4)
+
+
+def test_the_force_of_a_grain_is_the_pressure_on_its_face():
+    diameter = 2.0 * GRAINS.radius.mean()
+    assert force_scale(PACKING, SETTINGS) == pytest.approx(5e4 * LENGTH * diameter)
+    free = replace(PACKING, pressure=np.full(4, np.nan))
+    assert force_scale(free, ChainSettings(reference_pressure=3e3)) == pytest.approx(3e3 * LENGTH * diameter)
+
+
+def test_the_papers_time_step_has_a_kinematic_number():
+    """κ = m̄ v_rms / (δt f₀), δt that of a sub-step."""
+    step = advance_chain(PACKING, MOTION, ForceMemory.empty(), replace(SETTINGS, kappa=None), NEAR)
+    rms = np.sqrt(np.mean(np.sum(STATE.velocity**2, axis=1)))
+    scale = force_scale(PACKING, SETTINGS)
+    assert step.kappa == pytest.approx(GRAINS.mass.mean() * rms / (2.0 / 4 * scale))
+    assert advance_chain(PACKING, MOTION, ForceMemory.empty(), SETTINGS, NEAR).kappa == 0.05
+
+
+def test_a_chain_without_former_forces_takes_more_sub_steps():
+    first = advance_chain(PACKING, MOTION, ForceMemory.empty(), SETTINGS, NEAR)
+    assert first.sweeps == 4 * 6
+    assert np.isnan(first.old_unbalance)
+    second = advance_chain(PACKING, MOTION, first.memory, SETTINGS, NEAR)
+    assert second.sweeps == 3 * 6
+    assert second.old_unbalance > 0
+    still = advance_chain(PACKING, replace(MOTION, spans=False), ForceMemory.empty(), SETTINGS, NEAR)
+    assert still.sweeps == 6 * 3  # one sub-step with the sweeps of an interval
+
+
+def test_the_forces_found_are_what_the_next_interval_starts_from():
+    first = advance_chain(PACKING, MOTION, ForceMemory.empty(), SETTINGS, NEAR)
+    assert first.memory.recall(first.contacts) == pytest.approx(first.solution.force)
+    assert np.abs(first.solution.force).max() > 0
+
+
+class Spy:
+    """A network that writes down when it is asked."""
+
+    def __init__(self):
+        self.asked = []
+
+    def at(self, fraction, grains, state, walls):
+        self.asked.append((fraction, state.position.copy(), walls.endpoints.copy()))
+        return NEAR.at(fraction, grains, state, walls)
+
+
+def test_sub_steps_go_evenly_through_the_interval():
+    spy = Spy()
+    moving = replace(MOTION, wall_velocity=np.full((4, 2, 2), 1e-6))
+    first = advance_chain(PACKING, moving, ForceMemory.empty(), SETTINGS, spy)
+    assert [fraction for fraction, *_ in spy.asked] == pytest.approx([0.25, 0.5, 0.75, 1.0])
+    for fraction, position, endpoints in spy.asked:
+        assert position == pytest.approx(STATE.position - (1.0 - fraction) * 2.0 * STATE.velocity, abs=1e-15)
+        assert endpoints == pytest.approx(WALLS.endpoints - (1.0 - fraction) * 2e-6, abs=1e-15)
+    assert np.array_equal(first.walls.endpoints, WALLS.endpoints)
+
+
+def test_a_doubtful_contact_bears_less():
+    contacts, _ = NEAR.at(1.0, GRAINS, STATE, WALLS)
+    doubtful = contacts.key == contacts.key[np.flatnonzero(~contacts.with_wall)[3]]
+
+    def force(probability):
+        pairs = PairProbability(contacts.key, np.where(doubtful, probability, 1.0))
+        fast = replace(MOTION, grains=replace(STATE, velocity=30.0 * STATE.velocity))
+        found = advance_chain(PACKING, fast, ForceMemory.empty(), SETTINGS, ProbablePairs(pairs, pairs))
+        return found.solution.fn[np.isin(found.contacts.key, contacts.key[doubtful])][0]
+
+    sure = force(1.0)
+    assert sure > 0.0
+    assert force(0.3) == sure
+    assert force(0.004) < sure
