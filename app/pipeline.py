@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import SequenceState
+from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics
 
 from .atomic import write_atomically

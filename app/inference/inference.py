@@ -18,7 +18,9 @@ from solver.contacts.verdicts import Verdicts
 from solver.convex.friction_check import FrictionCheck
 from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import SequenceSettings, SequenceState, solve_sequence
+from solver.sequence.frames import solve_sequence
+from solver.sequence.settings import SequenceSettings
+from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics, frame_statistics
 
 from ..tracks import Tracks, WallTracks

@@ -8,7 +8,7 @@ from solver.bodies.grains import Array
 from solver.bodies.rods import RodMaterial
 from solver.calibration.settings import CalibrationSettings
 from solver.nlgs.chain import ChainSettings
-from solver.sequence.frames import SequenceSettings
+from solver.sequence.settings import SequenceSettings
 
 from ..experiment.config.experiment_file import ExperimentFile, InferenceSections
 

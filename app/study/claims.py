@@ -16,7 +16,7 @@ from solver.contacts.pairs import align
 from solver.dem.simulation import DemTruth
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import SequenceSettings
+from solver.sequence.settings import SequenceSettings
 from solver.statistics.agreement import pearson
 from solver.statistics.force_statistics import plateau_ratio, tail_exponent
 from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses

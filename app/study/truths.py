@@ -15,7 +15,7 @@ from solver.contacts.pairs import make_keys
 from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import SequenceSettings
+from solver.sequence.settings import SequenceSettings
 from solver.statistics.agreement import Agreement, compare_forces
 
 from ..atomic import replacing

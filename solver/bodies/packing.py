@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.walls import Walls
@@ -23,6 +24,10 @@ class Material:
             raise ValueError("a coefficient of friction cannot be negative")
         if not 0.0 <= self.formal_weight <= 0.5:
             raise ValueError(f"the formal weight lies in [0, 0.5], not at {self.formal_weight}")
+
+    def friction_at(self, with_wall: NDArray[np.bool_]) -> Array:
+        """Coefficient of friction of contacts with a wall or between grains (c,)."""
+        return np.where(with_wall, self.wall_friction, self.friction)
 
 
 @dataclass(frozen=True, slots=True)

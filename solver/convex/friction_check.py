@@ -79,7 +79,7 @@ def _sliding_frame(
         packing.grains, [snapshots[f] for f in window], k - window.start, settings
     )
     walls = packing.walls(snapshot.endpoints)
-    friction = np.where(contacts.with_wall, packing.material.wall_friction, packing.material.friction)
+    friction = packing.material.friction_at(contacts.with_wall)
     balance = assemble_balance(
         contacts, packing.grains, walls, present=snapshot.present, friction=friction, force_unit=force_unit,
         gravity=packing.material.gravity,

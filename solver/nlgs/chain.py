@@ -42,6 +42,8 @@ class ChainStep:
     kappa: float
     old_unbalance: float  # ū, NaN without former forces
     memory: ForceMemory
+    problem: ContactProblem  # of the last sub-step
+    former: Array | None  # (c, 2) [N] forces of the former frame on these contacts; None: there were none
 
 
 def force_scale(packing: Packing, settings: ChainSettings) -> float:
@@ -77,7 +79,7 @@ def advance_chain(
         every = recorder.strides() if nlgs.force_change is None else 1
         return solve(problem, nlgs, guess=guess, observer=recorder.hear, every=every, between=MEASURED_EVERY)
 
-    former, done = memory, 0
+    carried, done = memory, 0
     for step in range(1, steps):
         problem, contacts, _ = contacts_at(step / steps)
         solution = solve_step(problem, contacts, memory.recall(contacts))
@@ -85,6 +87,7 @@ def advance_chain(
         done += solution.sweeps
     problem, contacts, walls = contacts_at(1.0)
     solution = solve_step(problem, contacts, memory.recall(contacts))
+    former = None if fresh else carried.recall(contacts)
     return ChainStep(
         contacts=contacts,
         walls=walls,
@@ -92,8 +95,10 @@ def advance_chain(
         sweeps=done + solution.sweeps,
         history=recorder.history(contacts),
         kappa=kappa,
-        old_unbalance=np.nan if fresh else unbalance_of(problem, former.recall(contacts))[1],
+        old_unbalance=np.nan if former is None else unbalance_of(problem, former)[1],
         memory=memory.renew(contacts, solution.force, motion.grains.present),
+        problem=problem,
+        former=former,
     )
 
 

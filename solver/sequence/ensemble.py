@@ -9,34 +9,24 @@ them; averaging more of one kind gains nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.bodies.motion import FrameMotion, Snapshot
-from solver.bodies.packing import Packing
-from solver.bodies.walls import Walls
+from solver.bodies.motion import Snapshot
 from solver.contacts.contacts import Contacts
 from solver.contacts.pairs import are_among
-from solver.contacts.verdicts import NO_VERDICTS, Verdicts, apply_verdicts
+from solver.contacts.verdicts import apply_verdicts
 from solver.convex.members import RefinedMotion, Slip, advance_member, read_slip, steady_slip
-from solver.convex.program import ConvexSettings, assemble_balance, polish
+from solver.convex.program import Balance, assemble_balance, polish
 from solver.detection.displacement import find_reversals, member_intervals
 from solver.detection.networks import PairProbability, ProbablePairs
-from solver.detection.refinement import RefinedBlock
-from solver.detection.touch_probability import ContactProbabilitySettings
-from solver.nlgs.chain import ChainSettings, ChainStep, advance_chain, force_scale
+from solver.nlgs.chain import ChainStep, advance_chain, force_scale
 from solver.nlgs.warm_start import ForceMemory
+from solver.sequence.frame_problem import FrameProblem
 from solver.statistics.agreement import relative_change
-
-
-@dataclass(frozen=True, slots=True)
-class EnsembleSettings:
-    stiffer: float = 2.0  # kinematic number of the second chain over that of the first
-    convex: ConvexSettings = field(default_factory=ConvexSettings)
-    probability: ContactProbabilitySettings = field(default_factory=ContactProbabilitySettings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,65 +94,125 @@ class EnsembleForces:
         return float(np.linalg.norm(self.spread_fn)) / size if size > 0 else 0.0
 
 
-def solve_ensemble(
-    packing: Packing,
-    snapshots: Sequence[Snapshot],
-    k: int,
-    motion: FrameMotion,
-    state: EnsembleState,
-    chain: ChainSettings,
-    settings: EnsembleSettings,
-    *,
-    snapshot: Snapshot,
-    refined: RefinedBlock,
-    verdicts: Verdicts = NO_VERDICTS,
-) -> EnsembleForces:
-    """Solve frame k of a sequence with all members.
+def solve_ensemble(problem: FrameProblem, state: EnsembleState) -> EnsembleForces:
+    """Solve one frame of a sequence with all members."""
+    touching = _find_touching(problem)
+    chains = _advance_chains(problem, state, touching)
+    balance = _assemble_balance(problem, touching.contacts, chains.soft)
+    members = _advance_members(problem, state, touching, balance, chains)
+    fn, ft, remark = _average(problem, balance, members)
+    # A member that had nothing to read here goes on from the reported field.
+    force = np.column_stack([fn, ft])
+    reported = state.last.renew(touching.contacts, force, problem.snapshot.present)
+    soft, stiff = (chains.soft.memory, chains.stiff.memory) if problem.motion.spans else (reported, reported)
+    last, ahead, around, wide, steady = (reported if memory is None else memory for memory in members.memories)
+    return EnsembleForces(
+        chains.soft, fn, ft, touching.told, members.force[:, :, 0], members.force[:, :, 1], np.array(members.worth),
+        np.array(members.place),
+        EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs),
+        chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
+        touching.forbidden_probability,
+    )  # fmt: skip
 
-    motion leads to frame k; snapshot is that of frame k, with stand-ins for lost grains; refined: the block that
-    frame k belongs to; verdicts are on frame k.
-    """
-    walls = packing.walls(snapshot.endpoints)
-    detected, touch = refined.contacts_at(snapshot, k, packing.grains, walls, settings.probability.least)
-    contacts, before = apply_verdicts(detected, verdicts, packing.grains, snapshot.position, snapshot.present, walls)
+
+@dataclass(frozen=True, slots=True)
+class _Touching:
+    """The contacts of the frame, and how likely they touch."""
+
+    contacts: Contacts
+    told: Array  # (c,) P(touch) as detected; 0 for a contact that only people saw
+    probability: Array  # (c,) the same, but 1 for what people saw
+    forbidden: Contacts  # detected, but left out for people forbade them
+    forbidden_probability: Array  # (m,) P(touch) of those, as detected
+
+    @property
+    def pairs(self) -> PairProbability:
+        return PairProbability(self.contacts.key, self.probability)
+
+
+@dataclass(frozen=True, slots=True)
+class _Chains:
+    """What the Gauss-Seidel chains gave."""
+
+    soft: ChainStep
+    stiff: ChainStep
+    other: ForceMemory  # of the first chain from another start
+    start_difference: float  # H
+
+
+@dataclass(frozen=True, slots=True)
+class _Members:
+    """The fields that count in the mean, and what the convex members remember."""
+
+    force: Array  # (m, c, 2) [N]
+    worth: list[float]  # (m,)
+    place: list[int]  # (m,) in MEMBERS
+    memories: list[ForceMemory | None]  # of the five convex members; None: it had nothing to read
+    remarks: list[str]
+
+
+def _find_touching(problem: FrameProblem) -> _Touching:
+    packing, snapshot, verdicts, refined = problem.packing, problem.snapshot, problem.verdicts, problem.refined
+    assert refined is not None
+    least = problem.settings.ensemble.probability.least
+    detected, touch = refined.contacts_at(snapshot, problem.k, packing.grains, problem.walls, least)
+    contacts, before = apply_verdicts(
+        detected, verdicts, packing.grains, snapshot.position, snapshot.present, problem.walls
+    )
     # A pair that people saw touch is certain, whatever its measured gaps say.
     told = np.where(before >= 0, touch[before], 0.0) if len(touch) else np.zeros(contacts.count)
     probability = np.where(are_among(contacts.key, verdicts.forced), 1.0, told)
     forbidden = are_among(detected.key, verdicts.forbidden)
-    pairs = PairProbability(contacts.key, probability)
-    network = ProbablePairs(state.pairs if motion.spans else pairs, pairs)
+    return _Touching(contacts, told, probability, detected.select(forbidden), touch[forbidden])
+
+
+def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touching) -> _Chains:
+    packing, motion, contacts = problem.packing, problem.motion, touching.contacts
+    chain = problem.settings.chain
+    network = ProbablePairs(state.pairs if motion.spans else touching.pairs, touching.pairs)
     soft = advance_chain(packing, motion, state.soft, chain, network)
     assert chain.kappa is not None
-    stiff_chain = replace(chain, kappa=chain.kappa * settings.stiffer, keep="none")
+    stiff_chain = replace(chain, kappa=chain.kappa * problem.settings.ensemble.stiffer, keep="none")
     stiff = advance_chain(packing, motion, state.stiff, stiff_chain, network)
-    other, start_difference = state.other, np.nan
-    if motion.spans:
-        if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
-            uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
-            other = other.renew(contacts, uniform, snapshot.present)
-        again = advance_chain(packing, motion, other, replace(chain, keep="none"), network)
-        start_difference = relative_change(contacts.key, soft.solution.force, contacts.key, again.solution.force)
-        other = again.memory
+    if not motion.spans:
+        return _Chains(soft, stiff, state.other, np.nan)
+    other = state.other
+    if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
+        uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
+        other = other.renew(contacts, uniform, problem.snapshot.present)
+    again = advance_chain(packing, motion, other, replace(chain, keep="none"), network)
+    difference = relative_change(contacts.key, soft.solution.force, contacts.key, again.solution.force)
+    return _Chains(soft, stiff, again.memory, difference)
 
-    friction = np.where(contacts.with_wall, packing.material.wall_friction, packing.material.friction)
-    wall_total = None
-    if not walls.loaded.any():
-        wall_total = float(soft.solution.fn[contacts.with_wall].sum())
-    balance = assemble_balance(
-        contacts, packing.grains, walls, present=snapshot.present, friction=friction,
-        force_unit=force_scale(packing, chain), gravity=packing.material.gravity, wall_normal_total=wall_total,
+
+def _assemble_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep) -> Balance:
+    packing, walls = problem.packing, problem.walls
+    # Without a load forces are known up to a scale: that of the first chain.
+    wall_total = None if walls.loaded.any() else float(soft.solution.fn[contacts.with_wall].sum())
+    return assemble_balance(
+        contacts, packing.grains, walls, present=problem.snapshot.present,
+        friction=packing.material.friction_at(contacts.with_wall),
+        force_unit=force_scale(packing, problem.settings.chain), gravity=packing.material.gravity,
+        wall_normal_total=wall_total,
     )  # fmt: skip
-    slips = _slips(contacts, packing, walls, snapshots, k, settings, refined)
+
+
+def _advance_members(
+    problem: FrameProblem, state: EnsembleState, touching: _Touching, balance: Balance, chains: _Chains
+) -> _Members:
     former = (state.last, state.ahead, state.around, state.wide, state.steady)
-    fields = [soft.solution.force, stiff.solution.force]
+    fields = [chains.soft.solution.force, chains.stiff.solution.force]
     worth, place = [1.0, 1.0], [0, 1]
     memories: list[ForceMemory | None] = []
     remarks: list[str] = []
-    for number, (slip, memory) in enumerate(zip(slips, former, strict=True), start=2):
+    for number, (slip, memory) in enumerate(zip(_slips(problem, touching.contacts), former, strict=True), start=2):
         if slip is None:
             memories.append(None)
             continue
-        forces, renewed = advance_member(balance, contacts, snapshot, slip, probability, memory, settings.convex)
+        forces, renewed = advance_member(
+            balance, touching.contacts, problem.snapshot, slip, touching.probability, memory,
+            problem.settings.ensemble.convex,
+        )  # fmt: skip
         if forces.converged:
             fields.append(np.column_stack([forces.fn, forces.ft]))
             worth.append(slip.worth)
@@ -170,21 +220,16 @@ def solve_ensemble(
         else:
             remarks.append(f"a convex member was left out ({forces.ending})")
         memories.append(renewed)
-    members = np.stack(fields)
-    mean = np.average(members, axis=0, weights=worth)
-    polished = polish(balance, mean[:, 0], mean[:, 1], settings.convex)
-    if not polished.converged:
-        remarks.append(f"the mean was not polished ({polished.ending})")
-    fn, ft = (polished.fn, polished.ft) if polished.converged else (mean[:, 0], mean[:, 1])
-    # A member that had nothing to read here goes on from the reported field.
-    reported = state.last.renew(contacts, np.column_stack([fn, ft]), snapshot.present)
-    chains = (soft.memory, stiff.memory) if motion.spans else (reported, reported)
-    last, ahead, around, wide, steady = (reported if memory is None else memory for memory in memories)
-    return EnsembleForces(
-        soft, fn, ft, told, members[:, :, 0], members[:, :, 1], np.array(worth), np.array(place),
-        EnsembleState(*chains, other, last, ahead, around, wide, steady, pairs), start_difference,
-        "; ".join(remarks), detected.select(forbidden), touch[forbidden],
-    )  # fmt: skip
+    return _Members(np.stack(fields), worth, place, memories, remarks)
+
+
+def _average(problem: FrameProblem, balance: Balance, members: _Members) -> tuple[Array, Array, list[str]]:
+    """The mean of the members in balance, f_n and f_t (c,) [N]; and what went otherwise than it should."""
+    mean = np.average(members.force, axis=0, weights=members.worth)
+    polished = polish(balance, mean[:, 0], mean[:, 1], problem.settings.ensemble.convex)
+    if polished.converged:
+        return polished.fn, polished.ft, []
+    return mean[:, 0], mean[:, 1], [f"the mean was not polished ({polished.ending})"]
 
 
 def _spread(member: Array, worth: Array) -> Array:
@@ -192,24 +237,18 @@ def _spread(member: Array, worth: Array) -> Array:
     return np.sqrt(np.average((member - mean) ** 2, axis=0, weights=worth))
 
 
-def _slips(
-    contacts: Contacts,
-    packing: Packing,
-    walls: Walls,
-    snapshots: Sequence[Snapshot],
-    k: int,
-    settings: EnsembleSettings,
-    refined: RefinedBlock,
-) -> tuple[Slip | None, ...]:
+def _slips(problem: FrameProblem, contacts: Contacts) -> tuple[Slip | None, ...]:
     """What the convex members read at frame k: the intervals of `member_intervals`, then what outlasts the frame."""
+    snapshots, refined, convex = problem.sequence.snapshots, problem.refined, problem.settings.ensemble.convex
+    assert refined is not None
 
     def slip(interval: tuple[int, int]) -> Slip:
         ends = snapshots[interval[0]], snapshots[interval[1]]
         deviation = refined.slide_deviation(contacts, interval, (ends[0].sigma, ends[1].sigma))
         motion = RefinedMotion((refined.position_at(interval[0]), refined.position_at(interval[1])), deviation)
-        return read_slip(contacts, packing.grains, walls, ends, settings.convex, motion)
+        return read_slip(contacts, problem.packing.grains, problem.walls, ends, convex, motion)
 
-    slips = [None if interval is None else slip(interval) for interval in _intervals(snapshots, k)]
+    slips = [None if interval is None else slip(interval) for interval in _intervals(snapshots, problem.k)]
     before, after = slips[:2]
     return (*slips, None if before is None or after is None else steady_slip(before, after))
 

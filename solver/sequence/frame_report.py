@@ -8,55 +8,131 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.packing import Material
 from solver.bodies.quantity import columns
 from solver.contacts.contacts import Contacts, ContactSource, ContactState
+from solver.contacts.kinematics import relative_motion
+from solver.contacts.pairs import are_there, recall
+from solver.contacts.verdicts import sources
+from solver.sequence.estimate import Estimate
 from solver.sequence.frame_forces import FrameForces
-from solver.statistics.agreement import pearson
+from solver.sequence.frame_problem import FrameProblem
+from solver.sequence.judgement import (
+    Evidence,
+    Standing,
+    free_standard_deviation,
+    hidden_share,
+    tangential_standard_deviation,
+    trust,
+)
+from solver.sequence.state import SequenceState
+
+SLIDING_TOLERANCE = 1e-6  # of μ f_n
 
 
-def without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
-    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them.
+def report_frame(
+    problem: FrameProblem, estimate: Estimate, evidence: Evidence, standing: Standing, ages: NDArray[np.int32]
+) -> tuple[FrameForces, Evidence]:
+    """Report an estimate that was judged; gives the evidence as completed by what the report hides.
 
-    The trust is lowered by what is hidden that way.
+    ages (c,) of the estimate's contacts.
     """
-    contacts, history = frame.contacts, frame.history
-    stand_in = np.concatenate([bridged, np.zeros(contacts.wall_count, np.bool_)])
-    keep = ~(stand_in[contacts.i] | stand_in[contacts.j])
-    kept = {name: value[keep] for name, value in _contact_columns(frame).items()}
-    # What is left out counts as zero for whoever compares the whole network.
-    hidden = 1.0 - pearson(np.where(keep, frame.fn, 0.0), frame.fn)
-    return replace(
-        frame,
-        trust=frame.trust * (1.0 - hidden),
-        hidden_share=hidden,
-        contacts=contacts.select(keep),
-        history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
-        reason=f"{bridged.sum()} lost grains were bridged, and nothing is shown of their contacts; {frame.reason}",
-        **kept,
+    frame = _show_forbidden(problem, _describe(problem, estimate, evidence, standing, ages), estimate)
+    if problem.bridged.any():
+        frame = _without_bridged(frame, problem.bridged)
+        evidence = replace(evidence, hidden_share=frame.hidden_share)
+    return replace(frame, trust=trust(evidence)), evidence
+
+
+def find_ages(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
+    """Frames since every contact was last absent (c,)."""
+    return recall(contacts.key, state.age_key, state.age, fill=-1) + np.int32(1)
+
+
+def contact_state(material: Material, contacts: Contacts, fn: Array, ft: Array) -> NDArray[np.uint8]:
+    """ContactState of forces (c,) [N]."""
+    friction = material.friction_at(contacts.with_wall)
+    state = np.full(contacts.count, ContactState.STICKING, np.uint8)
+    state[np.abs(ft) >= friction * fn * (1.0 - SLIDING_TOLERANCE)] = ContactState.SLIDING
+    state[fn <= 0] = ContactState.OPEN
+    return state
+
+
+def _describe(
+    problem: FrameProblem, estimate: Estimate, evidence: Evidence, standing: Standing, ages: NDArray[np.int32]
+) -> FrameForces:
+    """All that the estimate says, its trust not yet drawn."""
+    material, contacts, step = problem.packing.material, estimate.contacts, estimate.step
+    fn, ft = estimate.fn, estimate.ft
+    un, ut = _measured_motion(problem, contacts, estimate)
+    reason = (estimate.remark, standing.reason, step.solution.stop.value)
+    return FrameForces(
+        frame=problem.k,
+        contacts=contacts,
+        fn=fn,
+        ft=ft,
+        nlgs_fn=step.solution.fn,
+        nlgs_ft=step.solution.ft,
+        un=un,
+        ut=ut,
+        state=contact_state(material, contacts, fn, ft),
+        age=ages,
+        source=sources(contacts, estimate.probability, problem.verdicts),
+        probability=estimate.probability,
+        fn_sd=free_standard_deviation(fn, estimate.spread_fn),
+        ft_sd=tangential_standard_deviation(fn, material.friction, estimate.spread_ft),
+        status=standing.status,
+        reason="; ".join(part for part in reason if part),
+        sweeps=step.sweeps,
+        natural_map=step.solution.natural_map,
+        unbalance=evidence.unbalance,
+        kappa=step.kappa,
+        correction=evidence.correction,
+        old_unbalance=evidence.old_unbalance,
+        trust=np.nan,
+        start_difference=evidence.start_difference,
+        unseen_grains=evidence.holes,
+        frames_since_reset=0,
+        history=step.history,
+        member_force=estimate.member_force,
     )
 
 
-def show_forbidden(frame: FrameForces, forbidden: Contacts, probability: Array, un: Array, ut: Array) -> FrameForces:
-    """List contacts that were detected but forbidden (m,), without force and marked as such.
+def _measured_motion(problem: FrameProblem, contacts: Contacts, estimate: Estimate) -> tuple[Array, Array]:
+    grains = problem.motion.grains
+    return relative_motion(contacts, problem.packing.grains.radius, grains.velocity, grains.spin, estimate.step.walls)
 
-    probability (m,): P(touch) by the detector; un, ut (m,) [m/s]: their measured relative velocity.
-    """
+
+def _without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
+    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them."""
+    contacts, history = frame.contacts, frame.history
+    keep = are_there(contacts.key, ~bridged, contacts.body_count)
+    return replace(
+        frame,
+        hidden_share=hidden_share(frame.fn, keep),
+        contacts=contacts.select(keep),
+        history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
+        reason=f"{bridged.sum()} lost grains were bridged, and nothing is shown of their contacts; {frame.reason}",
+        **{name: value[keep] for name, value in _columns(frame).items()},
+    )
+
+
+def _show_forbidden(problem: FrameProblem, frame: FrameForces, estimate: Estimate) -> FrameForces:
+    """List contacts that were detected but forbidden, without force and marked as such."""
+    forbidden, contacts, history = estimate.forbidden, frame.contacts, frame.history
     if forbidden.count == 0:
         return frame
-    contacts = frame.contacts
+    un, ut = _measured_motion(problem, forbidden, estimate)
     order = np.argsort(np.concatenate([contacts.key, forbidden.key]), kind="stable")
     known = {
         "state": np.full(forbidden.count, ContactState.OPEN),
         "source": np.full(forbidden.count, ContactSource.FORBIDDEN_BY_REVIEWER),
-        "probability": probability, "un": un, "ut": ut,
+        "probability": estimate.forbidden_probability, "un": un, "ut": ut,
     }  # fmt: skip
-    listed: dict[str, NDArray] = {}
-    for name, value in _contact_columns(frame).items():
-        added = np.zeros((forbidden.count, *value.shape[1:]), value.dtype)
-        if name in known:
-            added[:] = known[name]
-        listed[name] = np.concatenate([value, added])[order]
-    history = frame.history
+    listed = {
+        name: np.concatenate([value, _rows_of(value, forbidden.count, known.get(name))])[order]
+        for name, value in _columns(frame).items()
+    }
     nothing = np.zeros((len(history.recorded), forbidden.count), np.float32)
     geometry = {
         name: np.concatenate([getattr(contacts, name), getattr(forbidden, name)])[order]
@@ -75,7 +151,12 @@ def show_forbidden(frame: FrameForces, forbidden: Contacts, probability: Array, 
     )
 
 
-def _contact_columns(frame: FrameForces) -> dict[str, NDArray]:
-    """The columns that have a row per contact, those that are there."""
-    named = {name: getattr(frame, name) for name in columns(type(frame), "contact")}
-    return {name: value for name, value in named.items() if value is not None}
+def _columns(frame: FrameForces) -> dict[str, NDArray]:
+    """What the frame says of every contact, by the name of the field."""
+    return {name: value for name in columns(FrameForces, "contact") if (value := getattr(frame, name)) is not None}
+
+
+def _rows_of(column: NDArray, count: int, told: NDArray | None) -> NDArray:
+    """Rows to add to a column: what is told, or zeros."""
+    rows = np.zeros((count, *column.shape[1:])) if told is None else told
+    return np.asarray(rows, column.dtype)

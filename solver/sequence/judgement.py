@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.sequence.frame_forces import FrameStatus
+from solver.statistics.agreement import pearson
 
 # 1 − T = a D^p + b ε^q, a bound on 1 − r that one frame in fifteen passes: (a, p) and (b, q).
 TRUST_DISAGREEMENT = (0.83, 2.65)
@@ -56,11 +59,16 @@ class Evidence:
     holes: int = 0  # places that a rod would fit into
     grains: int = 0  # that take part
     reach: float = 0.0  # gap threshold of a single chain over the mean diameter: it lets false contacts in
+    assessed: bool = True  # False: no motion leads to the frame, so that its forces are a guess
+    hidden_share: float = 0.0  # 1 − correlation of the field with what is left when bridged grains are dropped
 
 
 def trust(evidence: Evidence) -> float:
-    """T in [0, 1], a conservative estimate of the correlation with the true normal forces."""
-    if math.isnan(evidence.correction):
+    """T in [0, 1], a conservative estimate of the correlation with the true normal forces; NaN: not assessed.
+
+    Every deduction is made here: for doubt of the forces, for holes, for what bridged grains hide.
+    """
+    if math.isnan(evidence.correction) or not evidence.assessed:
         return math.nan
     correction, disagreement = max(evidence.correction, 0.0), evidence.disagreement
     if math.isnan(disagreement):
@@ -71,7 +79,16 @@ def trust(evidence: Evidence) -> float:
             + TRUST_CORRECTION[0] * correction ** TRUST_CORRECTION[1]
         )
     unseen = HOLE_DOUBT * evidence.holes / max(evidence.grains, 1)
-    return float(np.clip(1.0 - doubt, 0.0, 1.0) * max(1.0 - unseen, 0.0))
+    shown = 1.0 - evidence.hidden_share
+    return float(np.clip(1.0 - doubt, 0.0, 1.0) * max(1.0 - unseen, 0.0)) * shown
+
+
+def hidden_share(fn: Array, shown: NDArray[np.bool_]) -> float:
+    """What is lost of forces (c,) [N] when only some contacts (c,) are shown: 1 − correlation with all.
+
+    What is left out counts as zero for whoever compares the whole network.
+    """
+    return 1.0 - pearson(np.where(shown, fn, 0.0), fn)
 
 
 def free_standard_deviation(fn: Array, spread: Array | None = None) -> Array:
@@ -108,13 +125,24 @@ def is_suspect(evidence: Evidence) -> bool:
     return not evidence.reset and bool(_faults(evidence))
 
 
-def judge(evidence: Evidence) -> tuple[FrameStatus, str]:
+class Standing(NamedTuple):
+    """A frame's status, and why it has it."""
+
+    status: FrameStatus
+    reason: str  # a sentence for the user
+
+
+def judge(evidence: Evidence) -> Standing:
     """Give a frame its status and say why in a sentence."""
     status, why = _judge(evidence)
+    if not evidence.assessed:
+        return Standing(
+            status, "no motion leads to the first frame: its forces are a guess, and their trust is not assessed"
+        )
     if evidence.holes:
         places = "1 hole" if evidence.holes == 1 else f"{evidence.holes} holes"
         why += f"; {places} would fit a rod: grains may be unseen, and the trust is lowered for it"
-    return status, why
+    return Standing(status, why)
 
 
 def _judge(evidence: Evidence) -> tuple[FrameStatus, str]:

@@ -115,7 +115,7 @@ def frame_statistics(
     between = bearing & ~contacts.with_wall
     parts = anisotropies(contacts.normal[between], branch[between], fn[between], ft[between])
     kinds = (parts.contact, parts.branch, parts.normal, parts.tangential)
-    friction = np.where(contacts.with_wall, material.wall_friction, material.friction)
+    friction = material.friction_at(contacts.with_wall)
     mobilised = mobilisation(carried, held, friction[bearing])
     tail, plateau = tail_exponent(carried), plateau_ratio(carried)
     strong = strong_network(carried, force[bearing], branch[bearing])

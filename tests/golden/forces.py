@@ -26,9 +26,9 @@ from solver.bodies.packing import Material, Packing
 from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
 from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.nlgs.chain import ChainSettings
-from solver.sequence.ensemble import EnsembleSettings
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import SequenceSettings, solve_sequence
+from solver.sequence.frames import solve_sequence
+from solver.sequence.settings import EnsembleSettings, SequenceSettings
 from solver.statistics.frame_statistics import FrameStatistics, frame_statistics
 
 STORED = Path(__file__).with_name("forces.npz")

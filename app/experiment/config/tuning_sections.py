@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from solver.bodies.rods import RodMaterial
 from solver.calibration.settings import CalibrationSettings
-from solver.sequence.frames import SequenceSettings
+from solver.sequence.settings import SequenceSettings
 
 from .section import AtLeastOne, Finite, Frame, NotNegative, Positive, Section, key
 

@@ -1,0 +1,56 @@
+"""One frame as it is to be solved: where the bodies are, how they got there, and what is known of it from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.motion import FrameMotion, Snapshot
+from solver.bodies.packing import Packing
+from solver.bodies.walls import Walls
+from solver.contacts.verdicts import NO_VERDICTS, Verdicts
+from solver.detection.refinement import RefinedBlock
+from solver.sequence.settings import SequenceSettings
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceProblem:
+    """A whole sequence: what does not change from frame to frame."""
+
+    packing: Packing
+    snapshots: Sequence[Snapshot]
+    settings: SequenceSettings
+
+
+@dataclass(frozen=True, slots=True)
+class FrameProblem:
+    """One frame of a sequence."""
+
+    sequence: SequenceProblem
+    k: int  # which frame
+    snapshot: Snapshot  # of the frame, with stand-ins for lost grains
+    bridged: NDArray[np.bool_]  # (n,) which grains only stand in
+    motion: FrameMotion  # that leads to the frame
+    refined: RefinedBlock | None = None  # that the frame belongs to; None: solved by a single chain
+    verdicts: Verdicts = NO_VERDICTS  # on the frame
+
+    @property
+    def packing(self) -> Packing:
+        return self.sequence.packing
+
+    @property
+    def settings(self) -> SequenceSettings:
+        return self.sequence.settings
+
+    @property
+    def walls(self) -> Walls:
+        """The walls at the frame, at rest and under their loads."""
+        return self.packing.walls(self.snapshot.endpoints)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which grains the photograph shows (n,)."""
+        return self.sequence.snapshots[self.k].present

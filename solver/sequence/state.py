@@ -1,0 +1,44 @@
+"""What one frame hands to the next: with it a sequence goes on where it stopped, bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.bodies.motion import LastSeen
+from solver.bodies.packing import Packing
+from solver.contacts.pairs import Keys
+from solver.sequence.ensemble import EnsembleState
+from solver.sequence.judgement import Evidence
+
+NOTHING_KNOWN = Evidence(True, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceState:
+    members: EnsembleState
+    age_key: Keys  # (m,) contacts of the last frame, ascending
+    age: NDArray[np.int32]  # (m,) frames
+    seen: LastSeen
+    time: float  # [s] of the last frame
+    endpoints: Array  # (w, 2, 2) [m] of the last frame
+    pressure: float  # [Pa] mean stress of the last frame, NaN: none
+    sound_pressure: float  # [Pa] of the last frame that was not suspect
+    evidence: Evidence  # what the last frame was judged by
+    frames_since_reset: int
+    frames_since_event: int
+
+    @classmethod
+    def first(cls, packing: Packing) -> SequenceState:
+        walls = len(packing.pressure)
+        return cls(
+            EnsembleState.first(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
+            np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NOTHING_KNOWN, 0, 0,
+        )  # fmt: skip
+
+    def without_forces(self) -> SequenceState:
+        """The same history of the motion, but no former forces to start from."""
+        return replace(self, members=EnsembleState.first())
