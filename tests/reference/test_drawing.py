@@ -61,7 +61,7 @@ def test_sub_pixels_are_weighted_about_their_pixels_and_added():
     assert taps.sum() == pytest.approx(1.0)
     before = rng.uniform(0, 9, (2, 40, 40)).astype(np.float32)
     light, covered = before.copy()
-    kernels.collect(light, covered, glow, share, taps, 5, 3, np.empty((2, SHAPE[1])))
+    kernels.collect_light(light, covered, glow, share, taps, 5, 3, np.empty((2, SHAPE[1])))
     for found, given, old in ((light, glow, before[0]), (covered, share, before[1])):
         added = drawing.collect(given, taps)
         expected = old.astype(float)

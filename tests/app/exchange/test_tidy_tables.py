@@ -52,7 +52,12 @@ def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
         with pytest.raises(SystemExit) as end:
             main(arguments)
         assert not end.value.code
-    assert {file.name for file in (out / "tables").iterdir()} == {"contacts.csv", "grains.csv", "frames.csv"}
+    assert {file.name for file in (out / "tables").iterdir()} == {
+        "contacts.csv",
+        "grains.csv",
+        "frames.csv",
+        "walls.csv",
+    }
     assert (out / "vtk" / "contacts.pvd").is_file()
     with pytest.raises(SystemExit) as end:
         main(["export", "dic", str(out)])
