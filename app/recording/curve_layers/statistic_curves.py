@@ -11,6 +11,7 @@ from solver.bodies.grains import Array
 from solver.bodies.walls import Walls
 from solver.statistics.frame_statistics import FrameStatistics
 
+from ...results.schema import unit_of
 from ..look import entities
 from ..look.colours import SERIES
 from ..look.scene import Clock, Scene
@@ -45,8 +46,8 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
         (entities.RATTLER_COUNT, "rattlers", SERIES[3]),
         (entities.CONTACT_COUNT, "contacts with force", SERIES[2]),
         (entities.SLIDING_FRACTION, "sliding fraction", SERIES[1]),
-        (entities.MEAN_FN, "mean f_n [N]", SERIES[0]),
-        (entities.MAX_FN, "greatest f_n [N]", SERIES[1]),
+        (entities.MEAN_FN, f"mean f_n [{unit_of('statistics/mean_fn')}]", SERIES[0]),
+        (entities.MAX_FN, f"greatest f_n [{unit_of('statistics/max_fn')}]", SERIES[1]),
         (entities.FABRIC_ANISOTROPY, "fabric anisotropy", SERIES[2]),
     ):
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import rerun.blueprint as rrb
 
+from ...results.schema import unit_of
 from ..curve_layers.radius_curve import RADIUS_BOUNDS
 from ..curve_layers.stress_and_fabric import ROSE_REACH, STRESS_REACH
 from ..look import entities
@@ -192,6 +193,7 @@ def _loads(layout: Layout) -> rrb.Container:
     def plot(name: str, paths: list[str], entries: int | None = None) -> rrb.View:
         return curve_view(name, paths, layout.extremes, height=340.0, entries=entries)
 
+    unit = unit_of("statistics/wall_force")
     return rrb.Vertical(
         rrb.Horizontal(
             plot("Friction angle [°]", angles),
@@ -200,8 +202,8 @@ def _loads(layout: Layout) -> rrb.Container:
         ),
         rrb.Horizontal(
             plot("Anisotropies", anisotropies),
-            plot("Forces on the walls, normal [N]", [entities.WALL_NORMAL_FORCE], layout.wall_count),
-            plot("Forces on the walls, tangential [N]", [entities.WALL_TANGENTIAL_FORCE], layout.wall_count),
+            plot(f"Forces on the walls, normal [{unit}]", [entities.WALL_NORMAL_FORCE], layout.wall_count),
+            plot(f"Forces on the walls, tangential [{unit}]", [entities.WALL_TANGENTIAL_FORCE], layout.wall_count),
         ),
         name=Tab.LOADS,
     )
