@@ -1,4 +1,6 @@
-"""Check the shapes that the solver's types state, `position: Float[Array, "n 2"]`, wherever one of them is made.
+"""Check the shapes that the solver's types state wherever one of them is made.
+
+A field states them as `position: Float[Array, "n 2"]`, or by the dimensions of its Quantity.
 
 Only the tests' runs do: `check_shapes` wraps the types in place, and nothing of it is in the product.
 """
@@ -10,10 +12,16 @@ import pkgutil
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from functools import wraps
+from types import NoneType
 from typing import Any, get_args, get_type_hints
 
+import numpy as np
 from beartype.door import is_bearable
-from jaxtyping import AbstractArray, jaxtyped
+from jaxtyping import AbstractArray, Shaped, jaxtyped
+
+from solver.bodies.quantity import quantities
+
+DIMENSIONS = {"xy": "2", "axis": "2", "component": "2"}  # of quantities, whose size is known
 
 
 class ShapeError(TypeError):
@@ -27,7 +35,7 @@ def check_shapes(package: str) -> list[type]:
 
 def check_shapes_of(kind: type) -> bool:
     """Wrap one type; whether it states any shape."""
-    stated = {name: hint for name, hint in get_type_hints(kind).items() if _states_shape(hint)}
+    stated = _stated_shapes(kind)
     if not stated:
         return False
     if is_dataclass(kind):
@@ -60,6 +68,16 @@ def _check(value: Any, stated: dict[str, Any]) -> None:
             if not is_bearable(field, hint):
                 found = f"{getattr(field, 'dtype', type(field).__name__)}{list(getattr(field, 'shape', []))}"
                 raise ShapeError(f"{type(value).__name__}.{name} is {found}, not {hint}, or disagrees with the others")
+
+
+def _stated_shapes(kind: type) -> dict[str, Any]:
+    hints = get_type_hints(kind)
+    stated = {name: hint for name, hint in hints.items() if _states_shape(hint)}
+    for each in quantities(kind) if is_dataclass(kind) else ():
+        if each.quantity.dims and each.name not in stated and each.dtype.kind != "O":
+            shape = Shaped[np.ndarray, " ".join(DIMENSIONS.get(name, name) for name in each.quantity.dims.split())]
+            stated[each.name] = shape | None if NoneType in get_args(hints[each.name]) else shape
+    return stated
 
 
 def _states_shape(hint: Any) -> bool:

@@ -7,6 +7,9 @@ from solver.bodies.grains import Grains
 from solver.bodies.motion import LastSeen, Snapshot
 from solver.contacts.contacts import Contacts
 from solver.nlgs.problem import ContactProblem
+from solver.nlgs.sweep_record import SweepHistory
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.frame_statistics import FrameStatistics
 from tests.shapes import ShapeError, check_shapes_of
 
 
@@ -53,6 +56,15 @@ def test_named_tuples_are_checked_too():
         problem(np.zeros((3, 6)))
 
 
+def test_dimensions_of_quantities_are_shapes_too():
+    none = {"recorded": np.zeros(2, np.int64), "fn": np.zeros((2, 5), np.float32), "ft": np.zeros((2, 5), np.float32)}
+    SweepHistory(np.zeros(9), np.zeros(9), np.zeros(9), **none)
+    with pytest.raises(ShapeError, match=r"SweepHistory\.natural_map"):
+        SweepHistory(np.zeros(9), np.zeros(8), np.zeros(9), **none)
+    with pytest.raises(ShapeError, match=r"SweepHistory\.ft"):
+        SweepHistory(np.zeros(9), np.zeros(9), np.zeros(9), **{**none, "ft": np.zeros((2, 4), np.float32)})
+
+
 def test_what_a_type_refuses_it_says_itself():
     with pytest.raises(ValueError, match="equal length"):
         Grains(np.ones(2), np.ones(3))
@@ -66,5 +78,5 @@ def test_types_without_stated_shapes_are_left_alone():
 
 
 def test_the_types_of_the_solver_are_checked_in_every_run():
-    for kind in (Grains, Snapshot, LastSeen, Contacts):
+    for kind in (Grains, Snapshot, LastSeen, Contacts, FrameForces, FrameStatistics, SweepHistory):
         assert hasattr(kind.__init__, "__wrapped__")

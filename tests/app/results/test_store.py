@@ -242,7 +242,9 @@ def test_great_columns_are_compressed_without_loss(tmp_path):
 
 
 def test_columns_of_different_lengths_are_not_written(results, tmp_path):
-    frames = [replace(frame, un=frame.un[:-1]) for frame in results.frames]
+    frames = [replace(frame) for frame in results.frames]
+    for frame in frames:  # past the shapes that the tests' runs check
+        object.__setattr__(frame, "un", frame.un[:-1])
     with pytest.raises(ValueError, match="contacts/un"):
         save_results(tmp_path / "results.h5", replace(results, frames=frames), ORIGIN)
     assert not (tmp_path / "results.h5").exists()

@@ -2,7 +2,7 @@
 
 from tests.mutation.mutant import mutants_of
 
-CALIBRATE = "tests/solver/calibration/test_calibrate.py"
+CALIBRATE = ("tests/solver/calibration/test_equations.py", "tests/solver/calibration/test_calibrate.py")
 SCALE = "tests/solver/calibration/test_scale.py"
 
 MUTANTS = [
@@ -21,7 +21,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/calibration/gaps.py",
-        (CALIBRATE, SCALE),
+        (*CALIBRATE, SCALE),
         ("distance - radius[i] - np.where(wall, 0.0, radius[grain])", "distance - radius[i] - radius[grain]"),
         ("endpoints[kw, w].mean(axis=1)", "endpoints[kw, w, 0]"),
     ),

@@ -3,7 +3,7 @@
 from tests.mutation.mutant import mutants_of
 
 SWEEPS = ("tests/reference/test_sweeps.py",)
-CHAIN = ("tests/golden/test_forces.py", "tests/solver/sequence/test_frames.py")
+CHAIN = ("tests/solver/nlgs/test_chain.py", "tests/golden/test_forces.py")
 MEASURES = ("tests/reference/test_measures.py",)
 
 MUTANTS = [

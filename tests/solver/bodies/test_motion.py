@@ -122,6 +122,7 @@ def test_rods_weigh_what_their_section_and_length_say():
     grains = Grains.of_rods(np.array([0.01, 0.02]), density=1000.0, length=0.5)
     assert grains.mass == pytest.approx([0.05 * np.pi, 0.2 * np.pi])
     assert grains.inertia == pytest.approx(0.5 * grains.mass * np.array([1e-4, 4e-4]))
+    assert grains.weight((1.0, -9.81)) == pytest.approx(np.outer([0.05 * np.pi, 0.2 * np.pi], [1.0, -9.81]))
 
 
 def test_a_wall_faces_away_from_the_packing_on_its_left():

@@ -53,3 +53,17 @@ def test_contacts_come_in_the_order_of_their_keys():
 def test_grains_in_one_place_are_refused():
     with pytest.raises(ValueError, match="same centre"):
         detect_contacts(rods(0.01, 0.01), np.zeros((2, 2)), np.ones(2, bool), box(1.0, 1.0), 1e-3)
+
+
+def test_walls_may_have_a_threshold_of_their_own():
+    position = np.array([[0.0101, 0.05], [0.0302, 0.05]])
+    grains, walls, here = rods(0.01, 0.01), box(0.2, 0.1), np.ones(2, bool)
+    pair, wall = (0, 1), (0, 5)
+
+    def found(threshold, wall_threshold=None):
+        contacts = detect_contacts(grains, position, here, walls, threshold, wall_threshold=wall_threshold)
+        return list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))
+
+    assert found(1.5e-4) == [pair, wall]
+    assert found(1.5e-4, 5e-5) == [pair]
+    assert found(5e-5, 1.5e-4) == [wall]

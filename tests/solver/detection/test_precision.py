@@ -52,3 +52,15 @@ def test_what_is_stated_stands_unless_it_is_contradicted():
     assert factor == pytest.approx(2.0)
     assert 3e-5 < overlap < 4e-5
     assert [s.sigma for s in with_precision(touching(SIGMA, 0.0)[1], factor)] == [2e-5] * 6
+
+
+def test_noise_alone_makes_no_overlap():
+    found = measure_precision(*touching(4e-5, 0.0))
+    assert found is not None
+    # Half-normal gaps of three photographs have an rms of √(2/3) σ, which is the noise and nothing else.
+    assert found.overlap < 0.3 * 4e-5
+
+
+def test_a_precision_stated_too_low_is_contradicted_as_one_too_high():
+    assert believed_precision(Precision(5e-6, 0.0, 1000), [1e-5], 0.0)[0] == pytest.approx(0.5)
+    assert believed_precision(Precision(0.8e-5, 0.0, 1000), [1e-5], 0.0)[0] == 1.0
