@@ -19,8 +19,8 @@ from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
 from .correlation.correlator import Rows
 from .detection.detect import Detection
-from .manual_poses import ManualPoses
-from .poses import FramePoses
+from .registration.manual_poses import ManualPoses
+from .registration.poses import FramePoses
 from .settings import TrackingSettings
 from .tracker import Tracker
 from .walls.wall_tracker import WallPoses, WallTracker

@@ -24,7 +24,7 @@ from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
-from .manual_poses import ManualPoses
+from .registration.manual_poses import ManualPoses
 from .report.page import Tracked
 from .settings import TrackingSettings
 from .walls.bar_depth import visible_depth

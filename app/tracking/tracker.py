@@ -16,18 +16,18 @@ import numpy as np
 from solver.bodies.grains import Array
 
 from ..experiment.photographs import Image
-from .consistency import doubt_inconsistent, refit_poor
 from .correlation.correlator import Correlator, Rows
 from .correlation.noise import image_noise
 from .correlation.patches import Patches
 from .correlation.splines import Pyramid
 from .detection.detect import Detection
-from .manual_poses import ManualPoses, settle_manual_poses
-from .poses import FramePoses, found_poses, reference_poses
-from .prediction import follow_own_motion, last_known
-from .registration import Registration
-from .renewal import find_damaged
-from .rescue import rescue
+from .registration.consistency import doubt_inconsistent, refit_poor
+from .registration.manual_poses import ManualPoses, settle_manual_poses
+from .registration.poses import FramePoses, found_poses, reference_poses
+from .registration.prediction import follow_own_motion, last_known
+from .registration.registration import Registration
+from .registration.renewal import find_damaged
+from .registration.rescue import rescue
 from .settings import TrackingSettings
 
 

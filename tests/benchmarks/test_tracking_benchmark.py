@@ -14,7 +14,7 @@ import pytest
 from rodsight.experiment.experiment import load_experiment, read_walls
 from rodsight.experiment.photographs import LUMA
 from rodsight.experiment.scaling import make_scale
-from rodsight.tracking.poses import FramePoses
+from rodsight.tracking.registration.poses import FramePoses
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracking.walls.bar_depth import visible_depth
 from rodsight.tracking.walls.wall_tracker import WallTracker

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.tracking.manual_poses import ManualPoses
+from rodsight.tracking.registration.manual_poses import ManualPoses
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.tracking.poses import FramePoses
+from rodsight.tracking.registration.poses import FramePoses
 from rodsight.tracking.settings import TrackingSettings
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus

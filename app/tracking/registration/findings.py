@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
-from .correlation.correlator import Fits, Rows
-from .correlation.patches import Patches
+from ...tracks import TrackStatus
+from ..correlation.correlator import Fits, Rows
+from ..correlation.patches import Patches
+from ..settings import TrackingSettings
 from .neighbours import local_motion, nearby_median
-from .settings import TrackingSettings
 
 
 class Findings:

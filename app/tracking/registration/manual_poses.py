@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
-from .correlation.correlator import Rows, SearchRange
+from ...tracks import TrackStatus
+from ..correlation.correlator import Rows, SearchRange
 from .registration import Registration
 
 # What a hand and an eye are trusted with [px], where correlation finds nothing there.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
-from .correlation.patches import Patches
+from ...tracks import TrackStatus
+from ..correlation.patches import Patches
 from .registration import Registration
 
 # What a patch needs about it to be correlated [px]: splines reach that far.

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
+from ...tracks import TrackStatus
 from .neighbours import local_motion, overlaps
 from .registration import Registration
 

@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..experiment.photographs import Image
-from ..tracks import TrackStatus
-from .correlation.correlator import Correlator, Rows
-from .correlation.patches import Patches
-from .correlation.splines import Pyramid
+from ...experiment.photographs import Image
+from ...tracks import TrackStatus
+from ..correlation.correlator import Correlator, Rows
+from ..correlation.patches import Patches
+from ..correlation.splines import Pyramid
 from .poses import FramePoses
 
 # Photographs in a row in which a part of a grain had to be disregarded before its reference is doubted.

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
+from ...tracks import TrackStatus
 from .poses import FramePoses
 from .registration import Registration
 

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
-from .correlation.correlator import Correlator, Fits, Rows
-from .correlation.patches import Patches
-from .correlation.splines import Pyramid
+from ...tracks import TrackStatus
+from ..correlation.correlator import Correlator, Fits, Rows
+from ..correlation.patches import Patches
+from ..correlation.splines import Pyramid
+from ..settings import TrackingSettings
 from .findings import Findings
-from .settings import TrackingSettings
 
 
 @dataclass(slots=True)

@@ -8,9 +8,9 @@ import numpy as np
 
 from solver.bodies.grains import Array
 
-from ..tracks import TrackStatus
-from .correlation.correlator import Rows, SearchRange
-from .correlation.search import DISTINCT_TURN
+from ...tracks import TrackStatus
+from ..correlation.correlator import Rows, SearchRange
+from ..correlation.search import DISTINCT_TURN
 from .prediction import follow_neighbours
 from .registration import Registration
 
