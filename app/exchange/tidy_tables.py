@@ -123,7 +123,8 @@ def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tu
     """Everything in results.h5 that has one value, or a few with names, for each of these rows."""
     labels = {name: tuple(map(str, DIMENSIONS[name].labels or ())) for name in SPREAD} | {"wall": results.walls.name}
     columns: dict[str, Column] = {}
-    for each in entries("tracks", "walls", "frames", "statistics"):
+    # What sensors of the walls said has a table of its own; in that of frames it would be taken for what was inferred.
+    for each in entries("tracks", *(["walls"] if "wall" in rows else []), "frames", "statistics"):
         rest = each.dims[len(rows) :]
         if each.name in SAID or each.path not in stored or each.dims != rows + rest or not set(rest) <= set(SPREAD):
             continue

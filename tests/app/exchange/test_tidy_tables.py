@@ -7,6 +7,8 @@ import pytest
 from rodsight.cli.main import main
 from rodsight.exchange.tidy_tables import make_tables, write_tables
 
+from tests.app.results.full_results import make_full_results
+
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
 def test_tables_read_back_with_every_digit(results, tmp_path, kind):
@@ -42,6 +44,18 @@ def test_walls_have_their_names_and_columns_their_units(results):
     assert np.array_equal(force, [s.wall_force[top, 1] for s in results.statistics])
 
 
+def test_recorded_wall_forces_are_told_apart_from_inferred_ones():
+    results = make_full_results()
+    tables = make_tables(results)
+    assert "force_top_x" not in tables["frames"].column_names
+    walls = tables["walls"]
+    assert results.walls.force is not None
+    assert np.array_equal(np.array(walls.column("force_y")), results.walls.force[:, :, 1].ravel())
+    inferred = np.concatenate([each.wall_force[:, 1] for each in results.statistics])
+    assert np.array_equal(np.array(walls.column("wall_force_y")), inferred)
+    assert walls.column("wall").to_pylist()[:4] == list(results.walls.name)
+
+
 def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     for arguments in (
@@ -52,12 +66,8 @@ def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
         with pytest.raises(SystemExit) as end:
             main(arguments)
         assert not end.value.code
-    assert {file.name for file in (out / "tables").iterdir()} == {
-        "contacts.csv",
-        "grains.csv",
-        "frames.csv",
-        "walls.csv",
-    }
+    names = {"contacts.csv", "grains.csv", "frames.csv", "walls.csv"}
+    assert {file.name for file in (out / "tables").iterdir()} == names
     assert (out / "vtk" / "contacts.pvd").is_file()
     with pytest.raises(SystemExit) as end:
         main(["export", "dic", str(out)])
