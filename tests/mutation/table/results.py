@@ -13,10 +13,10 @@ MUTANTS = [
             "CONTACT_OFFSET.path: _offset(frame.contacts.count for",
             "CONTACT_OFFSET.path: _offset(frame.contacts.count - 1 for",
         ),
-        ("values = [value[rows] for value, rows in", "values = [value[: len(rows)] for value, rows in"),
+        ("value[_measured(frame.history)] for", "value[: len(_measured(frame.history))] for"),
         ("np.concatenate([[0], np.cumsum(list(counts))])", "np.concatenate([np.cumsum(list(counts)), [0]])"),
         ("KEPT_OFFSET.path: _offset(len(history.recorded)", "KEPT_OFFSET.path: _offset(history.count"),
-        ("~np.isnan(np.stack(rows)).all(axis=0)", "~np.isnan(np.stack(rows)).any(axis=0)"),
+        ("np.flatnonzero(~np.isnan(rows).all(axis=0))", "np.flatnonzero(~np.isnan(rows).any(axis=0))"),
         ('dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit', 'dataset.attrs["unit"] = ""'),
         (
             "member.name.lower(): member.value for member in quantity.names}",

@@ -36,7 +36,7 @@ MUTANTS = [
         "solver/sequence",
         FRAMES,
         ("stiffer: float = 2.0", "stiffer: float = 4.0"),
-        ("np.average(members, axis=0, weights=worth)", "np.average(members, axis=0)"),
+        ("np.average(members.force, axis=0, weights=members.worth)", "np.average(members.force, axis=0)"),
         (
             "are_among(contacts.key, verdicts.forced), 1.0, told)",
             "are_among(contacts.key, verdicts.forced), told, told)",
@@ -53,7 +53,7 @@ MUTANTS = [
     *mutants_of(
         "solver/sequence",
         FRAMES,
-        ("keep = ~(stand_in[contacts.i] | stand_in[contacts.j])", "keep = ~stand_in[contacts.i]"),
-        ("trust=frame.trust * (1.0 - hidden)", "trust=frame.trust"),
+        ("keep = are_there(contacts.key, ~bridged, contacts.body_count)", "keep = ~bridged[contacts.i]"),
+        ("shown = 1.0 - evidence.hidden_share", "shown = 1.0"),
     ),
 ]

@@ -81,3 +81,11 @@ def test_too_few_trials_are_refused():
         estimate_friction([wedge(0.1)], factors=(1.0, 1.2))
     with pytest.raises(ValueError, match="at least one frame"):
         estimate_friction([])
+
+
+def test_every_trial_is_solved_with_its_own_friction():
+    frame = wedge(0.2)
+    twisted = SlidingFrame(frame.balance, frame.contacts, np.array([-1.0, 1.0, -1.0]), frame.probability)
+    gap = estimate_friction([twisted], factors=(0.5, 1.0, 2.0)).gap
+    # With more friction the grain can work against more of this sliding.
+    assert gap[0] > 1.1 * gap[1] > 1.2 * gap[2]

@@ -234,3 +234,25 @@ def test_coulomb_law_holds_exactly_at_any_friction(friction: float):
     grains, _, walls, contacts = lattice()
     forces = solve(balance_of(grains, walls, contacts, friction), np.random.default_rng(6).normal(size=contacts.count))
     assert np.all(np.abs(forces.ft) <= friction * forces.fn)
+
+
+def test_a_contact_as_likely_as_not_costs_nothing():
+    grains, _, walls, contacts = lattice()
+    balance, zero = balance_of(grains, walls, contacts), np.zeros(contacts.count)
+    slip = np.random.default_rng(2).normal(0.0, 0.5, contacts.count)
+    sure, even, doubtful = (
+        solve_member(balance, slip, np.full(contacts.count, p), zero, zero).fn for p in (1.0, 0.5, 0.45)
+    )
+    assert np.array_equal(sure, even)
+    assert not np.array_equal(sure, doubtful)
+
+
+def test_torques_are_balanced_over_the_mean_radius():
+    grains, _, walls, contacts = stack()
+    matrix = balance_of(grains, walls, contacts).matrix.toarray()
+    n, c = grains.count, contacts.count
+    for k in range(n):
+        own = [c + row for row in range(c) if k in (contacts.i[row], contacts.j[row])]
+        assert matrix[2 * n + k, own] == pytest.approx(-grains.radius[k] / grains.radius.mean())
+        others = np.delete(matrix[2 * n + k], own)
+        assert not others.any()

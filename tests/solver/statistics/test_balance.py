@@ -75,3 +75,14 @@ def test_the_kernel_measures_the_same_unbalance(gravity: tuple[float, float]) ->
     found = grain_unbalance(contacts, force[:, 0], force[:, 1], grains.weight(gravity), state.present)
     there = found[state.present]
     assert unbalance_of(problem, force) == pytest.approx((there.max(), there.mean()), rel=1e-9)
+
+
+def test_the_worst_is_sought_among_present_grains_alone() -> None:
+    heap = heap_at_rest()
+    n = heap.packing.grains.count
+    size = unbalances(heap.contacts, heap.fn, heap.ft, 0.0 * heap.packing.weight)
+    worst, mean = int(np.argmax(size)), heap.fn[heap.fn > 0].mean()
+    for here in (np.ones(n, bool), np.arange(n) != worst):
+        found = worst_unbalance(heap.contacts, heap.fn, heap.ft, 0.0 * heap.packing.weight, here)
+        assert found == pytest.approx(size[here].max() / mean)
+    assert size[np.arange(n) != worst].max() < size[worst]

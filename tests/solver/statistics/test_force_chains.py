@@ -138,3 +138,12 @@ def test_no_forces_and_no_grains_make_no_chains():
     none = find_force_chains(contacts, np.empty(0), np.empty(0), position, absent, grains, LENGTH)
     assert none.count == 0
     assert none.length.shape == (0,)
+
+
+def test_by_default_a_link_lies_within_45_degrees():
+    def zigzag(steep):  # [°] of the links, from the horizontal
+        position = path([0.5, 0.3], *[steep, 180 - steep] * 2, steep)
+        return chains_of(position, in_file(0, 1, 2, 3, 4, 5), idle=6).count
+
+    assert zigzag(47) == 1
+    assert zigzag(43) == 0

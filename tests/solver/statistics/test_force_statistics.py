@@ -186,3 +186,11 @@ def test_only_bearing_contacts_count():
     cosine = left[:, 0] ** 2 - left[:, 1] ** 2
     assert found.contact_anisotropy == pytest.approx(abs(2.0 * cosine.mean()), abs=EXACT)
     assert found.contact_anisotropy > 0.5
+
+
+def test_strong_is_what_bears_more_than_the_mean_not_more_than_half_of_the_contacts():
+    fn = np.array([1.0, 1.0, 1.2, 1.3, 10.5])  # mean 3, median 1.2
+    normal = np.tile([1.0, 0.0], (5, 1))
+    strong = strong_network(fn, fn[:, None] * normal, 0.02 * normal)
+    assert strong.contact_share == pytest.approx(1 / 5)
+    assert strong.pressure_share == pytest.approx(10.5 / 15.0)
