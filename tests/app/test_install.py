@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.screen  # a wheel is built, and processes are started
+
 TREE = Path(__file__).parents[2]
 OWN = 'print("the user\'s own")\n'
 

@@ -104,6 +104,7 @@ def test_a_wrong_correction_is_named(
         assert part in told
 
 
+@pytest.mark.screen  # many seconds of photographs
 def test_a_lens_is_taken_out_of_the_tracks(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     straight = plain.tracks.frames(0, 2)
     for file in sorted((photographed / "photos").iterdir()):
