@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from rodsight.synthetic.synthesis import synthesize
 
@@ -21,6 +21,8 @@ settings.register_profile(
     "rodsight", max_examples=25, deadline=None, derandomize=True, database=None,
     suppress_health_check=[HealthCheck.too_slow],
 )  # fmt: skip
+# A mutant need only be noticed: nobody asks for the least example of it.
+settings.register_profile("mutants", settings.get_profile("rodsight"), phases=[Phase.explicit, Phase.generate])
 settings.load_profile("rodsight")
 
 

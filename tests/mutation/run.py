@@ -126,7 +126,7 @@ def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, report: P
     sys.path[:] = [str(tree / ".editable"), str(tree), *theirs]
     os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])
     os.chdir(tree)
-    asked = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", *tests]
+    asked = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--hypothesis-profile=mutants", *tests]
     if not compile_kernels:
         numba.config.DISABLE_JIT = True
         asked += ["-m", "unit and not slow"]

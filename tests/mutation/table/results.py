@@ -2,7 +2,8 @@
 
 from tests.mutation.mutant import mutants_of
 
-STORE = ("tests/app/results/test_store.py", "tests/app/results/test_earlier_files.py")
+STORE = "tests/app/results/test_store.py"
+READER = ("tests/app/results/test_store.py", "tests/app/results/test_earlier_files.py")
 COMPARISON = "tests/app/results/test_comparison.py"
 
 MUTANTS = [
@@ -26,7 +27,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "app/results/reader.py",
-        STORE,
+        READER,
         ("every[self.number[rows]] = values[rows]", "every[: len(values[rows])] = values[rows]"),
         ("values[self.contact[k] : self.contact[k + 1]]", "values[self.contact[k] : self.contact[k + 1] - 1]"),
         (
@@ -45,7 +46,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "app/results/store.py",
-        STORE,
+        READER,
         ("(first, -1 if stop is None else stop)", "(first, first if stop is None else stop)"),
         ("not 1 <= found <= SCHEMA_VERSION", "not 1 <= found"),
         ('store.attrs["friction"] = results.friction', 'store.attrs["friction"] = 0.0'),
