@@ -102,7 +102,7 @@ MUTANTS = [
     ),
     *mutants_of(
         "solver/nlgs/solve.py",
-        "tests/solver/nlgs",
+        ("tests/solver/nlgs", "tests/solver/statistics/test_balance.py"),
         ("force[:] = guess[problem.rows]", "force[:] = guess"),
         ("result[..., problem.rows, :] = force", "result[:] = force[..., problem.rows, :]"),
         ("sweep.natural_map <= settings.natural_map", "sweep.natural_map >= settings.natural_map"),

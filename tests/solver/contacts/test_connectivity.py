@@ -33,3 +33,10 @@ def test_the_coordination_number_is_the_mean_over_grains_that_are_there():
     # Without 3 and 4 and what they touch: 3 + 2 + 2 over the three that are left.
     assert coordination_number(RING, ALL, HERE, without_rattlers=True) == pytest.approx(7 / 3)
     assert coordination_number(RING, ALL, np.zeros(5, bool)) == 0.0
+
+
+def test_it_does_not_matter_which_of_two_grains_has_the_lower_number():
+    # The same with 0 hanging on 1, 1 on the ring of 2, 3, 4.
+    turned = contacts((0, 1), (1, 2), (2, 3), (2, 4), (3, 4), (4, 5))
+    assert rattlers(turned, ALL, HERE).tolist() == [True, True, False, False, False]
+    assert coordination_number(turned, ALL, HERE, without_rattlers=True) == pytest.approx(7 / 3)
