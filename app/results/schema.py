@@ -20,6 +20,7 @@ from solver.contacts.radius_tuning import RadiusTuning
 from solver.convex.friction_check import FrictionCheck
 from solver.sequence.ensemble import MEMBERS
 from solver.sequence.frame_forces import FrameForces
+from solver.sequence.starts import COLD_SWEEPS
 from solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
 from solver.statistics.frame_statistics import FrameStatistics
 
@@ -93,6 +94,7 @@ DIMENSIONS = {
     "mobilisation_bin": Dimension("bins of |f_t| / (μ f_n), labelled by their middles", _middles(MOBILISATION_EDGES)),
     "radius_change": Dimension("changes of radius that were tried"),
     "friction_trial": Dimension("frictions that were tried"),
+    "cold_sweep": Dimension("sweeps from zero forces", COLD_SWEEPS.astype(np.float64)),
 }
 
 

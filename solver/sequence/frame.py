@@ -11,6 +11,8 @@ from solver.bodies.motion import motion_from, motion_to, no_motion
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts
 from solver.detection.refinement import RefinedBlock
 from solver.detection.touch_probability import window_of
+from solver.nlgs.warm_start import ForceMemory
+from solver.sequence.changes import find_changes
 from solver.sequence.estimate import Estimate, estimate_frame, mean_stress
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frame_problem import FrameProblem, SequenceProblem
@@ -61,7 +63,7 @@ def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForce
     since_reset = 0 if standing.status is FrameStatus.RESET else state.frames_since_reset + 1
     ages = find_ages(estimate.contacts, state)
     frame, evidence = report_frame(problem, estimate, evidence, standing, ages)
-    frame = replace(frame, frames_since_reset=since_reset)
+    frame = _compare_with_former(problem, replace(frame, frames_since_reset=since_reset), state)
     pressure = mean_stress(problem, estimate) if problem.motion.spans else np.nan
     return frame, SequenceState(
         members=estimate.members,
@@ -75,7 +77,16 @@ def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForce
         evidence=evidence,
         frames_since_reset=since_reset,
         frames_since_event=0 if eventful else state.frames_since_event + 1,
+        reported=ForceMemory(frame.contacts.key, np.column_stack([frame.fn, frame.ft])),
     )
+
+
+def _compare_with_former(problem: FrameProblem, frame: FrameForces, state: SequenceState) -> FrameForces:
+    """Say how the frame differs from the one before; the first differs from nothing."""
+    if not np.isfinite(state.time):
+        return replace(frame, gained_count=0.0, parted_count=0.0)
+    changes = find_changes(state.reported, frame.contacts, frame.fn, problem.seen)
+    return replace(frame, similarity=changes.similarity, gained_count=changes.gained, parted_count=changes.parted)
 
 
 def _reset_asked(problem: FrameProblem) -> bool:

@@ -14,6 +14,8 @@ from solver.bodies.quantity import Quantity
 from solver.contacts.contacts import Contacts, ContactSource, ContactState
 from solver.nlgs.sweep_record import SweepHistory
 
+NAN = float("nan")
+
 
 class FrameStatus(IntEnum):
     RESET = 0  # no usable history: solved from a first guess
@@ -68,3 +70,23 @@ class FrameForces:
     start_difference: Annotated[float, Quantity("H: of two chains started differently, over the rms")] = float("nan")
     unseen_grains: Annotated[int, Quantity("holes inside the walls that a rod would fit into")] = 0
     hidden_share: Annotated[float, Quantity("1 − correlation with the field less bridged grains")] = 0.0
+    similarity: Annotated[
+        float, Quantity("correlation of f_n with that of the frame before, on common contacts", since=2)
+    ] = NAN
+    gained_count: Annotated[float, Quantity("contacts that the frame before did not have", since=2)] = NAN
+    parted_count: Annotated[
+        float, Quantity("contacts of the frame before that are gone, lost grains aside", since=2)
+    ] = NAN
+    warm_residual: Annotated[float, Quantity("natural map after one sweep from the former forces", since=2)] = NAN
+    cold_residual: Annotated[
+        Array | None, Quantity("natural map after 1, 2, 4, … sweeps from zero forces", dims="cold_sweep", since=2)
+    ] = None
+    sweeps_saved: Annotated[
+        float, Quantity("sweeps from zero forces that do as much as one from the former", since=2)
+    ] = NAN
+    grain_unbalance: Annotated[
+        Array | None,
+        Quantity(
+            "|ΣF| / mean f_n of the reported field, NaN: not there", dims="grain", path="grains/unbalance", since=2
+        ),
+    ] = None

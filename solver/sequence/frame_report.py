@@ -25,7 +25,9 @@ from solver.sequence.judgement import (
     tangential_standard_deviation,
     trust,
 )
+from solver.sequence.starts import measure_starts
 from solver.sequence.state import SequenceState
+from solver.statistics.balance import grain_unbalance
 
 SLIDING_TOLERANCE = 1e-6  # of μ f_n
 
@@ -41,7 +43,8 @@ def report_frame(
     if problem.bridged.any():
         frame = _without_bridged(frame, problem.bridged)
         evidence = replace(evidence, hidden_share=frame.hidden_share)
-    return replace(frame, trust=trust(evidence)), evidence
+    unbalance = grain_unbalance(frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen)
+    return replace(frame, trust=trust(evidence), grain_unbalance=unbalance), evidence
 
 
 def find_ages(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
@@ -65,6 +68,7 @@ def _describe(
     material, contacts, step = problem.packing.material, estimate.contacts, estimate.step
     fn, ft = estimate.fn, estimate.ft
     un, ut = _measured_motion(problem, contacts, estimate)
+    starts = measure_starts(step)
     reason = (estimate.remark, standing.reason, step.solution.stop.value)
     return FrameForces(
         frame=problem.k,
@@ -95,6 +99,9 @@ def _describe(
         frames_since_reset=0,
         history=step.history,
         member_force=estimate.member_force,
+        warm_residual=starts.warm,
+        cold_residual=starts.cold,
+        sweeps_saved=starts.saved,
     )
 
 

@@ -11,6 +11,7 @@ from solver.bodies.grains import Array
 from solver.bodies.motion import LastSeen
 from solver.bodies.packing import Packing
 from solver.contacts.pairs import Keys
+from solver.nlgs.warm_start import ForceMemory
 from solver.sequence.ensemble import EnsembleState
 from solver.sequence.judgement import Evidence
 
@@ -30,13 +31,14 @@ class SequenceState:
     evidence: Evidence  # what the last frame was judged by
     frames_since_reset: int
     frames_since_event: int
+    reported: ForceMemory  # the last frame's forces, as they were reported
 
     @classmethod
     def first(cls, packing: Packing) -> SequenceState:
         walls = len(packing.pressure)
         return cls(
             EnsembleState.first(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
-            np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NOTHING_KNOWN, 0, 0,
+            np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NOTHING_KNOWN, 0, 0, ForceMemory.empty(),
         )  # fmt: skip
 
     def without_forces(self) -> SequenceState:

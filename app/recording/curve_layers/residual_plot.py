@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.nlgs.sweep_record import SweepHistory
+from solver.sequence.starts import COLD_SWEEPS
 
 from ..look import entities
 from ..look.axes import Axes
 from ..look.colours import INK, SERIES, Rgba, packed
 from ..look.scene import Clock
-from .starts import COLD_SWEEPS, Starts
 
 DECADES = (-6.0, 4.0)  # log10 of a residual, bottom and top
 MOST_POINTS = 220  # of a curve
@@ -36,13 +36,18 @@ class ResidualPlot:
         self._tolerance = tolerance
         self._axes: Axes | None = None
 
-    def log(self, clock: Clock, history: SweepHistory, starts: Starts, marked: NDArray[np.int64]) -> None:
-        """Draw one frame (at least one sweep); marked (r,): sweeps, ascending, at which points stand on the curves."""
+    def log(self, clock: Clock, history: SweepHistory, cold: Array | None, marked: NDArray[np.int64]) -> None:
+        """Draw one frame (at least one sweep).
+
+        cold (s,): residuals after COLD_SWEEPS sweeps from zero forces, None: not known; marked (r,): sweeps, ascending,
+        at which points stand on the curves.
+        """
+        cold = np.full(len(COLD_SWEEPS), np.nan) if cold is None else cold
         axes = self._axes or self._begin(clock.stream, history.count)
         residuals = np.stack([history.natural_map, history.unbalance, history.force_change])
         curves = [axes_points(axes, *envelope(each)) for each in residuals]
-        known = np.isfinite(starts.cold) & (starts.cold > 0.0)
-        strips = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), starts.cold[known])]
+        known = np.isfinite(cold) & (cold > 0.0)
+        strips = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), cold[known])]
         shown = [len(strip) > 1 for strip in strips]
         clock.start()
         clock.stream.log(

@@ -12,7 +12,6 @@ from ..look.colours import SERIES, Rgba
 from ..look.scene import Clock, Scene
 from ..look.texts import printable
 from ..look.values import log_scalar
-from ..packing_layers.changes import Changes
 from .convergence import power_of_ten
 
 STATUS_COLOURS: dict[FrameStatus, Rgba] = {
@@ -70,7 +69,7 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
 
 
-def log_settling(clock: Clock, scene: Scene, forces: FrameForces, changes: Changes) -> None:
+def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log lanes, trust and flags of one frame."""
     clock.start()
     lost = ~scene.tracks.present[clock.frame]
@@ -80,7 +79,7 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces, changes: Chang
     clock.end()
     for path, value in (
         (entities.TRUST, forces.trust),
-        (entities.SIMILARITY, changes.similarity),
+        (entities.SIMILARITY, forces.similarity),
         (entities.CORRECTION, forces.correction),
         (entities.OLD_UNBALANCE, forces.old_unbalance),
         (entities.START_DIFFERENCE, forces.start_difference),
@@ -88,8 +87,8 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces, changes: Chang
         (entities.SWEEP_COUNT, forces.sweeps),
         (entities.FINAL_NATURAL_MAP, power_of_ten(np.array(forces.natural_map))),
         (entities.FINAL_UNBALANCE, power_of_ten(np.array(forces.unbalance))),
-        (entities.GAINED_COUNT, changes.gained),
-        (entities.PARTED_COUNT, changes.parted),
+        (entities.GAINED_COUNT, forces.gained_count),
+        (entities.PARTED_COUNT, forces.parted_count),
     ):
         log_scalar(clock, path, float(value))
 

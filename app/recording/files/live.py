@@ -3,7 +3,7 @@
 The server answers on 127.0.0.1 only and keeps at most MEMORY_LIMIT of what was logged; a viewer that opens late sees
 what it still has. The file has everything, and every finished frame reaches it before the next one begins, so that a
 run that is interrupted, or killed, leaves a recording that opens. So as to keep up with the solve it keeps fewer
-sweeps than the full recording, which takes its place at the end, and measures no warm and cold starts. It runs in a
+sweeps than the full recording, which takes its place at the end. It runs in a
 process of its own (live_process), which the solve does not wait for.
 
 To watch a run on another machine, forward both ports, under the same numbers, and open the printed address here:
@@ -124,7 +124,7 @@ class LiveRecording:
         seen = ForceRange.of([forces])
         style = ForceStyle.on(self._canvas, ForceRange(seen.mean, HEADROOM * seen.top))
         scene = Scene(run.name, run.tracks, run.walls, run.grains, run.friction, run.configuration, self._canvas, style)
-        recorder = Recorder(self._running(), sweeps=self._sweeps, kept=SWEEPS_KEPT, flush_every=1, starts=False)
+        recorder = Recorder(self._running(), sweeps=self._sweeps, kept=SWEEPS_KEPT, flush_every=1)
         recorder.start(scene)
         send_layout(self._running(), self._layout(run, self._canvas))
         return recorder

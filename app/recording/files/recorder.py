@@ -21,7 +21,7 @@ from ..curve_layers.force_density import ForceDensity
 from ..curve_layers.radius_curve import log_radius_curve
 from ..curve_layers.residual_plot import ResidualPlot
 from ..curve_layers.settling import log_settling, log_settling_styles
-from ..curve_layers.starts import UNKNOWN, StartGauge, Starts, log_start_styles, log_starts
+from ..curve_layers.starts import log_start_styles, log_starts
 from ..curve_layers.statistic_curves import log_statistics, log_statistics_styles
 from ..curve_layers.stress_and_fabric import log_polar_axes, log_rose, log_stress
 from ..look.scene import Clock, Scene
@@ -55,8 +55,7 @@ SWEEPS_KEPT = 40  # per frame, with SweepChoice.LOG
 class Recorder:
     """Writes a run into a stream, one frame at a time. The stream is the caller's: file, socket or memory.
 
-    Call start once, frame for the frames in their order, finish once. starts: whether warm and cold starts are
-    measured, which takes sweeps of its own.
+    Call start once, frame for the frames in their order, finish once.
     """
 
     def __init__(
@@ -66,15 +65,12 @@ class Recorder:
         sweeps: SweepChoice = SweepChoice.LOG,
         kept: int = SWEEPS_KEPT,
         flush_every: int = FLUSHED_FRAMES,
-        starts: bool = True,
     ) -> None:
         rr.set_strict_mode(True)  # else the SDK warns and leaves out what it could not write
         self._stream = stream
         self._sweeps, self._kept, self._flush_every = sweeps, kept, flush_every
-        self._starts = starts
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
-        self._gauge: StartGauge | None = None
         self._stack: StackWriter | None = None
         self._plot: ResidualPlot | None = None
         self._former: FrameForces | None = None
@@ -97,7 +93,6 @@ class Recorder:
         self._scene = scene
         stream.send_recording_name(printable(scene.name))
         send_experiment(stream, scene)
-        self._gauge = StartGauge(scene) if self._starts else None
         self._stack = StackWriter(scene)
         self._plot = ResidualPlot(scene.tolerance)
         log_settling_styles(stream)
@@ -125,14 +120,13 @@ class Recorder:
             log_photograph(clock, scene.canvas, photograph)
         log_grains_and_walls(clock, scene, forces)
         self.network_rows += log_network(clock, scene, forces, self._sweeps, self._kept)
-        starts = self._gauge.measure(forces) if self._gauge else UNKNOWN
-        log_starts(clock, starts)
-        self._log_solve(clock, scene, forces, starts)
+        log_starts(clock, forces)
+        self._log_solve(clock, scene, forces)
         log_unconverged(clock, scene, forces, self._sweeps, self._kept)
         log_touching(clock, scene, forces)
         log_reviewed(clock, scene, forces)
-        changes = log_changes(clock, scene, forces, self._former)
-        log_settling(clock, scene, forces, changes)
+        log_changes(clock, scene, forces, self._former)
+        log_settling(clock, scene, forces)
         log_statistics(clock, scene, statistics)
         log_stress(clock, statistics)
         log_rose(clock, forces)
@@ -145,9 +139,7 @@ class Recorder:
         self._clipped += scene.style.clipped(forces.fn)
         self._drawn += len(forces.fn)
         lost = int((~scene.tracks.present[forces.frame]).sum())
-        self._facts.append(
-            FrameFacts.of(forces, statistics, similarity=changes.similarity, lost=lost, agreement=agreement)
-        )
+        self._facts.append(FrameFacts.of(forces, statistics, lost=lost, agreement=agreement))
         if len(self._facts) % self._flush_every == 0:
             self._stream.flush()
 
@@ -157,7 +149,7 @@ class Recorder:
         send_outcome(self._stream, self._facts)
         log_summary(self._stream, self._running(), self._facts, self._clipped, self._drawn, list(notes))
 
-    def _log_solve(self, clock: Clock, scene: Scene, forces: FrameForces, starts: Starts) -> None:
+    def _log_solve(self, clock: Clock, scene: Scene, forces: FrameForces) -> None:
         if scene.tolerance is not None:
             log_tolerance(clock, scene.tolerance)
         if forces.history.count == 0:
@@ -169,7 +161,7 @@ class Recorder:
         log_residuals(clock, history)
         if self._plot is not None:
             few = chosen_sweeps(history, SweepChoice.LOG, self._kept)
-            self._plot.log(clock, history, starts, history.recorded[few])
+            self._plot.log(clock, history, forces.cold_residual, history.recorded[few])
 
     def _running(self) -> Scene:
         if self._scene is None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts, measure_contacts
+from solver.contacts.pairs import are_among, are_there
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
@@ -22,28 +21,17 @@ GAP_RANGE_SHARE = 0.004  # of the mean radius: the gap at which colour no longer
 _RAMP = packed(GAP_RAMP)
 
 
-@dataclass(frozen=True, slots=True)
-class Changes:
-    """How a frame's network differs from the one before."""
-
-    gained: int
-    parted: int
-    similarity: float  # correlation of f_n on common contacts, NaN where it is not defined
-
-
-def log_changes(clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None) -> Changes:
+def log_changes(clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None) -> None:
     """Log gaps and changes of one frame; the first frame has no former one."""
     clock.start()
     _log_gaps(clock, scene, forces.contacts)
     contacts = forces.contacts
     if former is None:
         gained, parted = contacts.select(np.zeros(contacts.count, bool)), np.empty((0, 2, 2), np.float32)
-        similarity = float("nan")
     else:
-        gained = contacts.select(~np.isin(contacts.key, former.contacts.key))
-        gone = former.contacts.select(~np.isin(former.contacts.key, contacts.key))
+        gained = contacts.select(~are_among(contacts.key, former.contacts.key))
+        gone = former.contacts.select(~are_among(former.contacts.key, contacts.key))
         parted = _branches_now(scene, clock.frame, gone)
-        similarity = correlate_common(former, forces)
     for path, strips, colour in (
         (entities.GAINED, scene.branches(clock.frame, gained), GAINED),
         (entities.PARTED, parted, LOST),
@@ -57,22 +45,6 @@ def log_changes(clock: Clock, scene: Scene, forces: FrameForces, former: FrameFo
                 draw_order=25.0,
             ),
         )
-    return Changes(gained.count, len(parted), similarity)
-
-
-def correlate_common(former: FrameForces, latter: FrameForces) -> float:
-    """Pearson correlation of f_n over the contacts that both frames have; NaN with fewer than three."""
-    _, a, b = np.intersect1d(former.contacts.key, latter.contacts.key, assume_unique=True, return_indices=True)
-    return correlate(former.fn[a], latter.fn[b])
-
-
-def correlate(a: Array, b: Array) -> float:
-    """Pearson correlation; NaN with fewer than three values or where one side does not vary."""
-    known = np.isfinite(a) & np.isfinite(b)
-    a, b = a[known], b[known]
-    if len(a) < 3 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
-        return float("nan")
-    return float(np.corrcoef(a, b)[0, 1])
 
 
 def gap_range(scene: Scene) -> float:
@@ -110,9 +82,7 @@ def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
 
 def _branches_now(scene: Scene, frame: int, gone: Contacts) -> NDArray[np.float32]:
     """Branches of contacts of the frame before, where their bodies are now; those of lost grains are left out."""
-    n, present = scene.grains.count, scene.tracks.present[frame]
-    known = present[gone.i] & (gone.with_wall | present[np.minimum(gone.j, n - 1)])
-    gone = gone.select(known)
+    gone = gone.select(are_there(gone.key, scene.tracks.present[frame], gone.body_count))
     walls = scene.walls_at(frame)
     now = measure_contacts(scene.grains, scene.tracks.position[frame], walls, gone.i, gone.j)
     return scene.branches(frame, now)

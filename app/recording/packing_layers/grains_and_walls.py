@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.sequence.frame_forces import FrameForces
-from solver.statistics.balance import grain_unbalance
 
 from ...tracks import TrackStatus
 from ..look import entities
@@ -65,6 +64,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     centre = canvas.points(last_seen(tracks.position, frame))
     radius = canvas.lengths(tracks.radius)
     status = tracks.status[frame]
+    unbalance = np.full(tracks.grain_count, np.nan) if forces.grain_unbalance is None else forces.grain_unbalance
     line = np.where(present & (status != TrackStatus.SUSPECT), 0.02, 0.05) * canvas.grain_radius
     clock.stream.log(
         entities.GRAINS,
@@ -83,9 +83,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
             sigma_um=known((1e6 * tracks.sigma[frame]).astype(np.float32)),
             zncc=known(tracks.zncc[frame].astype(np.float32)),
             status=[TrackStatus(s).name.lower() for s in status.tolist()],
-            unbalance=known(
-                grain_unbalance(forces.contacts, forces.fn, forces.ft, scene.weight, present).astype(np.float32)
-            ),
+            unbalance=known(np.asarray(unbalance, np.float32)),
         ),
     )
     turned = tracks.rotation[frame] - _first_rotation(tracks.rotation)

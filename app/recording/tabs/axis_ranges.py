@@ -9,7 +9,6 @@ import numpy as np
 from ...results.results import Results
 from ..curve_layers.statistic_curves import statistic_values, wall_values
 from ..look import entities
-from ..packing_layers.changes import correlate_common
 
 Extremes = Mapping[str, tuple[float, float]]  # of the curves at a path
 
@@ -29,7 +28,7 @@ def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
         if np.isfinite(forces.probability).any():
             values.append((entities.EXPECTED_COUNT, float(np.nansum(forces.probability))))
         if frame:
-            values.append((entities.SIMILARITY, correlate_common(results.frames[frame - 1], forces)))
+            values.append((entities.SIMILARITY, forces.similarity))
         for path, several in wall_values(results.walls.endpoints[frame], statistics):
             values += [(path, float(value)) for value in several]
         for path, value in values:

@@ -46,13 +46,12 @@ class FrameFacts:
         forces: FrameForces,
         statistics: FrameStatistics,
         *,
-        similarity: float,
         lost: int,
         agreement: Agreement | None,
     ) -> FrameFacts:
         return cls(
-            forces.frame, forces.status, forces.reason, forces.trust, similarity, forces.sweeps, forces.natural_map,
-            forces.unbalance, statistics.contact_count, statistics.friction_angle, lost, agreement,
+            forces.frame, forces.status, forces.reason, forces.trust, forces.similarity, forces.sweeps,
+            forces.natural_map, forces.unbalance, statistics.contact_count, statistics.friction_angle, lost, agreement,
         )  # fmt: skip
 
 

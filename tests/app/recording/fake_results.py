@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from rodsight.results.results import Results, TruthContacts
@@ -13,7 +13,11 @@ from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, ContactState, detect_contacts
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.nlgs.sweep_record import SweepHistory
+from solver.nlgs.warm_start import ForceMemory
+from solver.sequence.changes import find_changes
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.starts import COLD_SWEEPS
+from solver.statistics.balance import grain_unbalance
 from solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
 from solver.statistics.frame_statistics import FrameStatistics
 
@@ -49,7 +53,7 @@ def make_results(
     for frame in range(frame_count):
         contacts = contacts_at(tracks, walls, grains, frame)
         forces = _frame(frame, contacts, waves, sweeps, kept, rng)
-        frames.append(forces)
+        frames.append(_compared(forces, frames[-1] if frames else None, grains, tracks.present[frame]))
         statistics.append(_statistics(forces, grains.count))
     return Results("fake", tracks, walls, grains, FRICTION, frames, statistics, CONFIGURATION)
 
@@ -137,6 +141,22 @@ def _frame(
         0.1 * np.abs(ft) + 1.0, status, f"{status.name.lower()}: invented", sweeps, reached[0],
         reached[1], 0.02, 0.06 + 0.1 * np.exp(-frame), 0.03 if frame else np.nan,
         0.95 - 0.3 * float(np.exp(-frame)), frame, history,
+    )  # fmt: skip
+
+
+def _compared(forces: FrameForces, former: FrameForces | None, grains: Grains, present: np.ndarray) -> FrameForces:
+    """With what the solver says of a frame beside the one before, and with the unbalance of its grains."""
+    weightless = np.zeros((grains.count, 2))
+    unbalance = grain_unbalance(forces.contacts, forces.fn, forces.ft, weightless, present)
+    cold = 0.5 / np.sqrt(COLD_SWEEPS)
+    forces = replace(forces, grain_unbalance=unbalance, cold_residual=cold, gained_count=0.0, parted_count=0.0)
+    if former is None:
+        return forces
+    memory = ForceMemory(former.contacts.key, np.column_stack([former.fn, former.ft]))
+    changes = find_changes(memory, forces.contacts, forces.fn, present)
+    return replace(
+        forces, similarity=changes.similarity, gained_count=changes.gained, parted_count=changes.parted,
+        warm_residual=1e-3, sweeps_saved=100.0,
     )  # fmt: skip
 
 

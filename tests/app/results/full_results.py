@@ -13,6 +13,7 @@ from solver.calibration.statistics import GapStatistics
 from solver.convex.friction_check import FrictionCheck
 from solver.sequence.ensemble import MEMBERS
 from solver.sequence.frame_forces import FrameForces
+from solver.sequence.starts import COLD_SWEEPS
 from tests.app.recording.fake_results import make_results, make_tuning
 
 WORLD = {"columns": 4, "rows": 3, "sweeps": 6}
@@ -65,6 +66,13 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         start_difference=float(rng.random()),
         unseen_grains=int(rng.integers(1, 9)),
         hidden_share=float(rng.random()),
+        similarity=float(rng.random()),
+        gained_count=float(rng.integers(1, 9)),
+        parted_count=float(rng.integers(1, 9)),
+        warm_residual=float(rng.random()),
+        cold_residual=rng.random(len(COLD_SWEEPS)),
+        sweeps_saved=float(rng.random()),
+        grain_unbalance=rng.random(frame.contacts.grain_count),
     )
 
 

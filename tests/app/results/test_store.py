@@ -100,12 +100,15 @@ def test_rows_of_a_frame_lie_between_its_offsets(results, file):
 def test_every_number_of_a_frame_has_its_own_dataset(results, file):
     names = (
         "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust", "frames_since_reset",
-        "start_difference", "unseen_grains", "hidden_share",
+        "start_difference", "unseen_grains", "hidden_share", "similarity", "gained_count", "parted_count",
+        "warm_residual", "cold_residual", "sweeps_saved",
     )  # fmt: skip
     with h5py.File(file) as store:
         for name in names:
             expected = [getattr(frame, name) for frame in results.frames]
             assert np.array_equal(store[f"frames/{name}"][()], expected, equal_nan=True), name
+        expected = [frame.grain_unbalance for frame in results.frames]
+        assert np.array_equal(store["grains/unbalance"][()], expected)
         assert store["frames/reason"].asstr()[()].tolist() == [frame.reason for frame in results.frames]
         assert store["frames/time"][()].tolist() == results.tracks.time.tolist()
         for name in ("stress", "wall_force", "mean_fn", "chain_count", "fn_density"):

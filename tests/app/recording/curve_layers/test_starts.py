@@ -8,15 +8,10 @@ import pytest
 from rodsight import pipeline
 from rodsight.experiment.experiment import load_experiment
 from rodsight.recording.curve_layers.residual_plot import DECADES, envelope
-from rodsight.recording.curve_layers.starts import COLD_SWEEPS, StartGauge, Starts, contact_problem
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
-from rodsight.recording.look.canvas import Canvas
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
-from rodsight.recording.look.scene import Scene
 from rodsight.results.results import Results
 
-from solver.nlgs.solve import NlgsSettings, solve
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest
 
@@ -29,66 +24,31 @@ def solved(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Resul
     return pipeline.solve(pipeline.Run(experiment, tmp_path_factory.mktemp("solved")))
 
 
-def scene_of(results: Results) -> Scene:
-    canvas = Canvas.around(results.tracks, None)
-    style = ForceStyle.on(canvas, ForceRange.of(results.frames))
-    return Scene(
-        results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
-        style,
-    )  # fmt: skip
-
-
-def test_the_problem_measured_is_the_one_that_the_chain_solved(solved: Results):
-    gauge = StartGauge(scene_of(solved))
-    for forces in solved.frames:
-        motion, packing = gauge._motion(forces.frame), gauge._packing
-        assert motion is not None
-        assert packing is not None
-        problem, rows = contact_problem(packing, motion, forces)
-        reached = np.column_stack([forces.nlgs_fn, forces.nlgs_ft])[rows]
-        found = solve(problem, NlgsSettings(0), guess=reached).natural_map
-        assert found == pytest.approx(forces.natural_map, rel=ROUNDING)
-        gauge.measure(forces)
-
-
-def test_a_warm_start_is_far_ahead_of_a_cold_one_where_little_has_changed(solved: Results):
-    gauge = StartGauge(scene_of(solved))
-    starts = [gauge.measure(forces) for forces in solved.frames]
-    assert np.isnan(starts[0].warm)  # nothing was there before
-    assert np.isnan(starts[0].saved)
-    for start in starts:
-        assert np.all(np.diff(start.cold) < 0.0)
-    carried = starts[2:]
-    assert all(start.warm < 0.5 * start.cold[0] and start.saved > 0.5 for start in carried)  # events included
-    assert np.median([start.warm / start.cold[0] for start in carried]) < 0.2
-
-
-def test_the_sweeps_saved_lie_between_those_that_bracket_the_warm_start():
-    cold = COLD_SWEEPS.astype(float) ** -1.0
-    assert Starts(0.3, cold).saved == pytest.approx(1.0 / 0.3 - 1.0)
-    assert Starts(2.0, cold).saved == 0.0
-    assert np.isnan(Starts(1e-9, cold).saved)
-    assert np.isnan(Starts(np.nan, cold).saved)
-
-
 def test_the_recording_has_warm_cold_and_reached_of_every_frame(solved: Results, tmp_path: Path):
     path = write_recording(solved, tmp_path / "run.rrd").path
-    gauge = StartGauge(scene_of(solved))
     for forces in solved.frames:
-        starts = gauge.measure(forces)
+        assert forces.cold_residual is not None
         for entity, value in (
-            (entities.COLD_RESIDUAL, starts.cold[0]), (entities.WARM_RESIDUAL, starts.warm),
+            (entities.COLD_RESIDUAL, forces.cold_residual[0]), (entities.WARM_RESIDUAL, forces.warm_residual),
             (entities.FINAL_NATURAL_MAP, forces.natural_map),
         ):  # fmt: skip
             shown = latest(path, entity, entities.FRAME, forces.frame)["Scalars:scalars"]
             assert shown == pytest.approx([np.log10(value)] if np.isfinite(value) else [])
 
 
-def test_a_run_that_does_not_say_how_it_was_loaded_has_no_starts():
+def test_what_an_earlier_version_did_not_store_is_left_out_of_the_recording(tmp_path: Path):
     results = make_results(2)
-    frames = [replace(forces, kappa=float("nan")) for forces in results.frames]
-    gauge = StartGauge(scene_of(results))
-    assert np.isnan(gauge.measure(frames[0]).cold).all()
+    unknown = {"similarity", "gained_count", "parted_count", "warm_residual", "sweeps_saved"}
+    less = dict.fromkeys(unknown, float("nan")) | {"cold_residual": None, "grain_unbalance": None}
+    path = write_recording(
+        replace(results, frames=[replace(each, **less) for each in results.frames]), tmp_path / "o.rrd"
+    ).path
+    for entity in (
+        entities.SIMILARITY, entities.GAINED_COUNT, entities.PARTED_COUNT, entities.WARM_RESIDUAL,
+        entities.COLD_RESIDUAL, entities.SAVED_SWEEPS,
+    ):  # fmt: skip
+        assert latest(path, entity, entities.FRAME, 1)["Scalars:scalars"] == []
+    assert set(latest(path, entities.GRAINS, entities.FRAME, 1)["unbalance"]) == {None}
 
 
 def test_a_thinned_residual_keeps_its_peaks():

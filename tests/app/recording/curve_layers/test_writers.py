@@ -12,7 +12,7 @@ from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.look.scene import Clock, Scene
 from rodsight.recording.look.texts import printable
-from rodsight.recording.packing_layers.changes import correlate, correlate_common, gap_colours
+from rodsight.recording.packing_layers.changes import gap_colours
 from rodsight.recording.packing_layers.grains_and_walls import _spin_marks, last_seen
 from rodsight.recording.packing_layers.rods_in_3d import turns_from_axis
 from rodsight.recording.packing_layers.true_forces import TruthWriter
@@ -21,7 +21,6 @@ from rodsight.results.truth import score
 
 from solver.contacts.contacts import Contacts
 from solver.statistics.balance import grain_unbalance
-from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest
 
 ROUNDING = 1e-12
@@ -45,21 +44,6 @@ def test_a_lost_grain_is_shown_where_it_was_last_seen_or_will_be():
     position[:2, 1] = np.nan
     shown = last_seen(position, 1)
     assert shown.tolist() == [[0.0, 1.0], [10.0, 11.0]]
-
-
-def test_similarity_uses_the_contacts_that_both_frames_have():
-    results = make_results(2)
-    former, latter = results.frames
-    assert correlate_common(former, former) == pytest.approx(1.0)
-    common = set(former.contacts.key.tolist()) & set(latter.contacts.key.tolist())
-    a = [former.fn[former.contacts.key.tolist().index(k)] for k in sorted(common)]
-    b = [latter.fn[latter.contacts.key.tolist().index(k)] for k in sorted(common)]
-    assert correlate_common(former, latter) == pytest.approx(np.corrcoef(a, b)[0, 1], rel=ROUNDING)
-
-
-def test_correlation_is_undefined_without_variation():
-    assert np.isnan(correlate(np.ones(5), np.arange(5.0)))
-    assert np.isnan(correlate(np.array([1.0, np.nan, 2.0]), np.arange(3.0)))
 
 
 def test_the_gap_ramp_ends_differ_and_nan_is_drawn_as_touching():

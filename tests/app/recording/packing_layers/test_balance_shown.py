@@ -14,6 +14,7 @@ from rodsight.results.results import Results
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 from solver.nlgs.sweep_record import SweepHistory
+from solver.statistics.balance import grain_unbalance
 from tests.app.recording.fake_results import WALL_NAMES, make_results
 from tests.app.recording.rows import latest
 from tests.packings import Heap, heap_at_rest
@@ -28,11 +29,12 @@ def results_of(heap: Heap) -> Results:
     force = np.stack([heap.fn, heap.ft]).astype(np.float32)
     measured = np.full(2, 1e-13)
     history = SweepHistory(measured, measured, measured, np.arange(2), *(np.stack([each, each]) for each in force))
+    unbalance = grain_unbalance(contacts, heap.fn, heap.ft, heap.packing.weight, heap.state.present)
     some, none = np.zeros(contacts.count), np.zeros(contacts.count, np.uint8)
     forces = replace(
         invented.frames[0], contacts=contacts, fn=heap.fn, ft=heap.ft, nlgs_fn=heap.fn, nlgs_ft=heap.ft, un=some,
         ut=some, state=none, age=none.astype(np.int32), source=none, probability=some, fn_sd=some, ft_sd=some,
-        history=history,
+        history=history, grain_unbalance=unbalance,
     )  # fmt: skip
     tracks = Tracks(
         np.arange(n), heap.packing.grains.radius, np.zeros(1), heap.state.position[None], np.zeros((1, n)),
