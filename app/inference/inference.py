@@ -16,7 +16,6 @@ from solver.calibration.calibrate import Calibration
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.contacts.verdicts import Verdicts
 from solver.convex.friction_check import FrictionCheck
-from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frames import solve_sequence
 from solver.sequence.settings import SequenceSettings
@@ -56,7 +55,7 @@ class CorrectedSequence:
 
     def check_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
         """What the motion of all solved frames says of the friction that was given."""
-        probability = ContactProbabilitySettings(overlap=self.settings.overlap)
+        probability = self.settings.for_radii(self.packing.grains.radius).ensemble.probability
         return friction_of(self.packing, self.snapshots, frames, probability)
 
 
@@ -81,7 +80,7 @@ class CoordinationError(ValueError):
 def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     """Calibrate tracks and tune radii as the settings ask for. Raises CoordinationError."""
     tracks, walls, settings = inputs.tracks, inputs.walls, inputs.settings
-    overlap = settings.typical_overlap(tracks.radius)
+    overlap = settings.overlap_of(tracks.radius)
     calibration = tuning = None
     if settings.calibration is not None:
         tracks, walls, calibration = calibrate_tracks(settings.calibration, tracks, walls, overlap)

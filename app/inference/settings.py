@@ -8,11 +8,9 @@ from solver.bodies.grains import Array
 from solver.bodies.rods import RodMaterial
 from solver.calibration.settings import CalibrationSettings
 from solver.nlgs.chain import ChainSettings
-from solver.sequence.settings import SequenceSettings
+from solver.sequence.settings import SequenceSettings, typical_overlap
 
 from ..experiment.config.experiment_file import ExperimentFile, InferenceSections
-
-SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,22 +22,13 @@ class InferenceSettings:
     coordination: float | None = None  # change all radii alike until z without rattlers is this
     overlap: float | None = None  # [m] of touching surfaces; None: 3e-4 mean diameters, or as the gaps show
 
-    def typical_overlap(self, radius: Array) -> float:
-        """How far touching surfaces overlap or stand apart by elasticity and roughness [m]; radius (n,) [m].
-
-        A missed contact costs far more than a false one, so it is rather too large than too small.
-        """
-        return SURFACE * 2.0 * float(radius.mean()) if self.overlap is None else self.overlap
+    def overlap_of(self, radius: Array) -> float:
+        """How far touching surfaces of grains of these radii (n,) [m] overlap [m]."""
+        return typical_overlap(radius) if self.overlap is None else self.overlap
 
     def for_overlap(self, overlap: float) -> SequenceSettings:
-        """The solver's settings for surfaces that overlap by so much [m]."""
-        ensemble = self.sequence.ensemble
-        return replace(
-            self.sequence,
-            overlap=overlap,
-            measure_overlap=self.overlap is None,
-            ensemble=replace(ensemble, probability=replace(ensemble.probability, overlap=overlap)),
-        )
+        """The solver's settings for surfaces that overlap by so much [m]; a given overlap is not measured anew."""
+        return replace(self.sequence, overlap=overlap, measure_overlap=self.overlap is None)
 
     def uncorrected(self) -> InferenceSettings:
         """The same for tracks that are corrected already: neither calibrated nor tuned."""

@@ -109,7 +109,7 @@ def _precision(inputs: VariedInputs, value: float, rng: np.random.Generator) -> 
 
 
 def _overlap(inputs: VariedInputs, value: float, rng: np.random.Generator) -> VariedInputs:
-    usual = inputs.settings.typical_overlap(inputs.tracks.radius)
+    usual = inputs.settings.overlap_of(inputs.tracks.radius)
     return replace(inputs, settings=replace(inputs.settings, overlap=value * usual))
 
 

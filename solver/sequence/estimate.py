@@ -100,7 +100,9 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
 def _estimate_by_chain(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
     settings, sigma = problem.settings, problem.snapshot.sigma
     threshold = settings.threshold
-    if threshold is None:  # the gap of a touching pair scatters by √2 σ and by the overlap
+    if threshold is None:
+        assert settings.overlap is not None
+        # The gap of a touching pair scatters by √2 σ and by the overlap.
         threshold = settings.threshold_sigmas * float(np.hypot(sigma, settings.overlap / np.sqrt(2.0)))
     estimate = _advance_chain(problem, state, threshold, threshold)
     evidence = gather_evidence(problem, estimate, state)

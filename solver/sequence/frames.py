@@ -35,6 +35,7 @@ def solve_sequence(
     state = SequenceState.first(packing) if state is None else state
     verdicts = {} if verdicts is None else verdicts
     snapshots = without_ignored(snapshots, verdicts)
+    settings = settings.for_radii(packing.grains.radius)
     snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
     sequence = SequenceProblem(packing, snapshots, settings)
     refined, number = None, -1
@@ -56,6 +57,7 @@ def _with_measured_precision(
     found = measure_precision(packing.grains, snapshots) if settings.measure_precision else None
     if found is None:
         return snapshots, settings, ""
+    assert settings.overlap is not None
     factor, overlap = believed_precision(found, [each.sigma for each in snapshots], settings.overlap)
     if settings.estimator == "nlgs":  # its threshold is all that it has against errors that stay
         factor = max(factor, 1.0)

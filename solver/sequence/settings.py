@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from solver.bodies.grains import Array
 from solver.convex.program import ConvexSettings
 from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.nlgs.chain import ChainSettings
+
+SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +28,23 @@ class SequenceSettings:
     keep_members: bool = False  # ensemble: keep the field of every member
     measure_precision: bool = True  # from the gaps, where they contradict what is stated
     measure_overlap: bool = True  # likewise
-    overlap: float = 0.0  # [m] typical overlap or roughness of touching surfaces
+    overlap: float | None = None  # [m] typical overlap or roughness of touching surfaces; None: `typical_overlap`
     threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
     reset_to_zero: bool = False  # the paper's reset at a rearrangement
     reset_frames: frozenset[int] = frozenset()  # frames that start from zero forces whatever is found
     kept_frames: frozenset[int] = frozenset()  # frames that never do
+
+    def for_radii(self, radius: Array) -> SequenceSettings:
+        """The same for grains of these radii (n,) [m], their overlap told to all that ask for it."""
+        overlap = typical_overlap(radius) if self.overlap is None else self.overlap
+        probability = replace(self.ensemble.probability, overlap=overlap)
+        return replace(self, overlap=overlap, ensemble=replace(self.ensemble, probability=probability))
+
+
+def typical_overlap(radius: Array) -> float:
+    """How far touching surfaces overlap or stand apart by elasticity and roughness [m]; radius (n,) [m].
+
+    A missed contact costs far more than a false one, so it is rather too large than too small.
+    """
+    return SURFACE * 2.0 * float(radius.mean())

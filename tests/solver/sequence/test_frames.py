@@ -231,6 +231,13 @@ def test_a_reset_at_a_rearrangement_says_what_it_changed_and_can_be_forbidden(mo
     assert not np.array_equal(frames[2].fn, carried[2].fn)
 
 
+def test_surfaces_overlap_by_a_share_of_the_mean_diameter_unless_told():
+    radius = np.array([0.007, 0.009])
+    told, usual = SequenceSettings(overlap=2e-6).for_radii(radius), SequenceSettings().for_radii(radius)
+    assert usual.overlap == usual.ensemble.probability.overlap == pytest.approx(3e-4 * 0.016)
+    assert told.overlap == told.ensemble.probability.overlap == 2e-6
+
+
 def test_only_the_ensemble_compares_two_starts():
     packing, snapshots = sheared_frames(4)
     chain = [frame.start_difference for frame, _ in run(packing, snapshots)]
