@@ -121,9 +121,7 @@ def refine(
         part = DAMPING if step else 1.0
         weight, pull = weight + part * (new_weight - weight), pull + part * (new_pull - pull)
         for f in range(len(snapshots)):
-            shift[f], gap, variance, slide[f] = network.solve(
-                normal[f], pairs.gap[f], weight[f], pull[f], sigma[f], present[f]
-            )
+            shift[f], gap, variance, slide[f] = network.solve(normal[f], pairs.gap[f], weight[f], pull[f], sigma[f])
             with np.errstate(divide="ignore"):
                 left = np.maximum(1.0 / variance - weight[f], LEAST_CAVITY / variance)
             doubt[f] = np.where(np.isfinite(gap), 1.0 / left, doubt[f])
@@ -155,7 +153,7 @@ class _Network:
         return cls(place[i], place[j], wall, place, 2 * widest + 1)
 
     def solve(
-        self, normal: Array, gap: Array, weight: Array, pull: Array, sigma: Array, present: NDArray[np.bool_]
+        self, normal: Array, gap: Array, weight: Array, pull: Array, sigma: Array
     ) -> tuple[Array, Array, Array, Array]:
         """Displacements (n, 2) that agree best with the messages, and what they make of the pairs.
 

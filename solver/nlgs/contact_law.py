@@ -1,6 +1,6 @@
 """The law of one contact: Signorini and Coulomb by projection, and the closed-form single contact.
 
-Scalars only; the loop over contacts (nlgs_kernels) and the plain reference in the tests use the same lines.
+Scalars only; the loop over contacts (kernels) and the plain reference in the tests use the same lines.
 """
 
 from __future__ import annotations
@@ -30,10 +30,3 @@ def relax_contact(
     projected on the cone.
     """
     return project_on_cone(fn - un * inverse_wnn, ft - ut * inverse_wtt, friction)
-
-
-def formal_weight(restitution: float) -> float:
-    """η = e / (1 + e) in [0, ½] for a coefficient of restitution e in [0, 1]."""
-    if not 0.0 <= restitution <= 1.0:
-        raise ValueError(f"a coefficient of restitution lies in [0, 1], not at {restitution}")
-    return restitution / (1.0 + restitution)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from solver.nlgs.contact_law import formal_weight
 from solver.nlgs.kernels import advance, apply_forces
 from solver.nlgs.ordering import GROUP
 from solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance
@@ -127,7 +126,3 @@ def test_impedances_follow_the_masses(case):
         assert kinematic[k] == pytest.approx(0.05 * 40.0 / 1e-5 / 0.8 * grains.mass[k] / mean)
     inertial = inertial_impedance(grains, interval=0.5, formal_weight=0.2)
     assert inertial == pytest.approx(grains.mass / (0.5 * 0.8))
-
-
-def test_the_formal_weight_goes_from_none_to_a_half():
-    assert [formal_weight(e) for e in (0.0, 0.25, 1.0)] == [0.0, 0.2, 0.5]

@@ -105,7 +105,7 @@ def test_positions_and_variances_are_those_of_the_dense_least_squares():
     weight, aim = rng.uniform(0.5, 2.0, 5) * 1e10, rng.normal(0, 1e-6, 5)
     sigma = np.array([1e-5, 2e-5, 1.5e-5, 1e-5])
     network = _Network.of(grains, Candidates(i, j, gap[None], np.full((1, 5), 1e-5)))
-    found = network.solve(normal, gap, weight, weight * aim, sigma, np.ones(4, bool))
+    found = network.solve(normal, gap, weight, weight * aim, sigma)
 
     design, tangent = np.zeros((5, 8)), np.zeros((5, 8))
     for c in range(5):
