@@ -14,7 +14,7 @@ from rodsight.tracking.correlation.splines import fine_coefficients, spline_coef
 from rodsight.tracking.detection.edges import sample_rays
 from scipy.ndimage import gaussian_filter
 
-from tests.reference.correlation import (
+from tests.reference.twins.correlation import (
     best_places,
     cut_patch,
     fit_plainly,
@@ -22,7 +22,7 @@ from tests.reference.correlation import (
     search_plainly,
     tukey_fixed_point,
 )
-from tests.reference.splines import value, values
+from tests.reference.twins.splines import value, values
 
 pytestmark = pytest.mark.unit
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.dem.kernels import Bodies, Law, Pairs, advance, contact_force
-from tests.reference.dem import PlainCell
+from tests.reference.twins.dem import PlainCell
 
 pytestmark = pytest.mark.unit
 

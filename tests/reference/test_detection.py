@@ -5,7 +5,7 @@ import pytest
 
 from solver.detection.band_inverse import band_inverse
 from solver.detection.touch_probability import ContactProbabilitySettings, smooth_gaps
-from tests.reference.touch_probability import plain_smooth
+from tests.reference.twins.touch_probability import plain_smooth
 
 pytestmark = pytest.mark.unit
 

@@ -5,7 +5,7 @@ import pytest
 from rodsight.synthetic import speckle_kernels as kernels
 from rodsight.synthetic.camera import pixel_response
 
-from tests.reference import drawing
+from tests.reference.twins import drawing
 
 pytestmark = pytest.mark.unit
 

@@ -6,7 +6,7 @@ from rodsight.tracking.detection.edges import fit_circle
 from rodsight.tracking.detection.rim_profile import locate_edges
 from scipy.optimize import least_squares
 
-from tests.reference.edges import circle_step, rim, rim_misfit
+from tests.reference.twins.edges import circle_step, rim, rim_misfit
 
 pytestmark = pytest.mark.unit
 

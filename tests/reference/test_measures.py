@@ -15,9 +15,9 @@ from solver.nlgs.kernels import (
     measure_unbalance,
 )
 from solver.nlgs.ordering import GROUP, visiting_order
-from tests.reference.ordering import plain_order
-from tests.reference.packing import make_case, make_guess
-from tests.reference.sweeps import PlainSolver, greatest_change, mean_normal, measured_sweeps
+from tests.reference.twins.ordering import plain_order
+from tests.reference.twins.packing import make_case, make_guess
+from tests.reference.twins.sweeps import PlainSolver, greatest_change, mean_normal, measured_sweeps
 
 pytestmark = pytest.mark.unit
 

@@ -6,8 +6,8 @@ import pytest
 from solver.nlgs.kernels import advance, apply_forces
 from solver.nlgs.ordering import GROUP
 from solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance
-from tests.reference.packing import LOST, make_case, make_guess
-from tests.reference.sweeps import PLATE, PlainSolver
+from tests.reference.twins.packing import LOST, make_case, make_guess
+from tests.reference.twins.sweeps import PLATE, PlainSolver
 
 pytestmark = pytest.mark.unit
 

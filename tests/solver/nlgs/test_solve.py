@@ -6,7 +6,7 @@ from solver.contacts.contacts import detect_contacts
 from solver.nlgs.problem import assemble
 from solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps, to_contact_order
 from tests.packings import box, motion, problem_of, rods, squeezed_heap
-from tests.reference.sweeps import plain_sweeps
+from tests.reference.twins.sweeps import plain_sweeps
 
 ROUNDING = 1e-10  # relative; the compiled sweep sums in another order than the plain one
 

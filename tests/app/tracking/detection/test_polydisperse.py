@@ -17,6 +17,7 @@ CENTRE_ALLOWED = 0.15  # [px] rms; the smallest show ten pixels of outline
 RECALL_LEAST = 0.97  # some of the smallest show next to no outline
 
 
+@pytest.mark.screen  # many seconds of detection
 @pytest.mark.parametrize("painted", [False, True], ids=["plain", "brown"])
 def test_small_discs_among_large_ones_are_found_and_nothing_else(painted: bool) -> None:
     x, y, radius = lay_discs(WIDTH, HEIGHT, SMALLEST, LARGEST, 3000, np.random.default_rng(5))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.bodies.grains import Array
-from tests.reference.splines import values
+from tests.reference.twins.splines import values
 
 
 def pixels_within(cx: float, cy: float, reach: float) -> list[tuple[int, int]]:
