@@ -14,7 +14,6 @@ MUTANTS = [
         ("limit = friction * fn", "limit = 0.5 * friction * fn"),
         ("min(max(ft, -limit), limit)", "min(max(ft, 0.0), limit)"),
         ("ft - ut * inverse_wtt, friction", "ft + ut * inverse_wtt, friction"),
-        ("restitution / (1.0 + restitution)", "restitution"),
     ),
     *mutants_of(
         "solver/nlgs/kernels.py",
