@@ -13,12 +13,13 @@ from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, ContactSource, detect_contacts, measure_pairs
 from solver.contacts.pairs import are_among, are_there, join_keys, recall
 from solver.contacts.verdicts import DETECTED
+from solver.sequence.settings import SequenceSettings
 
 from ...results.results import Results
 
 REACH = 4.0  # [σ of a gap] beyond the threshold
 UNLISTED = 3e-3  # P(touch) that a pair which the detector left out has at most
-THRESHOLD_SIGMAS = 6.0  # of a position: the threshold where the configuration names none
+THRESHOLD_SIGMAS = SequenceSettings().threshold_sigmas  # of a position, where the configuration names no threshold
 
 
 @dataclass(frozen=True, slots=True)
