@@ -105,12 +105,13 @@ def score(
     from .. import pipeline
     from ..experiment.experiment import load_experiment
     from ..results.store import load_results, read_origin
-    from ..results.summary import print_summary, summarize
+    from ..results.summary import summarize
     from ..results.truth import accuracy, correlations
     from ..results.truth import score as score_frames
     from ..review.judging import scoring
     from ..review.reviewed_run import Reviewed
     from ..run_folder import RESULTS, Run
+    from .summary_table import print_summary
 
     file = results / RESULTS if results.is_dir() else results
     solved, origin = load_results(file), read_origin(file)

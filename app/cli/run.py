@@ -72,8 +72,8 @@ def run(
     Example: rodsight run sample_data/shear --view web
     """
     from .. import pipeline
-    from ..results.summary import print_summary
     from .look import show
+    from .summary_table import print_summary
     from .watching import watching
 
     request = Request(experiment, settings, quiet, out, frames, max_size, full_frames)
@@ -166,7 +166,7 @@ def solve(
     Example: rodsight solve sample_data/shear --set material.friction=0.3
     """
     from .. import pipeline
-    from ..results.summary import print_summary
+    from .summary_table import print_summary
 
     request = Request(experiment, settings, quiet, out, frames)
     request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)

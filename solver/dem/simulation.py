@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from solver.bodies.grains import Array, Grains
-from solver.dem.kernels import HEIGHT, LOAD, RISE, SHEAR, TOP, WIDTH, Bodies, Law, Pairs, advance
+from solver.dem.kernels import HEIGHT, LOAD, SHEAR, TOP, WIDTH, Bodies, Law, Pairs, advance
 from solver.dem.truth import WALL_NAMES, DemFrame, DemSettings, DemTruth, UnbalancedError
 
 __all__ = ["DemFrame", "DemSettings", "DemTruth", "ShearCell", "UnbalancedError", "shear_photographs"]
@@ -104,10 +104,6 @@ class ShearCell:
     @property
     def height(self) -> float:
         return float(self._bodies.frame[HEIGHT])
-
-    @property
-    def plate_velocity(self) -> float:
-        return float(self._bodies.frame[RISE])
 
     @property
     def unbalance(self) -> float:

@@ -40,7 +40,6 @@ class RecordingFile:
     frames: int
     network_rows: int  # rows of widths and colours, the reported fields among them
     sweeps: SweepChoice  # as written, which is less than asked for where the size was limited
-    sweeps_kept: int | None  # per frame at most, None: every visible one
     clipped: int  # forces above the drawn range
     notes: tuple[str, ...]  # sentences for the user
 
@@ -95,7 +94,7 @@ def write_recording(
         part.unlink(missing_ok=True)
     return RecordingFile(
         path, path.stat().st_size, time.perf_counter() - begin, len(results.frames), recorder.network_rows,
-        plan.sweeps, None if plan.sweeps is SweepChoice.ALL else plan.kept, recorder.clipped, notes,
+        plan.sweeps, recorder.clipped, notes,
     )  # fmt: skip
 
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.cli.summary_table import calibration_lines
 from rodsight.experiment.config.experiment_file import ExperimentFile
 from rodsight.experiment.scaling import make_scale
 from rodsight.inference.calibration import calibrate_tracks, radius_classes
 from rodsight.inference.settings import radii_are_metres
-from rodsight.results.calibration_summary import calibration_facts, calibration_lines
+from rodsight.results.calibration_summary import calibration_facts
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 from solver.calibration.calibrate import Calibration, calibrate

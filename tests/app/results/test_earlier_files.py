@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from rich.console import Console
+from rodsight.cli.summary_table import print_summary
 from rodsight.errors import InputError
 from rodsight.exchange.tidy_tables import make_tables
 from rodsight.exchange.vtk_polydata import write_polydata
@@ -17,7 +18,7 @@ from rodsight.recording.files.readback import read_forces
 from rodsight.results.results import Results
 from rodsight.results.schema import entries
 from rodsight.results.store import load_results, read_origin
-from rodsight.results.summary import print_summary, save_summary, summarize
+from rodsight.results.summary import save_summary, summarize
 
 from tests.app.results.full_results import make_full_results
 from tests.app.results.same import differences

@@ -1,0 +1,192 @@
+"""What a person reads at the end of a run: the summary's frames as a table, and what they are worth in sentences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from solver.sequence.frame_forces import FrameStatus
+
+STATUS_STYLE = {
+    FrameStatus.SETTLED: "green",
+    FrameStatus.SETTLING: "yellow",
+    FrameStatus.REARRANGING: "magenta",
+    FrameStatus.SUSPECT: "red",
+    FrameStatus.RESET: "cyan",
+    FrameStatus.FAILED: "bold red",
+}
+NOTICEABLE = 1.0  # standard deviations: a correction of a wall or of the scale below this is not worth words
+MOST_ROWS = 40  # frames shown in the terminal's table; more are thinned evenly
+
+
+def print_summary(console: Console, summary: dict[str, Any]) -> None:
+    """Print the frames as a table, and below it how far they may be trusted."""
+    console.print(_frame_table(summary))
+    for line in trust_lines(summary):
+        console.print(line, highlight=False)
+
+
+def trust_lines(summary: dict[str, Any]) -> list[str]:
+    """The verdict in a few sentences."""
+    count = summary["status_count"]
+    settled, total = count.get("settled", 0), summary["frame_count"]
+    after = summary["settled_after"]
+    lines = [
+        f"[bold]{summary['grain_count']} grains, {total} frames.[/] "
+        + (f"Settled from frame {after}; {settled} of {total} frames are settled." if settled else "No frame settled.")
+    ]
+    events = [
+        f"{label} at frame{'s' if len(summary[key]) > 1 else ''} {_listed(summary[key])}"
+        for key, label in (("resets", "reset"), ("rearrangements", "rearrangement"), ("suspects", "suspect"))
+        if summary[key]
+    ]
+    if events:
+        lines.append("Events: " + "; ".join(events) + ".")
+    lost = f"{summary['lost_poses']} poses of {summary['lost_grains']} grains lost" if summary["lost_poses"] else ""
+    doubtful = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
+    tracked = ", ".join(part for part in (lost, doubtful) if part) or "every grain has a pose in every frame"
+    worst = _cell(summary["worst_unbalance"], ".3f")
+    lines.append(
+        f"Worst grain unbalance {worst} of the mean force (frame {summary['worst_unbalance_frame']}); {tracked}."
+    )
+    trusted = [t for t, s in zip(summary["trust"], summary["status"], strict=True) if s == "settled" and t is not None]
+    if trusted:
+        lines.append(
+            f"Trust (expected correlation with the true forces, given these inputs): {min(trusted):.2f} to "
+            f"{max(trusted):.2f} over settled frames."
+        )
+    if not summary["loaded_walls"]:
+        lines.append(
+            "[bold]No wall carries a given pressure:[/] forces are known up to a scale, which differs between frames."
+        )
+    friction = summary["friction"]
+    if friction is not None and friction["enclosed"]:
+        verdict = "agrees with" if friction["agrees"] else "[bold red]contradicts[/]"
+        measured, low, high = (_cell(friction[key], ".2f") for key in ("measured", "low", "high"))
+        lines.append(
+            f"Friction from the motion: {measured} ({low} to {high}), which {verdict} the given {friction['given']:g}."
+        )
+    if summary["wall_force_error"]:
+        told = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
+        lines.append(f"Inferred against recorded wall forces, rms difference over settled frames: {told}.")
+    if summary["corrections"] is not None:
+        lines += calibration_lines(summary["corrections"])
+    if summary["radius_change"] is not None:
+        lines.append(_curve_line(summary["radius_curve"]))
+        lines.append(
+            f"All radii changed by {summary['radius_change'] * 1e6:+.1f} µm for the wanted coordination number."
+        )
+    if "accuracy" in summary:
+        first = min(5, total - 1)
+        late = [value for value in summary["accuracy"]["r_fn"][first:] if value is not None]
+        late_t = [value for value in summary["accuracy"]["r_ft"][first:] if value is not None]
+        if late and late_t:
+            lines.append(
+                f"[bold]Against the truth, from frame {first} on: r(f_n) {np.mean(late):.3f} (least {min(late):.3f}), "
+                f"r(f_t) {np.mean(late_t):.3f}.[/]"
+            )
+    return lines
+
+
+def calibration_lines(facts: dict[str, Any]) -> list[str]:
+    """The same in a few sentences."""
+    lines = [f"Self-calibration {facts['verdict']}."]
+    if not facts["applied"]:
+        return [*lines, *_scale_line(facts)]
+    centre, radius = _pair(facts, "centre"), _pair(facts, "radius")
+    lines.append(
+        f"Corrected (rms ± standard deviation of what is left): centres by {centre} µm, radii by {radius} µm"
+        f"{_walls(facts['wall'])}."
+    )
+    lines += _scale_line(facts)
+    if facts["lens"] != 0.0:
+        lines.append(
+            f"Lens: what is left of its radial distortion moves the farthest corner by {1e6 * facts['lens']:+.0f} ± "
+            f"{1e6 * facts['lens_sd']:.0f} µm outward of where it was seen."
+        )
+    lines.append(
+        f"Distance of touching surfaces from contact, before → after: between grains "
+        f"{_micro(facts['gap_rms_before'])} → {_micro(facts['gap_rms_after'])} µm rms, at walls "
+        f"{_micro(facts['wall_gap_rms_before'])} → {_micro(facts['wall_gap_rms_after'])} µm rms."
+    )
+    return lines
+
+
+def _frame_table(summary: dict[str, Any]) -> Table:
+    table = Table(title=summary["name"], box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("frame", justify="right")
+    table.add_column("status")
+    for heading in ("contacts", "z", "φ/°", "⟨f_n⟩/N", "residual", "ε", "trust"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    truth = summary.get("accuracy")
+    if truth:
+        table.add_column("r(f_n)", justify="right", no_wrap=True)
+        table.add_column("r(f_t)", justify="right", no_wrap=True)
+    total = summary["frame_count"]
+    shown = np.unique(np.linspace(0, total - 1, min(total, MOST_ROWS)).round().astype(int))
+    for k in shown:
+        status = summary["status"][k]
+        cells = [
+            str(k),
+            f"[{STATUS_STYLE[FrameStatus[status.upper()]]}]{status}[/]",
+            str(summary["contact_count"][k]),
+            _cell(summary["coordination_number"][k], ".2f"),
+            _cell(summary["friction_angle_degrees"][k], ".1f"),
+            _cell(summary["mean_fn"][k], ".3g"),
+            _cell(summary["natural_map"][k], ".0e"),
+            _cell(summary["correction"][k], ".3f"),
+            _cell(summary["trust"][k], ".2f"),
+        ]
+        if truth:
+            cells += [_cell(truth["r_fn"][k], ".3f"), _cell(truth["r_ft"][k], ".3f")]
+        table.add_row(*cells)
+    return table
+
+
+def _cell(value: float | None, form: str) -> str:
+    return "–" if value is None else format(value, form)
+
+
+def _curve_line(curve: dict[str, list[float]]) -> str:
+    """The curve in one line, thinned to nine points."""
+    shown = np.linspace(0, len(curve["change"]) - 1, 9).round().astype(int)
+    points = (f"{curve['change'][k] * 1e6:+.0f}: {curve['coordination_number'][k]:.2f}" for k in shown)
+    return "Coordination number without rattlers against the change of all radii [µm]: " + ", ".join(points) + "."
+
+
+def _listed(frames: list[int]) -> str:
+    return ", ".join(str(k) for k in frames[:8]) + (f" and {len(frames) - 8} more" if len(frames) > 8 else "")
+
+
+def _scale_line(facts: dict[str, Any]) -> list[str]:
+    value, sd = 100 * facts["pixel_size"], 100 * facts["pixel_size_sd"]
+    if sd == 0.0:
+        return []  # it was not asked for: nothing to say
+    if value == 0.0:
+        return [f"Pixel size: as given, in agreement with the known radii within ± {sd:.2f} %."]
+    walls = "the walls were measured with it and follow" if facts["walls_follow_pixel_size"] else "the walls stay"
+    return [f"Pixel size: {value:+.2f} ± {sd:.2f} % from the known radii; {walls}."]
+
+
+def _walls(walls: dict[str, dict[str, float]]) -> str:
+    said = []
+    for name, wall in walls.items():
+        words = []
+        if abs(wall["outward"]) > NOTICEABLE * wall["outward_sd"]:
+            words.append(f"{1e6 * wall['outward']:+.0f} ± {1e6 * wall['outward_sd']:.0f} µm outward")
+        if abs(wall["tilt"]) > NOTICEABLE * wall["tilt_sd"]:
+            words.append(f"turned by {1e3 * wall['tilt']:+.2f} ± {1e3 * wall['tilt_sd']:.2f} mrad")
+        if words:
+            said.append(f"wall {name} {' and '.join(words)}")
+    return "".join(f", {words}" for words in said)
+
+
+def _pair(facts: dict[str, Any], part: str) -> str:
+    return f"{_micro(facts[f'{part}_rms'])} ± {_micro(facts[f'{part}_sd'])}"
+
+
+def _micro(metres: float) -> str:
+    return f"{1e6 * metres:.1f}"
