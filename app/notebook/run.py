@@ -93,7 +93,7 @@ class Run:
         count = self.results.tracks.frame_count
         if not 0 <= frame < count:
             raise IndexError(f"there is no frame {frame}: frames go from 0 to {count - 1}")
-        return table[table["frame"] == frame].reset_index(drop=True)
+        return table.loc[table["frame"] == frame, :].reset_index(drop=True)
 
 
 def run(

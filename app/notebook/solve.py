@@ -107,9 +107,10 @@ def _arrange_walls(walls: pd.DataFrame, frame_count: int, pressure: Mapping[str,
 
 def _check_constant(frame: pd.DataFrame, by: str, column: str) -> None:
     """One value of a column for each of another; the complaint names the first that has two."""
-    changing = frame.groupby(by)[column].nunique(dropna=False) > 1
-    if changing.any():
-        raise InputError("tracks", f"{by} = {changing.idxmax()}", f"has more than one {column}")
+    counts = frame.groupby(by)[column].nunique(dropna=False)
+    changing = counts.index[np.asarray(counts) > 1]
+    if len(changing):
+        raise InputError("tracks", f"{by} = {changing[0]}", f"has more than one {column}")
 
 
 def _table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
