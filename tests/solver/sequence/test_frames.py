@@ -6,6 +6,7 @@ import pytest
 from solver.bodies.grains import Grains
 from solver.bodies.motion import LastSeen, Snapshot, motion_to
 from solver.bodies.packing import Material, Packing
+from solver.contacts.verdicts import Verdicts
 from solver.nlgs.chain import ChainSettings
 from solver.nlgs.sweep_record import recorded_sweeps
 from solver.nlgs.warm_start import ForceMemory
@@ -236,6 +237,16 @@ def test_surfaces_overlap_by_a_share_of_the_mean_diameter_unless_told():
     told, usual = SequenceSettings(overlap=2e-6).for_radii(radius), SequenceSettings().for_radii(radius)
     assert usual.overlap == usual.ensemble.probability.overlap == pytest.approx(3e-4 * 0.016)
     assert told.overlap == told.ensemble.probability.overlap == 2e-6
+
+
+def test_a_pair_that_people_saw_touch_is_certain_whatever_its_gaps_say():
+    packing, snapshots = sheared_frames(3)
+    detected, _ = run(packing, snapshots, ENSEMBLE)[2]
+    doubtful = detected.contacts.key[[np.argmin(detected.probability)]]
+    assert detected.probability.min() < 0.9
+    frame, state = run(packing, snapshots, ENSEMBLE, verdicts={2: Verdicts(forced=doubtful)})[2]
+    assert state.members.pairs.of(doubtful) == 1.0
+    assert frame.probability[frame.contacts.key == doubtful] == detected.probability.min()  # as detected
 
 
 def test_only_the_ensemble_compares_two_starts():
