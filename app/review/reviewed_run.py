@@ -9,10 +9,9 @@ from ..errors import InputError
 from ..experiment.experiment import CONFIG_NAME, Experiment, load_experiment
 from ..results.results import Results
 from ..results.store import load_results, read_origin
+from ..run_folder import RESULTS
 from ..verdicts.decisions import Bodies
 from ..verdicts.log import VERDICTS, VerdictLog
-
-RESULTS = "results.h5"
 
 
 @dataclass(frozen=True, slots=True)
