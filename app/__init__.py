@@ -12,6 +12,8 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .kernel_cache import find_room_for_kernels
+
 if TYPE_CHECKING:
     from .errors import InputError
     from .notebook.run import Run, run
@@ -38,6 +40,7 @@ def _load_own_solver() -> None:
 
 
 _load_own_solver()
+find_room_for_kernels(Path(sys.modules["solver"].__file__ or "").parent)
 
 # Public names, loaded when they are first asked for: their module, and what they are called there.
 _LAZY = {

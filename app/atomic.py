@@ -7,12 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+PART = ".part"  # what is being written ends in it
+
 
 @contextmanager
 def replacing(file: Path) -> Iterator[Path]:
     """Give a name to write to; once the block ends well it takes the place of `file`, otherwise nothing changes."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_name(file.name + ".part")
+    part = file.with_name(file.name + PART)
     try:
         yield part
         os.replace(part, file)
@@ -22,4 +24,9 @@ def replacing(file: Path) -> Iterator[Path]:
 
 def write_atomically(file: Path, content: bytes) -> None:
     with replacing(file) as part:
-        part.write_bytes(content)
+        try:
+            part.write_bytes(content)
+        except OSError as error:
+            if error.filename is None:  # what refuses a write does not say where
+                error.filename = str(part)
+            raise

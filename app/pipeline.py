@@ -8,7 +8,7 @@ frame where it stopped.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,20 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics
 
 from .atomic import write_atomically
-from .errors import InputError
+from .errors import InputError, RunError, UndeterminedError
+from .experiment.boundary import bound_tracks, free_surfaces
 from .experiment.config.experiment_file import as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
-from .experiment.experiment import read_grain_guess, read_times, read_tracks, read_walls
-from .experiment.plausibility import check_inside, check_radii, rods_beyond_ends
+from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
+from .experiment.plausibility import check_inside, check_radii, doubtful_loads, open_sides, rods_beyond_ends
 from .experiment.scaling import make_scale
+from .experiment.walls import read_walls
 from .inference.inference import (
-    CoordinationError,
     CorrectedSequence,
     Inputs,
     SolvedFrame,
@@ -39,10 +40,10 @@ from .inference.inference import (
 from .inference.settings import material_of, settings_of
 from .results.checkpoint import Checkpoint
 from .results.results import Results, TruthContacts
-from .results.store import Provenance, load_results, load_tracks, read_origin, save_results, save_tracks
+from .results.store import Provenance, load_results, load_tracks, save_results, save_tracks
 from .results.summary import save_summary, summarize
-from .results.truth import read_truth, score, true_names
-from .run_folder import RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, UNFINISHED, Run
+from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
+from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run
 from .sensitivity.execution import available_cores
 from .sensitivity.spread import calibrated_inputs, solve_members, with_spread
 from .sensitivity.study import Nominal
@@ -54,7 +55,8 @@ from .verdicts.log import VERDICTS, Flag, VerdictLog
 
 # Sections of the experiment file on which forces depend.
 FORCES_FROM = (
-    "photographs", "tracking", "tracks", "walls", "calibration", "material", "contacts", "solver", "recording",
+    "photographs", "tracking", "tracks", "walls", "boundary", "calibration", "material", "contacts", "solver",
+    "recording",
 )  # fmt: skip
 
 
@@ -64,6 +66,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
     if experiment.config.tracks is not None:
         tracks = read_tracks(experiment)
         walls = read_walls(experiment, tracks.frame_count)
+        tracks = bound_tracks(experiment, tracks, walls)
         if walls is not None:
             _check_packing(run, tracks, walls)
         ids, count = tracks.id, tracks.frame_count
@@ -77,11 +80,20 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         ids = guess.id if guess is not None else None
         read_corrections(experiment, ids, count)
     run.frame_range(count)
+    for name, columns in ((experiment.config.truth, TRUTH_COLUMNS), (experiment.config.truth_tracks, POSE_COLUMNS)):
+        if name is not None:
+            experiment.table(name, columns)
+    if experiment.config.truth is not None:
+        _refuse_unnamed_truth(run)
     # Grains of photographs are named by truth_tracks where there is one, and not by their own ids.
     named = experiment.config.photographs is not None and experiment.config.truth_tracks is not None
     if experiment.config.truth is not None and ids is not None and not named:
         file = experiment.folder / experiment.config.truth
-        read_truth(file, ids, walls.name if walls else (), first_frame=0, frame_count=count)
+        poses, names = experiment.config.truth_tracks, walls.name if walls else ()
+        unseen = None if poses is None else true_ids(experiment.folder / poses)
+        read_truth(
+            file, ids, names, first_frame=0, frame_count=count, unseen=unseen, inputs=experiment.inputs
+        )  # fmt: skip
     return tracks, walls
 
 
@@ -93,23 +105,33 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         assert tracks is not None
         start, stop = run.frame_range(tracks.frame_count)
         return tracks.frames(start, stop), walls.frames(start, stop) if walls is not None else None
-    origin = run.origin(("photographs", "tracking", "walls"))
-    stored = read_origin(run.file(TRACKS))
-    if stored is not None and stored.fingerprint == origin.fingerprint and run.file(DETECTIONS).exists():
+    origin = run.origin(("photographs", "tracking", "walls", "boundary"))
+    if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
         return load_tracks(run.file(TRACKS))
     check(run)
     since = time.perf_counter()
     start, stop = run.frame_range(len(experiment.photographs()))
-    unfinished = run.folder / UNFINISHED
-    tracks, walls, tables = track_photographs(experiment, stop, unfinished, origin.fingerprint, run.progress)
+    kept: list[Checkpoint] = []
+
+    def keep(stage: str) -> Checkpoint:
+        kept.append(run.checkpoint(stage, origin.fingerprint))
+        return kept[-1]
+
+    tracks, walls, tables = track_photographs(
+        experiment, stop, keep, run.progress, run.note_failure, tell=run.notes.append
+    )  # fmt: skip
+    tracks = bound_tracks(experiment, tracks, walls)
     if walls is not None:
         _check_packing(run, tracks, walls)
         walls = walls.frames(start, stop)
     tracks = tracks.frames(start, stop)
     write_found_tables(run.folder, tables)
     save_tracks(run.file(TRACKS), experiment.name, tracks, walls, origin)
-    for stage in ("tracking", "walls"):
-        Checkpoint(unfinished / stage, origin.fingerprint).clear()
+    run.tell_manifest()
+    for name in (DETECTIONS, TRACKS):
+        run.manifest.add(name, origin.fingerprint)
+    for checkpoint in kept:
+        checkpoint.clear()
     run.timings.add("tracking", since)
     return tracks, walls
 
@@ -126,34 +148,47 @@ def report_tracking(run: Run, tracks: Tracks, walls: WallTracks | None) -> Path:
 def solve(run: Run) -> Results:
     """Contacts, forces and statistics of every frame, stored in results.h5."""
     experiment = run.experiment
-    if experiment.config.walls is None:
-        raise InputError(experiment.file, "key walls", "is missing: without walls grains can be tracked but not solved")
-    log = VerdictLog(run.file(VERDICTS))
+    if experiment.config.walls is None and experiment.config.boundary is None:
+        missing = "is missing: without walls grains can be tracked but not solved; or give a [boundary]"
+        raise InputError(experiment.file, "key walls", missing)
+    return _solve(run, VerdictLog(run.file(VERDICTS)).as_of_now())
+
+
+def nominal_run(run: Run) -> tuple[Nominal, str]:
+    """What the robustness study varies and compares with: the run as it was given, and its fingerprint."""
+    log = VerdictLog(run.file(VERDICTS)).as_of_now()
+    results = _solve(run, log)
+    tracks, walls = track(run)
+    assert walls is not None
+    inputs = _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
+    return Nominal.of(inputs, results, load_truth(run, results)), run.origin(FORCES_FROM, log).fingerprint
+
+
+def solved_inputs(run: Run) -> tuple[Inputs, Results, TruthContacts | None]:
+    """What the forces of a run follow from, with the forces and their truth, for whoever changes it a little."""
+    log = VerdictLog(run.file(VERDICTS)).as_of_now()
+    results = _solve(run, log)
+    tracks, walls = track(run)
+    assert walls is not None
+    inputs = _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
+    return replace(inputs, settings=inputs.settings.without_sweeps()), results, load_truth(run, results)
+
+
+def _solve(run: Run, log: VerdictLog) -> Results:
+    """The results of a run that obeys what has been said until now, and nothing that is said meanwhile."""
     origin = run.origin(FORCES_FROM, log)
-    stored = read_origin(run.file(RESULTS))
     results = None
-    if stored is not None and stored.fingerprint == origin.fingerprint:
+    if run.has(RESULTS, origin):
         results = load_results(run.file(RESULTS))
-        if experiment.config.solver.ensemble_size in (0, results.ensemble_size):
+        if run.experiment.config.solver.ensemble_size in (0, results.ensemble_size):
             return results
         if results.ensemble_size:
             results = None  # the free formula is part of new error bars, and the former ones took its place
     if results is None:
         results = _solve_nominal(run, origin, log)
-    if experiment.config.solver.ensemble_size:
+    if run.experiment.config.solver.ensemble_size:
         results = _add_error_bars(run, origin, log, results)
     return results
-
-
-def nominal_run(run: Run) -> tuple[Nominal, str]:
-    """What the robustness study varies and compares with: the run as it was given, and its fingerprint."""
-    results = solve(run)
-    stored = read_origin(run.file(RESULTS))
-    tracks, walls = track(run)
-    assert stored is not None
-    assert walls is not None
-    inputs = _inputs(run, VerdictLog(run.file(VERDICTS)), tracks, walls)
-    return Nominal.of(inputs, results, load_truth(run, results)), stored.fingerprint
 
 
 def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inputs:
@@ -173,23 +208,26 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     since = time.perf_counter()
     try:
         sequence = correct_sequence(_inputs(run, log, tracks, walls))
-    except CoordinationError as error:
-        key = f"key contacts.coordination = {error.wanted}"
-        raise InputError(run.experiment.file, key, str(error)) from None
-    checkpoint = Checkpoint(run.folder / UNFINISHED / "solving", origin.fingerprint)
+    except UndeterminedError as error:
+        raise InputError(run.experiment.file, f"key {error.key}", str(error)) from None
+    run.tell_manifest(log)
+    checkpoint = run.checkpoint("solving", origin.fingerprint)
     packing, configuration = sequence.packing, as_toml(run.experiment.config)
     unsolved = Results(
         run.experiment.name, sequence.tracks, sequence.walls, packing.grains, packing.material.friction, (), (),
         configuration, calibration=sequence.calibration, radius_tuning=sequence.tuning,
+        boundary=sequence.boundary,
     )  # fmt: skip
     if run.watch is not None:
         run.watch.start(unsolved)
     solved = list(_solve_frames(run, sequence, checkpoint))
     frames = [each.forces for each in solved]
     statistics = [each.statistics for each in solved]
-    check = sequence.check_friction(frames)
+    _refuse_nothing(run, frames)
+    frames, check = sequence.check_friction(frames)
     results = replace(unsolved, frames=frames, statistics=statistics, friction_check=check)
     save_results(run.file(RESULTS), results, origin)
+    run.manifest.add(RESULTS, origin.fingerprint)
     checkpoint.clear()
     run.timings.add("solving", since)
     return results
@@ -205,7 +243,7 @@ def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint)
             run.watch.frame(last.forces, last.statistics)
         yield last
     run.progress("solving", done, total)
-    for frame in solve_frames(sequence, after=last):
+    for frame in solve_frames(sequence, after=last, observer=run.note_failure):
         checkpoint.save(frame.forces.frame, frame.forces, frame.statistics, frame.state)
         if run.watch is not None:
             run.watch.frame(frame.forces, frame.statistics)
@@ -213,16 +251,24 @@ def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint)
         yield frame
 
 
+def _refuse_nothing(run: Run, frames: Sequence[FrameForces]) -> None:
+    if all(frame.status is FrameStatus.FAILED for frame in frames):
+        log = f"; {run.file(FAILURES)} tells more" if run.file(FAILURES).exists() else ""
+        raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {frames[0].reason}{log}")
+
+
 def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Results) -> Results:
     """Replace the standard deviations by those of an ensemble of sequences solved again, and store the results so."""
     since = time.perf_counter()
     size = run.experiment.config.solver.ensemble_size
-    checkpoint = Checkpoint(run.folder / UNFINISHED / "ensemble", f"{origin.fingerprint} {size}")
-    inputs = calibrated_inputs(_inputs(run, log, results.tracks, results.walls))
+    checkpoint = run.checkpoint("ensemble", f"{origin.fingerprint} {size}")
+    inputs = _inputs(run, log, results.tracks, results.walls).with_friction(results.friction, results.friction_check)
+    inputs = calibrated_inputs(inputs)
     members = solve_members(inputs, size, checkpoint, workers=available_cores(), progress=run.progress)
     frames = with_spread(results.frames, members, inputs.settings.sequence.estimator)
     results = replace(results, frames=frames, ensemble_size=size, configuration=as_toml(run.experiment.config))
     save_results(run.file(RESULTS), results, origin)
+    run.manifest.add(RESULTS, origin.fingerprint)
     checkpoint.clear()
     run.timings.add("ensemble", since)
     run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")
@@ -287,23 +333,37 @@ def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthCon
     first = run.frames[0]
     ids = results.tracks.id
     if config.truth_tracks is not None:
-        ids = true_names(folder / config.truth_tracks, results.tracks, first)
-    elif config.photographs is not None and config.photographs.grains is None:
-        raise InputError(
-            run.experiment.file,
-            "key truth",
-            "names grains by ids, but these grains were detected: give truth_tracks or photographs.grains",
-        )
+        find_names = true_names if config.tracks is None else names_of_told
+        ids = find_names(folder / config.truth_tracks, results.tracks, first)
+    else:
+        _refuse_unnamed_truth(run)
     return read_truth(
         file if file is not None else folder / str(config.truth),
         ids,
         results.walls.name,
         first_frame=first,
         frame_count=len(results.frames),
-    )
+        unseen=None if config.truth_tracks is None else true_ids(folder / config.truth_tracks),
+    ).outside(results.tracks.boundary)
+
+
+def _refuse_unnamed_truth(run: Run) -> None:
+    """Grains that are detected get names of their own, which a truth does not know."""
+    config = run.experiment.config
+    detected = config.photographs is not None and config.photographs.grains is None
+    if config.truth_tracks is None and detected:
+        raise InputError(
+            run.experiment.file,
+            "key truth",
+            "names grains by ids, but these grains were detected: give truth_tracks or photographs.grains",
+        )
 
 
 def _check_packing(run: Run, tracks: Tracks, walls: WallTracks) -> None:
     check_inside(run.experiment, tracks, walls)
     check_radii(run.experiment, tracks)
     run.notes.extend(rods_beyond_ends(tracks, walls))
+    run.notes.extend(doubtful_loads(run.experiment, tracks, walls))
+    if walls.cell is None and tracks.boundary is None:
+        run.notes.extend(open_sides(walls))
+    run.notes.extend(free_surfaces(run.experiment, tracks, walls))

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
@@ -13,9 +18,14 @@ from solver.sequence.frame_forces import FrameForces
 from solver.statistics.frame_statistics import FrameStatistics
 
 from . import __version__
+from .atomic import PART
 from .errors import InputError
+from .experiment.config.experiment_file import as_toml
 from .experiment.experiment import Experiment, checksums
+from .lock import holding
 from .progress import Progress, silent
+from .results.checkpoint import Checkpoint
+from .results.manifest import MANIFEST, Manifest
 from .results.results import Results
 from .results.store import Provenance
 from .verdicts.decisions import fingerprint
@@ -24,6 +34,8 @@ from .verdicts.log import VerdictLog
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 REPORT = "tracking_report.html"
 SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
+FAILURES = "failures.log"  # tracebacks of what failed a frame
+OWN = (TRACKS, RESULTS, RECORDING, SUMMARY, REPORT, SIDE, MANIFEST, "detections.csv", "tracked_walls.csv")
 UNFINISHED = ".unfinished"  # folder of checkpoints
 ERROR_BARS = {"solver": {"ensemble_size"}}  # settings that leave the forces as they are
 
@@ -73,6 +85,14 @@ class Run:
             raise InputError("--frames", f"{start}:{stop}", f"is not a range of the frames 0:{count}")
         return start, stop
 
+    def note_failure(self, stage: str, frame: int, error: Exception) -> None:
+        """Keep the traceback of what failed a frame; frame: of the experiment's while tracking, else of the run's."""
+        frame += 0 if stage in ("tracking", "walls") else self.frames[0]
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with self.file(FAILURES).open("a", encoding="utf-8") as log:
+            log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {stage}, frame {frame}\n")
+            log.write("".join(traceback.format_exception(error)) + "\n")
+
     def origin(self, sections: tuple[str, ...], log: VerdictLog | None = None) -> Provenance:
         """What a result is made from: these sections of the configuration, all input files, and people's verdicts."""
         config = self.experiment.config.model_dump(mode="json", include=set(sections), exclude=ERROR_BARS)
@@ -82,4 +102,63 @@ class Run:
         verdicts = fingerprint(log) if log is not None else ""
         if verdicts:  # without any the fingerprint stays what it was
             digest = hashlib.sha256((digest + verdicts).encode()).hexdigest()
-        return Provenance(digest, str(self.experiment.file.resolve()), self.frames, sums)
+        return Provenance(digest, self.experiment.file.name, self.frames, sums)
+
+    @property
+    def manifest(self) -> Manifest:
+        """What is told of the stored pieces."""
+        return Manifest(self.folder)
+
+    def tell_manifest(self, log: VerdictLog | None = None) -> None:
+        """Write what the run is made from beside its results; log: the verdicts that it obeys."""
+        experiment = self.experiment
+        file = Path(os.path.relpath(experiment.file.resolve(), self.folder.resolve()))
+        verdicts = {}
+        if log is not None:
+            lines = [entry.line for entry in log.entries()]
+            verdicts = {"verdicts": {"sha256": fingerprint(log), "lines": lines}}
+        self.manifest.tell({
+            "rodsight_version": __version__,
+            "experiment": file.as_posix(),
+            "inputs": {experiment.file.name: experiment.inputs.checksum(experiment.file), **checksums(experiment)},
+            "settings": as_toml(experiment.config),
+            "frames": list(self.frames),
+            **verdicts,
+        })  # fmt: skip
+
+    def has(self, name: str, origin: Provenance) -> bool:
+        """Whether a stored piece was made from this and is what it was then; a damaged one is told."""
+        if not self.manifest.lists(name, origin.fingerprint):
+            return False
+        if self.manifest.is_whole(name):
+            return True
+        self.notes.append(f"{name} is damaged or was changed: it is made again.")
+        return False
+
+    def checkpoint(self, stage: str, fingerprint: str) -> Checkpoint:
+        """Finished frames of an unfinished stage that is made from this."""
+        return Checkpoint(self.folder / UNFINISHED / stage, fingerprint, self.notes)
+
+
+@contextmanager
+def owned(run: Run) -> Iterator[Run]:
+    """The run, while no other process works in its folder; what a stopped one was writing is removed.
+
+    Raises RunError while another process does.
+    """
+    with holding(run.folder, run.notes.append):
+        for part in (*run.folder.glob(f"*{PART}"), *(run.folder / UNFINISHED).rglob(f"*{PART}")):
+            if part.parent != run.folder or part.name.removesuffix(PART) in OWN:
+                part.unlink(missing_ok=True)
+        yield run
+
+
+def find_experiment(results: Path, origin: Provenance) -> Path:
+    """The experiment file that results were made from: the folder's manifest tells, else the results themselves."""
+    told = Manifest(results.parent).fact("experiment")
+    file = results.parent / told if isinstance(told, str) else Path(origin.experiment)
+    if not file.is_file():
+        raise InputError(
+            results, f"experiment {file}", "is not there: its folder was moved; run it again with this --out"
+        )
+    return file.resolve()

@@ -7,10 +7,13 @@ from enum import IntEnum
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from solver.bodies.grains import Array
 from solver.bodies.quantity import Quantity
+from solver.bodies.wall_shapes import STRAIGHT, all_sides, circle_of, outlines
+
+BAR, CORNER, NOT_TOLD = 0, 1, -1  # what the two points of a wall are
 
 
 class TrackStatus(IntEnum):
@@ -23,6 +26,7 @@ class TrackStatus(IntEnum):
     LOST = 4  # no pose
     OUT_OF_FRAME = 5  # its patch leaves the photograph: no pose
     GIVEN = 6  # read from a table
+    INFERRED = 7  # no photograph shows this rod: its neighbours tell where it is
 
     @property
     def has_pose(self) -> bool:
@@ -38,7 +42,8 @@ class Tracks:
     time: Annotated[Array, Quantity("time of the frame, ascending", "s", "frame", essential=True, path="frames/time")]
     position: Annotated[Array, Quantity("centre; NaN: lost", "m", "frame grain xy", essential=True)]
     rotation: Annotated[
-        Array, Quantity("angle, counter-clockwise, not wrapped; NaN: lost", "rad", "frame grain", essential=True)
+        Array,
+        Quantity("angle, counter-clockwise, not wrapped; NaN: lost, or unknown", "rad", "frame grain", essential=True),
     ]
     sigma: Annotated[Array, Quantity("standard deviation of a position component", "m", "frame grain")]
     zncc: Annotated[Array, Quantity("correlation with the reference patch, NaN: unknown", dims="frame grain")]
@@ -55,6 +60,24 @@ class Tracks:
     reference_frame: Annotated[
         NDArray[np.int32] | None, Quantity("photograph it is compared with", dims="frame grain")
     ] = None
+    failed_reason: Annotated[
+        tuple[str, ...] | None, Quantity("why a photograph shows nothing; empty where it does", dims="frame", since=2)
+    ] = None
+
+    inferred: Annotated[
+        NDArray[np.bool_] | None,
+        Quantity("whether no photograph shows the rod", dims="grain", since=2, path="grains/inferred"),
+    ] = None
+
+    boundary: Annotated[
+        NDArray[np.bool_] | None,
+        Quantity(
+            "whether the grain is the packing's boundary: it moves as it was seen, and no balance is asked of it",
+            dims="grain",
+            since=2,
+            path="grains/boundary",
+        ),
+    ] = None  # none is
 
     def __post_init__(self) -> None:
         f, n = len(self.time), len(self.id)
@@ -67,6 +90,10 @@ class Tracks:
             value = getattr(self, name)
             if value is not None and value.shape != (f, n):
                 raise ValueError(f"{name} must be ({f}, {n}), not {value.shape}")
+        if self.failed_reason is not None and len(self.failed_reason) != f:
+            raise ValueError(f"failed_reason must have {f} entries, not {len(self.failed_reason)}")
+        if self.boundary is not None and self.boundary.shape != (n,):
+            raise ValueError(f"boundary must be ({n},), not {self.boundary.shape}")
         if self.radius.shape != (n,):
             raise ValueError(f"radius must be ({n},), not {self.radius.shape}")
 
@@ -86,6 +113,11 @@ class Tracks:
         return np.sqrt(variance / np.maximum(self.present.sum(axis=1), 1) + fixed)
 
     @property
+    def failed(self) -> dict[int, str]:
+        """The frames whose photographs show nothing, and why."""
+        return {k: reason for k, reason in enumerate(self.failed_reason or ()) if reason}
+
+    @property
     def renewal_count(self) -> int:
         """How many grains are compared with a later photograph than the first by the last frame, being damaged."""
         if self.reference_frame is None:
@@ -95,7 +127,28 @@ class Tracks:
     @property
     def present(self) -> NDArray[np.bool_]:
         """Which grains have a pose (f, n)."""
-        return np.isfinite(self.rotation) & np.isfinite(self.position).all(axis=2)
+        return np.isfinite(self.position[..., 0]) & np.isfinite(self.position[..., 1])
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Which grains should be seen and were not found (f, n); rods that no photograph shows are none of them."""
+        missing = ~self.present & ~self.out_of_frame
+        return missing if self.inferred is None else missing & ~self.inferred
+
+    @property
+    def out_of_frame(self) -> NDArray[np.bool_]:
+        """Which grains the border of the picture cuts (f, n): nothing failed there."""
+        return ~self.present & (self.status == TrackStatus.OUT_OF_FRAME)
+
+    def describe_missing(self) -> str:
+        """How many poses are missing, in words: those lost, and apart from them cut and inferred ones."""
+        cut = self.out_of_frame
+        words = [f"{_counted(self.lost, 'pose')} lost"]
+        if cut.any():
+            words.append(f"{_counted(cut.any(axis=0), 'rod')} cut by the picture's border ({_counted(cut, 'pose')})")
+        if self.inferred is not None and self.inferred.any():
+            words.append(f"{_counted(self.inferred, 'rod')} inferred")
+        return ", ".join(words)
 
     def frames(self, start: int, stop: int, step: int = 1) -> Tracks:
         """Every step-th of the frames start … stop − 1 alone."""
@@ -105,7 +158,14 @@ class Tracks:
             self.sigma[part], self.zncc[part], self.status[part], self.centre_sigma,
             None if self.second_zncc is None else self.second_zncc[part],
             None if self.reference_frame is None else self.reference_frame[part],
+            None if self.failed_reason is None else self.failed_reason[part],
+            self.inferred, self.boundary,
         )  # fmt: skip
+
+
+def _counted(which: ArrayLike, what: str) -> str:
+    count = int(np.sum(which))
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +174,14 @@ class WallTracks:
 
     name: Annotated[tuple[str, ...], Quantity("name of the wall", dims="wall", essential=True)]
     endpoints: Annotated[
-        Array, Quantity("ends; packing to the left of 0 → 1", "m", "frame wall end xy", essential=True)
+        Array,
+        Quantity(
+            "ends; packing to the left of 0 → 1; of a circle the ends of a diameter, which turns with it; of a failed "
+            "frame between its neighbours'",
+            "m",
+            "frame wall end xy",
+            essential=True,
+        ),
     ]
     pressure: Annotated[
         Array, Quantity("pressure on the wall, NaN where its motion is imposed", "Pa", "wall", essential=True)
@@ -128,13 +195,101 @@ class WallTracks:
         Array | None, Quantity("standard deviation of an end along the normal; NaN: given", "m", "frame wall")
     ] = None
 
+    told: Annotated[
+        NDArray[np.int8] | None,
+        Quantity("what its ends were told to be; 0: points of the bar, 1: corners, −1: not told", dims="wall", since=2),
+    ] = None
+    side: Annotated[
+        NDArray[np.int8] | None,
+        Quantity(
+            "what the wall is; 0: straight, 1: a circle around the packing, −1: one within it", dims="wall", since=2
+        ),
+    ] = None
+    load: Annotated[
+        Array | None, Quantity("normal force that was told to load the wall, NaN: none", "N", "frame wall", since=2)
+    ] = None
+    # Whatever they are given as, these two follow from the endpoints.
+    centre: Annotated[Array | None, Quantity("centre of a circle; NaN: straight", "m", "frame wall xy", since=2)] = None
+    radius: Annotated[Array | None, Quantity("radius of a circle; NaN: straight", "m", "frame wall", since=2)] = None
+
+    def __post_init__(self) -> None:
+        centre, radius, _ = circle_of(self.endpoints)
+        straight = self.sides == STRAIGHT
+        told = self.side is not None
+        object.__setattr__(self, "centre", np.where(straight[:, None], np.nan, centre) if told else None)
+        object.__setattr__(self, "radius", np.where(straight, np.nan, radius) if told else None)
+
+    cell: Annotated[
+        Array | None,
+        Quantity(
+            "vectors a and b of the periodic cell, in place of walls; positions are not wrapped into it",
+            "m",
+            "frame lattice xy",
+            since=2,
+            path="cell/vectors",
+        ),
+    ] = None
+
     @property
     def count(self) -> int:
         return len(self.name)
+
+    @property
+    def sides(self) -> NDArray[np.int8]:
+        """What each wall is (w,): STRAIGHT, or a circle with the packing IN or OUT of it."""
+        return all_sides(self.side, self.count)
+
+    @property
+    def loaded(self) -> NDArray[np.bool_]:
+        """Which walls are plates under a pressure or a load (w,)."""
+        measured = False if self.load is None else np.isfinite(self.load).any(axis=0)
+        return np.isfinite(self.pressure) | measured
+
+    def outlines(self, frame: int) -> list[Array]:
+        """Lines (p, 2) [m] that draw the walls of a frame."""
+        return outlines(self.endpoints[frame], self.side)
+
+    def load_at(self, frame: int) -> Array | None:
+        """Load that was measured on the walls in a frame (w,) [N], NaN: none; None: on none."""
+        return None if self.load is None else self.load[frame]
+
+    def usual_pressure(self, length: float) -> Array:
+        """Pressure on the walls (w,) [Pa], that of a measured load on average; NaN where the motion is imposed.
+
+        length [m] of the rods.
+        """
+        if self.load is None:
+            return self.pressure
+        ends = self.endpoints[..., 1, :] - self.endpoints[..., 0, :]
+        face = np.where(self.sides == STRAIGHT, 1.0, np.pi) * np.linalg.norm(ends, axis=-1)
+        pressed = self.load / (face * length)
+        known = np.isfinite(pressed)
+        mean = np.where(known, pressed, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        return np.where(known.any(axis=0), mean, self.pressure)
+
+    @property
+    def ends_told(self) -> NDArray[np.int8]:
+        """What was told of the ends of each wall (w,): BAR, CORNER or NOT_TOLD."""
+        return np.full(self.count, NOT_TOLD, np.int8) if self.told is None else self.told
+
+    def select(self, rows: NDArray[np.intp]) -> WallTracks:
+        """Some of the walls alone."""
+        return WallTracks(
+            tuple(self.name[row] for row in rows), self.endpoints[:, rows], self.pressure[rows],
+            None if self.force is None else self.force[:, rows],
+            None if self.sigma is None else self.sigma[:, rows],
+            None if self.told is None else self.told[rows],
+            None if self.side is None else self.side[rows],
+            None if self.load is None else self.load[:, rows],
+        )  # fmt: skip
 
     def frames(self, start: int, stop: int, step: int = 1) -> WallTracks:
         """Every step-th of the frames start … stop − 1 alone."""
         part = slice(start, stop, step)
         force = None if self.force is None else self.force[part]
         sigma = None if self.sigma is None else self.sigma[part]
-        return WallTracks(self.name, self.endpoints[part], self.pressure, force, sigma)
+        cell = None if self.cell is None else self.cell[part]
+        load = None if self.load is None else self.load[part]
+        return WallTracks(
+            self.name, self.endpoints[part], self.pressure, force, sigma, self.told, self.side, load, cell=cell
+        )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shutil
+import time
 
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Error, Page
 
 from solver.bodies.grains import Array
 
@@ -17,6 +18,7 @@ FLAGS = (
     "--disable-dev-shm-usage", "--disable-features=LocalNetworkAccessChecks",
 )  # fmt: skip
 SECONDS = 90.0  # for what is drawn in software on a busy machine
+PATIENCE = 90.0  # [s] until a server answers
 POLLING = 250.0  # [ms] between two looks of the browser at its own picture
 DRAWN = 0.003  # least share of a page that strong forces cover
 LEGEND_FROM = 0.8  # of the page's height: the legend of the forces, which is always drawn, lies below
@@ -74,11 +76,15 @@ def find_chromium() -> str:
 
 def open_when_served(page: Page, address: str) -> None:
     """Open a page whose server may still have to start."""
-    page.wait_for_function(
-        "(address) => { fetch(address, { mode: 'no-cors' }).then(() => (self.up = true), () => {}); return self.up; }",
-        arg=address, polling=POLLING,
-    )  # fmt: skip
-    page.goto(address)
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            page.goto(address)
+            return
+        except Error:  # nobody listens yet
+            if time.monotonic() > until:
+                raise
+            page.wait_for_timeout(POLLING)
 
 
 def wait_for_forces(page: Page) -> None:

@@ -21,6 +21,10 @@ Settings = Annotated[
     ),
 ]
 Frames = Annotated[str | None, tyro.conf.arg(metavar="A:B", help="only the frames A … B − 1")]
+ProgressForm = Annotated[
+    Literal["bars", "lines"],
+    tyro.conf.arg(name="progress", help="lines: as JSON on standard error, for programs; default bars, on a terminal"),
+]
 Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]
 Sweeps = Annotated[
     Literal["all", "log", "none"] | None, tyro.conf.arg(help="whose forces the recording holds; default log")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import threading
+import webbrowser
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -104,19 +106,19 @@ def score(
 
     from .. import pipeline
     from ..experiment.experiment import load_experiment
-    from ..results.store import load_results, read_origin
+    from ..results.store import load_results, origin_of
     from ..results.summary import summarize
     from ..results.truth import accuracy, correlations
     from ..results.truth import score as score_frames
     from ..review.judging import scoring
     from ..review.reviewed_run import Reviewed
-    from ..run_folder import RESULTS, Run
+    from ..run_folder import RESULTS, Run, find_experiment
+    from ..study.baselines import baseline_lists, score_baselines, tell_baselines
     from .summary_table import print_summary
 
     file = results / RESULTS if results.is_dir() else results
-    solved, origin = load_results(file), read_origin(file)
-    assert origin is not None
-    run = Run(load_experiment(Path(origin.experiment)), file.parent, origin.frames)
+    solved, origin = load_results(file), origin_of(file)
+    run = Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames)
     known = pipeline.load_truth(run, solved, truth)
     reviewed = Reviewed(file, solved, run.experiment, origin.frames[0])
     verdicts = scoring.score_verdicts(reviewed)
@@ -129,7 +131,9 @@ def score(
     fitted = scoring.fit(reviewed, verdicts) if fit_threshold and verdicts is not None else None
     agreement = score_frames(solved, known) if known is not None else []
     if as_json:
-        told: dict[str, Any] = accuracy(agreement) if known is not None else {}
+        told: dict[str, Any] = {}
+        if known is not None:
+            told = accuracy(agreement) | {"baselines": baseline_lists(score_baselines(solved, known))}
         if verdicts is not None:
             told["verdicts"] = scoring.as_json(verdicts, fitted)
         print(json.dumps(told, indent=1))
@@ -142,6 +146,7 @@ def score(
     print_summary(console, summarize(solved, agreement, {}))
     r = np.array(correlations(agreement))
     console.print(f"r(f_n) over all frames: mean {np.nanmean(r):.3f}, least {np.nanmin(r):.3f}.", highlight=False)
+    console.print(tell_baselines(score_baselines(solved, known)), highlight=False, soft_wrap=True)
     return 0
 
 
@@ -195,6 +200,7 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
     The viewer is waited for: the catalogue is served by this process.
     """
     from ..recording.files.catalogue import can_serve, find_recordings, read_entries, serve, show_together
+    from ..recording.viewing.recording_server import RecordingServer
     from ..recording.viewing.viewer import has_display
 
     files = find_recordings(folder)
@@ -208,16 +214,20 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
     if not web and not has_display():
         console.print(f"No display here. In a browser: rodsight view --web {folder}", highlight=False, soft_wrap=True)
         return 0
+    if web:
+        server = RecordingServer(files)
+        tell(console, f"At {server.address} until interrupted (Ctrl+C).")
+        if has_display():
+            webbrowser.open(server.address)
+        threading.Event().wait()
     with ExitStack() as stack:
         if can_serve():
             shown = stack.enter_context(serve(files))
         else:
             shown = files
             tell(console, "Opened side by side. With pip install 'rodsight[catalog]' the viewer shows this table, too.")
-        viewer, page = show_together(shown, web=web)
+        viewer = show_together(shown)
         stack.callback(viewer.terminate)
-        if page:
-            tell(console, f"At {page} until interrupted (Ctrl+C).")
         viewer.wait()
     return 0
 
@@ -246,9 +256,10 @@ def _compare_with_truth(results: Results, origin: Provenance, path: Path, name: 
     from ..experiment.experiment import load_experiment
     from ..pipeline import load_truth
     from ..results.comparison import compare_with_truth
-    from ..run_folder import Run
+    from ..run_folder import RESULTS, Run, find_experiment
 
-    run = Run(load_experiment(Path(origin.experiment)), path if path.is_dir() else path.parent, origin.frames)
+    file = path / RESULTS if path.is_dir() else path
+    run = Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames)
     truth = load_truth(run, results)
     if truth is None:
         raise InputError(run.experiment.file, "key truth", "is missing: there is nothing to compare with")
@@ -256,14 +267,11 @@ def _compare_with_truth(results: Results, origin: Provenance, path: Path, name: 
 
 
 def _load(path: Path) -> tuple[Results, Provenance]:
-    from ..results.store import load_results, read_origin
+    from ..results.store import load_results, origin_of
     from ..run_folder import RESULTS
 
     file = path / RESULTS if path.is_dir() else path
-    results, origin = load_results(file), read_origin(file)
-    if origin is None:
-        raise InputError(file, "", "does not say where it comes from")
-    return results, origin
+    return load_results(file), origin_of(file)
 
 
 def _names(first: Path, second: Path | None) -> tuple[str, str]:

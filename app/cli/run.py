@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,15 +23,17 @@ from .arguments import (
     FullFrames,
     MaxSize,
     Out,
+    ProgressForm,
     Quiet,
     Settings,
     Sweeps,
     parse_frames,
 )
-from .terminal import progress_of, tell
+from .terminal import Form, progress_of, tell
 
 if TYPE_CHECKING:
     from ..run_folder import Run
+    from ..tracks import Tracks, WallTracks
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +47,7 @@ class Request:
     frames: str | None = None
     max_size: float | None = None  # [MB] of the recording
     full_frames: tuple[int, ...] = ()
+    progress: Form = "bars"
 
     @property
     def console(self) -> Console:
@@ -65,6 +69,15 @@ def run(
     ensemble: Ensemble = None,
     frames: Frames = None,
     settings: Settings = (),
+    progress: ProgressForm = "bars",
+    follow: Annotated[
+        bool,
+        tyro.conf.FlagCreatePairsOff,
+        tyro.conf.arg(help="wait for further photographs and solve them as they come, then run as ever"),
+    ] = False,
+    idle: Annotated[
+        float | None, tyro.conf.arg(metavar="SECONDS", help="with --follow: without a photograph for so long it ends")
+    ] = None,
     quiet: Quiet = False,
 ) -> int:
     """Photographs to contact forces and a recording: the main job.
@@ -76,15 +89,17 @@ def run(
     from .summary_table import print_summary
     from .watching import watching
 
-    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames)
+    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames, progress)
     request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)
     console = request.console
     began = time.perf_counter()
+    if follow:
+        _follow(request, idle)
     with open_run(request) as plain, watching(plain, view, console) as (run, watch):
         results = pipeline.solve(run)
         truth = pipeline.load_truth(run, results)
         recording = pipeline.record(run, results, truth)
-    summary = pipeline.conclude(run, results, truth, began)
+        summary = pipeline.conclude(run, results, truth, began)
     print_summary(console, summary)
     console.print(f"Results in {run.folder}/ after {summary['timings']['total']:.1f} s.", highlight=False)
     _tell_notes(run, console)
@@ -92,26 +107,50 @@ def run(
     return show(recording, "none" if watched else view, console)
 
 
-def check(experiment: ExperimentPath, /, settings: Settings = (), quiet: Quiet = False) -> int:
-    """Validate an experiment without computing.
+def check(
+    experiment: ExperimentPath,
+    /,
+    budget: Annotated[
+        bool, tyro.conf.arg(help="say what tracks of the first photographs promise of the forces")
+    ] = True,
+    settings: Settings = (),
+    quiet: Quiet = False,
+) -> int:
+    """Validate an experiment without computing, and say from its first tracks what to expect of the forces.
 
     Example: rodsight check sample_data/shear
     """
     from .. import pipeline
+    from ..inference.data_budget import measure_budget
 
     request = Request(experiment, settings, quiet)
-    with open_run(request) as run:
+    with open_run(request, writes=False) as run:
         tracks, walls = pipeline.check(run)
+    promised = None if tracks is None or not budget else measure_budget(tracks, walls)
     config = run.experiment.config
     if tracks is not None:
         what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
     else:
         what = f"{len(run.experiment.photographs())} photographs"
-    what += f", {walls.count} walls" if walls is not None else ", no walls: it can be tracked but not solved"
+    what += f", {_bounds(tracks, walls)}"
     console = request.console
     console.print(f"{config.name}: the input is good: {what}.", highlight=False)
     _tell_notes(run, console)
+    for sentence in [] if promised is None else promised.describe():
+        tell(console, sentence)
     return 0
+
+
+def _bounds(tracks: Tracks | None, walls: WallTracks | None) -> str:
+    """What bounds the packing, in a phrase."""
+    if walls is None:
+        return "no walls: it can be tracked but not solved"
+    told = [f"{walls.count} walls"] if walls.count else []
+    if walls.cell is not None:
+        told.append("in a periodic cell")
+    if tracks is not None and tracks.boundary is not None:
+        told.append(f"{int(tracks.boundary.sum())} of them the boundary")
+    return ", ".join(told) or "bounded by grains"
 
 
 def track(
@@ -139,13 +178,14 @@ def track(
         tracks, walls = pipeline.track(run)
         page = pipeline.report_tracking(run, tracks, walls) if report else None
     console = request.console
-    lost = int((~tracks.present).sum())
     renewed = f", {tracks.renewal_count} damaged grains with a new reference" if tracks.renewal_count else ""
     where = run.file(TRACKS) if run.experiment.config.photographs else "the experiment's own tables"
     console.print(
-        f"{tracks.grain_count} grains over {tracks.frame_count} frames, {lost} poses lost{renewed}; tracks in {where}.",
+        f"{tracks.grain_count} grains over {tracks.frame_count} frames, {tracks.describe_missing()}{renewed}; "
+        f"tracks in {where}.",
         highlight=False,
     )
+    _tell_notes(run, console)
     if page is not None:
         console.print(f"How well it went: {page}", highlight=False)
     return 0
@@ -174,7 +214,7 @@ def solve(
     with open_run(request) as run:
         results = pipeline.solve(run)
         truth = pipeline.load_truth(run, results)
-    summary = pipeline.conclude(run, results, truth, began)
+        summary = pipeline.conclude(run, results, truth, began)
     console = request.console
     print_summary(console, summary)
     _tell_notes(run, console)
@@ -210,20 +250,44 @@ def record(
 
 
 @contextmanager
-def open_run(request: Request) -> Iterator[Run]:
-    """The run that was asked for, with progress shown while it is open."""
+def open_run(request: Request, *, writes: bool = True) -> Iterator[Run]:
+    """The run that was asked for, with progress shown while it is open; its folder is its own if it writes there."""
     from ..experiment.config.unused_keys import refuse_unused_keys
     from ..experiment.experiment import load_experiment
-    from ..run_folder import Run
+    from ..run_folder import Run, owned
 
     experiment = load_experiment(request.experiment, request.settings)
     refuse_unused_keys(experiment.config, experiment.file)
     folder = request.out if request.out is not None else Path("runs") / experiment.name
-    with progress_of(request.quiet) as progress:
-        yield Run(
+    with progress_of(request.quiet, request.progress) as progress:
+        run = Run(
             experiment, folder, parse_frames(request.frames), progress, max_size=_bytes(request.max_size),
             full_frames=request.full_frames,
         )  # fmt: skip
+        if not writes:
+            yield run
+            return
+        with owned(run):
+            yield run
+
+
+def _follow(request: Request, idle: float | None) -> None:
+    """Solve photographs as they come, telling what a person should know at once."""
+    from ..following.follow import follow
+
+    if request.frames is not None:
+        raise InputError("--frames", request.frames, "does not go with --follow, which takes every photograph")
+    if idle is not None and not (math.isfinite(idle) and idle > 0.0):
+        raise InputError("--idle", str(idle), "is not a positive number of seconds")
+
+    def alarm(frame: int, text: str) -> None:
+        if request.progress == "lines":
+            print(json.dumps({"alarm": text, "frame": frame}), file=sys.stderr, flush=True)
+        else:
+            tell(request.console, f"\a{f'Frame {frame}: {text}'}")
+
+    with open_run(request) as run:
+        follow(run, request.settings, idle=idle, alarm=alarm, say=lambda text: tell(request.console, text))
 
 
 def _bytes(megabytes: float | None) -> int | None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import tyro
 
 from ..errors import InputError
+from ..synthetic.worlds.names import WorldName
 from .arguments import ExperimentPath, Frames, Out, Quiet, Settings
 from .run import Request, open_run
 from .terminal import progress_of, table_console
@@ -77,22 +78,70 @@ def sensitivity(
 
 def study(
     subject: Annotated[
-        Literal["paper", "accuracy", "status", "uncertainty"],
+        Literal["paper", "accuracy", "status", "uncertainty", "worlds", "numbers", "real", "perturbation"],
         tyro.conf.Positional,
-        tyro.conf.arg(help="the paper's claims; r against noise; trust and status refitted; coverage of error bars"),
+        tyro.conf.arg(
+            help="the paper's claims; r against noise; trust and status refitted; coverage of error bars; what "
+            "laboratories bring, as simulated worlds; every statistic against the truth's; a run "
+            "against forces that were measured; how far forces move when next to nothing is changed"
+        ),
     ],
+    folder: Annotated[
+        Path | None,
+        tyro.conf.Positional,
+        tyro.conf.arg(
+            metavar="PATH",
+            help="real: folder of a run, or results.h5; perturbation: an experiment, instead of --worlds",
+        ),
+    ] = None,
     /,
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(help="of the simulated packings")] = (0, 1, 2),
-    grains: Annotated[int, tyro.conf.arg(help="rods of a packing")] = 1172,
+    grains: Annotated[int | None, tyro.conf.arg(help="rods of a packing; default 1172, of worlds 450")] = None,
     estimator: Literal["ensemble", "nlgs"] = "ensemble",
     ensemble: Annotated[int, tyro.conf.arg(metavar="K", help="uncertainty: sequences solved again")] = 8,
+    worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
+    jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
+    settings: Settings = (),
     out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
+    as_json: Annotated[
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="worlds, real: print JSON")
+    ] = False,
+    page: Annotated[
+        Path | None, tyro.conf.arg(metavar="OUT.html", help="real: pictures side by side, true, inferred and baseline")
+    ] = None,
+    frame: Annotated[int | None, tyro.conf.arg(help="real: the frame of the pictures; default: the middle one")] = None,
     quiet: Quiet = False,
 ) -> int:
     """Measure the method on simulated truth: minutes for each packing, kept for the next time.
 
+    Worlds that are finished are kept; --worlds, --jobs, --set and --json are for worlds.
+
+    Some of them: rodsight study worlds --seeds 1 --worlds shear gravity; of one's own: rodsight study perturbation
+    sample_data/shear
+
+    Photoelastic forces: rodsight import pegs, rodsight run, then rodsight study real runs/my_test --page real.html
+
     Example: rodsight study paper --seeds 0 1 --grains 400
     """
+    if subject == "real":
+        return _study_real(folder, page, frame, as_json=as_json)
+    for option, value in (("--page", page), ("--frame", frame)):
+        if value is not None:
+            raise InputError("study", f"{option} with {subject}", "is for real only")
+    if subject == "perturbation":
+        return _study_perturbation(folder, worlds, seeds, grains, out, settings, quiet=quiet)
+    if folder is not None:
+        raise InputError("study", f"{folder} with {subject}", "a path is for real and perturbation only")
+    if subject == "worlds":
+        if estimator == "nlgs":
+            settings = (*settings, "solver.estimator=nlgs")
+        return _study_worlds(worlds, seeds, grains, out, settings, jobs=jobs, as_json=as_json, quiet=quiet)
+    if subject == "numbers":
+        return _study_numbers(worlds, seeds, grains, out, settings, quiet=quiet)
+    for option, given in (("--worlds", worlds), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
+        if given:
+            raise InputError("study", f"{option} with {subject}", "is for worlds only")
+    grains = 1172 if grains is None else grains
     from ..study.accuracy import study_accuracy
     from ..study.claims import study_claims
     from ..study.status import refit_status
@@ -114,4 +163,123 @@ def study(
             refit_status(seeds[:half], seeds[half:], grains=(grains,), folder=out, console=console, progress=progress)
         else:
             study_claims(seeds, grains=grains, folder=out, console=console, progress=progress)
+    return 0
+
+
+def _study_real(folder: Path | None, page: Path | None, frame: int | None, *, as_json: bool) -> int:
+    from .. import pipeline
+    from ..experiment.experiment import load_experiment
+    from ..results.store import load_results, origin_of
+    from ..run_folder import RESULTS, Run, find_experiment
+    from ..study import real_forces, real_page
+
+    if folder is None:
+        raise InputError("study real", "RUN", "is missing: the folder of a run, such as runs/my_test")
+    file = folder / RESULTS if folder.is_dir() else folder
+    results, origin = load_results(file), origin_of(file)
+    run = Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames)
+    truth = pipeline.load_truth(run, results)
+    if truth is None or run.experiment.config.truth is None:
+        raise InputError(run.experiment.file, "key truth", "is missing: there are no measured forces to compare with")
+    sides = real_forces.correlate_sides(
+        run.experiment.folder / run.experiment.config.truth, origin.frames[0], len(results.frames)
+    )
+    found = real_forces.study_real(results, truth, sides, frame)
+    if page is not None:
+        page.write_text(real_page.real_page(found), encoding="utf-8")
+    if as_json:
+        print(json.dumps(real_forces.as_json(found), indent=1))
+        return 0
+    real_page.print_real(table_console(real_page.WIDTH), found)
+    if page is not None:
+        table_console().print(f"Pictures of frame {found.shown}: {page}", highlight=False)
+    return 0
+
+
+def _study_perturbation(
+    experiment: Path | None,
+    worlds: tuple[WorldName, ...],
+    seeds: tuple[int, ...],
+    grains: int | None,
+    out: Path,
+    settings: tuple[str, ...],
+    *,
+    quiet: bool,
+) -> int:
+    from .. import pipeline
+    from ..study.perturbation import on_told_grains, perturb_world, print_perturbations, study_perturbations
+    from ..synthetic.worlds.making import GRAINS
+
+    console = table_console()
+    if experiment is not None:
+        with open_run(Request(experiment, settings, quiet)) as run:
+            inputs, results, truth = pipeline.solved_inputs(run)
+            bodies, walls = results.grains.count + results.walls.count, results.walls.count
+            true = None if truth is None else truth.by_frame(bodies, len(results.frames))
+            told = inputs.tracks.grain_count
+            known = None if true is None else [on_told_grains(*each, bodies, walls, told) for each in true]
+            effects = study_perturbations(inputs, known, progress=run.progress)
+        print_perturbations(console, run.experiment.name, effects)
+        return 0
+    count = GRAINS if grains is None else grains
+    for world in worlds or get_args(WorldName):
+        for seed in seeds:
+            with progress_of(quiet) as progress:
+                effects = perturb_world(
+                    world, seed, grains=count, folder=out / "worlds", settings=settings, progress=progress
+                )
+            print_perturbations(console, f"{world}, seed {seed}", effects)
+    return 0
+
+
+def _study_worlds(
+    worlds: tuple[WorldName, ...],
+    seeds: tuple[int, ...],
+    grains: int | None,
+    out: Path,
+    settings: tuple[str, ...],
+    *,
+    jobs: int,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    from ..study.world_score import WorldPlan
+    from ..study.worlds import WIDTH, print_worlds, study_worlds
+    from ..study.worlds import as_json as worlds_as_json
+    from ..synthetic.worlds.making import GRAINS
+
+    if jobs < 1:
+        raise InputError("--jobs", str(jobs), "must be at least one")
+    plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", settings)
+    with progress_of(quiet) as progress:
+        scores = study_worlds(plan, worlds or get_args(WorldName), seeds, jobs=jobs, progress=progress)
+    if as_json:
+        print(json.dumps(worlds_as_json(scores), indent=1))
+    else:
+        print_worlds(table_console(WIDTH), scores)
+    return 0
+
+
+def _study_numbers(
+    worlds: tuple[WorldName, ...],
+    seeds: tuple[int, ...],
+    grains: int | None,
+    out: Path,
+    settings: tuple[str, ...],
+    *,
+    quiet: bool,
+) -> int:
+    from ..study.numbers import WORLDS, compare_numbers, print_numbers
+    from ..study.world_score import WorldPlan
+    from ..study.worlds import WIDTH
+    from ..synthetic.worlds.making import GRAINS
+
+    plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", settings)
+    cases: list[tuple[WorldName, int]] = [(world, seed) for world in worlds or WORLDS for seed in seeds]
+    found = []
+    with progress_of(quiet) as progress:
+        for number, (world, seed) in enumerate(cases):
+            progress("worlds", number, len(cases))
+            found += compare_numbers(plan, world, seed)
+    print_numbers(table_console(WIDTH), found)
     return 0

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from solver.sequence.frame_forces import FrameStatus
@@ -45,9 +46,11 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     ]
     if events:
         lines.append("Events: " + "; ".join(events) + ".")
+    lines += _failure_lines(summary["failures"])
     lost = f"{summary['lost_poses']} poses of {summary['lost_grains']} grains lost" if summary["lost_poses"] else ""
     doubtful = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
-    tracked = ", ".join(part for part in (lost, doubtful) if part) or "every grain has a pose in every frame"
+    cut = f"{summary['cut_grains']} rods cut by the picture's border" if summary.get("cut_grains") else ""
+    tracked = ", ".join(part for part in (lost, doubtful, cut) if part) or "every grain has a pose in every frame"
     worst = _cell(summary["worst_unbalance"], ".3f")
     lines.append(
         f"Worst grain unbalance {worst} of the mean force (frame {summary['worst_unbalance_frame']}); {tracked}."
@@ -55,9 +58,10 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     trusted = [t for t, s in zip(summary["trust"], summary["status"], strict=True) if s == "settled" and t is not None]
     if trusted:
         lines.append(
-            f"Trust (expected correlation with the true forces, given these inputs): {min(trusted):.2f} to "
+            f"Trust (a lower bound of the correlation with the true forces): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
         )
+    lines += _doubt_line(summary)
     if not summary["loaded_walls"]:
         lines.append(
             "[bold]No wall carries a given pressure:[/] forces are known up to a scale, which differs between frames."
@@ -69,11 +73,17 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         lines.append(
             f"Friction from the motion: {measured} ({low} to {high}), which {verdict} the given {friction['given']:g}."
         )
+    if friction is not None and friction["walls"][0] is not None:
+        measured, low, high = (_cell(value, ".2f") for value in friction["walls"])
+        lines.append(f"Friction of the walls from the motion: {measured} ({low} to {high}), which was used.")
     if summary["wall_force_error"]:
         told = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
         lines.append(f"Inferred against recorded wall forces, rms difference over settled frames: {told}.")
     if summary["corrections"] is not None:
         lines += calibration_lines(summary["corrections"])
+    lines += [f"Boundary: {each}." for each in summary.get("boundary") or []]
+    if summary.get("inferred_grains"):
+        lines += [f"{summary['inferred_grains']} rods that no photograph shows were inferred from their neighbours."]
     if summary["radius_change"] is not None:
         lines.append(_curve_line(summary["radius_curve"]))
         lines.append(
@@ -89,6 +99,28 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
                 f"r(f_t) {np.mean(late_t):.3f}.[/]"
             )
     return lines
+
+
+def _doubt_line(summary: dict[str, Any]) -> list[str]:
+    """Why the least trusted frame is not trusted more."""
+    doubted = [
+        (t, k) for k, t in enumerate(summary["trust"]) if t is not None and summary.get("doubts", [])[k : k + 1] != [""]
+    ]
+    if not doubted:
+        return []
+    trust, frame = min(doubted)
+    return [f"What lowers it most, in frame {frame} (T = {trust:.2f}): {escape(summary['doubts'][frame])}."]
+
+
+def _failure_lines(failures: dict[int, str]) -> list[str]:
+    """The frames that failed, those for the same reason together."""
+    frames: dict[str, list[int]] = {}
+    for frame, reason in failures.items():
+        frames.setdefault(reason, []).append(frame)
+    return [
+        f"[bold red]Frame{'s' if len(at) > 1 else ''} {_listed(at)} failed[/], without forces: {escape(reason)}."
+        for reason, at in frames.items()
+    ]
 
 
 def calibration_lines(facts: dict[str, Any]) -> list[str]:

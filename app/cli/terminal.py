@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Literal
 
 from rich.console import Console
 from rich.progress import (
@@ -19,6 +21,7 @@ from rich.progress import Progress as Bars
 
 from ..progress import Progress, silent
 
+Form = Literal["bars", "lines"]
 WIDE = 120  # columns of a table that goes to a file
 
 
@@ -45,10 +48,17 @@ def progress_bars() -> Iterator[Progress]:
         yield show
 
 
+def progress_lines(stage: str, done: int, total: int) -> None:
+    """Tell progress on standard error as lines of JSON, for a program that reads them."""
+    print(json.dumps({"stage": stage, "done": done, "total": total}), file=sys.stderr, flush=True)
+
+
 @contextmanager
-def progress_of(quiet: bool) -> Iterator[Progress]:
-    """Bars on a terminal, silence elsewhere and where it was asked for."""
-    if quiet or not sys.stderr.isatty():
+def progress_of(quiet: bool, form: Form = "bars") -> Iterator[Progress]:
+    """Bars on a terminal, silence elsewhere and where it was asked for; lines wherever they were asked for."""
+    if form == "lines":
+        yield progress_lines
+    elif quiet or not sys.stderr.isatty():
         yield silent
     else:
         with progress_bars() as progress:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,7 +12,6 @@ from rich.console import Console
 
 from ..experiment.scaling import make_scale
 from ..run_folder import Run
-from ..signals import answering
 from .terminal import tell
 
 if TYPE_CHECKING:
@@ -34,10 +32,8 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
 
     watch = _watch(run, viewer, partial(tell, console))
     try:
-        # A termination from outside ends the run as an interrupt does, so that it says what it leaves.
-        with answering(signal.SIGTERM, signal.default_int_handler):
-            yield replace(run, watch=watch), watch
-            watch.close(whole=True)
+        yield replace(run, watch=watch), watch
+        watch.close(whole=True)
         watch.path.unlink(missing_ok=True)
     except BaseException:
         watch.close(whole=False)

@@ -27,6 +27,7 @@ IDENTITY = {
     "y": "m",
     "theta": "rad",
     "radius": "m",
+    **dict.fromkeys(("ax", "ay", "bx", "by"), "m"),
     "x1": "m",
     "y1": "m",
     "x2": "m",
@@ -99,7 +100,9 @@ def _grains(results: Results) -> dict[str, Column]:
 
 
 def _frames(results: Results) -> dict[str, Column]:
-    return _identity(frame=np.arange(len(results.frames)), time=results.tracks.time)
+    cell = results.walls.cell
+    vectors = {} if cell is None else dict(zip(("ax", "ay", "bx", "by"), cell.reshape(-1, 4).T, strict=True))
+    return _identity(frame=np.arange(len(results.frames)), time=results.tracks.time, **vectors)
 
 
 def _walls(results: Results) -> dict[str, Column]:

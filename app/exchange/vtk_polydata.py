@@ -51,6 +51,7 @@ def _grains(results: Results, frame: int) -> str:
         "rotation": tracks.rotation[frame, here],
         "status": tracks.status[frame, here],
         "loaded_contacts": count[: tracks.grain_count][here],
+        **({} if tracks.boundary is None else {"boundary": tracks.boundary[here].astype(np.int64)}),
         **_columns(forces, "grain", here),
     }
     vertices = np.arange(len(here))[:, None]
@@ -65,7 +66,7 @@ def _contacts(results: Results, frame: int) -> str:
     contacts = forces.contacts
     far = contacts.point.copy()
     pair = ~contacts.with_wall
-    far[pair] = position[contacts.j[pair]]
+    far[pair] = contacts.second_centre(position)[pair]  # of the image that i touches
     points = np.concatenate([position[contacts.i], far])
     lines = np.column_stack([np.arange(contacts.count), np.arange(contacts.count) + contacts.count])
     ids = np.concatenate([results.tracks.id, -1 - np.arange(results.walls.count)])  # walls: −1, −2, …

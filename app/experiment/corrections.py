@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 
 from .experiment import Experiment, rows_of
-from .tables import Table, check_unique, read_table
+from .tables import Table, check_unique
 
 LOST = "lost"
 
@@ -37,7 +37,7 @@ def read_corrections(experiment: Experiment, ids: NDArray[np.int64] | None, fram
     section = experiment.config.photographs
     if section is None or section.corrections is None:
         return None
-    table = read_table(experiment.folder / section.corrections, ("frame", "id", "x", "y", "theta"))
+    table = experiment.table(section.corrections, ("frame", "id", "x", "y", "theta"))
     frame, of = table.integers("frame"), table.integers("id")
     check_unique(table, "id", frame, of)
     for row in np.flatnonzero((frame < 1) | (frame >= frame_count)):

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.bodies.cell import follow_cell
 from solver.bodies.grains import Array
 
 from ..errors import InputError
-from ..tracks import Tracks, TrackStatus, WallTracks
+from ..tracks import Tracks, TrackStatus
 from .config.experiment_file import ExperimentFile, load_config
-from .photographs import Photographs
+from .input_files import InputFiles
+from .photographs import Channel, Look, Photographs
 from .tables import Table, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
+PLACE_COLUMNS = ("frame", "id", "x", "y")  # of a pose whose rotation may be unknown
 GRAIN_COLUMNS, POSE_COLUMNS = ("id", "radius"), ("frame", "id", "x", "y", "theta")
-TIME_COLUMNS, WALL_COLUMNS = ("frame", "time"), ("frame", "wall", "x1", "y1", "x2", "y2")
+TIME_COLUMNS, CELL_COLUMNS = ("frame", "time"), ("frame", "ax", "ay", "bx", "by")
+FLAT = 1e-9  # sine of the angle between the vectors of a cell without area
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,7 @@ class GrainGuess:
 class Experiment:
     file: Path
     config: ExperimentFile
+    inputs: InputFiles = field(default_factory=InputFiles, compare=False)
 
     @property
     def folder(self) -> Path:
@@ -46,10 +50,17 @@ class Experiment:
     def name(self) -> str:
         return self.config.name
 
-    def photographs(self) -> Photographs:
+    def photographs(self, channel: Channel | None = None) -> Photographs:
+        """The photographs; channel: another than the experiment's own."""
         section = self.config.photographs
         assert section is not None
-        return Photographs.matching(self.folder, section.files)
+        files = self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
+        look = Look(channel or section.channel, section.region)
+        return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, look=look)
+
+    def table(self, name: str, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
+        """A table of the experiment's folder. Raises InputError naming file, row and value."""
+        return read_table(self.folder / name, columns, self.inputs, optional)
 
     def input_files(self) -> list[Path]:
         """Every file that the experiment names, photographs included."""
@@ -60,7 +71,9 @@ class Experiment:
         if config.tracks:
             names += [config.tracks.positions, config.tracks.grains, config.tracks.times]
         if config.walls:
-            names += [config.walls.file, config.walls.forces]
+            names += [config.walls.file, config.walls.arcs, config.walls.load, config.walls.forces]
+        if config.boundary:
+            names += [config.boundary.periodic, None if config.boundary.found else config.boundary.grains]
         files = [self.folder / name for name in names if name is not None]
         return files + (list(self.photographs().files) if config.photographs else [])
 
@@ -70,24 +83,25 @@ def load_experiment(path: Path, settings: Sequence[str] = ()) -> Experiment:
     file = path / CONFIG_NAME if path.is_dir() else path
     if not file.exists():
         raise InputError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
-    return Experiment(file, load_config(file, tuple(settings)))
+    inputs = InputFiles()
+    return Experiment(file, load_config(file, tuple(settings), inputs), inputs)
 
 
 def checksums(experiment: Experiment) -> dict[str, str]:
-    """SHA-256 of every input file, by its path in the experiment."""
+    """SHA-256 of every input file as it was read, by its path in the experiment; of one elsewhere, by its name."""
     result = {}
     for file in experiment.input_files():
         try:
-            with file.open("rb") as stream:
-                digest = hashlib.file_digest(stream, "sha256").hexdigest()
+            result[_relative(file, experiment.folder)] = experiment.inputs.checksum(file)
         except OSError as error:
             raise InputError(file, "", f"cannot be read ({error.strerror})") from None
-        result[_relative(file, experiment.folder)] = digest
     return result
 
 
 def _relative(file: Path, folder: Path) -> str:
-    return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else str(file)
+    if file.is_relative_to(folder):
+        return file.relative_to(folder).as_posix()
+    return f"elsewhere/{file.parent.name}/{file.name}"  # where on this machine is nobody's business
 
 
 def read_times(experiment: Experiment, frame_count: int) -> Array:
@@ -97,7 +111,7 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
         return np.arange(frame_count, dtype=np.float64) * config.photographs.interval
     name = config.photographs.times if config.photographs is not None else config.tracks and config.tracks.times
     assert name is not None
-    return arrange_times(read_table(experiment.folder / name, TIME_COLUMNS), frame_count)
+    return arrange_times(experiment.table(name, TIME_COLUMNS), frame_count)
 
 
 def arrange_times(table: Table, frame_count: int) -> Array:
@@ -118,10 +132,17 @@ def read_tracks(experiment: Experiment) -> Tracks:
     """Grains tracked by another tool."""
     section = experiment.config.tracks
     assert section is not None
-    grains = read_table(experiment.folder / section.grains, GRAIN_COLUMNS)
-    poses = read_table(experiment.folder / section.positions, POSE_COLUMNS)
-    times = read_table(experiment.folder / section.times, TIME_COLUMNS)
-    return arrange_tracks(grains, poses, times, section.precision)
+    grains = experiment.table(section.grains, GRAIN_COLUMNS)
+    poses = experiment.table(section.positions, PLACE_COLUMNS, optional=("theta",))
+    times = experiment.table(section.times, TIME_COLUMNS)
+    tracks = arrange_tracks(grains, poses, times, section.precision)
+    if section.radius_offset == "estimate":
+        return tracks
+    radius = tracks.radius + section.radius_offset
+    if not radius.min() > 0.0:
+        least = f"leaves a radius of {radius.min():g} m: {section.grains} has one of {tracks.radius.min():g} m"
+        raise InputError(experiment.file, f"key tracks.radius_offset = {section.radius_offset:g}", least)
+    return replace(tracks, radius=radius)
 
 
 def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) -> Tracks:
@@ -139,8 +160,8 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
     shape = (frame_count, len(ids))
     position, rotation = np.full((*shape, 2), np.nan), np.full(shape, np.nan)
     position[frame, row] = np.column_stack([poses.numbers("x"), poses.numbers("y")])
-    rotation[frame, row] = poses.numbers("theta")
-    present = np.isfinite(rotation)
+    rotation[frame, row] = poses.numbers_if_told("theta")
+    present = np.isfinite(position).all(axis=2)
     return Tracks(
         id=ids,
         radius=radius,
@@ -158,75 +179,26 @@ def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
     section = experiment.config.photographs
     if section is None or section.grains is None:
         return None
-    table = read_table(experiment.folder / section.grains, ("id", "x", "y", "radius"))
+    table = experiment.table(section.grains, ("id", "x", "y", "radius"))
     ids, radius = table.integers("id"), table.numbers("radius")
     check_unique(table, "id", ids)
     _all_positive(table, "radius", radius)
     return GrainGuess(ids, table.numbers("x"), table.numbers("y"), radius)
 
 
-def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
-    """The walls in every frame; None where the experiment has none.
-
-    Endpoints are NaN where they are to be followed in the photographs: with `walls.track`, wherever the table has no
-    row; without it, where the table ends with frame 0.
-    """
-    section = experiment.config.walls
-    if section is None:
-        return None
-    table = read_table(experiment.folder / section.file, WALL_COLUMNS)
-    track = section.track
-    if track and experiment.config.photographs is None:
-        raise InputError(experiment.file, "key walls.track = true", "walls can be followed in photographs only")
-    if track is None:
-        track = experiment.config.photographs is not None and not np.any(table.integers("frame") > 0)
-    names, endpoints = arrange_walls(table, frame_count, followed=track)
-    for unknown in section.plates.keys() - set(names):
-        raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {section.file}")
-    pressure = np.array([section.plates[n].pressure if n in section.plates else None for n in names], np.float64)
-    return WallTracks(names, endpoints, pressure, _read_wall_forces(experiment, names, frame_count))
-
-
-def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> tuple[tuple[str, ...], Array]:
-    """Names (w,) and endpoints (f, w, 2, 2) [m] of a table frame,wall,x1,y1,x2,y2.
-
-    followed: frame 0 is enough; endpoints are NaN where the table has no row.
-    """
-    frame, name = table.integers("frame"), table.text("wall")
-    names = tuple(dict.fromkeys(name))
-    row = np.array([names.index(each) for each in name])
-    check_unique(table, "wall", frame, row)
-    found = int(frame.max()) + 1 if followed and frame.min() == 0 else check_frames(table, frame)
-    if found > frame_count or (found < frame_count and not followed):
-        raise InputError(table.file, "frame", f"there are walls of {found} frames, but {frame_count} frames")
-    endpoints = np.full((frame_count, len(names), 2, 2), np.nan)
-    endpoints[frame, row] = np.column_stack([table.numbers(c) for c in WALL_COLUMNS[2:]]).reshape(-1, 2, 2)
-    absent = np.argwhere(np.isnan(endpoints[: 1 if followed else None, :, 0, 0]))
-    if len(absent):
-        raise InputError(table.file, f"frame {absent[0][0]}", f"has no row of wall {names[absent[0][1]]!r}")
-    point = np.flatnonzero(np.all(endpoints[frame, row, 0] == endpoints[frame, row, 1], axis=1))
-    if len(point):
-        raise table.error(int(point[0]), "wall", "has no length: its two ends are the same point")
-    return names, endpoints
-
-
-def _read_wall_forces(experiment: Experiment, names: tuple[str, ...], frame_count: int) -> Array | None:
-    """What sensors recorded on the walls (f, w, 2) [N], NaN where they did not; None without a table."""
-    section = experiment.config.walls
-    if section is None or section.forces is None:
-        return None
-    table = read_table(experiment.folder / section.forces, ("frame", "wall", "fx", "fy"))
-    frame, name = table.integers("frame"), table.text("wall")
-    for row, (k, each) in enumerate(zip(frame, name, strict=True)):
-        if each not in names:
-            raise table.error(row, "wall", "is not the name of a wall")
-        if not 0 <= k < frame_count:
-            raise table.error(row, "frame", f"is not one of the {frame_count} frames")
-    wall = np.array([names.index(each) for each in name])
-    check_unique(table, "wall", frame, wall)
-    force = np.full((frame_count, len(names), 2), np.nan)
-    force[frame, wall] = np.column_stack([table.numbers("fx"), table.numbers("fy")])
-    return force
+def arrange_cell(table: Table, frame_count: int) -> Array:
+    """Vectors of the cell (f, 2, 2) [m] of a table frame,ax,ay,bx,by, without jumps by whole vectors."""
+    frame = table.integers("frame")
+    check_unique(table, "frame", frame)
+    found = check_frames(table, frame)
+    if found != frame_count:
+        raise InputError(table.file, "frame", f"there are cells of {found} frames, but {frame_count} frames")
+    order = np.argsort(frame)
+    vectors = np.column_stack([table.numbers(c) for c in CELL_COLUMNS[1:]]).reshape(-1, 2, 2)
+    flat = np.flatnonzero(np.abs(np.linalg.det(vectors)) <= FLAT * np.prod(np.linalg.norm(vectors, axis=2), axis=1))
+    if len(flat):
+        raise table.error(int(flat[0]), "bx", "makes b parallel to a: the cell has no area")
+    return follow_cell(vectors[order])
 
 
 def _all_positive(table: Table, column: str, values: Array) -> None:

@@ -2,27 +2,66 @@
 
 from __future__ import annotations
 
+import io
+import os
 import re
+import sys
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
+from typing import Literal, Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .image_header import claimed_size
+from .input_files import InputFiles
 
 Image = NDArray[np.float32]
 
 # ITU-R BT.601 luma of blue, green, red: the order in which OpenCV hands out colours.
 LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
+Channel = Literal["grey", "red", "green", "blue"]
+CHANNELS: dict[Channel, NDArray[np.float32]] = {
+    "grey": LUMA,
+    "red": np.array([0.0, 0.0, 1.0], dtype=np.float32),
+    "green": np.array([0.0, 1.0, 0.0], dtype=np.float32),
+    "blue": np.array([1.0, 0.0, 0.0], dtype=np.float32),
+}
 
 FULL_SCALE = 255.0
+MAX_PIXELS = 200_000_000  # beyond any camera in a laboratory; as float32 it takes .8 GB
 
 # What cameras call the data of their sensor; read with the optional package rawpy.
 RAW_SUFFIXES = frozenset(
     (".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dng", ".iiq", ".nef", ".nrw", ".orf", ".pef", ".raf", ".rw2", ".srw")
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What of a photograph is looked at."""
+
+    channel: Channel = "grey"
+    region: tuple[int, int, int, int] | None = None  # [px] first and last column and row; None: all of it
+
+    def cut(self, image: Image) -> Image:
+        """The image with everything outside the region as its middle grey, so that nothing is found there."""
+        if self.region is None:
+            return image
+        left, top, right, bottom = self.region
+        inside = np.s_[max(top, 0) : bottom + 1, max(left, 0) : right + 1]
+        cut = np.full_like(image, np.median(image[inside]))
+        cut[inside] = image[inside]
+        return cut
+
+
+EVERYTHING = Look()
 
 
 class Photographs(Sequence[Image]):
@@ -34,11 +73,20 @@ class Photographs(Sequence[Image]):
     another size than the first.
     """
 
-    def __init__(self, files: Sequence[Path | str], *, source: Path | str = "photographs") -> None:
+    def __init__(
+        self,
+        files: Sequence[Path | str],
+        *,
+        source: Path | str = "photographs",
+        inputs: InputFiles | None = None,
+        max_pixels: int = MAX_PIXELS,
+        look: Look = EVERYTHING,
+    ) -> None:
         self.files: tuple[Path, ...] = tuple(sorted((Path(file) for file in files), key=natural_key))
         if not self.files:
             raise InputError(source, "", "there are no photographs")
         self._shape: tuple[int, int] | None = None
+        self._inputs, self._max_pixels, self._look = inputs, max_pixels, look
 
     @classmethod
     def matching(cls, folder: Path, pattern: str, *, source: Path | str | None = None) -> Photographs:
@@ -60,8 +108,16 @@ class Photographs(Sequence[Image]):
     def shape(self) -> tuple[int, int]:
         """Rows and columns of every photograph [px]."""
         if self._shape is None:
-            self._shape = _shape_of(read_photograph(self.files[0]))
+            self._shape = _shape_of(read_photograph(self.files[0], self._inputs, self._max_pixels, self._look.channel))
+            self.check_region(self._shape)
         return self._shape
+
+    def check_region(self, shape: tuple[int, int]) -> None:
+        """Raise InputError where the region reaches beyond a photograph of this many rows and columns."""
+        region = self._look.region
+        if region is not None and (region[2] >= shape[1] or region[3] >= shape[0]):
+            what = f"key photographs.region = {list(region)}"
+            raise InputError(self.files[0], what, f"reaches beyond its {shape[1]} x {shape[0]} pixels")
 
     def check(self) -> None:
         """Read every photograph once, so that a bad one is known before any work begins."""
@@ -73,9 +129,10 @@ class Photographs(Sequence[Image]):
 
     def __getitem__(self, frame: int) -> Image:  # pyright: ignore[reportIncompatibleMethodOverride]
         file = self.files[frame]
-        image = read_photograph(file)
+        image = read_photograph(file, self._inputs, self._max_pixels, self._look.channel)
         if self._shape is None and file == self.files[0]:
             self._shape = _shape_of(image)
+            self.check_region(self._shape)
         height, width = self.shape
         if image.shape != (height, width):
             raise InputError(
@@ -83,11 +140,46 @@ class Photographs(Sequence[Image]):
                 f"photograph {range(len(self))[frame]}",
                 f"is {image.shape[1]} x {image.shape[0]} pixels, the first photograph {width} x {height}",
             )
-        return image
+        return self._look.cut(image)
 
     def __iter__(self) -> Iterator[Image]:
         for frame in range(len(self)):
             yield self[frame]
+
+
+class Readable(Protocol):
+    def __getitem__(self, frame: int, /) -> Image:
+        """Photograph `frame` (H, W)."""
+        ...
+
+
+class ReadAhead:
+    """Photographs that are asked for one after the other: the next is read while one is worked at.
+
+    To be closed, or used as a context: the thread ends with it.
+    """
+
+    def __init__(self, photographs: Readable, stop: int) -> None:
+        self._photographs, self._stop = photographs, stop
+        self._reader = ThreadPoolExecutor(1, "photographs")
+        self._coming: tuple[int, Future[Image]] | None = None
+
+    def __getitem__(self, frame: int) -> Image:
+        """Photograph `frame`; what reading it raised is raised here."""
+        coming, self._coming = self._coming, None
+        if coming is not None and coming[0] == frame:
+            image = coming[1].result()
+        else:
+            image = self._photographs[frame]
+        if frame + 1 < self._stop:
+            self._coming = (frame + 1, self._reader.submit(self._photographs.__getitem__, frame + 1))
+        return image
+
+    def __enter__(self) -> ReadAhead:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._reader.shutdown(wait=True, cancel_futures=True)
 
 
 def natural_key(file: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
@@ -96,27 +188,33 @@ def natural_key(file: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
     return tuple((0, int(part)) if part.isdecimal() else (1, part.lower()) for part in parts), file.as_posix()
 
 
-def read_photograph(file: Path) -> Image:
+def read_photograph(
+    file: Path, inputs: InputFiles | None = None, max_pixels: int = MAX_PIXELS, channel: Channel = "grey"
+) -> Image:
     """Read one 8- or 16-bit photograph, grey or colour, as float32 grey (H, W) with full scale 255.
 
-    Raw files of cameras are developed to 16 bits, all alike. Raises InputError for what is not a photograph, and for
+    channel: of CHANNELS, what of a colour photograph is taken for grey.
+
+    Raw files of cameras are developed to 16 bits, all alike. inputs: what the file is read by, where it has to stay
+    what it is; max_pixels: that it may claim to have. Raises InputError for what is not a photograph, and for
     raw files while the package that reads them is not installed.
     """
-    if file.suffix.lower() in RAW_SUFFIXES:
-        return _to_grey(file, _develop(file))
     try:
-        content = file.read_bytes()
+        content = (InputFiles() if inputs is None else inputs).read(file)
     except OSError as error:
         raise InputError(file, "", f"cannot be read: {error.strerror or error}") from None
+    if file.suffix.lower() in RAW_SUFFIXES:
+        return _to_grey(file, _develop(file, content), CHANNELS[channel])
     _refuse_truncated(file, content)
+    _refuse_huge(file, content, max_pixels)
     pixels = _decode(content)
     if pixels is None:
         raise InputError(file, "", "is not a photograph that can be read (PNG, TIFF or JPEG)")
-    return _to_grey(file, pixels)
+    return _to_grey(file, pixels, CHANNELS[channel])
 
 
-def _to_grey(file: Path, pixels: NDArray) -> Image:
-    """Blue, green, red or grey (H, W[, c]) of either depth to grey."""
+def _to_grey(file: Path, pixels: NDArray, weight: NDArray[np.float32]) -> Image:
+    """Blue, green, red or grey (H, W[, c]) of either depth to grey, by the weight (3,) of each colour."""
     if pixels.dtype == np.uint8:
         scale = np.float32(1.0)
     elif pixels.dtype == np.uint16:
@@ -128,13 +226,13 @@ def _to_grey(file: Path, pixels: NDArray) -> Image:
     elif pixels.shape[2] <= 2:  # grey, with or without an opacity
         grey = pixels[:, :, 0].astype(np.float32)
     else:
-        grey = cv2.transform(pixels[:, :, :3].astype(np.float32), LUMA[None, :])
+        grey = cv2.transform(pixels[:, :, :3].astype(np.float32), weight[None, :])
     if scale != 1.0:
         grey *= scale
     return np.ascontiguousarray(grey, dtype=np.float32)
 
 
-def _develop(file: Path) -> NDArray:
+def _develop(file: Path, content: bytes) -> NDArray:
     """The sensor's data as blue, green, red (H, W, 3) uint16, exposed and coloured alike in every photograph."""
     try:
         import rawpy  # pyright: ignore[reportMissingImports]
@@ -143,7 +241,7 @@ def _develop(file: Path) -> NDArray:
             file, "", "is a camera's raw file: pip install 'rodsight[raw]' reads it, or convert it to 16-bit TIFF"
         ) from None
     try:
-        with rawpy.imread(str(file)) as raw:
+        with rawpy.imread(io.BytesIO(content)) as raw:
             # No brightening by the picture's own content, and no turning: photographs must stay comparable.
             colours = raw.postprocess(output_bps=16, no_auto_bright=True, use_camera_wb=True, user_flip=0)
     except (rawpy.LibRawError, OSError) as error:
@@ -151,18 +249,47 @@ def _develop(file: Path) -> NDArray:
     return np.ascontiguousarray(colours[:, :, ::-1])
 
 
+# Standard error belongs to the whole process: two threads that set it aside would not both put it back.
+_DECODING = Lock()
+
+
 def _decode(content: bytes) -> NDArray | None:
     if not content:
         return None
+    with _DECODING:
+        return _decode_alone(content)
+
+
+def _decode_alone(content: bytes) -> NDArray | None:
     # A decoder's complaints would reach standard error beside our own single line.
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(0)
     try:
-        return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+        with _silenced():
+            return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         return None
     finally:
         cv2.utils.logging.setLogLevel(level)
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Keep what C libraries write to standard error by themselves off the screen: libpng, libjpeg and libtiff do."""
+    sys.stderr.flush()
+    try:
+        kept = os.dup(2)
+    except OSError:  # there is none
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _refuse_truncated(file: Path, content: bytes) -> None:
@@ -172,6 +299,17 @@ def _refuse_truncated(file: Path, content: bytes) -> None:
     )
     if cut:
         raise InputError(file, f"{len(content)} bytes", "the file is cut short")
+
+
+def _refuse_huge(file: Path, content: bytes, most: int) -> None:
+    """A few bytes may claim any size: what is not believed is not allocated."""
+    width, height = claimed_size(content) or (0, 0)
+    if width * height > most:
+        raise InputError(
+            file,
+            f"{width} x {height} pixels",
+            f"is more than photographs.max_pixels = {most}: raise it if that is true",
+        )
 
 
 def _shape_of(image: Image) -> tuple[int, int]:

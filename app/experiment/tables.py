@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -10,21 +11,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .input_files import InputFiles
+
+GREATEST = 2**53  # beyond it a number with a point no longer tells two whole ones apart
 
 
 class Table:
     """Columns of one file, with the line of each row."""
 
-    def __init__(self, file: Path, columns: Mapping[str, list[str]], line: list[int]) -> None:
+    def __init__(self, file: Path, columns: Mapping[str, list[str]], line: list[int], *, of: str = "row") -> None:
         self.file = file
         self._columns = columns
         self._line = line
+        self._of = of  # what `line` counts
 
     def __len__(self) -> int:
         return len(self._line)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._columns)
+
+    def select(self, kept: Sequence[bool] | NDArray[np.bool_]) -> Table:
+        """The rows that are marked (m,)."""
+        columns = {name: [v for v, k in zip(values, kept, strict=True) if k] for name, values in self._columns.items()}
+        line = [number for number, k in zip(self._line, kept, strict=True) if k]
+        return Table(self.file, columns, line, of=self._of)
+
     def where(self, row: int) -> str:
-        return f"row {self._line[row]}"
+        return f"{self._of} {self._line[row]}"
 
     def text(self, column: str) -> list[str]:
         return self._columns[column]
@@ -39,24 +54,48 @@ class Table:
             raise self.error(int(bad[0]), column, "is not a finite number")
         return values
 
+    def numbers_if_told(self, column: str) -> NDArray[np.float64]:
+        """Numbers of a column that may be absent, or empty in any row: NaN there."""
+        if column not in self._columns:
+            return np.full(len(self), np.nan)
+        told = np.flatnonzero([text != "" for text in self._columns[column]])
+        values = np.full(len(self), np.nan)
+        values[told] = [self._number(float, column, int(row)) for row in told]
+        bad = told[~np.isfinite(values[told])]
+        if len(bad):
+            raise self.error(int(bad[0]), column, "is not a finite number")
+        return values
+
     def error(self, row: int, column: str, problem: str) -> InputError:
         return InputError(self.file, f"{self.where(row)}, {column} = {self._columns[column][row]!r}", problem)
 
     def _number(self, kind: type[int] | type[float], column: str, row: int) -> int | float:
         text = self._columns[column][row]
         try:
-            return kind(text)
+            value = kind(text)
         except ValueError:
             name = "a whole number" if kind is int else "a number"
             raise self.error(row, column, f"is not {name}") from None
+        if kind is int and abs(value) > GREATEST:
+            raise self.error(row, column, f"is beyond the whole numbers that are exact, ± {GREATEST}")
+        return value
 
 
-def read_table(file: Path, columns: Sequence[str]) -> Table:
-    """Read the named columns of a table; others are passed over. Raises InputError naming file, row and value."""
+def read_table(
+    file: Path, columns: Sequence[str], inputs: InputFiles | None = None, optional: Sequence[str] = ()
+) -> Table:
+    """Read the named columns of a table; others are passed over. Raises InputError naming file, row and value.
+
+    inputs: what the file is read by, where it has to stay what it is; optional: columns that may be absent.
+    """
     try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
+        content = (InputFiles() if inputs is None else inputs).read(file)
+        if b"\0" in content:
+            raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL character")
+        with io.StringIO(content.decode("utf-8-sig"), newline="") as stream:
             reader = csv.reader(stream)
             header = [name.strip() for name in next(reader, [])]
+            columns = [*columns, *(name for name in optional if name in header)]
             for name in columns:
                 if header.count(name) != 1:
                     problem = "there is no such column" if name not in header else "stands twice in the header"

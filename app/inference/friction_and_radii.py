@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
+from solver.bodies.rods import RodMaterial
 from solver.contacts.radius_tuning import RadiusTuning, tune_radii
-from solver.convex.friction_check import FRAMES, FrictionCheck, check_friction
+from solver.convex.friction_check import FRAMES, FrictionCheck, WallFriction, check_friction, measure_wall_friction
 from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.nlgs.chain import ChainSettings, force_scale
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 
+from ..errors import UndeterminedError
 from ..tracks import Tracks, WallTracks
+from .snapshots import make_snapshots
 
+GUESSES = 5  # of the friction, each from the one before
+SAME_FRICTION = 0.02  # relative change below which it is found
+POSSIBLE = (0.02, 2.0)  # friction
 REACH = 0.04  # radii are changed by this share of the mean radius at most, either way
 CURVE_POINTS = 81
 ENOUGH_CONTACTS = 8000  # of all frames together, to measure friction on: more frames of a large packing add only time
@@ -48,9 +55,59 @@ def friction_of(
     return check_friction(packing, snapshots, first, first + count - 1, force_scale(packing, ChainSettings()), settings)
 
 
-def tuned_radii(packing: Packing, tracks: Tracks, walls: WallTracks, wanted: float) -> RadiusTuning:
-    """The common change of all radii that gives the wanted coordination number, rattlers excluded."""
+def measure_friction(
+    material: RodMaterial, packing: Packing, snapshots: Sequence[Snapshot], settings: ContactProbabilitySettings
+) -> RodMaterial:
+    """The material with the friction that the motion shows, found anew with it until both agree.
+
+    A friction at walls that was told stays. Raises FrictionError where the motion does not tell it.
+    """
+    count = min(FRAMES, len(snapshots) - 2)
+    if count < 1:
+        raise FrictionError("three photographs are needed to measure it")
+    first = max(1, (len(snapshots) - count) // 2)
+    unit = force_scale(packing, ChainSettings())
+    for _ in range(GUESSES):
+        guess = replace(packing, material=material.friction_law())
+        found = check_friction(guess, snapshots, first, first + count - 1, unit, settings)
+        if not np.isfinite(found.measured):
+            raise FrictionError("nothing slides in these photographs, so that they do not tell it: give a number")
+        change = abs(found.measured / material.friction - 1.0)
+        material = replace(material, friction=float(np.clip(found.measured, *POSSIBLE)))
+        if found.enclosed and change < SAME_FRICTION:
+            return material
+    ended = f"{GUESSES} guesses ended at {material.friction:.3f}"
+    raise FrictionError(f"the motion does not tell it ({ended}): give a number")
+
+
+def measure_friction_of_walls(
+    material: RodMaterial, packing: Packing, snapshots: Sequence[Snapshot], settings: ContactProbabilitySettings
+) -> WallFriction | None:
+    """The friction of walls that the motion shows; None where it was told, or where it is not shown."""
+    count = min(FRAMES, len(snapshots) - 2)
+    if material.wall_friction is not None or count < FEWEST_FRAMES:
+        return None
+    first = max(1, (len(snapshots) - count) // 2)
+    unit = force_scale(packing, ChainSettings())
+    return measure_wall_friction(packing, snapshots, first, first + count - 1, unit, settings)
+
+
+class FrictionError(UndeterminedError):
+    """The motion does not tell the friction."""
+
+    key = 'material.friction = "measured"'
+
+
+def tuned_radii(
+    packing: Packing, tracks: Tracks, walls: WallTracks, wanted: float, failed: Collection[int] = ()
+) -> RadiusTuning:
+    """The common change of all radii that gives the wanted coordination number, rattlers excluded.
+
+    failed: frames that show nothing.
+    """
+    seen = [k for k in range(tracks.frame_count) if k not in failed]
     reach = REACH * float(packing.grains.radius.mean())
     change = np.linspace(-reach, reach, CURVE_POINTS)
-    bodies = [packing.walls(ends) for ends in walls.endpoints]
-    return tune_radii(packing.grains, tracks.position, tracks.present, bodies, wanted, change)
+    snapshots = make_snapshots(tracks, walls)
+    bodies = [packing.walls_of(snapshots[k]) for k in seen]
+    return tune_radii(packing.grains, tracks.position[seen], tracks.present[seen], bodies, wanted, change)

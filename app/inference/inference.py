@@ -8,25 +8,38 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
+import numpy as np
+
+from solver.bodies.bridging import bridge_frames
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
 from solver.bodies.rods import RodMaterial
+from solver.boundary.boundary import Boundary
 from solver.calibration.calibrate import Calibration
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.contacts.verdicts import Verdicts
-from solver.convex.friction_check import FrictionCheck
-from solver.sequence.frame_forces import FrameForces
+from solver.convex.friction_check import FrictionCheck, WallFriction
+from solver.sequence.doubts import doubt_friction
+from solver.sequence.failure import describe_error, failed_frame, find_unseen
+from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_sequence
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
-from solver.statistics.frame_statistics import FrameStatistics, frame_statistics
+from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics, no_statistics
 
+from ..errors import UndeterminedError
+from ..progress import Observer, unheard
 from ..tracks import Tracks, WallTracks
-from .calibration import calibrate_tracks
-from .friction_and_radii import friction_of, tuned_radii
+from .boundary import measure_noise, mend
+from .calibration import calibrate_tracks, known_radii
+from .friction_and_radii import friction_of, measure_friction, measure_friction_of_walls, tuned_radii
+from .radii import calibrate_with_radii
 from .settings import InferenceSettings
 from .snapshots import make_snapshots
+from .softness import find_softness
+from .unseen import add_unseen
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +51,19 @@ class Inputs:
     material: RodMaterial = field(default_factory=RodMaterial)
     settings: InferenceSettings = field(default_factory=InferenceSettings)
     verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # what people said of frames, by row
+
+    def with_friction(self, friction: float, check: FrictionCheck | None = None) -> Inputs:
+        """The same where a friction that was to be measured is known: sequences solved again do not measure theirs.
+
+        check: what was found with it of walls, too.
+        """
+        if not self.material.friction_measured:
+            return self
+        of_walls = self.material.wall_friction
+        if of_walls is None and check is not None and np.isfinite(check.wall_measured):
+            of_walls = check.wall_measured
+        known = replace(self.material, friction=friction, wall_friction=of_walls, friction_measured=False)
+        return replace(self, material=known)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +78,18 @@ class CorrectedSequence:
     verdicts: Mapping[int, Verdicts]
     calibration: Calibration | None  # None: not tried
     tuning: RadiusTuning | None  # None: not asked for
+    boundary: Boundary | None  # None: taken as it was told
+    failed: Mapping[int, str]  # frames that show nothing, and why; their snapshots lie between their neighbours'
+    wall_friction: WallFriction | None = None  # that was measured; None: told, or as between grains
 
-    def check_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
-        """What the motion of all solved frames says of the friction that was given."""
+    def check_friction(self, frames: Sequence[FrameForces]) -> tuple[list[FrameForces], FrictionCheck | None]:
+        """What the motion of all solved frames says of the friction that was given, and how far they hold after it."""
         probability = self.settings.for_radii(self.packing.grains.radius).ensemble.probability
-        return friction_of(self.packing, self.snapshots, frames, probability)
+        check = friction_of(self.packing, self.snapshots, frames, probability)
+        found = self.wall_friction
+        if check is not None and found is not None:
+            check = replace(check, wall_measured=found.measured, wall_low=found.low, wall_high=found.high)
+        return [doubt_friction(frame, check) for frame in frames], check
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,37 +101,75 @@ class SolvedFrame:
     state: SequenceState
 
 
-class CoordinationError(ValueError):
+class CoordinationError(UndeterminedError):
     """No change of the radii gives the coordination number that was asked for."""
 
     def __init__(self, tuning: RadiusTuning) -> None:
         low, high = tuning.coordination_number.min(), tuning.coordination_number.max()
         super().__init__(f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 4 %")
-        self.wanted = tuning.wanted
+        self.key = f"contacts.coordination = {tuning.wanted}"
 
 
 def correct_sequence(inputs: Inputs) -> CorrectedSequence:
-    """Calibrate tracks and tune radii as the settings ask for. Raises CoordinationError."""
+    """Calibrate tracks and tune radii as the settings ask for. Raises UndeterminedError."""
     tracks, walls, settings = inputs.tracks, inputs.walls, inputs.settings
+    told = make_snapshots(tracks, walls)
+    failed = find_unseen(told) | tracks.failed
+    nothing_seen = len(failed) == tracks.frame_count
+    if nothing_seen:
+        settings = replace(settings, boundary=None, calibration=None, coordination=None)
+    else:  # walls that no photograph shows are between those of its neighbours
+        walls = replace(walls, endpoints=np.stack([each.endpoints for each in bridge_frames(told, failed)]))
     overlap = settings.overlap_of(tracks.radius)
-    calibration = tuning = None
+    calibration = tuning = boundary = None
+    if settings.boundary is not None:
+        if settings.sequence.measure_precision:
+            tracks = measure_noise(tracks, walls)
+        tracks, walls, boundary = mend(settings.boundary, tracks, walls)
+    if settings.calibration is not None:  # tracks that were corrected are hard
+        told = find_softness(inputs.material, settings.sequence, tracks, walls, failed)
+        # Overlaps of soft grains are forces, not errors to be explained away.
+        settings = replace(settings, sequence=told, calibration=None if told.soft else settings.calibration)
     if settings.calibration is not None:
-        tracks, walls, calibration = calibrate_tracks(settings.calibration, tracks, walls, overlap)
-    packing = inputs.material.pack(tracks.radius, walls.pressure)
+        told_motion = settings.calibration, tracks, walls, overlap, failed
+        if settings.sequence.asks_positions:
+            tracks, walls, calibration = calibrate_with_radii(inputs.material, *told_motion)
+        else:
+            tracks, walls, calibration = calibrate_tracks(*told_motion)
+    if settings.infer_unseen:
+        tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius))
+        calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
+    material, inferred = inputs.material, 0 if tracks.inferred is None else int(tracks.inferred.sum())
+    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
     if settings.coordination is not None:
-        tuning = tuned_radii(packing, tracks, walls, settings.coordination)
+        tuning = tuned_radii(packing, tracks, walls, settings.coordination, failed)
         if not tuning.met:
             raise CoordinationError(tuning)
         tracks = replace(tracks, radius=tracks.radius + tuning.found)
-        packing = inputs.material.pack(tracks.radius, walls.pressure)
+        packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+    snapshots, of_walls = make_snapshots(tracks, walls), None
+    if material.friction_measured and not nothing_seen:
+        seen = bridge_frames(snapshots, failed)
+        probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
+        material = measure_friction(material, packing, seen, probability)
+        packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+        of_walls = measure_friction_of_walls(material, packing, seen, probability)
+        if of_walls is not None:
+            material = replace(material, wall_friction=of_walls.measured)
+            packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
     return CorrectedSequence(
-        packing, tracks, walls, make_snapshots(tracks, walls), settings.for_overlap(overlap), inputs.verdicts,
-        calibration, tuning,
+        packing, tracks, walls, snapshots if nothing_seen else bridge_frames(snapshots, failed),
+        settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
     )  # fmt: skip
 
 
-def solve_frames(sequence: CorrectedSequence, *, after: SolvedFrame | None = None) -> Iterator[SolvedFrame]:
-    """Solve frame after frame; `after`: the last one that is solved already, None: begin with the first."""
+def solve_frames(
+    sequence: CorrectedSequence, *, after: SolvedFrame | None = None, observer: Observer = unheard
+) -> Iterator[SolvedFrame]:
+    """Solve frame after frame; `after`: the last one that is solved already, None: begin with the first.
+
+    observer: hears what a frame could not be solved for.
+    """
     for forces, state in solve_sequence(
         sequence.packing,
         sequence.snapshots,
@@ -106,19 +177,35 @@ def solve_frames(sequence: CorrectedSequence, *, after: SolvedFrame | None = Non
         state=None if after is None else after.state,
         first=0 if after is None else after.forces.frame + 1,
         verdicts=sequence.verdicts,
+        failed=sequence.failed,
+        observer=partial(observer, "solving"),
     ):
-        yield SolvedFrame(forces, _summarize(sequence, forces), state)
+        try:
+            statistics = _summarize(sequence, forces)
+        except MemoryError:  # not the frame's fault
+            raise
+        except Exception as error:
+            observer("statistics", forces.frame, error)
+            n, w = sequence.packing.grains.count, len(sequence.packing.pressure)
+            reason = f"nothing can be made of its forces ({describe_error(error)})"
+            members = sequence.settings.keep_members
+            forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
+        yield SolvedFrame(forces, statistics, state)
 
 
 def infer_frames(inputs: Inputs) -> Iterator[SolvedFrame]:
-    """Correct, find contacts and solve, frame after frame, as a run does. Raises CoordinationError."""
+    """Correct, find contacts and solve, frame after frame, as a run does. Raises UndeterminedError."""
     yield from solve_frames(correct_sequence(inputs))
 
 
 def _summarize(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatistics:
     packing, snapshot = sequence.packing, sequence.snapshots[forces.frame]
+    if forces.status is FrameStatus.FAILED:
+        return no_statistics(len(packing.pressure))
+    assert forces.bearing_probability is not None
+    assert forces.sliding_probability is not None
     return frame_statistics(
-        forces.contacts, forces.fn, forces.ft, forces.state,
-        snapshot.position, snapshot.present, packing.walls(snapshot.endpoints), packing.length,
+        forces.contacts, forces.fn, forces.ft, Likely(forces.bearing_probability, forces.sliding_probability),
+        snapshot.position, snapshot.present, packing.walls_of(snapshot), packing.length,
         grains=packing.grains, material=packing.material,
     )  # fmt: skip

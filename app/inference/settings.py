@@ -6,11 +6,14 @@ from dataclasses import dataclass, field, replace
 
 from solver.bodies.grains import Array
 from solver.bodies.rods import RodMaterial
+from solver.boundary.boundary import BoundarySettings
 from solver.calibration.settings import CalibrationSettings
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.settings import SequenceSettings, typical_overlap
 
 from ..experiment.config.experiment_file import ExperimentFile, InferenceSections
+
+FIRST_GUESS = 0.3  # of a friction that is found from the motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +22,8 @@ class InferenceSettings:
 
     sequence: SequenceSettings = field(default_factory=SequenceSettings)
     calibration: CalibrationSettings | None = field(default_factory=CalibrationSettings)  # None: as tracked
+    boundary: BoundarySettings | None = field(default_factory=BoundarySettings)  # None: as it was told
+    infer_unseen: bool = True  # rods that no photograph shows are put back where they must be
     coordination: float | None = None  # change all radii alike until z without rattlers is this
     overlap: float | None = None  # [m] of touching surfaces; None: 3e-4 mean diameters, or as the gaps show
 
@@ -32,7 +37,7 @@ class InferenceSettings:
 
     def uncorrected(self) -> InferenceSettings:
         """The same for tracks that are corrected already: neither calibrated nor tuned."""
-        return replace(self, calibration=None, coordination=None)
+        return replace(self, calibration=None, boundary=None, infer_unseen=False, coordination=None)
 
     def without_sweeps(self) -> InferenceSettings:
         """The same where only the final forces are wanted: no sweep keeps its own."""
@@ -42,7 +47,10 @@ class InferenceSettings:
 
 def material_of(config: InferenceSections) -> RodMaterial:
     """The rods of an experiment."""
-    return RodMaterial(**config.material.model_dump())
+    told = config.material.model_dump()
+    if measured := told["friction"] == "measured":
+        told["friction"] = FIRST_GUESS
+    return RodMaterial(**told, friction_measured=measured)
 
 
 def settings_of(config: InferenceSections) -> InferenceSettings:
@@ -51,13 +59,26 @@ def settings_of(config: InferenceSections) -> InferenceSettings:
     return InferenceSettings(
         sequence=sequence_settings(config),
         calibration=CalibrationSettings(
-            calibration.pixel_size, calibration.lens, calibration.radius_class, radii_are_metres(config)
+            calibration.pixel_size,
+            calibration.lens,
+            calibration.radius_class,
+            _radius_offset(config),
+            radii_are_metres(config),
         )
         if calibration.enabled
         else None,
+        boundary=BoundarySettings(calibration.camera, calibration.walls_continue),
+        infer_unseen=contacts.unseen == "infer",
         coordination=contacts.coordination,
         overlap=contacts.overlap,
     )
+
+
+def _radius_offset(config: InferenceSections) -> float:
+    """How far all radii may be wrong alike, relative; a number that was told is exact."""
+    tracks = getattr(config, "tracks", None)
+    told = tracks is not None and tracks.radius_offset != "estimate"
+    return 0.0 if told else CalibrationSettings().radius_offset
 
 
 def sequence_settings(config: InferenceSections) -> SequenceSettings:
@@ -77,6 +98,7 @@ def sequence_settings(config: InferenceSections) -> SequenceSettings:
         estimator="nlgs" if paper else solver.estimator,
         chain=chain,
         keep_members=solver.keep_members,
+        positions=solver.positions,
         measure_precision=solver.precision == "measured" and not paper,
         threshold_sigmas=contacts.threshold_sigmas,
         threshold=contacts.threshold,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from solver.bodies.grains import Array
 from solver.bodies.motion import Snapshot
+from solver.calibration.gaps import MeasuredSequence
+from solver.inferred.rolling import roll_unknown
 
 from ..tracks import Tracks, WallTracks
 
@@ -10,10 +13,29 @@ from ..tracks import Tracks, WallTracks
 def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
     """What the solver reads of tracks and walls."""
     present, sigma = tracks.present, tracks.position_sigma
+    rotation = _rotations(tracks, walls)
     return [
         Snapshot(
-            float(tracks.time[k]), tracks.position[k], tracks.rotation[k], present[k], walls.endpoints[k],
-            float(sigma[k]),
+            float(tracks.time[k]), tracks.position[k], rotation[k], present[k], walls.endpoints[k],
+            float(sigma[k]), walls.side, walls.load_at(k), None if walls.cell is None else walls.cell[k],
         )
         for k in range(tracks.frame_count)
     ]  # fmt: skip
+
+
+def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:
+    """The same as what calibration reads."""
+    present = tracks.present
+    rotation = _rotations(tracks, walls)
+    sigma = tracks.sigma.copy()
+    sigma[~present] = 0.0
+    return MeasuredSequence(
+        tracks.radius, tracks.position, rotation, present, walls.endpoints, sigma, walls.side, walls.cell
+    )
+
+
+def _rotations(tracks: Tracks, walls: WallTracks) -> Array:
+    return roll_unknown(
+        tracks.radius, tracks.position, tracks.rotation, tracks.present, walls.endpoints, side=walls.side,
+        cell=walls.cell,
+    )  # fmt: skip

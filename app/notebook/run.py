@@ -18,7 +18,7 @@ from ..progress import Progress, silent
 from ..results.results import Results
 from ..results.store import load_results
 from ..results.summary import summarize
-from ..run_folder import RESULTS
+from ..run_folder import RESULTS, owned
 from ..run_folder import Run as RunFolder
 from .settings import as_texts
 
@@ -109,16 +109,17 @@ def run(
     experiment: its folder or its experiment.toml; out: folder of the results, default runs/<name>; settings: by the
     keys of experiment.toml, {"solver.kappa": 0.1}, laid over it; frames: first, and end or None. What is there already
     is not done again.
-    Raises InputError for bad input.
+    Raises InputError for bad input, RunError where another process works in the folder or nothing can be solved.
     """
     began = time.perf_counter()
     loaded = load_experiment(Path(experiment), as_texts(settings or {}))
     folder = Path(out) if out is not None else Path("runs") / loaded.name
     at = RunFolder(loaded, folder, frames, progress)
-    results = pipeline.solve(at)
-    truth = pipeline.load_truth(at, results)
-    pipeline.record(at, results, truth)
-    pipeline.conclude(at, results, truth, began)
+    with owned(at):
+        results = pipeline.solve(at)
+        truth = pipeline.load_truth(at, results)
+        pipeline.record(at, results, truth)
+        pipeline.conclude(at, results, truth, began)
     return Run(at.file(RESULTS))
 
 

@@ -20,12 +20,13 @@ from solver.contacts.pairs import align
 
 from ..experiment.units import Scale
 from ..results.comparison import Comparison, FieldFrame
+from .files.writing import writing
 from .look import entities
 from .look.axes import Axes, round_step
 from .look.canvas import Canvas
 from .look.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
 from .look.force_style import ForceRange, ForceStyle
-from .look.scene import Clock, Scene
+from .look.scene import Clock, Scene, tracks_in_cell
 from .look.texts import printable
 from .look.values import known, log_scalar
 from .packing_layers.grains_and_walls import log_grains_and_walls
@@ -56,28 +57,27 @@ _RAMP = packed(make_ramp(_DIFFERENCE_WAY))
 def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale | None = None) -> int:
     """Write a comparison as a recording; returns its size [bytes]."""
     path, base = Path(path), comparison.base
-    canvas = Canvas.around(base.tracks, scale)
+    tracks = tracks_in_cell(base.tracks, base.walls)
+    canvas = Canvas.around(tracks, scale)
     scene = Scene(
-        f"{comparison.first.name} and {comparison.second.name}", base.tracks, base.walls, base.grains, base.friction,
+        f"{comparison.first.name} and {comparison.second.name}", tracks, base.walls, base.grains, base.friction,
         base.configuration, canvas, ForceStyle.on(canvas, _range_of(comparison)),
     )  # fmt: skip
     part = path.with_name(path.name + ".part")
     rr.set_strict_mode(True)
     stream = rr.RecordingStream(APPLICATION_ID)
     try:
-        stream.save(part, default_blueprint=make_comparison_blueprint(comparison, canvas))
-        stream.set_log_time_enabled(False)
-        stream.send_recording_name(printable(scene.name))
-        axes = _log_styles(stream, scene, comparison)
-        for frame in range(len(base.frames)):
-            _log_frame(Clock(stream, frame, frame, frame), scene, comparison, axes)
-        stream.reset_time()
-        text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
-        stream.log(SUMMARY, text, static=True)
-        stream.disconnect()
+        with writing(stream, part, make_comparison_blueprint(comparison, canvas)):
+            stream.set_log_time_enabled(False)
+            stream.send_recording_name(printable(scene.name))
+            axes = _log_styles(stream, scene, comparison)
+            for frame in range(len(base.frames)):
+                _log_frame(Clock(stream, frame, frame, frame), scene, comparison, axes)
+            stream.reset_time()
+            text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
+            stream.log(SUMMARY, text, static=True)
         os.replace(part, path)
     finally:
-        stream.disconnect()
         part.unlink(missing_ok=True)
     return path.stat().st_size
 

@@ -48,7 +48,7 @@ class Backdrop:
     photograph: NDArray[np.uint8] | None  # (H, W) grey
     centre: Array  # (n, 2) [m] of the present grains
     radius: Array  # (n,) [m]
-    walls: Array  # (w, 2, 2) [m]
+    walls: list[Array]  # (w) lines (p, 2) [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class ReviewLayer:
         stream.log(
             WALLS,
             rr.LineStrips2D(
-                _px(canvas.points(backdrop.walls)), radii=np.float32(0.03 * canvas.grain_radius),
+                [_px(canvas.points(line)) for line in backdrop.walls], radii=np.float32(0.03 * canvas.grain_radius),
                 colors=packed_one(_WALL), draw_order=5.0,
             ),
             static=True,

@@ -34,6 +34,8 @@ def calibration_facts(found: Calibration, walls: tuple[str, ...]) -> dict[str, A
         "pixel_size": found.pixel_size,
         "pixel_size_sd": found.pixel_size_sd,
         "walls_follow_pixel_size": found.walls_follow,
+        "radius_offset": found.radius_offset,
+        "radius_offset_sd": found.radius_offset_sd,
         "lens": found.lens,
         "lens_sd": found.lens_sd,
         "gap_rms_before": found.before.spread,
@@ -45,4 +47,4 @@ def calibration_facts(found: Calibration, walls: tuple[str, ...]) -> dict[str, A
 
 
 def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
+    return float(np.sqrt(np.nanmean(np.square(values)))) if np.isfinite(values).any() else 0.0

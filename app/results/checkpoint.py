@@ -1,11 +1,13 @@
 """Finished frames of an unfinished run, one file each, so that an interruption costs one frame at most.
 
 A file is written beside its final name and then renamed: it is there whole or not at all. The folder carries the
-fingerprint of what the frames were computed from; another fingerprint finds it empty.
+fingerprint of what the frames were computed from; another fingerprint finds it empty. Every file begins with a checksum
+of itself, its number and that fingerprint: one that is damaged, or of another run, is not there, nor is any after it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import shutil
 from collections.abc import Mapping
@@ -14,31 +16,38 @@ from dataclasses import MISSING, fields, is_dataclass
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, get_origin, get_type_hints
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from ..atomic import write_atomically
 
 T = TypeVar("T")
+CHECKSUM = 32  # bytes at the beginning of a file
 
 
 class Checkpoint:
     """Frames of one stage of one run."""
 
-    def __init__(self, folder: Path, fingerprint: str) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, fingerprint: str, notes: list[str] | None = None) -> None:
+        """notes: where a sentence goes about what is damaged."""
+        self.folder, self._fingerprint = folder, fingerprint
+        self._notes = notes if notes is not None else []
         mark = folder / "fingerprint"
-        if folder.exists() and (not mark.exists() or mark.read_text() != fingerprint):
+        if folder.exists() and (not mark.exists() or mark.read_bytes() != fingerprint.encode()):
             shutil.rmtree(folder)
         folder.mkdir(parents=True, exist_ok=True)
         if not mark.exists():
             write_atomically(mark, fingerprint.encode())
 
     def finished(self) -> int:
-        """How many frames from the first on are there."""
+        """How many frames from the first on are there, whole."""
         count = 0
         while self._file(count).exists():
+            if self._content(count) is None:
+                self._notes.append(f"Frame {count} of the unfinished {self.folder.name} is damaged: it is done again.")
+                break
             count += 1
         return count
 
@@ -47,10 +56,14 @@ class Checkpoint:
         stream = io.BytesIO()
         named = {f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)}
         np.savez(stream, allow_pickle=False, **named)
-        write_atomically(self._file(frame), stream.getvalue())
+        content = stream.getvalue()
+        write_atomically(self._file(frame), self._checksum(frame, content) + content)
 
     def load(self, frame: int, *kinds: type) -> list[Any]:
-        with np.load(self._file(frame), allow_pickle=False) as arrays:
+        content = self._content(frame)
+        if content is None:
+            raise ValueError(f"{self._file(frame)} is damaged")
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
 
     def clear(self) -> None:
@@ -59,8 +72,17 @@ class Checkpoint:
         with suppress(OSError):
             self.folder.parent.rmdir()
 
+    def _content(self, frame: int) -> bytes | None:
+        """What was kept of a frame; None if that is not what is there."""
+        whole = self._file(frame).read_bytes()
+        content = whole[CHECKSUM:]
+        return content if whole[:CHECKSUM] == self._checksum(frame, content) else None
+
+    def _checksum(self, frame: int, content: bytes) -> bytes:
+        return hashlib.sha256(f"{self._fingerprint} {frame} ".encode() + content).digest()
+
     def _file(self, frame: int) -> Path:
-        return self.folder / f"{frame:06d}.npz"
+        return self.folder / f"{frame:06d}.piece"
 
 
 def flatten(value: Any, prefix: str = "") -> list[tuple[str, np.ndarray]]:
@@ -91,6 +113,10 @@ def restore(kind: type[T], named: Mapping[str, Any], prefix: str) -> T:
 
 
 def _typed(hint: Any, value: Any) -> Any:
+    if value is None:
+        return None
+    if isinstance(hint, UnionType):  # such as tuple[str, ...] | None
+        hint = next((each for each in get_args(hint) if get_origin(each) is tuple), hint)
     if get_origin(hint) is tuple:
         return tuple(np.asarray(value).tolist())
     if hint not in (int, float, bool, str) and not (isinstance(hint, type) and issubclass(hint, IntEnum)):

@@ -14,7 +14,7 @@ from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, measure_contacts
 from solver.contacts.pairs import make_keys
 from solver.statistics.agreement import Agreement, compare_forces
-from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, wall_forces, wall_ratio_angle
+from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, sums_on_walls, wall_ratio_angle
 
 from .results import Results, TruthContacts
 
@@ -175,10 +175,12 @@ def _with_angles(base: Results, frame: int, field: FieldFrame) -> FieldFrame:
     walls = _walls_at(base, frame)
     area = packing_area(walls, position[present])
     stress = love_weber_stress(contacts, fn, ft, position, area, 1.0)  # a ratio: the length of the rods cancels
-    ratio = wall_ratio_angle(walls, wall_forces(contacts, fn, ft))
+    ratio = wall_ratio_angle(walls, sums_on_walls(contacts, fn, ft))
     return replace(field, friction_angle=friction_angle(stress), wall_ratio_angle=ratio)
 
 
 def _walls_at(base: Results, frame: int) -> Walls:
-    """The walls of a frame at rest, plates with their pressure for a load: which are loaded is all that matters."""
-    return Walls.at_rest(base.walls.endpoints[frame], base.walls.pressure)
+    """The walls of a frame at rest, plates with a load of one: which are loaded is all that matters."""
+    walls = base.walls
+    cell = None if walls.cell is None else walls.cell[frame]
+    return Walls.at_rest(walls.endpoints[frame], np.where(walls.loaded, 1.0, np.nan), walls.side, cell)

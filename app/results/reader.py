@@ -6,9 +6,15 @@ than the rest, is an InputError that names the dataset.
 
 from __future__ import annotations
 
+import operator
+import threading
+import weakref
+from collections import OrderedDict
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import h5py
 import numpy as np
@@ -28,6 +34,7 @@ from .schema import (
     entries,
 )
 
+MOST_KEPT = 4  # frames that were read last
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps whose forces are kept
 
 
@@ -37,6 +44,7 @@ class Stored:
     def __init__(self, file: Path, store: h5py.File) -> None:
         self.file, self._store = file, store
         self._forgotten: set[str] = set()
+        self._found: dict[str, h5py.Dataset | None] | None = None  # once nothing changes any more
         self._sizes = self._find_sizes()
 
     def part(self, part: str) -> Any:
@@ -53,43 +61,92 @@ class Stored:
             raise InputError(self.file, f"group {part}", "is missing")
         return whole
 
-    def frames(self, grain_count: int, wall_count: int) -> list[Any]:
-        """The forces of every frame."""
+    def frames(self, grain_count: int, wall_count: int) -> StoredFrames:
+        """The forces of every frame, each read when it is asked for; all columns are checked now."""
         rows = self._rows_of_frames()
-        columns = {each.attribute: (each, self.read(each)) for each in entries("frames")}
+        for each in entries("frames"):
+            dataset = self._dataset(each)
+            if dataset is not None and each.quantity.names is not None:
+                self._renumbered(each, dataset, np.asarray(dataset[()]))
         bodies = {"contacts.grain_count": grain_count, "contacts.wall_count": wall_count}
-        frames = []
-        for k in range(self._sizes["frame"]):
-            own = {name: rows.take(k, each.dims, values) for name, (each, values) in columns.items()}
-            frames.append(restore(PARTS["frames"], own | bodies | {"frame": k}, ""))
-        return frames
+        return StoredFrames(self._opened_again(), rows, bodies, self._sizes["frame"])
+
+    def frame(self, k: int, rows: _Rows, bodies: dict[str, int]) -> Any:
+        """The forces of one frame."""
+        own = {each.attribute: rows.shaped(k, each, self._part(each, rows.of(k, each))) for each in entries("frames")}
+        count = bodies["contacts.grain_count"]
+        for name, known in (("i", count), ("j", count + bodies["contacts.wall_count"])):
+            body = own[f"contacts.{name}"]
+            if len(body) and not (body.min() >= 0 and body.max() < known):
+                raise InputError(self.file, f"dataset contacts/{name}", f"names a body beyond {known} in frame {k}")
+        return restore(PARTS["frames"], own | bodies | {"frame": k}, "")
 
     def statistics(self) -> list[Any]:
         """The statistics of every frame."""
         columns = {each.attribute: self.read(each) for each in entries("statistics")}
         return [
-            restore(PARTS["statistics"], {name: values[k] for name, values in columns.items()}, "")
+            restore(
+                PARTS["statistics"],
+                {name: None if values is None else values[k] for name, values in columns.items()},
+                "",
+            )
             for k in range(self._sizes["frame"])
         ]
 
     def read(self, entry: Entry) -> Any:
         """All values of a dataset; where there is none, what stands for absent ones."""
+        return self._part(entry, slice(None))
+
+    def _part(self, entry: Entry, rows: slice) -> Any:
+        """Some rows of a dataset; where there is none, what stands for absent ones."""
+        dataset = self._dataset(entry)
+        if dataset is None:
+            return self._absent(entry, rows)
+        part = rows if entry.dims else ()
+        if entry.dtype.kind == "O":
+            return self._texts(entry, dataset, part)
+        values = np.asarray(dataset[part])
+        if entry.quantity.names is not None:
+            values = self._renumbered(entry, dataset, values)
+        return values.astype(entry.dtype, copy=False)[()]
+
+    def _dataset(self, entry: Entry) -> h5py.Dataset | None:
+        """What the file has of it, of the right shape and kind; None: nothing. Raises InputError."""
+        if self._found is not None and entry.path in self._found:
+            return self._found[entry.path]
+        dataset = self._checked(entry)
+        if self._found is not None:
+            self._found[entry.path] = dataset
+        return dataset
+
+    def _checked(self, entry: Entry) -> h5py.Dataset | None:
         dataset = self._find(entry)
         if dataset is None or self._forgotten.intersection(entry.dims):
             if entry.quantity.essential:
                 raise self._error(entry, "is missing")
-            return self._absent(entry)
+            return None
         shape = tuple(self._sizes.get(name, 0) for name in entry.dims)
         if dataset.shape != shape:
             raise self._error(entry, f"has shape {dataset.shape}, not {shape} ({', '.join(entry.dims)})")
-        if entry.dtype.kind == "O":
-            return self._texts(entry, dataset)
-        if not np.can_cast(dataset.dtype, entry.dtype, "same_kind"):
+        if entry.dtype.kind != "O" and not np.can_cast(dataset.dtype, entry.dtype, "same_kind"):
             raise self._error(entry, f"holds {dataset.dtype}, not {entry.dtype}")
-        values = np.asarray(dataset[()])
-        if entry.quantity.names is not None:
-            values = self._renumbered(entry, dataset, values)
-        return values.astype(entry.dtype, copy=False)[()]
+        if entry.dtype.kind == "O" and h5py.check_string_dtype(dataset.dtype) is None:
+            raise self._error(entry, f"holds {dataset.dtype}, not text")
+        return dataset
+
+    def _opened_again(self) -> Stored:
+        """The same by a handle of its own, which is closed once nobody holds it; a file put in its place is another."""
+        again = copy(self)
+        stream = self.file.open("rb")
+        again._store = store = h5py.File(stream, "r")
+        again._found = {}
+
+        def close() -> None:
+            store.close()
+            stream.close()
+
+        weakref.finalize(again, close)
+        return again
 
     def _rows_of_frames(self) -> _Rows:
         """Without all that says which sweep is which, no sweep was measured; likewise of those that are kept."""
@@ -138,22 +195,37 @@ class Stored:
 
     def _find(self, entry: Entry) -> h5py.Dataset | None:
         for path in (entry.path, entry.quantity.formerly):
-            if path is not None and isinstance(dataset := self._store.get(path), h5py.Dataset):
-                return dataset
+            if path is not None and self._lies_in_the_file(path):
+                dataset = self._store.get(path)
+                if isinstance(dataset, h5py.Dataset):
+                    if dataset.external or dataset.is_virtual:
+                        raise self._error(entry, "keeps its values in another file, which is not opened")
+                    return dataset
         return None
 
-    def _absent(self, entry: Entry) -> Any:
+    def _lies_in_the_file(self, path: str) -> bool:
+        """Whether there is something by this name; raises InputError where it is a link, which may lead anywhere."""
+        place = ""
+        for part in path.split("/"):
+            place = f"{place}/{part}"
+            link = self._store.get(place, getlink=True)
+            if link is None:
+                return False
+            if not isinstance(link, h5py.HardLink):
+                raise InputError(self.file, place.removeprefix("/"), "is a link, which is not followed")
+        return True
+
+    def _absent(self, entry: Entry, rows: slice) -> Any:
         if entry.absent is None or not entry.dims:
             return entry.absent
         value = np.asarray(entry.absent)
         unknown = value.dtype.kind == "f" and entry.dtype.kind in "iu"  # NaN in place of whole numbers
-        shape = tuple(self._sizes.get(name, 0) for name in entry.dims)
+        first, *rest = (self._sizes.get(name, 0) for name in entry.dims)
+        shape = (len(range(*rows.indices(first))), *rest)
         return np.full(shape, value, value.dtype if unknown else entry.dtype)
 
-    def _texts(self, entry: Entry, dataset: h5py.Dataset) -> Any:
-        if h5py.check_string_dtype(dataset.dtype) is None:
-            raise self._error(entry, f"holds {dataset.dtype}, not text")
-        return dataset.asstr()[()]
+    def _texts(self, entry: Entry, dataset: h5py.Dataset, part: Any) -> Any:
+        return dataset.asstr()[part]
 
     def _renumbered(self, entry: Entry, dataset: h5py.Dataset, values: np.ndarray) -> np.ndarray:
         """The numbers that we use for the names that the file has."""
@@ -188,20 +260,61 @@ class _Rows:
     kept: np.ndarray  # (f + 1,) rows of sweeps whose forces are kept
     force: np.ndarray  # (f + 1,) rows of their forces
 
-    def take(self, k: int, dims: tuple[str, ...], values: Any) -> Any:
-        """What of a column is frame k's; a row for every sweep, NaN where nothing was measured."""
+    def of(self, k: int, entry: Entry) -> slice:
+        """Which rows of a column are frame k's."""
+        edges = {
+            "contact": self.contact, "sweep": self.sweep, "kept_sweep": self.kept, "kept_force": self.force,
+        }.get(entry.dims[0])  # fmt: skip
+        return slice(k, k + 1) if edges is None else slice(int(edges[k]), int(edges[k + 1]))
+
+    def shaped(self, k: int, entry: Entry, values: Any) -> Any:
+        """Those rows as a frame has them: one for every sweep, NaN where nothing was measured."""
         if values is None:
             return None
-        if dims[0] == "contact":
-            return values[self.contact[k] : self.contact[k + 1]]
-        if dims[0] == "sweep":
-            rows = slice(self.sweep[k], self.sweep[k + 1])
+        if entry.dims[0] == "sweep":
             every = np.full(self.sweep_count[k], np.nan)
-            every[self.number[rows]] = values[rows]
+            every[self.number[self.sweep[k] : self.sweep[k + 1]]] = values
             return every
-        if dims[0] == "kept_sweep":
-            return values[self.kept[k] : self.kept[k + 1]]
-        if dims[0] == "kept_force":
-            shape = (self.kept[k + 1] - self.kept[k], self.contact[k + 1] - self.contact[k])
-            return values[self.force[k] : self.force[k + 1]].reshape(shape)
-        return values[k]
+        if entry.dims[0] == "kept_force":
+            return values.reshape(self.kept[k + 1] - self.kept[k], self.contact[k + 1] - self.contact[k])
+        return values if entry.dims[0] in ("contact", "kept_sweep") else values[0]
+
+
+class StoredFrames(Sequence[Any]):
+    """The forces of every frame of a file; a few that were read last are kept."""
+
+    def __init__(self, stored: Stored, rows: _Rows, bodies: dict[str, int], count: int) -> None:
+        self._stored, self._rows, self._bodies, self._count = stored, rows, bodies, count
+        self._kept: OrderedDict[int, Any] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Any: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Any]: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(self._count))]
+        k = operator.index(index)
+        k += self._count if k < 0 else 0
+        if not 0 <= k < self._count:
+            raise IndexError(f"there is no frame {index} of {self._count}")
+        with self._lock:
+            if k not in self._kept:
+                self._kept[k] = self._read(k)
+            self._kept.move_to_end(k)
+            while len(self._kept) > MOST_KEPT:
+                self._kept.popitem(last=False)
+            return self._kept[k]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return list, (list(self),)  # another process has no handle of the file
+
+    def _read(self, k: int) -> Any:
+        try:
+            return self._stored.frame(k, self._rows, self._bodies)
+        except (OSError, RuntimeError, KeyError) as error:
+            raise InputError(self._stored.file, f"frame {k}", f"is damaged: {error}") from None

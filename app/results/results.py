@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
+from solver.boundary.boundary import Boundary
 from solver.calibration.calibrate import Calibration
 from solver.contacts.pairs import Keys, make_keys
 from solver.contacts.radius_tuning import RadiusTuning
@@ -29,6 +30,15 @@ class TruthContacts:
     j: NDArray[np.int64]  # (t,) row of a grain, j > i, or grain count + row of a wall
     fn: Array  # (t,) [N]
     ft: Array  # (t,) [N]
+
+    def outside(self, boundary: NDArray[np.bool_] | None) -> TruthContacts:
+        """The same without contacts between two grains of the boundary (n,); None: there is none."""
+        if boundary is None:
+            return self
+        of_boundary = np.append(boundary, False)  # whatever is no grain
+        n = len(boundary)
+        keep = ~(of_boundary[np.minimum(self.i, n)] & of_boundary[np.minimum(self.j, n)])
+        return TruthContacts(self.frame[keep], self.i[keep], self.j[keep], self.fn[keep], self.ft[keep])
 
     def by_frame(self, bodies: int, frame_count: int) -> tuple[tuple[Keys, Array], ...]:
         """Keys (c,) of the pairs and forces (c, 2) [N] of every frame; bodies: grains and walls together."""
@@ -52,4 +62,5 @@ class Results:
     calibration: Calibration | None = None  # None: not tried
     friction_check: FrictionCheck | None = None
     radius_tuning: RadiusTuning | None = None  # None: not asked for
+    boundary: Boundary | None = None  # None: taken as it was told
     ensemble_size: int = 0  # sequences solved again for the standard deviations of the forces; 0: free formula

@@ -15,12 +15,13 @@ import numpy as np
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.quantity import Declared, Quantity, quantities
+from solver.boundary.boundary import Boundary
 from solver.calibration.calibrate import Calibration
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.convex.friction_check import FrictionCheck
+from solver.nlgs.starts import COLD_SWEEPS
 from solver.sequence.ensemble import MEMBERS
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.starts import COLD_SWEEPS
 from solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
 from solver.statistics.frame_statistics import FrameStatistics
 
@@ -38,6 +39,7 @@ PARTS: dict[str, type] = {
     "frames": FrameForces,
     "statistics": FrameStatistics,
     "calibration": Calibration,
+    "boundary": Boundary,
     "friction_check": FrictionCheck,
     "radius_tuning": RadiusTuning,
 }
@@ -87,6 +89,7 @@ DIMENSIONS = {
     "xy": Dimension("components of a vector", ("x", "y")),
     "axis": Dimension("second components of a tensor", ("x", "y")),
     "end": Dimension("ends of a wall"),
+    "lattice": Dimension("vectors of the periodic cell", ("a", "b")),
     "member": Dimension("members of the ensemble", MEMBERS),
     "component": Dimension("components of a contact's force", ("fn", "ft")),
     "anisotropy": Dimension("kinds of anisotropy", ("contact", "branch", "normal", "tangential")),
@@ -172,7 +175,7 @@ ATTRIBUTES = (
     Attribute("created", "text", "when, ISO 8601, UTC"),
     Attribute("name", "text", "name of the experiment"),
     Attribute("fingerprint", "text", "SHA-256 of the input and of the settings that matter"),
-    Attribute("experiment", "text", "path of the experiment file"),
+    Attribute("experiment", "text", "name of the experiment file"),
     Attribute("frames", "two integers", "frames of the experiment that are in the file: first, and end or −1"),
     Attribute("configuration", "text", "the resolved configuration, TOML"),
     Attribute("friction", "number", "friction that was used"),

@@ -5,6 +5,8 @@ What is in it is the table of `schema`; this file says how it begins and ends, a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,13 +18,16 @@ import numpy as np
 from solver.sequence.ensemble import MEMBERS
 
 from .. import __version__
-from ..atomic import replacing
+from ..atomic import write_atomically
 from ..errors import InputError
 from ..tracks import Tracks, WallTracks
+from .manifest import MANIFEST, Manifest
 from .reader import Stored
 from .results import Results
 from .schema import DEVIATIONS, SCHEMA, SCHEMA_VERSION
 from .writer import columns_of, columns_of_results, write_columns
+
+BLOCK = 1 << 20  # [bytes] by which a file grows in memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +35,14 @@ class Provenance:
     """Where results come from; stored as attributes."""
 
     fingerprint: str  # of the input and the settings that matter for what is stored
-    experiment: str  # path of the experiment file
+    experiment: str  # name of the experiment file; earlier versions: its path
     frames: tuple[int, int | None]  # the experiment's frames that are in it: first, and end or None
     checksums: dict[str, str]  # SHA-256 by input file
 
 
 def save_tracks(file: Path, name: str, tracks: Tracks, walls: WallTracks | None, origin: Provenance) -> None:
     """Write tracks alone, as the tracking stage leaves them."""
-    with replacing(file) as part, h5py.File(part, "w") as store:
+    with _creating(file) as store:
         _write_origin(store, name, origin)
         write_columns(store, columns_of("tracks", tracks) | columns_of("walls", walls))
 
@@ -50,7 +55,7 @@ def load_tracks(file: Path) -> tuple[Tracks, WallTracks | None]:
 
 def save_results(file: Path, results: Results, origin: Provenance) -> None:
     """Write everything; float64 where it was computed so, recorded sweeps in float32."""
-    with replacing(file) as part, h5py.File(part, "w") as store:
+    with _creating(file) as store:
         _write_origin(store, results.name, origin)
         store.attrs["configuration"] = results.configuration
         store.attrs["friction"] = results.friction
@@ -79,6 +84,7 @@ def load_results(file: Path) -> Results:
             statistics=stored.statistics(),
             configuration=str(_attribute(file, store, "configuration")),
             calibration=stored.part("calibration"),
+            boundary=stored.part("boundary"),
             friction_check=stored.part("friction_check"),
             radius_tuning=stored.part("radius_tuning"),
             ensemble_size=_ensemble_size(store),
@@ -97,11 +103,44 @@ def read_origin(file: Path) -> Provenance | None:
                 (int(first), int(stop) if stop >= 0 else None),
                 {str(key): str(value) for key, value in sums.items()},
             )
-    except (OSError, KeyError):
+    except (OSError, KeyError, TypeError, ValueError):
         return None
 
 
-def _open(file: Path) -> h5py.File:
+def origin_of(file: Path) -> Provenance:
+    """Where a stored file comes from. Raises InputError where it does not say so."""
+    origin = read_origin(file)
+    if origin is None:
+        raise InputError(file, "", "does not say where it comes from")
+    return origin
+
+
+@contextmanager
+def _creating(file: Path) -> Iterator[h5py.File]:
+    """Make a file in memory and then write it: the library breaks down where a disk refuses what it closes."""
+    with h5py.File(file.name, "w", driver="core", backing_store=False, block_size=BLOCK) as store:
+        yield store
+        store.flush()
+        content = store.id.get_file_image()
+    write_atomically(file, content)
+
+
+@contextmanager
+def _open(file: Path) -> Iterator[h5py.File]:
+    """Open one of our files; what cannot be read of it is an InputError."""
+    store = _opened(file)
+    try:
+        with store:
+            yield store
+    except (OSError, RuntimeError, KeyError) as error:  # the library reads each dataset when it is asked for
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
+        raise InputError(file, "", f"is damaged: {error}") from None
+
+
+def _opened(file: Path) -> h5py.File:
+    if not Manifest(file.parent).is_whole(file.name):
+        raise InputError(file, "", f"is not what {MANIFEST} lists: it was damaged or changed; run the experiment again")
     try:
         store = h5py.File(file, "r")
     except FileNotFoundError:

@@ -25,16 +25,15 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
     frames, tracks = results.frames, results.tracks
     status = Counter(frame.status.name.lower() for frame in frames)
     settled = [frame.frame for frame in frames if frame.status is FrameStatus.SETTLED]
-    lost = (tracks.status == TrackStatus.LOST) | (tracks.status == TrackStatus.OUT_OF_FRAME)
+    lost, cut = tracks.lost, tracks.out_of_frame
     trust = np.array([frame.trust for frame in frames])
-    worst = max(frames, key=lambda frame: frame.unbalance)
+    solved = [frame for frame in frames if frame.status is not FrameStatus.FAILED]
+    worst = max(solved or frames, key=lambda frame: frame.unbalance)
     summary: dict[str, Any] = {
         "name": results.name,
         "frame_count": len(frames),
         "grain_count": results.grains.count,
-        "loaded_walls": [
-            name for name, load in zip(results.walls.name, results.walls.pressure, strict=True) if np.isfinite(load)
-        ],
+        "loaded_walls": [name for name, loaded in zip(results.walls.name, results.walls.loaded, strict=True) if loaded],
         "wall_count": results.walls.count,
         "contact_count": [frame.contacts.count for frame in frames],
         "status": [frame.status.name.lower() for frame in frames],
@@ -45,8 +44,12 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "resets": [frame.frame for frame in frames if frame.status is FrameStatus.RESET],
         "rearrangements": [frame.frame for frame in frames if frame.status is FrameStatus.REARRANGING],
         "suspects": [frame.frame for frame in frames if frame.status is FrameStatus.SUSPECT],
+        "failures": {frame.frame: frame.failed_reason for frame in frames if frame.status is FrameStatus.FAILED},
         "lost_grains": int(lost.any(axis=0).sum()),
+        "inferred_grains": int(tracks.inferred.sum()) if tracks.inferred is not None else 0,
         "lost_poses": int(lost.sum()),
+        "cut_grains": int(cut.any(axis=0).sum()),
+        "cut_poses": int(cut.sum()),
         "suspect_poses": int((tracks.status == TrackStatus.SUSPECT).sum()),
         "position_sigma": _plain(tracks.position_sigma.tolist()),
         "worst_unbalance": _plain([worst.unbalance])[0],
@@ -54,12 +57,14 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "natural_map": _plain([frame.natural_map for frame in frames]),
         "correction": _plain([frame.correction for frame in frames]),
         "trust": _plain(trust.tolist()),
+        "doubts": [frame.doubt for frame in frames],
         "friction_angle_degrees": _plain([float(np.rad2deg(s.friction_angle)) for s in results.statistics]),
         "coordination_number": _plain([s.coordination_number for s in results.statistics]),
         "mean_fn": _plain([s.mean_fn for s in results.statistics]),
         "friction": _friction(results),
         "wall_force_error": _wall_force_error(results),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
+        "boundary": results.boundary.describe(results.walls.name) if results.boundary is not None else [],
         "corrections": calibration_facts(results.calibration, results.walls.name) if results.calibration else None,
         "radius_change": results.radius_tuning.found if results.radius_tuning is not None else None,
         "timings": {stage: round(value, 3) for stage, value in seconds.items()},
@@ -110,6 +115,7 @@ def _friction(results: Results) -> dict[str, Any] | None:
         "high": _plain([check.high])[0],
         "frames": [check.first, check.last],
         "enclosed": check.enclosed,
+        "walls": _plain([check.wall_measured, check.wall_low, check.wall_high]),
         "agrees": check.agrees if check.enclosed else None,  # None: nothing can be said
     }
 

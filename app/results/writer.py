@@ -47,7 +47,7 @@ def columns_of(part: str, whole: Any) -> Columns:
 def columns_of_results(results: Results) -> Columns:
     """Everything that results hold."""
     columns = {}
-    for part in ("tracks", "walls", "grains", "calibration", "friction_check", "radius_tuning"):
+    for part in ("tracks", "walls", "grains", "calibration", "boundary", "friction_check", "radius_tuning"):
         columns |= columns_of(part, getattr(results, part))
     for part in PER_FRAME:
         columns |= _over_frames(part, getattr(results, part))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import signal
 import webbrowser
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from rich.console import Console
 from ..errors import InputError
 from ..experiment.photographs import Photographs
 from ..experiment.scaling import make_scale
+from ..signals import Stopped
 from ..verdicts.table import export_verdicts, import_verdicts
 from .judging.candidate_pairs import find_candidate_pairs
 from .reviewed_run import Reviewed, open_reviewed
@@ -51,7 +53,9 @@ def review(path: Path, *, port: int, browser: bool, reviewer: str | None) -> int
         webbrowser.open(server.address)
     try:
         server.serve()
-    except KeyboardInterrupt:
+    except Stopped as stopped:
+        if stopped.number != signal.SIGINT:  # Ctrl-C is how a review ends
+            raise
         spoken = len(reviewed.log.last_words())
         console.print(f"{spoken} verdicts and flags in the log. Next: rodsight solve", highlight=False)
     finally:

@@ -8,8 +8,8 @@ from pathlib import Path
 from ..errors import InputError
 from ..experiment.experiment import CONFIG_NAME, Experiment, load_experiment
 from ..results.results import Results
-from ..results.store import load_results, read_origin
-from ..run_folder import RESULTS
+from ..results.store import load_results, origin_of
+from ..run_folder import RESULTS, find_experiment
 from ..verdicts.decisions import Bodies
 from ..verdicts.log import VERDICTS, VerdictLog
 
@@ -44,6 +44,5 @@ def open_reviewed(path: Path) -> Reviewed:
     file = path / RESULTS if path.is_dir() else path
     if not file.exists():
         raise InputError(file, "", "there are no results: run `rodsight run` on the experiment first")
-    results, origin = load_results(file), read_origin(file)
-    assert origin is not None
-    return Reviewed(file, results, load_experiment(Path(origin.experiment)), origin.frames[0])
+    results, origin = load_results(file), origin_of(file)
+    return Reviewed(file, results, load_experiment(find_experiment(file, origin)), origin.frames[0])

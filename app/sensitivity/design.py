@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..errors import InputError
 from ..experiment.experiment import Experiment
@@ -88,6 +87,8 @@ def space_filling(factors: Sequence[Factor], samples: int, seed: int) -> list[Ca
     if samples < least:
         raise InputError("--samples", str(samples), f"is too few for {len(factors)} factors: at least {least}")
     power = int(np.ceil(np.log2(samples)))
+    from scipy.stats import qmc  # half a second of imports that no other command needs
+
     unit = qmc.Sobol(len(factors), rng=np.random.default_rng(seed)).random_base2(power)[:samples]
     return [
         Case(tuple((each.name, each.value_at(part)) for each, part in zip(factors, row, strict=True)), seed)

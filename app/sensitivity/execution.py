@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import multiprocessing.connection
 import os
 import signal
+import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any, TypeVar
@@ -91,9 +93,18 @@ def _in_processes(
 
 
 def _begin(work: Callable[[Any, Any], Any], common: Any) -> None:
-    """Make this worker ready."""
+    """Make this worker ready. It ends with the process that asked for it, however that ends."""
     global _work
+    asking = multiprocessing.parent_process()
+    if asking is not None:
+        threading.Thread(target=_end_with, args=(asking.sentinel,), daemon=True).start()
     _work = lambda item: work(common, item)  # noqa: E731
+
+
+def _end_with(sentinel: int) -> None:
+    """Wait for the end of a process, and end this one: a queue that nobody fills any more is waited at for ever."""
+    multiprocessing.connection.wait([sentinel])
+    os._exit(1)
 
 
 def _do(item: Any) -> Any:

@@ -15,7 +15,6 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from solver.bodies.grains import Array
 from solver.contacts.pairs import Keys, recall
@@ -46,6 +45,8 @@ class Spread:
 
 def make_members(count: int) -> list[Case]:
     """What each of `count` members changes: a Latin hypercube over RANGES, noise drawn anew for each."""
+    from scipy.stats import qmc  # half a second of imports that no other command needs
+
     unit = qmc.LatinHypercube(len(RANGES), rng=np.random.default_rng(SEED)).random(count)
     order = [each.name for each in FACTORS]
     cases = []

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.statistics.agreement import Agreement, compare_forces
 
-from ..inference.inference import CoordinationError, Inputs
+from ..errors import UndeterminedError
+from ..inference.inference import Inputs
 from ..progress import Progress, silent
 from ..results.results import Results, TruthContacts
 from .design import Case, vary
@@ -79,7 +80,7 @@ def measure_case(nominal: Nominal, case: Case) -> Effect:
     """Run one case and compare it."""
     try:
         return compare(infer(vary(nominal.inputs, case)), nominal)
-    except CoordinationError as error:
+    except UndeterminedError as error:
         nothing: dict[str, Any] = {each.name: math.nan for each in fields(Effect)}
         return Effect(**(nothing | {"frames": 0, "failure": str(error)}))
 

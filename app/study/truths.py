@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +18,11 @@ from solver.sequence.frame_forces import FrameForces
 from solver.sequence.settings import SequenceSettings
 from solver.statistics.agreement import Agreement, compare_forces
 
-from ..atomic import replacing
 from ..inference.inference import Inputs
 from ..inference.settings import InferenceSettings
 from ..progress import Progress, silent
 from ..synthetic.dense_packing import prepare_packing
+from ..synthetic.worlds.making import load_truth, save_truth
 from ..tracks import Tracks, TrackStatus, WallTracks
 
 STEP = 0.25  # [°] of shear between photographs
@@ -36,10 +36,7 @@ def simulate(seed: int, *, grains: int, folder: Path, turn: float = TURN, progre
     file = folder / f"truth_{grains}_{turn:g}_{seed}.npz"
     settings = DemSettings()
     if file.exists():
-        with np.load(file) as kept:
-            values = {each.name: kept[each.name] for each in fields(DemTruth) if each.name in kept}
-        values["wall_names"] = tuple(str(name) for name in values["wall_names"])
-        return DemTruth(**values, settings=settings)
+        return load_truth(file, settings)
     up = np.arange(round(turn / STEP) + 1)
     angles = np.deg2rad(STEP) * np.concatenate([up, up[-2::-1]])
     cell = prepare_packing(grains, np.random.default_rng(seed), settings)
@@ -48,9 +45,7 @@ def simulate(seed: int, *, grains: int, folder: Path, turn: float = TURN, progre
         frames.append(frame)
         progress(f"truth {seed}", len(frames), len(angles))
     truth = DemTruth.of_frames(cell.grains.radius, frames, settings)
-    arrays = {each.name: getattr(truth, each.name) for each in fields(DemTruth) if each.name != "settings"}
-    with replacing(file) as part, part.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
+    save_truth(file, truth)
     return truth
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,8 @@ from solver.dem.simulation import DemSettings, ShearCell, UnbalancedError
 
 RADIUS_CLASSES = (0.007, 0.008, 0.011)  # [m], rods of 14, 16 and 22 mm
 CLASS_SHARES = (0.40, 0.41, 0.19)  # by number: 1172 rods then fill 0.5 × 0.6 m
+WIDE_RADII = (0.004, 0.020)  # [m], least and greatest
+TWO_RADII = (0.007, 0.0098)  # [m], 1 : 1.4, which keeps discs from forming crystals
 SOLID_FRACTION = 0.845  # of a dense frictionless packing in two dimensions
 LOOSENESS = 1.1  # first height over the dense one
 JITTER = 0.3  # of a lattice cell, either way
@@ -28,14 +31,34 @@ def choose_radii(count: int, rng: np.random.Generator) -> Array:
     return rng.permutation(np.array(RADIUS_CLASSES)[np.minimum(classes, len(RADIUS_CLASSES) - 1)])
 
 
-def prepare_packing(count: int, rng: np.random.Generator, settings: DemSettings, *, aspect: float = 1.2) -> ShearCell:
+def choose_wide_radii(count: int, rng: np.random.Generator) -> Array:
+    """Draw count radii (n,) [m] between WIDE_RADII, every size covering the same area."""
+    small, large = WIDE_RADII
+    return 1.0 / rng.uniform(1.0 / large, 1.0 / small, count)
+
+
+def choose_two_radii(count: int, rng: np.random.Generator) -> Array:
+    """Draw count radii (n,) [m], as many of one of TWO_RADII as of the other, in random order."""
+    return rng.permutation(np.array(TWO_RADII)[np.arange(count) % 2])
+
+
+def prepare_packing(
+    count: int,
+    rng: np.random.Generator,
+    settings: DemSettings,
+    *,
+    aspect: float = 1.2,
+    sizes: Callable[[int, np.random.Generator], Array] = choose_radii,
+    loose: bool = False,
+) -> ShearCell:
     """Compress rods without friction under the settings' pressure; return the cell at rest, friction switched on.
 
-    aspect: height over width. The rods start on a jittered lattice, overlaps are pushed apart with
+    aspect: height over width. loose: compressed with friction, so that few contacts bear.
+    The rods start on a jittered lattice, overlaps are pushed apart with
     soft springs, then the plate is loaded; a drag that only this preparation knows takes the energy out.
     Raise UnbalancedError if the packing does not come to rest.
     """
-    radius = choose_radii(count, rng)
+    radius = sizes(count, rng)
     width = float(np.sqrt(np.pi * np.sum(radius**2) / SOLID_FRACTION / aspect))
     height = LOOSENESS * aspect * width
     columns = max(1, round(np.sqrt(count * width / height)))
@@ -48,7 +71,8 @@ def prepare_packing(count: int, rng: np.random.Generator, settings: DemSettings,
     soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
     cell = ShearCell(radius, position, width=width, height=height, settings=soft, drag=SOFT_DRAG)
     cell.run(np.zeros(SOFT_STEPS))
-    cell = ShearCell(radius, cell.position, width=width, height=height, settings=frictionless, drag=LOADING_DRAG)
+    loading = settings if loose else frictionless
+    cell = ShearCell(radius, cell.position, width=width, height=height, settings=loading, drag=LOADING_DRAG)
     for _ in range(LOADING_ROUNDS):
         cell.run(np.zeros(LOADING_STEPS))
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:

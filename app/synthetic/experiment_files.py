@@ -5,12 +5,37 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.dem.simulation import DemTruth
+from solver.bodies.wall_shapes import IN, circle_of, reach_of_wall
+from solver.dem.simulation import DemSettings, DemTruth
+
+Ids = NDArray[np.integer]
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What an experiment file says of the material and the loads."""
+
+    pressure: dict[str, float]  # [Pa] on plates by their walls' names; where there is one, walls have sensors, too
+    density: float  # [kg/m³]
+    length: float  # [m]
+    friction: float
+    wall_friction: float
+    gravity: tuple[float, float]  # [m/s²]
+
+    @classmethod
+    def of(cls, settings: DemSettings, *, plates: tuple[str, ...]) -> Known:
+        """What is true of a simulation in which these walls are plates under its pressure."""
+        return cls(
+            dict.fromkeys(plates, settings.pressure), settings.density, settings.length, settings.friction,
+            settings.wall_friction, settings.gravity,
+        )  # fmt: skip
 
 
 def write_walls(path: Path, names: Sequence[str], endpoints: Array) -> None:
@@ -23,14 +48,40 @@ def write_walls(path: Path, names: Sequence[str], endpoints: Array) -> None:
     _write(path, ("frame", "wall", "x1", "y1", "x2", "y2"), rows)
 
 
-def write_tracks(path: Path, position: Array, rotation: Array) -> None:
-    """Write position (f, n, 2) [m] and rotation (f, n) [rad]; a grain's id is its row."""
+def write_cell(path: Path, vectors: Array) -> None:
+    """Write the vectors of a periodic cell (f, 2, 2) [m] as cell.csv."""
+    rows = ((frame, *(_metres(value) for value in each.ravel())) for frame, each in enumerate(vectors))
+    _write(path, ("frame", "ax", "ay", "bx", "by"), rows)
+
+
+def write_arcs(path: Path, names: Sequence[str], endpoints: Array, side: NDArray[np.int8]) -> None:
+    """Write circles by their diameters (f, w, 2, 2) [m] as arcs.csv, with their turns."""
+    centre, radius, turn = circle_of(endpoints)
     rows = (
-        (frame, grain, _metres(x), _metres(y), f"{theta:.9f}")
-        for frame in range(len(position))
-        for grain, ((x, y), theta) in enumerate(zip(position[frame], rotation[frame], strict=True))
+        (frame, name, _metres(x), _metres(y), _metres(radius[frame, w]), told, _metres(turn[frame, w]))
+        for frame in range(len(endpoints))
+        for w, (name, told) in enumerate(zip(names, ("in" if s == IN else "out" for s in side), strict=True))
+        for x, y in (centre[frame, w],)
     )
-    _write(path, ("frame", "id", "x", "y", "theta"), rows)
+    _write(path, ("frame", "wall", "x", "y", "radius", "side", "theta"), rows)
+
+
+def write_loads(path: Path, names: Sequence[str], load: Array) -> None:
+    """Write loads on walls (f, w) [N] as load.csv."""
+    rows = (
+        (frame, name, f"{force:.4f}") for frame, row in enumerate(load) for name, force in zip(names, row, strict=True)
+    )
+    _write(path, ("frame", "wall", "force"), rows)
+
+
+def write_tracks(path: Path, ids: Ids, position: Array, rotation: Array | None) -> None:
+    """Write position (f, n, 2) [m] and rotation (f, n) [rad], None: unknown, of grains by id (n,)."""
+    rows = (
+        (frame, grain, _metres(x), _metres(y), *(() if rotation is None else (f"{rotation[frame, row]:.9f}",)))
+        for frame in range(len(position))
+        for row, (grain, (x, y)) in enumerate(zip(ids, position[frame], strict=True))
+    )
+    _write(path, ("frame", "id", "x", "y", *(() if rotation is None else ("theta",))), rows)
 
 
 def write_truth_contacts(path: Path, truth: DemTruth) -> None:
@@ -47,14 +98,14 @@ def write_truth_contacts(path: Path, truth: DemTruth) -> None:
 def write_wall_forces(path: Path, truth: DemTruth) -> None:
     """Write the packing's force on every wall [N], as sensors would record it."""
     n, w = len(truth.radius), len(truth.wall_names)
-    along = truth.endpoints[:, :, 1] - truth.endpoints[:, :, 0]
-    along /= np.linalg.norm(along, axis=2, keepdims=True)
-    normal = np.stack([along[..., 1], -along[..., 0]], axis=2)  # the tangent, normal turned by +90°, is `along`
     frame = np.repeat(np.arange(truth.frame_count), np.diff(truth.offset))
     on_wall = truth.j >= n
     k, wall = frame[on_wall], truth.j[on_wall] - n
     force = np.zeros((truth.frame_count, w, 2))
-    each = truth.fn[on_wall, None] * normal[k, wall] + truth.ft[on_wall, None] * along[k, wall]
+    side = None if truth.side is None else truth.side[wall]
+    _, normal = reach_of_wall(truth.endpoints[k, wall], side, truth.position[k, truth.i[on_wall]])
+    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    each = truth.fn[on_wall, None] * normal + truth.ft[on_wall, None] * tangent
     np.add.at(force, (k, wall), each)
     rows = (
         (k, name, f"{fx:.4f}", f"{fy:.4f}")
@@ -64,9 +115,9 @@ def write_wall_forces(path: Path, truth: DemTruth) -> None:
     _write(path, ("frame", "wall", "fx", "fy"), rows)
 
 
-def write_grains(path: Path, radius: Array) -> None:
-    """Write radius (n,) [m], as tracks need it."""
-    _write(path, ("id", "radius"), ((grain, _metres(value)) for grain, value in enumerate(radius)))
+def write_grains(path: Path, ids: Ids, radius: Array) -> None:
+    """Write radius (n,) [m] of grains by id (n,), as tracks need it."""
+    _write(path, ("id", "radius"), ((grain, _metres(value)) for grain, value in zip(ids, radius, strict=True)))
 
 
 def write_grains_in_pixels(path: Path, pixels: Array, radius: Array) -> None:
@@ -83,30 +134,40 @@ def write_times(path: Path, time: Array) -> None:
     _write(path, ("frame", "time"), ((frame, f"{value:.6f}") for frame, value in enumerate(time)))
 
 
-def write_experiment(path: Path, *, name: str, remark: str, source: str, truth: DemTruth) -> None:
-    """Write experiment.toml; source is its [photographs] or [tracks] table."""
-    settings = truth.settings
+def write_experiment(
+    path: Path,
+    *,
+    name: str,
+    remark: str,
+    source: str,
+    known: Known,
+    boundary: str = "",
+    walls: str = 'file = "walls.csv"\n',
+) -> None:
+    """Write experiment.toml; source is its [photographs] or [tracks] table.
+
+    boundary: a table in place of [walls]; walls: what [walls] says of tables.
+    """
     name = re.sub(r"[^\w .+-]", "-", name)
     name = name if re.match(r"\w", name) else f"synthetic {name}"
     remarks = "".join(f"# {line}\n" for line in remark.splitlines())
+    sensors = 'forces = "wall_forces.csv"\n' if known.pressure else ""
+    plates = "".join(f"[walls.{wall}]\npressure = {value}\n" for wall, value in known.pressure.items())
+    walls = f"[walls]\n{walls}{sensors}{plates}"
+    gravity = f"gravity = [{known.gravity[0]}, {known.gravity[1]}]\n" if any(known.gravity) else ""
     path.write_text(
         f"""{remarks}name = "{name}"
 truth = "truth_contacts.csv"
 truth_tracks = "truth_tracks.csv"
 
 {source}
-[walls]
-file = "walls.csv"
-forces = "wall_forces.csv"
-[walls.top]
-pressure = {settings.pressure}
-
+{boundary or walls}
 [material]
-density = {settings.density}
-length = {settings.length}
-friction = {settings.friction}
-wall_friction = {settings.wall_friction}
-""",
+density = {known.density}
+length = {known.length}
+friction = {known.friction}
+wall_friction = {known.wall_friction}
+{gravity}""",
         encoding="utf-8",
     )
 

@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..experiment.units import Scale
 from . import experiment_files
 from .dense_packing import prepare_packing
+from .placement import cut_sides, place_in_picture
 from .rearrangement import choose_window, measure_old_unbalance
 from .speckle import SpeckleSettings, render_photograph
 
@@ -26,7 +27,6 @@ SHEAR_RATE = 4.8e-3  # [°/s], of the real test: it dates the photographs
 STEEPEST = 30.0  # [°]
 LEAST_GRAINS = 12
 MARGIN = 0.006  # [m], of backing seen around the frame
-SIDE_SURPLUS = 0.004  # [m], that the sides stand out above the plate at its highest
 FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
 # Speckle and noise offer no repeats to find: Huffman coding alone packs them best and fastest (measured).
 PNG_OPTIONS = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
@@ -102,15 +102,16 @@ def synthesize(
     jpeg_quality = None if png else jpeg_quality
 
     truth = _simulate(plan, seed, reversal, progress or _silent)
-    truth = _place_in_picture(truth, MARGIN + speckle.bar_thickness)
+    truth = place_in_picture(cut_sides(truth), MARGIN + speckle.bar_thickness)
     old_unbalance = measure_old_unbalance(truth)
     event = int(np.nanargmax(old_unbalance)) if truth.frame_count > 1 else 0
 
     out.mkdir(parents=True, exist_ok=True)
+    ids = np.arange(len(truth.radius))
     experiment_files.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
     experiment_files.write_wall_forces(out / "wall_forces.csv", truth)
     experiment_files.write_truth_contacts(out / "truth_contacts.csv", truth)
-    experiment_files.write_tracks(out / "truth_tracks.csv", truth.position, truth.rotation)
+    experiment_files.write_tracks(out / "truth_tracks.csv", ids, truth.position, truth.rotation)
     if photographs:
         source, shape = _write_photographs(
             out, truth, speckle, seed, plan.step_degrees, jpeg_quality, progress or _silent
@@ -123,7 +124,7 @@ def synthesize(
         name=out.resolve().name,
         remark=_remark(preset, seed, truth, old_unbalance, event),
         source=source,
-        truth=truth,
+        known=experiment_files.Known.of(truth.settings, plates=("top",)),
     )
     return Synthesis(out, truth, old_unbalance, event, shape)
 
@@ -152,24 +153,6 @@ def _simulate(plan: Preset, seed: int, reversal: bool, progress: Progress) -> De
         return truth
     first, _ = choose_window(measure_old_unbalance(truth), plan.frames)
     return truth.frames(first, first + plan.frames)
-
-
-def _place_in_picture(truth: DemTruth, margin: float) -> DemTruth:
-    """Shift the world until everything is right of and above the picture's corner; cut the sides to one length."""
-    endpoints = truth.endpoints.copy()
-    right, top, left = (truth.wall_names.index(name) for name in ("right", "top", "left"))
-    reach = np.linalg.norm(endpoints[:, top, 0] - endpoints[:, right, 0], axis=1).max() + SIDE_SURPLUS
-    side = endpoints[:, right, 1] - endpoints[:, right, 0]
-    side *= reach / np.linalg.norm(side, axis=1)[:, None]
-    endpoints[:, right, 1] = endpoints[:, right, 0] + side
-    endpoints[:, left, 0] = endpoints[:, left, 1] + side
-    shift = margin - endpoints.min(axis=(0, 1, 2))
-    return replace(
-        truth,
-        endpoints=endpoints + shift,
-        position=truth.position + shift,
-        rotation=truth.rotation - truth.rotation[0],
-    )
 
 
 def _write_photographs(
@@ -226,8 +209,9 @@ def _write_tracks(out: Path, truth: DemTruth, noise: float, seed: int, step_degr
     rng = np.random.default_rng([seed, 1])
     position = truth.position + noise * rng.standard_normal(truth.position.shape)
     rotation = truth.rotation + noise / truth.radius * rng.standard_normal(truth.rotation.shape)
-    experiment_files.write_tracks(out / "tracks.csv", position, rotation)
-    experiment_files.write_grains(out / "grains.csv", truth.radius)
+    ids = np.arange(len(truth.radius))
+    experiment_files.write_tracks(out / "tracks.csv", ids, position, rotation)
+    experiment_files.write_grains(out / "grains.csv", ids, truth.radius)
     experiment_files.write_times(
         out / "times.csv", step_degrees / SHEAR_RATE * np.arange(truth.frame_count, dtype=np.float64)
     )

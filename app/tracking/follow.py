@@ -1,4 +1,8 @@
-"""From photographs to tracks in the world: one photograph after the other, grains and walls."""
+"""From photographs to tracks in the world: one photograph after the other, grains and walls.
+
+A photograph that shows nothing of the packing, or that a tracker cannot get through, fails alone: nothing is tracked in
+it, why is kept with the tracks, and the next one is compared with the last that showed something.
+"""
 
 from __future__ import annotations
 
@@ -10,22 +14,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.sequence.failure import describe_error
 
 from ..errors import InputError
-from ..experiment.photographs import Photographs
+from ..experiment.photographs import Image, Photographs, ReadAhead
 from ..experiment.units import Scale
-from ..progress import Progress, silent
+from ..progress import Observer, Progress, silent, unheard
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
 from .correlation.correlator import Rows
 from .detection.detect import Detection
+from .outline.outline_tracker import OutlineTracker
 from .registration.manual_poses import ManualPoses
-from .registration.poses import FramePoses
+from .registration.poses import FramePoses, no_poses
 from .settings import TrackingSettings
 from .tracker import Tracker
 from .walls.wall_tracker import WallPoses, WallTracker
 
+AnyTracker = Tracker | OutlineTracker
+
 HISTORY = 8  # frames that the tracker looks back upon
+
+# Share of the grains of the first photograph: one that shows fewer shows none, and those by accident.
+FEWEST_FOUND = 0.1
+
+# The least that a centre by its rim is off for good [px]: rims are not lit alike all around.
+RIM_ERROR = 0.02
 
 # What is assumed of the centre of a grain whose outline could not be seen [px].
 UNSEEN_SIGMA = 1.0
@@ -56,6 +70,7 @@ class Execution:
     workers: int
     checkpoint: Checkpoint
     progress: Progress = silent
+    observer: Observer = unheard  # hears what failed a photograph
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,26 +97,28 @@ def follow_photographs(
     told = told if told is not None else {}
     photographs, scale, detection = series.photographs, series.scale, grains.detection
     checkpoint, progress = execution.checkpoint, execution.progress
-    tracker = Tracker(photographs[0], detection, settings, workers=execution.workers)
+    kind = OutlineTracker if settings is not None and settings.follow == "outline" else Tracker
+    tracker = kind(photographs[0], detection, settings, workers=execution.workers)
     frame_count = len(series.time)
     poses: list[FramePoses] = [
         checkpoint.load(k, FramePoses)[0] for k in range(min(checkpoint.finished(), frame_count))
     ]
     for k in range(1, len(poses)):
         _renew(tracker, photographs, poses[:k], np.flatnonzero(poses[k].reference != poses[k - 1].reference))
-    for k in range(len(poses), frame_count):
-        progress("tracking", k, frame_count)
-        if k == 0:
-            pose = tracker.first()
-        else:
-            recent = poses[-HISTORY:]
-            _renew(tracker, photographs, poses, tracker.find_damaged(recent, k - len(recent), photographs.__getitem__))
-            pose = tracker.follow(photographs[k], recent, told.get(k))
-        checkpoint.save(k, pose)
-        poses.append(pose)
+    with ReadAhead(photographs, frame_count) as coming:
+        for k in range(len(poses), frame_count):
+            progress("tracking", k, frame_count)
+            image = coming[k]
+            pose = tracker.first() if k == 0 else _follow(tracker, photographs, image, poses, told.get(k), execution)
+            checkpoint.save(k, pose)
+            poses.append(pose)
     progress("tracking", frame_count, frame_count)
     pixels = np.stack([np.stack([p.x, p.y], axis=1) for p in poses])
     centre = np.stack([detection.x, detection.y], axis=1)
+    constant = np.where(np.isfinite(detection.sigma), detection.sigma, UNSEEN_SIGMA)
+    if isinstance(tracker, OutlineTracker):  # every photograph is measured by itself: noise does not last
+        noise = np.nan_to_num(poses[0].sigma)
+        constant = np.sqrt(np.maximum(constant**2 - noise**2, RIM_ERROR**2))
     return Tracks(
         id=grains.id,
         radius=grains.radius,
@@ -113,11 +130,37 @@ def follow_photographs(
         status=np.stack([p.status for p in poses]),
         second_zncc=np.stack([p.second_zncc for p in poses]),
         reference_frame=np.stack([p.reference for p in poses]),
-        centre_sigma=np.where(np.isfinite(detection.sigma), detection.sigma, UNSEEN_SIGMA) * scale.size_at(centre),
+        centre_sigma=constant * scale.size_at(centre),
+        failed_reason=tuple(p.failed_reason for p in poses),
     )
 
 
-def _renew(tracker: Tracker, photographs: Photographs, poses: list[FramePoses], rows: Rows) -> None:
+def _follow(
+    tracker: AnyTracker, photographs: Photographs, image: Image, poses: list[FramePoses], told: ManualPoses | None,
+    execution: Execution,
+) -> FramePoses:  # fmt: skip
+    """The poses in the photograph after those that are given; what it cannot be followed for fails it alone."""
+    k = len(poses)
+    recent = poses[-HISTORY:]
+    # Whether a reference is damaged is judged on photographs in a row.
+    row = next((at for at in range(len(recent), 0, -1) if recent[at - 1].failed_reason), 0)
+    try:
+        if recent[row:]:
+            damaged = tracker.find_damaged(recent[row:], k - len(recent[row:]), photographs.__getitem__)
+            _renew(tracker, photographs, poses, damaged)
+        pose = tracker.follow(image, recent, told)
+    except (MemoryError, InputError, OSError):  # not the picture's fault
+        raise
+    except Exception as error:
+        execution.observer("tracking", k, error)
+        return no_poses(tracker.reference, f"{photographs.files[k].name} cannot be followed: {describe_error(error)}")
+    found, expected = int(pose.has_pose.sum()), int(poses[0].has_pose.sum())
+    if found < FEWEST_FOUND * expected:
+        return no_poses(tracker.reference, f"{found} of {expected} grains are found in {photographs.files[k].name}")
+    return pose
+
+
+def _renew(tracker: AnyTracker, photographs: Photographs, poses: list[FramePoses], rows: Rows) -> None:
     """Take the references of `rows` (m,) anew from the last frame of poses."""
     if len(rows):
         tracker.renew(rows, len(poses) - 1, photographs[len(poses) - 1], poses[-1])
@@ -126,7 +169,8 @@ def _renew(tracker: Tracker, photographs: Photographs, poses: list[FramePoses], 
 def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Execution, source: Path) -> FollowedWalls:
     """Follow the walls where their endpoints are NaN; depth (w,) [m]: how much of each bar is seen.
 
-    source: the walls' table. Raises InputError for a wall without texture and for one that is not found.
+    source: the walls' table. A wall that is not found in a photograph has no ends there. Raises InputError for a wall
+    without texture.
     """
     photographs, checkpoint, progress = series.photographs, execution.checkpoint, execution.progress
     frame_count = len(walls.endpoints)
@@ -140,19 +184,14 @@ def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Exe
             "too few to be followed; give its position in every frame",
         )
     poses: list[WallPoses] = [checkpoint.load(k, WallPoses)[0] for k in range(min(checkpoint.finished(), frame_count))]
-    for k in range(len(poses), frame_count):
-        progress("walls", k, frame_count)
-        pose = tracker.first() if k == 0 else tracker.follow(photographs[k], poses[-HISTORY:])
-        pose = _measured_where_told(pose, walls.endpoints[k], ~asked[k])
-        missing = np.asarray(np.isnan(pose.endpoints).any(axis=(1, 2)), dtype=np.bool_)
-        for w in np.flatnonzero(missing):
-            raise InputError(
-                source,
-                f"frame {k}, wall {walls.name[w]!r}",
-                f"is not found again in {photographs.files[k].name}: give its position in that frame",
-            )
-        checkpoint.save(k, pose)
-        poses.append(pose)
+    with ReadAhead(photographs, frame_count) as coming:
+        for k in range(len(poses), frame_count):
+            progress("walls", k, frame_count)
+            image = coming[k]
+            pose = tracker.first() if k == 0 else _follow_bars(tracker, image, poses, execution)
+            pose = _measured_where_told(pose, walls.endpoints[k], ~asked[k])
+            checkpoint.save(k, pose)
+            poses.append(pose)
     progress("walls", frame_count, frame_count)
     return FollowedWalls(
         replace(walls, endpoints=np.stack([p.endpoints for p in poses])),
@@ -160,6 +199,18 @@ def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Exe
         np.stack([p.zncc for p in poses]),
         np.stack([p.patches for p in poses]),
     )
+
+
+def _follow_bars(tracker: WallTracker, image: Image, poses: list[WallPoses], execution: Execution) -> WallPoses:
+    """The walls in the photograph after those that are given; NaN where they are not found in it."""
+    try:
+        return tracker.follow(image, poses[-HISTORY:])
+    except (MemoryError, InputError, OSError):  # not the picture's fault
+        raise
+    except Exception as error:
+        execution.observer("walls", len(poses), error)
+        w = tracker.wall_count
+        return WallPoses(np.full((w, 2, 2), np.nan), np.full((w, 2), np.nan), np.full(w, np.nan), np.zeros(w, np.int64))
 
 
 def _measured_where_told(pose: WallPoses, endpoints: Array, told: NDArray[np.bool_]) -> WallPoses:

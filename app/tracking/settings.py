@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingSettings:
     """How grains are followed. Lengths in pixels."""
 
+    follow: Literal["texture", "outline"] = "texture"  # what of a grain is followed
     patch_share: float = 0.85  # radius of the correlated disc / radius of the grain; the rim is shaded
-    tolerance: float = 1e-2  # [px] a step below which a fit has converged
+    tolerance: float = 3e-2  # [px] a step below which a fit has converged: the next one would be a twentieth of it
     step_limit: int = 25  # Gauss-Newton steps
     search_window: float = 60.0  # [px] half width of the widest search
     margin: float = 0.15  # by which a ZNCC must exceed the greatest accidental one, and that of the second best place

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,19 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import STRAIGHT, reach_of_wall
 
 from ..atomic import replacing
 from ..errors import InputError
 from ..experiment.corrections import read_corrections
-from ..experiment.experiment import Experiment, read_grain_guess, read_times, read_walls
-from ..experiment.photographs import Image
+from ..experiment.experiment import Experiment, read_grain_guess, read_times
+from ..experiment.photographs import CHANNELS, FULL_SCALE, Image, Photographs
 from ..experiment.scaling import make_scale
 from ..experiment.tables import read_table, write_table
 from ..experiment.units import Scale
-from ..progress import Progress
+from ..experiment.walls import read_walls
+from ..progress import Observer, Progress
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
+from .detection.channels import count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
+from .detection.strangers import describe_channels, describe_strangers
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
 from .registration.manual_poses import ManualPoses
 from .report.page import Tracked
@@ -37,42 +43,74 @@ Columns = dict[str, NDArray[Any]]
 DETECTIONS, WALLS = "detections.csv", "tracked_walls.csv"
 
 
+def untold(sentence: str) -> None:
+    """Keep a sentence for the user to oneself."""
+
+
 def track_photographs(
-    experiment: Experiment, stop: int, checkpoint: Path, fingerprint: str, progress: Progress
+    experiment: Experiment,
+    stop: int,
+    keep: Callable[[str], Checkpoint],
+    progress: Progress,
+    observer: Observer,
+    *,
+    grains: ReferenceGrains | None = None,
+    tell: Callable[[str], None] = untold,
 ) -> tuple[Tracks, WallTracks | None, dict[str, Columns]]:
     """Tracks of the grains and walls of the frames 0 … stop − 1, and tables by file name, for the user to edit.
 
-    checkpoint: folder for finished frames of this fingerprint. Raises InputError where nothing is found.
+    grains: of the first photograph, where they are found already. keep: gives the checkpoint of a stage by its name;
+    observer: hears what a photograph could not be followed for; tell: gets sentences for the user.
+    Raises InputError where nothing is found.
     """
     section, tuning = experiment.config.photographs, experiment.config.tracking
     assert section is not None
+    workers = tuning.workers or _cores()
     photographs = experiment.photographs()
     count = len(photographs)
     first = photographs[0]
     scale = make_scale(section, photographs.shape[0])
     walls = read_walls(experiment, count)
-    progress("detection", 0, 1)
-    grains = _detect(experiment, first, scale, walls)
-    progress("detection", 1, 1)
+    if grains is None:
+        progress("detection", 0, 1)
+        grains = _detect(experiment, first, scale, walls, tell)
+        progress("detection", 1, 1)
     if grains.detection.count == 0:
         raise InputError(photographs.files[0], "", "no grains were found; give them with photographs.grains")
     tables = {DETECTIONS: _detections_table(grains)}
+    unfound: dict[int, str] = {}
     series = Series(photographs, read_times(experiment, count)[:stop], scale)
     if walls is not None:
         walls = walls.frames(0, stop)
         if np.isnan(walls.endpoints).any():
+            straight = np.flatnonzero(walls.sides == STRAIGHT)
+            bars = walls.select(straight)
             followed = follow_walls(
-                series, walls, _bar_depth(experiment, first, walls, scale, float(grains.radius.mean())),
-                Execution(tuning.workers, Checkpoint(checkpoint / "walls", fingerprint), progress),
-                source=experiment.folder / (experiment.config.walls.file if experiment.config.walls else ""),
+                series, bars, _bar_depth(experiment, first, bars, scale, float(grains.radius.mean())),
+                Execution(workers, keep("walls"), progress, observer),
+                source=experiment.folder / ((experiment.config.walls and experiment.config.walls.file) or ""),
             )  # fmt: skip
-            walls = replace(followed.walls, sigma=np.sqrt((followed.sigma**2).mean(axis=2)))
+            endpoints, sigma = walls.endpoints.copy(), np.full(walls.endpoints.shape[:2], np.nan)
+            endpoints[:, straight] = followed.walls.endpoints
+            sigma[:, straight] = np.sqrt((followed.sigma**2).mean(axis=2))
+            walls = replace(walls, endpoints=endpoints, sigma=sigma)
+            unfound = _name_unfound(walls, photographs)
             tables[WALLS] = _walls_table(followed)
     tracks = follow_photographs(
-        series, grains, Execution(tuning.workers, Checkpoint(checkpoint / "tracking", fingerprint), progress),
-        TrackingSettings(search_window=tuning.search_window), _manual_poses(experiment, grains.id, scale, count),
+        series, grains, Execution(workers, keep("tracking"), progress, observer),
+        TrackingSettings(section.follow, search_window=tuning.search_window),
+        _manual_poses(experiment, grains.id, scale, count),
     )  # fmt: skip
-    return tracks, walls, tables
+    reasons = ("; ".join(filter(None, (said, unfound.get(k)))) for k, said in enumerate(tracks.failed_reason or ()))
+    return replace(tracks, failed_reason=tuple(reasons)), walls, tables
+
+
+def find_reference(experiment: Experiment) -> ReferenceGrains:
+    """The grains of the first photograph, as `track_photographs` finds them."""
+    section, photographs = experiment.config.photographs, experiment.photographs()
+    assert section is not None
+    scale = make_scale(section, photographs.shape[0])
+    return _detect(experiment, photographs[0], scale, read_walls(experiment, len(photographs)), untold)
 
 
 def write_found_tables(folder: Path, tables: dict[str, Columns]) -> None:
@@ -101,7 +139,9 @@ def gather_report(
     )  # fmt: skip
 
 
-def _detect(experiment: Experiment, first: Image, scale: Scale, walls: WallTracks | None) -> ReferenceGrains:
+def _detect(
+    experiment: Experiment, first: Image, scale: Scale, walls: WallTracks | None, tell: Callable[[str], None]
+) -> ReferenceGrains:
     """The grains that are told, else those that are found."""
     section, tuning = experiment.config.photographs, experiment.config.tracking
     assert section is not None
@@ -117,9 +157,15 @@ def _detect(experiment: Experiment, first: Image, scale: Scale, walls: WallTrack
     except ValueError as error:
         raise InputError(experiment.file, f"key photographs.radii = {list(section.radii)}", str(error)) from None
     detection = detect_grains(first, settings)
+    if section.follow == "outline":
+        # Dark discs on a light ground are as good.
+        dark = detect_grains(np.float32(FULL_SCALE) - first, settings)
+        detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
     centres = np.stack([detection.x, detection.y], axis=1)
-    if walls is not None:
-        within = _inside(scale.to_world(centres), walls)
+    within = _inside(scale.to_world(centres), walls) if walls is not None else None
+    for sentence in [*_about_channels(experiment, settings), *describe_strangers(detection, within, first.shape)]:
+        tell(sentence)
+    if within is not None:
         detection = _some(detection, within)
         centres = centres[within]
     if len(classes):
@@ -129,14 +175,28 @@ def _detect(experiment: Experiment, first: Image, scale: Scale, walls: WallTrack
     return ReferenceGrains(np.arange(detection.count), detection, radius)
 
 
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _about_channels(experiment: Experiment, settings: DetectionSettings) -> list[str]:
+    """Whether discs of a colour photograph stand out better in another channel."""
+    section = experiment.config.photographs
+    assert section is not None
+    channels: dict[str, Image] = {name: experiment.photographs(name)[0] for name in CHANNELS}
+    if not is_coloured(channels):
+        return []
+    return describe_channels(count_discs(channels, settings), section.channel)
+
+
 def _inside(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
     """Which circles (n,) lie between the walls of frame 0: screws and wheels of the apparatus are round, too.
 
     Walls that would leave next to nothing are told the wrong way round; that is said later, with all grains there.
     """
-    start, end = walls.endpoints[0, :, 0], walls.endpoints[0, :, 1]
-    outward = np.stack([(end - start)[:, 1], -(end - start)[:, 0]], axis=1)
-    within = (np.einsum("nwk,wk->nw", position[:, None] - start, outward) < 0.0).all(axis=1)
+    depth, _ = reach_of_wall(walls.endpoints[0], walls.sides, position[:, None])
+    within = np.asarray((depth > 0.0).all(axis=1))
     return within if within.mean() > 0.2 else np.ones_like(within)
 
 
@@ -178,10 +238,21 @@ def _detections_table(grains: ReferenceGrains) -> Columns:
     }
 
 
+def _name_unfound(walls: WallTracks, photographs: Photographs) -> dict[int, str]:
+    """The frames in which walls were not found, and what to do about it."""
+    unfound: dict[int, list[str]] = {}
+    for k, w in np.argwhere(np.isnan(walls.endpoints).any(axis=(2, 3))).tolist():
+        unfound.setdefault(k, []).append(repr(walls.name[w]))
+    return {
+        k: f"wall {', '.join(names)} is not found in {photographs.files[k].name}: give its position in that frame"
+        for k, names in unfound.items()
+    }
+
+
 def _walls_table(followed: FollowedWalls) -> Columns:
     f, w = followed.zncc.shape
     ends = followed.walls.endpoints.reshape(f * w, 4)
-    return {
+    columns: Columns = {
         "frame": np.repeat(np.arange(f), w),
         "wall": np.tile(np.array(followed.walls.name), f),
         **{name: ends[:, k] for k, name in enumerate(("x1", "y1", "x2", "y2"))},
@@ -190,3 +261,5 @@ def _walls_table(followed: FollowedWalls) -> Columns:
         "zncc": followed.zncc.ravel(),
         "patches": followed.patches.ravel(),
     }
+    found = np.isfinite(ends).all(axis=1)
+    return {name: values[found] for name, values in columns.items()}

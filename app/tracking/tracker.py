@@ -75,7 +75,7 @@ class Tracker:
         The last two frames predict the motion. Frames further back are read only for grains that were lost
         meanwhile: without them such a grain's rotation counts from the first photograph, in (−π, π].
         """
-        registration = self._begin(image, history)
+        registration = self.begin(image, history)
         if told is not None:
             settle_manual_poses(registration, told)
         follow_own_motion(registration, history)
@@ -96,7 +96,8 @@ class Tracker:
         self.reference = self.reference.copy()
         self.reference[rows] = frame
 
-    def _begin(self, image: Image, history: Sequence[FramePoses]) -> Registration:
+    def begin(self, image: Image, history: Sequence[FramePoses]) -> Registration:
+        """Make a photograph ready to be registered; nothing is looked for yet. history: as of `follow`."""
         if not history:
             raise ValueError("the history must hold at least one frame, the tracker's own first()")
         if image.shape != self.patches.reference.image.shape:

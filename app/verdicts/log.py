@@ -101,6 +101,7 @@ class VerdictLog:
         self._read_to = 0
         self._line_number = 0
         self._lock = threading.RLock()
+        self._closed = False  # to lines that are not read yet
 
     def append(self, entry: Entry) -> Entry:
         """Write one verdict or flag; returns it with its time and name."""
@@ -111,6 +112,16 @@ class VerdictLog:
         stamped = [_stamped(entry) for entry in entries]
         self._write([_as_json(entry) for entry in stamped])
         return stamped
+
+    def as_of_now(self) -> VerdictLog:
+        """The same without what will be said from now on."""
+        with self._lock:
+            self._read()
+            words = self._words
+            now = VerdictLog(self.file)
+            now._words = _Words(dict(words.entries), set(words.undone), words.torn)
+            now._closed = True
+            return now
 
     def undo(self, reviewer: str) -> Entry | None:
         """Take back the reviewer's last line that still counts; None where there is none."""
@@ -178,6 +189,8 @@ class VerdictLog:
 
     def _read(self) -> None:
         """Read on from where the last reading ended, whole lines only."""
+        if self._closed:
+            return
         try:
             with self.file.open("rb") as stream:
                 stream.seek(self._read_to)
@@ -197,7 +210,7 @@ class VerdictLog:
             return
         try:
             values = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             self._words.torn += 1
             return
         where = f"line {self._line_number}"

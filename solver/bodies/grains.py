@@ -20,22 +20,35 @@ class Grains:
 
     radius: Annotated[Float[Array, " n"], Quantity("radius as it was used", "m", "grain", essential=True)]
     mass: Annotated[Float[Array, " n"], Quantity("mass", "kg", "grain", essential=True)]
+    boundary: Annotated[
+        Bool[NDArray[np.bool_], " n"] | None,
+        Quantity("whether the grain is the packing's boundary: its motion is imposed", dims="grain", since=2),
+    ] = None  # none is
 
     def __post_init__(self) -> None:
+        if self.boundary is not None and self.boundary.shape != self.radius.shape:
+            raise ValueError("boundary must tell of every grain")
         if self.radius.shape != self.mass.shape or self.radius.ndim != 1:
             raise ValueError("radius and mass must be one-dimensional and of equal length")
         if not (np.all(self.radius > 0) and np.all(self.mass > 0)):
             raise ValueError("every radius and every mass must be positive")
 
     @classmethod
-    def of_rods(cls, radius: Array, *, density: float, length: float) -> Grains:
-        """Make rods of one material: radius (n,) [m], density [kg/m³], length [m]."""
+    def of_rods(
+        cls, radius: Array, *, density: float, length: float, boundary: NDArray[np.bool_] | None = None
+    ) -> Grains:
+        """Make rods of one material: radius (n,) [m], density [kg/m³], length [m]; boundary (n,)."""
         radius = np.ascontiguousarray(radius, dtype=np.float64)
-        return cls(radius, density * length * np.pi * radius**2)
+        return cls(radius, density * length * np.pi * radius**2, boundary)
 
     @property
     def count(self) -> int:
         return len(self.radius)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which grains are in balance (n,): all that are no boundary."""
+        return np.ones(self.count, np.bool_) if self.boundary is None else ~self.boundary
 
     @property
     def inertia(self) -> Array:

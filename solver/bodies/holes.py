@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 
 from solver.bodies.grains import Array, Grains
+from solver.bodies.wall_shapes import reach_of_wall
 from solver.bodies.walls import Walls
 
 FITTING = 0.97  # of the smallest radius: the three grains around a hole give way a little
@@ -29,7 +30,9 @@ def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], wall
     place = _equally_far(centre[corner], radius[corner])
     with np.errstate(invalid="ignore"):
         inside = np.all(
-            np.einsum("wk,hwk->hw", walls.outward, walls.endpoints[None, :, 0] - place[:, None]) >= least, 1
+            reach_of_wall(walls.endpoints[None], None if walls.side is None else walls.side[None], place[:, None])[0]
+            >= least,
+            1,
         )
     place = place[inside & np.isfinite(place).all(axis=1)]
     if not len(place):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int8
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from solver.bodies.cell import Cell
 from solver.bodies.grains import Array, GrainMotion
+from solver.bodies.strain import displacement_gradient, shear_of
+from solver.bodies.wall_shapes import moved_back, walls_moved
 from solver.bodies.walls import Walls
 
 NEIGHBOURS = 6  # whose motion stands in for that of a grain seen for the first time
@@ -25,6 +28,14 @@ class Snapshot:
     present: Bool[NDArray[np.bool_], " n"]
     endpoints: Float[Array, "w 2 2"]  # [m]
     sigma: float  # [m] standard deviation of a position component, error of the centre included
+    side: Int8[NDArray[np.int8], " w"] | None = None  # which walls are circles, as of Walls; None: none
+    load: Float[Array, " w"] | None = None  # [N] measured on walls, NaN where none was; None: on none
+    cell: Float[Array, "2 2"] | None = None  # [m] vectors of the periodic cell, in place of walls
+
+    @property
+    def walls(self) -> Walls:
+        """The walls at rest, without their loads."""
+        return Walls.at_rest(self.endpoints, side=self.side, cell=self.cell)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +70,9 @@ class FrameMotion:
     wall_velocity: Float[Array, "w 2 2"]  # [m/s]
     spans: bool  # True: the interval ends here, so that earlier instants of it exist
     sigma: float  # [m]
+    side: Int8[NDArray[np.int8], " w"] | None = None  # which walls are circles; None: none
+    load: Float[Array, " w"] | None = None  # [N] measured on walls at the frame, NaN: none
+    cell: Cell | None = None
 
     @property
     def velocity_rms(self) -> float:
@@ -76,22 +90,30 @@ class FrameMotion:
             self.grains.spin,
             self.grains.present,
         )
-        return grains, Walls(self.endpoints - back * self.wall_velocity, self.wall_velocity, load)
+        cell = None if self.cell is None else replace(self.cell, vectors=self.cell.vectors - back * self.cell.velocity)
+        endpoints = moved_back(self.endpoints, back * self.wall_velocity, self.side)
+        return grains, Walls(endpoints, self.wall_velocity, load, self.side, cell)
 
 
-def motion_to(snapshot: Snapshot, seen: LastSeen, former_time: float, former_endpoints: Array) -> FrameMotion:
+def motion_to(
+    snapshot: Snapshot, seen: LastSeen, former_time: float, former_endpoints: Array, former_cell: Array | None = None
+) -> FrameMotion:
     """The motion that leads to a snapshot from the frame before it.
 
-    seen: of the frames before; former_time [s], former_endpoints (w, 2, 2) [m]: of the frame before. A grain that
-    was lost in between moves with its mean velocity since it was last seen; one never seen, like its neighbours.
+    seen: of the frames before; former_time [s], former_endpoints (w, 2, 2) [m] and former_cell (2, 2) [m]: of the
+    frame before. A grain that was lost in between moves with its mean velocity since it was last seen; one never seen,
+    like its neighbours.
     """
     interval = snapshot.time - former_time
     if not interval > 0:
         raise ValueError(f"the time of a frame ({snapshot.time} s) is not after that of the frame before it")
     velocity, spin = _velocities(snapshot, seen)
     grains = GrainMotion(snapshot.position, velocity, spin, snapshot.present)
-    wall_velocity = (snapshot.endpoints - former_endpoints) / interval
-    return FrameMotion(interval, grains, snapshot.endpoints, wall_velocity, True, snapshot.sigma)
+    wall_velocity = walls_moved(former_endpoints, snapshot.endpoints, snapshot.side) / interval
+    cell = _cell_between(snapshot, former_cell, snapshot.cell, interval)
+    return FrameMotion(
+        interval, grains, snapshot.endpoints, wall_velocity, True, snapshot.sigma, snapshot.side, snapshot.load, cell
+    )
 
 
 def motion_from(snapshot: Snapshot, following: Snapshot) -> FrameMotion:
@@ -104,28 +126,38 @@ def motion_from(snapshot: Snapshot, following: Snapshot) -> FrameMotion:
     velocity, spin = _velocities(following, seen)
     velocity[~both], spin[~both] = 0.0, 0.0
     grains = GrainMotion(snapshot.position, velocity, spin, snapshot.present)
-    wall_velocity = (following.endpoints - snapshot.endpoints) / interval
-    return FrameMotion(interval, grains, snapshot.endpoints, wall_velocity, False, snapshot.sigma)
+    way = walls_moved(snapshot.endpoints, following.endpoints, snapshot.side, at=snapshot.endpoints)
+    cell = _cell_between(snapshot, snapshot.cell, following.cell, interval)
+    return FrameMotion(
+        interval, grains, snapshot.endpoints, way / interval, False, snapshot.sigma, snapshot.side, snapshot.load, cell
+    )
 
 
 def no_motion(snapshot: Snapshot) -> FrameMotion:
     """A single snapshot, at rest for a second."""
     n = len(snapshot.present)
     grains = GrainMotion(snapshot.position, np.zeros((n, 2)), np.zeros(n), snapshot.present)
-    return FrameMotion(1.0, grains, snapshot.endpoints, np.zeros_like(snapshot.endpoints), False, snapshot.sigma)
+    still, cell = np.zeros_like(snapshot.endpoints), None if snapshot.cell is None else Cell.at_rest(snapshot.cell)
+    return FrameMotion(
+        1.0, grains, snapshot.endpoints, still, False, snapshot.sigma, snapshot.side, snapshot.load, cell
+    )
 
 
 def shear_over(motion: FrameMotion) -> float:
     """Amount of shear of the packing over the interval [rad], from the best homogeneous motion of the grains."""
-    here = motion.grains.present
-    if here.sum() < 4:
+    grains = motion.grains
+    gradient = displacement_gradient(grains.position, grains.velocity, grains.present) * motion.interval
+    if not np.isfinite(gradient).all():
         return 0.0
-    x = motion.grains.position[here]
-    design = np.column_stack([x - x.mean(axis=0), np.ones(len(x))])
-    gradient = np.linalg.lstsq(design, motion.grains.velocity[here], rcond=None)[0][:2].T * motion.interval
     strain = 0.5 * (gradient + gradient.T)
-    low, high = np.linalg.eigvalsh(strain)
-    return float(high - low)
+    return shear_of(strain)
+
+
+def _cell_between(snapshot: Snapshot, before: Array | None, after: Array | None, interval: float) -> Cell | None:
+    """The cell of a snapshot, moving as it does from the vectors before to those after [m]."""
+    if snapshot.cell is None or before is None or after is None:
+        return None
+    return Cell(snapshot.cell, (after - before) / interval)
 
 
 def _velocities(snapshot: Snapshot, seen: LastSeen) -> tuple[Array, Array]:

@@ -9,6 +9,8 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
+from solver.bodies.motion import Snapshot
+from solver.bodies.wall_shapes import Sides
 from solver.bodies.walls import Walls
 
 
@@ -37,17 +39,41 @@ class Packing:
     grains: Grains
     length: float  # [m] of the rods
     material: Material
-    pressure: Float[Array, " w"]  # [Pa] on plates, NaN where the motion is imposed
+    # [Pa] on plates, NaN where the motion is imposed; of a load that was measured, what it makes on average
+    pressure: Float[Array, " w"]
+    inferred: int = 0  # grains that no photograph shows
 
     @property
     def weight(self) -> Array:
         """Weight of every grain (n, 2) [N]."""
         return self.grains.weight(self.material.gravity)
 
-    def load(self, endpoints: Array) -> Array:
-        """Load on every wall (w,) [N] of given endpoints (w, 2, 2) [m]."""
-        return self.pressure * np.linalg.norm(endpoints[:, 1] - endpoints[:, 0], axis=1) * self.length
+    @property
+    def scale_is_known(self) -> bool:
+        """Whether loads or weight fix the scale of the forces; else they are known up to a factor."""
+        return bool(np.isfinite(self.pressure).any() or any(self.material.gravity))
 
-    def walls(self, endpoints: Array) -> Walls:
+    def mean_pressure(self, snapshot: Snapshot) -> float:
+        """Mean pressure of the plates as they are loaded at a snapshot [Pa]; 0 without one."""
+        plates = np.isfinite(self.pressure)
+        if snapshot.load is None or not plates.any():
+            return float(self.pressure[plates].mean()) if plates.any() else 0.0
+        walls = self.walls_of(snapshot)
+        return float((walls.load[plates] / (walls.face[plates] * self.length)).mean())
+
+    def load(self, endpoints: Array, side: Sides = None, measured: Array | None = None) -> Array:
+        """Load on every wall (w,) [N] of given endpoints (w, 2, 2) [m].
+
+        measured (w,) [N]: loads that were measured, which count instead of a pressure; NaN: none.
+        """
+        pressed = self.pressure * Walls.at_rest(endpoints, side=side).face * self.length
+        return pressed if measured is None else np.where(np.isfinite(measured), measured, pressed)
+
+    def walls(self, endpoints: Array, side: Sides = None, measured: Array | None = None) -> Walls:
         """The walls at rest at these endpoints (w, 2, 2) [m], under their loads."""
-        return Walls.at_rest(endpoints, self.load(endpoints))
+        return Walls.at_rest(endpoints, self.load(endpoints, side, measured), side)
+
+    def walls_of(self, snapshot: Snapshot) -> Walls:
+        """The walls of a snapshot at rest, under the loads that they carry there."""
+        load = self.load(snapshot.endpoints, snapshot.side, snapshot.load)
+        return Walls.at_rest(snapshot.endpoints, load, snapshot.side, snapshot.cell)

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.packing import Material, Packing
@@ -18,16 +22,28 @@ class RodMaterial:
     wall_friction: float | None = None  # None: as friction
     formal_weight: float = 0.0  # η in [0, ½]
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
+    friction_measured: bool = False  # friction is a first guess: it is found from the motion
+    stiffness: float | Literal["rigid", "estimate"] | None = None  # [Pa] of a contact, per length; None: as gaps show
 
     def at_walls(self) -> float:
         """The coefficient of friction at walls."""
         return self.friction if self.wall_friction is None else self.wall_friction
 
-    def pack(self, radius: Array, pressure: Array) -> Packing:
-        """Make a packing of rods of radius (n,) [m]; pressure (w,) [Pa] on walls, NaN where motion is imposed."""
+    def friction_law(self) -> Material:
+        """What of it the contacts need."""
+        return Material(self.friction, self.at_walls(), self.formal_weight, self.gravity)
+
+    def pack(
+        self, radius: Array, pressure: Array, inferred: int = 0, boundary: NDArray[np.bool_] | None = None
+    ) -> Packing:
+        """Make a packing of rods of radius (n,) [m]; pressure (w,) [Pa] on walls, NaN where motion is imposed.
+
+        inferred: rods that no photograph shows; boundary (n,): rods whose motion is imposed.
+        """
         return Packing(
-            Grains.of_rods(radius, density=self.density, length=self.length),
+            Grains.of_rods(radius, density=self.density, length=self.length, boundary=boundary),
             self.length,
-            Material(self.friction, self.at_walls(), self.formal_weight, self.gravity),
+            self.friction_law(),
             pressure,
+            inferred,
         )

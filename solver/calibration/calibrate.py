@@ -59,6 +59,7 @@ class Calibration:
         ),
     ]
     wall_tilt: Annotated[Array, Quantity("correction of a wall about its middle, counter-clockwise", "rad", "wall")]
+    radius_offset: Annotated[float, Quantity("error that all radii share, part of radius", "m", since=2, absent=0.0)]
     pixel_size: Annotated[float, Quantity("true distances are (1 + pixel_size) times the measured ones")]
     lens: Annotated[float, Quantity("outward shift of the farthest corner by the lens", "m")]
     walls_follow: Annotated[bool, Quantity("the walls are corrected by the pixel size, too", absent=False)]
@@ -69,6 +70,7 @@ class Calibration:
     wall_sd: Annotated[Array, Quantity("standard deviation of wall_outward", "m", "wall")]
     wall_tilt_sd: Annotated[Array, Quantity("standard deviation of wall_tilt", "rad", "wall")]
     pixel_size_sd: Annotated[float, Quantity("standard deviation of pixel_size")]
+    radius_offset_sd: Annotated[float, Quantity("standard deviation of radius_offset", "m", since=2)]
     lens_sd: Annotated[float, Quantity("standard deviation of lens", "m")]
     gap_sd: Annotated[float, Quantity("what the errors left do to a gap, noise apart", "m")]
     priors: CalibrationPriors  # those used: never wider than given, narrower where the gaps say so
@@ -86,6 +88,18 @@ class Calibration:
         """
         return float(np.hypot(self.noise_factor * sigma, self.gap_sd / np.sqrt(2.0)))
 
+    def of_grains(self, count: int) -> Calibration:
+        """The same for `count` grains: those after the ones that were calibrated were not corrected at all."""
+        more = count - len(self.radius)
+        unknown = np.full((more, 2), np.nan)
+        return replace(
+            self,
+            offset=np.concatenate([self.offset, np.zeros((more, 2))]),
+            radius=np.concatenate([self.radius, np.zeros(more)]),
+            offset_sd=np.concatenate([self.offset_sd, unknown]),
+            radius_sd=np.concatenate([self.radius_sd, unknown[:, 0]]),
+        )
+
     def correct(self, sequence: MeasuredSequence) -> MeasuredSequence:
         """Apply the corrections: centres, radii and walls of the sequence they were found in."""
         scale = 1.0 + self.pixel_size
@@ -95,8 +109,10 @@ class Calibration:
             scale * sequence.position + self.lens * bulge(sequence) + rotate_offsets(sequence, self.offset),
             sequence.rotation,
             sequence.present,
-            move_walls(endpoints, self.wall, self.wall_tilt),
+            move_walls(endpoints, self.wall, self.wall_tilt, sequence.side),
             sequence.sigma,
+            sequence.side,
+            sequence.cell,
         )
 
 
@@ -140,7 +156,10 @@ def _calibrate(
     scale = find_scale(sequence, limits, typical_overlap, radius_class)
     equations = GapEquations(scale.correct(sequence, radius_class), radius_class, walls_follow=scale.walls_follow)
     # A scale that may be right is not touched; one that was wrong is known to its standard deviation now.
-    rest = replace(limits, pixel_size=scale.pixel_size_sd if scale.found else 0.0, radius_class=0.0)
+    rest = replace(
+        limits, pixel_size=scale.pixel_size_sd if scale.found else 0.0, radius_class=0.0,
+        radius_offset=0.0,
+    )  # fmt: skip
     start, demand = narrow_priors(equations, rest, typical_overlap)
     lens_sd = _lens_sd(equations, start, typical_overlap, rng)
     if lens_sd is not None:
@@ -172,14 +191,19 @@ def _lens_sd(
 
 
 def expected_priors(
-    sequence: MeasuredSequence, *, pixel_size: float = 0.0, radius_class: float = 0.0
+    sequence: MeasuredSequence, *, pixel_size: float = 0.0, radius_class: float = 0.0, radius_offset: float = 0.0
 ) -> CalibrationPriors:
-    """What to think of errors nobody was told about; pixel_size and radius_class are relative."""
+    """What to think of errors nobody was told about; pixel_size, radius_class and radius_offset are relative."""
     radius = float(sequence.radius.mean())
+    if sequence.cell is not None:  # no camera saw it, and its size is told with the positions
+        pixel_size, lens = 0.0, 0.0
+    else:
+        lens = EXPECTED_LENS * 2.0 * radius
     centre = EXPECTED_CENTRE * 2.0 * radius
     return CalibrationPriors(
         centre, RADIUS_SHARE * centre, wall=EXPECTED_WALL * 2.0 * radius, wall_tilt=EXPECTED_TILT,
-        pixel_size=pixel_size, lens=EXPECTED_LENS * 2.0 * radius, radius_class=radius_class * radius,
+        pixel_size=pixel_size, lens=lens, radius_class=radius_class * radius,
+        radius_offset=radius_offset * radius,
     )  # fmt: skip
 
 
@@ -193,7 +217,9 @@ def _judge(
     raised: float,
 ) -> Calibration:
     layout, noise_factor = equations.layout, raised * fit.candidates.noise_factor
-    given = measure_gaps(fit.candidates.rows, sequence.position, sequence.endpoints, sequence.radius).gap
+    given = measure_gaps(
+        fit.candidates.rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side, sequence.cell
+    ).gap
     before = gap_statistics(given, fit)
     between, after = gap_statistics(fit.gap_before, fit), gap_statistics(fit.gap_after, fit)
     gain, certain = width_gain(fit), _certain_parts(equations, fit)
@@ -214,6 +240,7 @@ def _judge(
         radius=equations.radius(unknowns) - sequence.radius,
         wall=unknowns[layout.wall],
         wall_tilt=unknowns[layout.wall_tilt],
+        radius_offset=scale.radius_offset if applied else 0.0,
         pixel_size=(1.0 + scale.pixel_size) * (1.0 + float(unknowns[layout.scale][0])) - 1.0,
         lens=float(unknowns[layout.lens][0]),
         walls_follow=scale.walls_follow,
@@ -222,6 +249,7 @@ def _judge(
         wall_sd=sd[layout.wall],
         wall_tilt_sd=sd[layout.wall_tilt],
         pixel_size_sd=float(sd[layout.scale][0]) if scale.found else scale.pixel_size_sd,
+        radius_offset_sd=scale.radius_offset_sd,
         lens_sd=float(sd[layout.lens][0]),
         gap_sd=fit.gap_sd,
         priors=fit.priors,
@@ -236,6 +264,9 @@ def _judge(
 
 def _scale_parts(scale: ScaleErrors) -> list[str]:
     parts = [] if abs(scale.pixel_size) <= scale.pixel_size_sd else ["pixel size"]
+    parts += [] if abs(scale.radius_offset) <= scale.radius_offset_sd else ["all radii alike"]
+    if len(parts) and not scale.told_apart:
+        parts = ["pixel size or all radii alike, which rods of one size cannot tell"]
     return parts + (["radius classes"] if np.any(np.abs(scale.radius_class) > scale.radius_class_sd) else [])
 
 

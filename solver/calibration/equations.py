@@ -6,8 +6,9 @@ about its middle. The gap of grains i and j is then, to first order,
     g − n·Rot(θ_i) o_i + n·Rot(θ_j) o_j − δR_i − δR_j + ε n·(x_j − x_i),
 
 and of grain i and a wall g − n·Rot(θ_i) o_i − δR_i + b − a s − ε n·x_i, at the distance s from the wall's middle, with
-+ ε n·e more where the wall e was measured with the same pixel size. The angle θ counts from the first frame in which
-the grain is seen.
++ ε n·e more where the wall e was measured with the same pixel size. A circular wall that lies b further out has a
+radius that is b greater, or smaller where the packing is outside it; it is not turned. The angle θ counts from the
+first frame in which the grain is seen.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from solver.bodies.grains import Array
-from solver.calibration.gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps, outward_normals
+from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, circle_ends, circle_of, outward_normals
+from solver.calibration.gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +80,19 @@ def rotate_offsets(sequence: MeasuredSequence, offset: Array) -> Array:
     return np.where(sequence.present[..., None], turned, 0.0)
 
 
-def move_walls(endpoints: Array, outward: Array, tilt: Array) -> Array:
-    """Walls with endpoints (f, w, 2, 2) [m], moved outward (w,) [m] and turned by tilt (w,) [rad], small."""
+def move_walls(endpoints: Array, outward: Array, tilt: Array, side: Sides = None) -> Array:
+    """Walls with endpoints (f, w, 2, 2) [m], moved outward (w,) [m] and turned by tilt (w,) [rad], small.
+
+    side (w,): which are circles; these get wider, or narrower, instead.
+    """
     along = endpoints[..., 1, :] - endpoints[..., 0, :]
     half = 0.5 * np.linalg.norm(along, axis=-1) * tilt  # (f, w) [m] outward at end 0, inward at end 1
     moved = np.stack([outward + half, outward - half], axis=-1)
-    return endpoints + moved[..., None] * outward_normals(endpoints)[:, :, None, :]
+    straight = endpoints + moved[..., None] * outward_normals(endpoints)[:, :, None, :]
+    if side is None or not np.any(side):
+        return straight
+    centre, radius, turn = circle_of(endpoints)
+    return np.where((side != STRAIGHT)[:, None, None], circle_ends(centre, radius + side * outward, turn), straight)
 
 
 def bulge(sequence: MeasuredSequence) -> Array:
@@ -135,11 +144,13 @@ class GapEquations:
     def endpoints(self, unknowns: Array) -> Array:
         """Corrected ends of the walls (f, w, 2, 2) [m]."""
         scale = 1.0 + unknowns[self.layout.scale] * self.walls_follow
-        return move_walls(scale * self.sequence.endpoints, unknowns[self.layout.wall], unknowns[self.layout.wall_tilt])
+        out, tilt = unknowns[self.layout.wall], unknowns[self.layout.wall_tilt]
+        return move_walls(scale * self.sequence.endpoints, out, tilt, self.sequence.side)
 
     def measure(self, rows: GapRows, unknowns: Array) -> GapGeometry:
         """Compute the corrected gaps, exactly, not to first order."""
-        return measure_gaps(rows, self.position(unknowns), self.endpoints(unknowns), self.radius(unknowns))
+        radius, side, cell = self.radius(unknowns), self.sequence.side, self.sequence.cell
+        return measure_gaps(rows, self.position(unknowns), self.endpoints(unknowns), radius, side, cell)
 
     def derive(self, rows: GapRows, geometry: GapGeometry) -> sparse.csr_matrix:
         """Derivatives (m, unknowns) of the corrected gaps of `rows`, whose geometry is `geometry`."""
@@ -176,6 +187,11 @@ class GapEquations:
         wall = rows.with_wall(n)
         end = position[k, rows.second_grain(n)]
         end[wall] = self.sequence.endpoints[k[wall], rows.j[wall] - n, 0] if self.walls_follow else 0.0
+        if self.walls_follow and self.sequence.side is not None:
+            curved = np.zeros(rows.count, np.bool_)
+            curved[wall] = all_sides(self.sequence.side, self.layout.wall_count)[rows.j[wall] - n] != STRAIGHT
+            depth = geometry.gap + self.sequence.radius[rows.i]  # of any point of the wall's face, along the normal
+            end[curved] = (position[k, rows.i] + depth[:, None] * geometry.normal)[curved]
         return np.einsum("mk,mk->m", geometry.normal, end - position[k, rows.i])
 
     def _bend(self, rows: GapRows, geometry: GapGeometry) -> Array:

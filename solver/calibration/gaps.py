@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from solver.bodies.cell import Cell
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, beside_wall, reach_of_wall
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +23,8 @@ class MeasuredSequence:
     present: NDArray[np.bool_]  # (f, n)
     endpoints: Array  # (f, w, 2, 2) [m]; the packing lies to the left of endpoint 0 → 1
     sigma: Array  # (f, n) [m], standard deviation of the random error of a position component
+    side: Sides = None  # (w,) which walls are circles, as of Walls; None: none
+    cell: Array | None = None  # (f, 2, 2) [m] vectors of the periodic cell, in place of walls
 
     def __post_init__(self) -> None:
         f, n = self.present.shape
@@ -39,8 +43,9 @@ class MeasuredSequence:
         f = self.frame_count
         k = np.unique(np.linspace(0, f - 1, min(f, count)).round().astype(np.int64))
         return MeasuredSequence(
-            self.radius, self.position[k], self.rotation[k], self.present[k], self.endpoints[k], self.sigma[k]
-        )
+            self.radius, self.position[k], self.rotation[k], self.present[k], self.endpoints[k], self.sigma[k],
+            self.side, None if self.cell is None else self.cell[k],
+        )  # fmt: skip
 
     @property
     def frame_count(self) -> int:
@@ -109,28 +114,36 @@ def find_gap_rows(sequence: MeasuredSequence, reach: float, *, wall_reach: float
     return GapRows(frame[order], i[order], j[order], pair[order])
 
 
-def measure_gaps(rows: GapRows, position: Array, endpoints: Array, radius: Array) -> GapGeometry:
-    """Gaps of `rows` at position (f, n, 2) [m], endpoints (f, w, 2, 2) [m] and radius (n,) [m]."""
+def measure_gaps(
+    rows: GapRows,
+    position: Array,
+    endpoints: Array,
+    radius: Array,
+    side: Sides = None,
+    cell: Array | None = None,
+) -> GapGeometry:
+    """Gaps of `rows` at position (f, n, 2) [m], endpoints (f, w, 2, 2) [m], radius (n,) [m] and cell (f, 2, 2) [m].
+
+    side (w,): which walls are circles.
+    """
     n = len(radius)
     k, i, grain, wall = rows.frame, rows.i, rows.second_grain(n), rows.with_wall(n)
     branch = position[k, grain] - position[k, i]
+    if cell is not None:
+        for each in np.unique(k):
+            branch[k == each] += Cell.at_rest(cell[each]).shift(branch[k == each])
     normal = branch / np.maximum(np.linalg.norm(branch, axis=1, keepdims=True), np.finfo(float).tiny)
     along = np.zeros(rows.count)
     kw, w, at = k[wall], rows.j[wall] - n, position[k[wall], i[wall]]
-    outward = outward_normals(endpoints)[kw, w]
-    branch[wall] = endpoints[kw, w, 0] - at
-    normal[wall] = outward
+    shape = all_sides(side, endpoints.shape[1])[w]
+    curved = shape != STRAIGHT
+    depth, outward = reach_of_wall(endpoints[kw, w], shape, at)
     direction = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
-    along[wall] = np.einsum("mk,mk->m", at - endpoints[kw, w].mean(axis=1), direction)
+    # A circle that is turned about its middle stays where it is.
+    along[wall] = np.where(curved, 0.0, np.einsum("mk,mk->m", at - endpoints[kw, w].mean(axis=1), direction))
     distance = np.einsum("mk,mk->m", branch, normal)
+    distance[wall], normal[wall] = depth, outward
     return GapGeometry(distance - radius[i] - np.where(wall, 0.0, radius[grain]), normal, along)
-
-
-def outward_normals(endpoints: Array) -> Array:
-    """Unit normals (…, 2) that point out of the packing, of walls with endpoints (…, 2, 2) [m]."""
-    along = endpoints[..., 1, :] - endpoints[..., 0, :]
-    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    return np.stack([along[..., 1], -along[..., 0]], axis=-1)
 
 
 def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach: float) -> tuple[NDArray, NDArray]:
@@ -138,19 +151,31 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
     position, radius = sequence.position[k], sequence.radius
     if len(rows) == 0:
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    tree = KDTree(position[rows])
-    pairs = rows[tree.query_pairs(2.0 * radius[rows].max() + reach, output_type="ndarray")]
-    i, j = pairs.min(axis=1), pairs.max(axis=1)
+    # A tree takes a negative distance for one without bounds.
+    widest = max(2.0 * radius[rows].max() + reach, 0.0)
+    if sequence.cell is not None:
+        return _pairs_of_cell(Cell.at_rest(sequence.cell[k]), position[rows], radius[rows], rows, widest, reach)
+    pairs = KDTree(position[rows]).query_pairs(widest, output_type="ndarray")
+    i, j = rows[pairs[:, 0]], rows[pairs[:, 1]]
     near = np.linalg.norm(position[j] - position[i], axis=1) - radius[i] - radius[j] < reach
 
-    start = sequence.endpoints[k, :, 0]
-    outward = outward_normals(sequence.endpoints[k])
-    along = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
-    length = np.linalg.norm(sequence.endpoints[k, :, 1] - start, axis=1)
-    offset = position[rows, None, :] - start[None]
-    gap = -np.einsum("nwk,wk->nw", offset, outward) - radius[rows, None]
-    s = np.einsum("nwk,wk->nw", offset, along)
-    # A grain meets a wall only beside the segment, give or take its radius.
-    beside = (s > -radius[rows, None]) & (s < length + radius[rows, None]) & (gap > -radius[rows, None])
+    walls, side = sequence.endpoints[k][None], all_sides(sequence.side, sequence.wall_count)[None]
+    place, margin = position[rows, None], radius[rows, None]
+    gap = reach_of_wall(walls, side, place)[0] - margin
+    # A grain meets a straight wall only beside it, give or take its radius.
+    beside = beside_wall(walls, side, place, margin) & (gap > -margin)
     grain, wall = np.nonzero(beside & (gap < wall_reach))
     return np.concatenate([i[near], rows[grain]]), np.concatenate([j[near], wall + sequence.grain_count])
+
+
+def _pairs_of_cell(
+    cell: Cell, position: Array, radius: Array, rows: NDArray, widest: float, reach: float
+) -> tuple[NDArray, NDArray]:
+    """The same across the edges of a cell, without walls; widest [m]: distance of centres that is looked at."""
+    place, owner = cell.with_surroundings(position, widest)
+    pairs = KDTree(place).query_pairs(widest, output_type="ndarray")
+    apart = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
+    pairs = np.sort(owner[pairs], axis=1)
+    near = (apart - radius[pairs].sum(axis=1) < reach) & (pairs[:, 0] < pairs[:, 1])
+    once = np.unique(pairs[near], axis=0)
+    return rows[once[:, 0]], rows[once[:, 1]]

@@ -41,10 +41,14 @@ class CalibrationPriors:
         float, Quantity("prior standard deviation of the shift of the farthest corner by the lens", "m")
     ] = 0.0
     radius_class: Annotated[float, Quantity("prior standard deviation of the error that a class shares", "m")] = 0.0
+    radius_offset: Annotated[
+        float, Quantity("prior standard deviation of the error that all radii share", "m", since=2)
+    ] = 0.0
 
     def __post_init__(self) -> None:
         given = (
-            self.centre, self.radius, self.wall, self.wall_tilt, self.pixel_size, self.lens, self.radius_class
+            self.centre, self.radius, self.wall, self.wall_tilt, self.pixel_size, self.lens, self.radius_class,
+            self.radius_offset,
         )  # fmt: skip
         if not min(given) >= 0.0:
             raise ValueError("a prior standard deviation is negative or not a number")

@@ -4,11 +4,12 @@ Touching grains of two classes have one gap: measured with the true scale and ra
 So the gaps of each pair of classes pile up at one value, on a tail of pairs that do not touch, and where they pile up
 tells an error that all of these pairs share,
 
-    gap = −overlap − ε (R_a + R_b) + δR_a + δR_b,
+    gap = −overlap − ε (R_a + R_b) + 2 ω + δR_a + δR_b,
 
-with ε the relative error of the pixel size and δR those of the classes. A pixel size is easily wrong by half a per
-cent, and machined rods are true to a thousandth unless a class was mistaken altogether: ε has a Gaussian prior, every
-δR an exponential one on both sides, so that the fewest causes that explain all gaps are found.
+with ε the relative error of the pixel size, ω one that all radii share, as where a rim is seen too far in, and δR those
+of the classes. A pixel size is easily wrong by half a per cent, rims are seen true or well inside, and machined rods
+are true to a thousandth unless a class was mistaken altogether: ε has a Gaussian prior, ω and every δR an exponential
+one on both sides, so that the fewest causes that explain all gaps are found. Rods of one size cannot tell ε from ω.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.calibration.gaps import MeasuredSequence, find_gap_rows, measure_gaps, outward_normals
+from solver.bodies.wall_shapes import all_sides, reach_of_wall
+from solver.calibration.gaps import MeasuredSequence, find_gap_rows, measure_gaps
 from solver.calibration.priors import CalibrationPriors
 
-REACH = 0.03  # of a mean diameter: gaps beyond are not looked at
+REACH = 0.06  # of a mean diameter: gaps beyond are not looked at
 COARSE = 1.5e-3  # of a mean diameter: width of the kernel that finds the pile, then reduced to the pile's own
 FINEST = 2e-4  # of a mean diameter: no narrower kernel
 KERNEL_STEPS = 30  # mean-shift steps
@@ -31,6 +33,7 @@ FRAMES = 20  # photographs that are looked at, evenly spread
 OVERLAP_DOUBT = 0.5  # the typical overlap is known to this share …
 TAIL_DOUBT = 0.1  # … and the tail of open gaps may draw the pile aside by this share of its width
 NORMAL_MEDIAN = 0.6745  # median of |N(0, 1)|
+TOLD = 3.0  # standard deviations beyond which an error is surely there
 DECISIVE = 20.0  # gain in twice the log likelihood, priors included, from which on the given scale is given up
 REWEIGHTINGS = 60  # of the exponential priors
 NEGLIGIBLE = 1e-3  # of a prior: an error of a class below this is none
@@ -42,10 +45,13 @@ class ScaleErrors:
 
     pixel_size: float  # relative; true distances are (1 + pixel_size) times the measured ones
     pixel_size_sd: float
-    radius_class: Array  # (c,) [m] from given to true radius
+    radius_class: Array  # (c,) [m] from given to true radius, beside radius_offset
     radius_class_sd: Array  # (c,) [m]
     walls_follow: bool  # the walls were measured with the same pixel size
     found: bool  # False: all of it is zero
+    radius_offset: float = 0.0  # [m] from given to true radius, of all grains
+    radius_offset_sd: float = 0.0
+    told_apart: bool = True  # whether the gaps tell the pixel size from the offset of the radii
 
     def correct(self, sequence: MeasuredSequence, radius_class: NDArray[np.integer] | None) -> MeasuredSequence:
         """Apply them. radius_class (n,): the class of each grain, as they were found with."""
@@ -55,7 +61,7 @@ class ScaleErrors:
         classes = np.zeros(sequence.grain_count, np.int64) if radius_class is None else radius_class
         return replace(
             sequence,
-            radius=sequence.radius + self.radius_class[classes],
+            radius=sequence.radius + self.radius_offset + self.radius_class[classes],
             position=scale * sequence.position,
             endpoints=scale * sequence.endpoints if self.walls_follow else sequence.endpoints,
         )
@@ -86,24 +92,32 @@ def find_scale(
     classes = np.zeros(sequence.grain_count, np.int64) if radius_class is None else radius_class.astype(np.int64)
     count = int(classes.max(initial=0)) + 1
     nothing = ScaleErrors(
-        0.0, priors.pixel_size, np.zeros(count), np.full(count, priors.radius_class), walls_follow=False, found=False
-    )
-    if priors.pixel_size == 0.0 and priors.radius_class == 0.0:
+        0.0, priors.pixel_size, np.zeros(count), np.full(count, priors.radius_class),
+        walls_follow=False, found=False, radius_offset_sd=priors.radius_offset,
+    )  # fmt: skip
+    if priors.pixel_size == 0.0 and priors.radius_class == 0.0 and priors.radius_offset == 0.0:
         return nothing
     piles = _find_piles(sequence.thinned(FRAMES), classes, overlap)
     if piles is None:
         return nothing
     errors, sd, gain = _explain(piles, count, priors)
+    # Each with all that the other may be: one of them has to be sure.
+    apart = bool(np.any(np.abs(errors[:2]) > TOLD * sd[:2])) or 0.0 in (priors.pixel_size, priors.radius_offset)
     if gain < DECISIVE:
-        return replace(nothing, pixel_size_sd=float(sd[0]), radius_class_sd=sd[1:])
-    found = ScaleErrors(float(errors[0]), float(sd[0]), errors[1:], sd[1:], walls_follow=False, found=True)
+        return replace(
+            nothing, pixel_size_sd=float(sd[0]), radius_offset_sd=float(sd[1]), told_apart=apart, radius_class_sd=sd[2:]
+        )
+    found = ScaleErrors(
+        float(errors[0]), float(sd[0]), errors[2:], sd[2:], walls_follow=False, found=True,
+        radius_offset=float(errors[1]), radius_offset_sd=float(sd[1]), told_apart=apart,
+    )  # fmt: skip
     return replace(found, walls_follow=_walls_follow(sequence.thinned(FRAMES), found, radius_class))
 
 
 def _find_piles(sequence: MeasuredSequence, classes: NDArray[np.int64], overlap: float) -> _Piles | None:
     diameter = 2.0 * float(sequence.radius.mean())
     rows = find_gap_rows(sequence, REACH * diameter, wall_reach=-np.inf)
-    gap = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius).gap
+    gap = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, cell=sequence.cell).gap
     pair_class = np.sort(np.stack([classes[rows.i], classes[rows.j]], axis=1), axis=1)
     piles = []
     for first, second in np.unique(pair_class, axis=0):
@@ -143,19 +157,19 @@ def _densest(gap: Array, kernel: float) -> float:
 
 
 def _explain(piles: _Piles, count: int, priors: CalibrationPriors) -> tuple[Array, Array, float]:
-    """The most probable errors (1 + c,), their standard deviations, and how much better than none they are."""
+    """The most probable errors (2 + c,), ε, ω and δR, their standard deviations, and what is gained over none."""
     rows = np.arange(len(piles.first))
-    matrix = np.zeros((len(rows), 1 + count))
+    matrix = np.zeros((len(rows), 2 + count))
     matrix[:, 0] = piles.distance
-    np.add.at(matrix, (rows, 1 + piles.first), -1.0)
-    np.add.at(matrix, (rows, 1 + piles.second), -1.0)
+    matrix[:, 1] = -2.0
+    np.add.at(matrix, (rows, 2 + piles.first), -1.0)
+    np.add.at(matrix, (rows, 2 + piles.second), -1.0)
     precision = np.linalg.inv(np.diag(piles.sd**2) + piles.doubt**2)
     target = -piles.excess
-    limit = np.concatenate([[priors.pixel_size], np.full(count, priors.radius_class)])
+    limit = np.concatenate([[priors.pixel_size, priors.radius_offset], np.full(count, priors.radius_class)])
     free = limit > 0.0
+    gaussian = (np.arange(2 + count) < 1)[free]
     matrix, limit = matrix[:, free], limit[free]
-    gaussian = np.zeros(len(limit), np.bool_)
-    gaussian[0] = priors.pixel_size > 0.0
     variance = limit**2
     normal = matrix.T @ precision @ matrix
     right = matrix.T @ precision @ target
@@ -168,7 +182,7 @@ def _explain(piles: _Piles, count: int, priors: CalibrationPriors) -> tuple[Arra
     cost = np.where(gaussian, (errors / limit) ** 2, 2.0 * np.abs(errors) / limit).sum()
     gain = target @ precision @ target - residual @ precision @ residual - cost
     spread = np.where(gaussian, limit**2, np.maximum(variance, limit**2))
-    all_errors, sd = np.zeros(1 + count), np.zeros(1 + count)
+    all_errors, sd = np.zeros(2 + count), np.zeros(2 + count)
     all_errors[free] = errors
     sd[free] = np.sqrt(np.diag(np.linalg.inv(normal + np.diag(1.0 / spread))))
     return all_errors, sd, float(gain)
@@ -186,8 +200,8 @@ def _walls_follow(sequence: MeasuredSequence, found: ScaleErrors, radius_class: 
 
 def _misfit(sequence: MeasuredSequence) -> float:
     """How far the walls stand off their nearest grains, or cut into them [m], summed over the walls."""
-    outward = outward_normals(sequence.endpoints)
-    ahead = sequence.endpoints[:, None, :, 0] - sequence.position[:, :, None]
-    gap = np.einsum("fnwk,fwk->fnw", ahead, outward) - sequence.radius[:, None]
+    side = all_sides(sequence.side, sequence.wall_count)
+    depth, _ = reach_of_wall(sequence.endpoints[:, None], side, sequence.position[:, :, None])
+    gap = depth - sequence.radius[:, None]
     gap = np.where(sequence.present[..., None], gap, np.inf)
     return float(np.abs(np.median(gap.min(axis=1), axis=0)).sum())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
 
 
@@ -30,16 +31,23 @@ def rattlers(contacts: Contacts, bearing: NDArray[np.bool_], present: NDArray[np
 
 
 def coordination_number(
-    contacts: Contacts, bearing: NDArray[np.bool_], present: NDArray[np.bool_], *, without_rattlers: bool = False
+    contacts: Contacts,
+    bearing: NDArray[np.bool_],
+    present: NDArray[np.bool_],
+    *,
+    without_rattlers: bool = False,
+    weight: Array | None = None,
 ) -> float:
-    """Mean number of bearing contacts of a present grain; a contact with a wall counts once. 0 without grains."""
-    count = contacts_per_grain(contacts, bearing)
-    counted = present.copy()
-    if without_rattlers:
-        loose = rattlers(contacts, bearing, present)
-        counted &= ~loose
-        pair = contacts.j < contacts.grain_count
-        kept = bearing & ~loose[contacts.i]
-        kept[pair] &= ~loose[contacts.j[pair]]
-        count = contacts_per_grain(contacts, kept)
-    return float(count[counted].mean()) if counted.any() else 0.0
+    """Mean number of contacts of a present grain; a contact with a wall counts once. 0 without grains.
+
+    bearing (c,): which contacts count, and which hold a grain, so that it is no rattler; weight (c,): how likely each
+    contact, bearing or not, bears force, where counts are to be what is expected; None: as bearing says.
+    """
+    loose = rattlers(contacts, bearing, present) if without_rattlers else np.zeros(contacts.grain_count, np.bool_)
+    pair, weight = ~contacts.with_wall, bearing.astype(np.float64) if weight is None else weight
+    i, j = contacts.i, contacts.j[pair]
+    held = ~loose[i]
+    held[pair] &= ~loose[j]
+    counted = present & ~loose
+    total = float(weight @ (held & counted[i]) + weight[pair] @ (held[pair] & counted[j]))
+    return total / int(counted.sum()) if counted.any() else 0.0

@@ -11,8 +11,10 @@ from jaxtyping import Float, Int32
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from solver.bodies.cell import Cell
 from solver.bodies.grains import Array, Grains
 from solver.bodies.quantity import Quantity
+from solver.bodies.wall_shapes import Sides, beside_wall, reach_of_wall
 from solver.bodies.walls import Walls
 from solver.contacts.pairs import Keys, make_keys, split_keys
 
@@ -38,6 +40,10 @@ class Contacts:
     ]
     grain_count: int  # n: j >= n is a wall
     wall_count: int
+    shift: Annotated[
+        Float[Array, "c 2"] | None,
+        Quantity("to be added to the centre of j for the image that i touches", "m", "contact xy", since=2),
+    ] = None  # there is no periodic cell
 
     @property
     def count(self) -> int:
@@ -57,6 +63,19 @@ class Contacts:
     def with_wall(self) -> NDArray[np.bool_]:
         return self.j >= self.grain_count
 
+    def second_centre(self, position: Array) -> Array:
+        """Centre of j as i touches it (c, 2) [m], where j is a grain; else NaN. position (n, 2) [m]."""
+        centre = np.full((self.count, 2), np.nan)
+        pair = ~self.with_wall
+        centre[pair] = position[self.j[pair]]
+        return centre if self.shift is None else centre + self.shift
+
+    @property
+    def gauge(self) -> NDArray[np.bool_]:
+        """Contacts the sum of whose f_n stands for an unknown scale (c,): those with walls, or all without walls."""
+        wall = self.with_wall
+        return wall if wall.any() else np.ones(self.count, np.bool_)
+
     @property
     def tangent(self) -> Array:
         """The normal turned by +90° (c, 2)."""
@@ -66,7 +85,7 @@ class Contacts:
         """Keep some rows (mask, or ascending indices)."""
         return Contacts(
             self.i[rows], self.j[rows], self.gap[rows], self.normal[rows], self.point[rows],
-            self.grain_count, self.wall_count,
+            self.grain_count, self.wall_count, None if self.shift is None else self.shift[rows],
         )  # fmt: skip
 
 
@@ -85,8 +104,11 @@ def detect_contacts(
     `wall_threshold` is given, between grain and wall too.
     """
     wall_threshold = threshold if wall_threshold is None else wall_threshold
-    i, j = _grain_pairs(grains.radius, position, present, threshold)
-    wi, wj = _wall_pairs(grains.radius, position, present, walls, wall_threshold)
+    i, j = _grain_pairs(grains.radius, position, present, threshold, walls.cell)
+    if grains.boundary is not None:
+        some = ~(grains.boundary[i] & grains.boundary[j])  # between what moves as it was seen are no contacts
+        i, j = i[some], j[some]
+    wi, wj = _wall_pairs(grains.radius, position, present & grains.free, walls, wall_threshold)
     return measure_contacts(grains, position, walls, np.concatenate([i, wi]), np.concatenate([j, wj + grains.count]))
 
 
@@ -103,6 +125,11 @@ def measure_contacts(
 
     a, b = i[~wall], j[~wall]
     branch = position[b] - position[a]
+    shift = None
+    if walls.cell is not None:
+        shift = np.zeros((len(i), 2))
+        shift[~wall] = walls.cell.shift(branch)
+        branch += shift[~wall]
     distance = np.linalg.norm(branch, axis=1)
     if np.any(distance == 0.0):
         row = int(np.argmin(distance))
@@ -111,11 +138,11 @@ def measure_contacts(
     gap[~wall] = distance - grains.radius[a] - grains.radius[b]
 
     a, w = i[wall], j[wall] - n
-    normal[wall] = walls.outward[w]
-    gap[wall] = np.einsum("ij,ij->i", walls.endpoints[w, 0] - position[a], normal[wall]) - grains.radius[a]
+    distance, normal[wall] = walls.reach(w, position[a])
+    gap[wall] = distance - grains.radius[a]
 
     point = position[i] + normal * (grains.radius[i] + 0.5 * gap)[:, None]
-    return Contacts(i, j, gap, normal, point, n, walls.count)
+    return Contacts(i, j, gap, normal, point, n, walls.count, shift)
 
 
 def measure_pairs(grains: Grains, position: Array, walls: Walls, key: Keys) -> Contacts:
@@ -124,30 +151,41 @@ def measure_pairs(grains: Grains, position: Array, walls: Walls, key: Keys) -> C
 
 
 def _grain_pairs(
-    radius: Array, position: Array, present: NDArray[np.bool_], threshold: float
+    radius: Array, position: Array, present: NDArray[np.bool_], threshold: float, cell: Cell | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     rows = np.flatnonzero(present)
     if len(rows) < 2:
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    tree = KDTree(position[rows])
-    pairs = rows[tree.query_pairs(2.0 * radius[rows].max() + threshold, output_type="ndarray")]
-    i, j = pairs.min(axis=1), pairs.max(axis=1)
-    gap = np.linalg.norm(position[j] - position[i], axis=1) - radius[i] - radius[j]
+    reach = 2.0 * radius[rows].max() + threshold
+    place, owner = (position[rows], rows) if cell is None else _surroundings(cell, position, rows, reach)
+    pairs = KDTree(place).query_pairs(reach, output_type="ndarray")
+    i, j = owner[pairs].min(axis=1), owner[pairs].max(axis=1)
+    gap = np.linalg.norm(place[pairs[:, 1]] - place[pairs[:, 0]], axis=1) - radius[i] - radius[j]
     near = gap < threshold
-    return i[near], j[near]
+    i, j = i[near], j[near]
+    if cell is None:
+        return i, j
+    once = np.unique(i[i < j] * len(radius) + j[i < j])  # a pair and its image are one
+    return once // len(radius), once % len(radius)
+
+
+def _surroundings(cell: Cell, position: Array, rows: NDArray[np.intp], reach: float) -> tuple[Array, NDArray[np.intp]]:
+    place, owner = cell.with_surroundings(position[rows], reach)
+    return place, rows[owner]
 
 
 def _wall_pairs(
     radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """A grain meets a wall only beside the segment: its centre must project onto it, give or take one radius."""
-    start, direction, outward = walls.endpoints[:, 0], walls.direction, walls.outward
-    offset = position[:, None, :] - start[None, :, :]
-    gap = -np.einsum("nwk,wk->nw", offset, outward) - radius[:, None]
-    along = np.einsum("nwk,wk->nw", offset, direction)
-    beside = (along > -radius[:, None]) & (along < walls.length[None, :] + radius[:, None])
+    """A grain meets a straight wall only beside it: its centre must project onto it, give or take one radius."""
+    gap = reach_of_wall(walls.endpoints[None], _row(walls.side), position[:, None])[0] - radius[:, None]
+    beside = beside_wall(walls.endpoints[None], _row(walls.side), position[:, None], radius[:, None])
     i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & beside & present[:, None])
     return i, w
+
+
+def _row(side: Sides) -> Sides:
+    return None if side is None else side[None]
 
 
 class ContactState(IntEnum):
@@ -160,3 +198,4 @@ class ContactSource(IntEnum):
     DETECTED = 0
     ADDED_BY_REVIEWER = 1
     FORBIDDEN_BY_REVIEWER = 2
+    DEMANDED = 3  # not detected, but without it the forces around it do not fit the motion

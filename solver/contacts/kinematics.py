@@ -68,8 +68,8 @@ def relative_motion(
     """Give the motion of j as seen from i at every contact, (u_n, u_t), each (c,).
 
     translation (n, 2) and rotation (n,) are velocities [m/s, rad/s], or displacements [m, rad] if
-    `walls.velocity` holds the displacements of the endpoints too. u_n > 0 opens. A contact of a grain whose
-    motion is NaN is NaN.
+    `walls.velocity` holds the displacements of the endpoints too, and the cell's that of its vectors. u_n > 0 opens.
+    A contact of a grain whose motion is NaN is NaN.
     """
     i, j = contacts.i, contacts.j
     wall = contacts.with_wall
@@ -77,6 +77,8 @@ def relative_motion(
     turn = -radius[i] * rotation[i]
     motion[~wall] += translation[j[~wall]]
     turn[~wall] -= radius[j[~wall]] * rotation[j[~wall]]
+    if walls.cell is not None and contacts.shift is not None:
+        motion += walls.cell.drift(contacts.shift)
     motion[wall] += walls.velocity_at(j[wall] - contacts.grain_count, contacts.point[wall])
     un = np.einsum("ij,ij->i", motion, contacts.normal)
     ut = np.einsum("ij,ij->i", motion, contacts.tangent) + turn

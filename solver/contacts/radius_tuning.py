@@ -94,7 +94,7 @@ def find_candidates(
     """
     reach = greatest_change + ABOVE_STEP
     contacts = detect_contacts(grains, position, present, walls, 2.0 * reach, wall_threshold=reach)
-    return Candidates(contacts, np.where(contacts.with_wall, contacts.gap, 0.5 * contacts.gap), present)
+    return Candidates(contacts, np.where(contacts.with_wall, contacts.gap, 0.5 * contacts.gap), present & grains.free)
 
 
 def coordination_numbers(frames: Sequence[Candidates], change: float) -> Array:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
-from solver.bodies.motion import Snapshot
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, ContactSource, measure_pairs
 from solver.contacts.pairs import Keys, are_among, are_there, find_rows, join_keys
@@ -73,29 +72,6 @@ def sources(contacts: Contacts, probability: Array, verdicts: Verdicts) -> NDArr
     return source
 
 
-def without_ignored(snapshots: Sequence[Snapshot], verdicts: Mapping[int, Verdicts]) -> list[Snapshot]:
-    """Put snapshots between their neighbours where a frame is to be ignored.
-
-    Positions, rotations and walls go linearly in time from the last believed frame to the next; before the first and
-    behind the last they stand still. Raises ValueError where every frame is ignored.
-    """
-    ignored = {k for k, each in verdicts.items() if each.ignored and 0 <= k < len(snapshots)}
-    believed = [k for k in range(len(snapshots)) if k not in ignored]
-    if not believed:
-        raise ValueError("every frame is ignored: nothing is left to solve")
-    shown = list(snapshots)
-    for k in ignored:
-        before = max((b for b in believed if b < k), default=believed[0])
-        after = min((b for b in believed if b > k), default=believed[-1])
-        one, two = snapshots[before], snapshots[after]
-        span = two.time - one.time
-        share = min(max((snapshots[k].time - one.time) / span, 0.0), 1.0) if span > 0 else 0.0
-        shown[k] = replace(
-            snapshots[k],
-            position=(1.0 - share) * one.position + share * two.position,
-            rotation=(1.0 - share) * one.rotation + share * two.rotation,
-            present=one.present & two.present,
-            endpoints=(1.0 - share) * one.endpoints + share * two.endpoints,
-            sigma=max(one.sigma, two.sigma),
-        )
-    return shown
+def find_ignored(verdicts: Mapping[int, Verdicts]) -> set[int]:
+    """The frames that are not to be believed."""
+    return {k for k, each in verdicts.items() if each.ignored}

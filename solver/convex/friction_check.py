@@ -21,6 +21,12 @@ from solver.detection.touch_probability import ContactProbabilitySettings, proba
 # (packings of 500 and 1172 grains, μ = 0.15, 0.25 and 0.4).
 KNOWN_BIAS = 0.92
 BIAS_SCATTER = 0.07
+# Of walls, over the true one: 0.83 to 1.06 (a core in a ring and a shear box, 200 rods, μ = 0.15 and 0.4 at walls,
+# 0.25 between rods).
+WALL_BIAS_SCATTER = 0.12
+WALL_SCATTER = 0.15  # relative standard deviation over the frames above which nothing is said of walls
+WALL_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.45, 1.7, 2.0, 2.4)
+FEWEST_AT_WALLS = 20  # contacts
 INTERVAL = 2.0  # standard deviations
 FRAMES = 8  # consecutive photographs that the check looks at
 
@@ -38,6 +44,12 @@ class FrictionCheck:
     enclosed: Annotated[bool, Quantity("whether the friction lies within the trials", absent=False)]
     trial: Annotated[Array, Quantity("factors on the given friction that were tried", dims="friction_trial")]
     gap: Annotated[Array, Quantity("relative power gap of every trial", dims="friction_trial")]
+
+    wall_measured: Annotated[
+        float, Quantity("friction of walls that the motion shows and that was used; NaN: as between grains", since=2)
+    ] = float("nan")
+    wall_low: Annotated[float, Quantity("lower end of its interval", since=2)] = float("nan")
+    wall_high: Annotated[float, Quantity("upper end of its interval", since=2)] = float("nan")
 
     @property
     def agrees(self) -> bool:
@@ -71,6 +83,39 @@ def check_friction(
     )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class WallFriction:
+    """The friction of walls that the motion shows, with its interval of two standard deviations."""
+
+    measured: float
+    low: float
+    high: float
+
+
+def measure_wall_friction(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    first: int,
+    last: int,
+    force_unit: float,
+    settings: ContactProbabilitySettings,
+) -> WallFriction | None:
+    """Measure the friction of walls as `check_friction` does that of all contacts, that between grains being known.
+
+    None where too few rods are at walls, or where what slides there does not tell it.
+    """
+    frames = [_sliding_frame(packing, snapshots, k, force_unit, settings) for k in range(first, last + 1)]
+    if np.mean([np.count_nonzero(frame.contacts.with_wall) for frame in frames]) < FEWEST_AT_WALLS:
+        return None
+    found = estimate_friction(frames, WALL_FACTORS, of_walls=True)
+    spread = found.factor_sd / max(found.factor, 1e-12)
+    if not found.enclosed or not spread < WALL_SCATTER:
+        return None
+    measured = packing.material.wall_friction * found.factor
+    width = INTERVAL * float(np.hypot(spread, WALL_BIAS_SCATTER))
+    return WallFriction(measured, measured * max(1.0 - width, 0.0), measured * (1.0 + width))
+
+
 def _sliding_frame(
     packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float, settings: ContactProbabilitySettings
 ) -> SlidingFrame:
@@ -78,13 +123,13 @@ def _sliding_frame(
     contacts, probability = probable_contacts(
         packing.grains, [snapshots[f] for f in window], k - window.start, settings
     )
-    walls = packing.walls(snapshot.endpoints)
+    walls = packing.walls_of(snapshot)
     friction = packing.material.friction_at(contacts.with_wall)
     balance = assemble_balance(
         contacts, packing.grains, walls, present=snapshot.present, friction=friction, force_unit=force_unit,
         gravity=packing.material.gravity,
         # The power gap does not depend on the scale of the forces, so any total will do.
-        wall_normal_total=None if walls.loaded.any() else force_unit * max(int(contacts.with_wall.sum()), 1),
+        wall_normal_total=None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1),
     )  # fmt: skip
     slip = measured_slip(contacts, packing.grains, walls, (snapshots[k - 1], snapshots[k + 1]))
     return SlidingFrame(balance, contacts, slip, probability)

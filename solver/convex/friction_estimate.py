@@ -9,7 +9,7 @@ assumed coefficient, no replacement of a tilt test. The spread over frames does 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from solver.convex.program import Balance, ConvexSettings, solve_member
 from solver.nlgs.warm_start import ForceMemory
 
 FACTORS = (0.5, 0.6, 0.7, 0.8, 0.88, 0.94, 1.0, 1.06, 1.14, 1.25, 1.45, 1.7, 2.0)  # of the assumed coefficient
+SIDE = 2  # trials that are wanted on either side of the least gap
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class FrictionEstimate:
 
     factor: float
     factor_sd: float  # spread of the estimate over the frames, jackknife; NaN with fewer than three frames
-    trial: Array  # (q,) factors tried
+    trial: Array  # (q,) factors tried, ascending
     gap: Array  # (q,) relative power gap, mean over the frames
     enclosed: bool  # False: the least gap is at the first or last trial: the friction lies beyond, or nothing slides
 
@@ -53,17 +54,23 @@ def relative_power_gap(slip: Array, friction: Array, fn: Array, ft: Array) -> fl
 
 
 def estimate_friction(
-    frames: Sequence[SlidingFrame], factors: Sequence[float] = FACTORS, settings: ConvexSettings | None = None
+    frames: Sequence[SlidingFrame],
+    factors: Sequence[float] = FACTORS,
+    settings: ConvexSettings | None = None,
+    *,
+    of_walls: bool = False,
 ) -> FrictionEstimate:
     """Find the friction that explains the sliding of consecutive frames best, as a factor on the assumed one.
 
-    Friction between grains and with walls is changed by the same factor (those with walls must not be zero). Each
-    trial is a chain of its own through the frames. Errors: ValueError without frames or with fewer than three trials.
+    Friction between grains and with walls is changed by the same factor (those with walls must not be zero); of_walls:
+    that with walls alone, that between grains being known. Each
+    trial is a chain of its own through the frames; of the factors only those about the valley that is met from the
+    one nearest to 1 are tried. Errors: ValueError without frames or with fewer than three factors.
     """
     trial = np.sort(np.asarray(factors, dtype=np.float64))
     if not len(frames) or len(trial) < 3:
         raise ValueError("friction needs at least one frame and three trial factors")
-    gap = np.array([_gaps_of_a_chain(frames, factor, settings) for factor in trial]).T  # (f, q)
+    trial, gap = _walk_into_valley(trial, lambda factor: np.array(_gaps_of_a_chain(frames, factor, settings, of_walls)))
     gap = gap[np.isfinite(gap).all(axis=1)]
     if not len(gap):
         return FrictionEstimate(np.nan, np.nan, trial, np.full(len(trial), np.nan), False)
@@ -71,11 +78,37 @@ def estimate_friction(
     return FrictionEstimate(factor, _jackknife(trial, gap), trial, gap.mean(axis=0), enclosed)
 
 
-def _gaps_of_a_chain(frames: Sequence[SlidingFrame], factor: float, settings: ConvexSettings | None) -> list[float]:
+def _walk_into_valley(trial: Array, gaps_of: Callable[[float], Array]) -> tuple[Array, Array]:
+    """Try neighbour after neighbour until two lie on either side of the least gap, whichever frame is left out.
+
+    trial (q,), ascending; gaps_of a factor: those of all frames (f,). The factors tried (p,), and their gaps (f, p).
+    """
+    first = last = int(np.argmin(np.abs(np.log(trial))))
+    gap = gaps_of(float(trial[first]))[:, None]
+    while True:
+        known = gap[np.isfinite(gap).all(axis=1)]
+        if not len(known):
+            break
+        least = first + np.argmin([known.mean(axis=0), *_means_without_one(known)], axis=1)
+        if first > max(int(least.min()) - SIDE, 0):
+            first -= 1
+            gap = np.column_stack([gaps_of(float(trial[first])), gap])
+        elif last < min(int(least.max()) + SIDE, len(trial) - 1):
+            last += 1
+            gap = np.column_stack([gap, gaps_of(float(trial[last]))])
+        else:
+            break
+    return trial[first : last + 1], gap
+
+
+def _gaps_of_a_chain(
+    frames: Sequence[SlidingFrame], factor: float, settings: ConvexSettings | None, of_walls: bool
+) -> list[float]:
     memory = ForceMemory.empty()
     gaps = []
     for frame in frames:
-        balance = replace(frame.balance, friction=factor * frame.balance.friction)
+        tried = np.where(frame.contacts.with_wall | (not of_walls), factor, 1.0)
+        balance = replace(frame.balance, friction=tried * frame.balance.friction)
         former = memory.recall(frame.contacts)
         forces = solve_member(balance, frame.slip, frame.probability, former[:, 0], former[:, 1], settings)
         everyone = np.ones(frame.contacts.grain_count, dtype=bool)
@@ -101,5 +134,10 @@ def _jackknife(trial: Array, gap: Array) -> float:
     count = len(gap)
     if count < 3:
         return np.nan
-    without = [_least(trial, np.delete(gap, f, axis=0).mean(axis=0))[0] for f in range(count)]
+    without = [_least(trial, mean)[0] for mean in _means_without_one(gap)]
     return float(np.sqrt((count - 1) * np.var(without)))
+
+
+def _means_without_one(gap: Array) -> list[Array]:
+    """Mean gap of every trial (q,) without the first frame, without the second, …; none of fewer than three frames."""
+    return [np.delete(gap, f, axis=0).mean(axis=0) for f in range(len(gap))] if len(gap) > 2 else []

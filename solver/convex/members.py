@@ -80,6 +80,7 @@ def read_slip(
     _, ut = contact_displacement(
         contacts, grains.radius, (earlier, later) if refined is None else refined.position,
         (interval[0].rotation, interval[1].rotation), walls, (interval[0].endpoints, interval[1].endpoints),
+        (interval[0].cell, interval[1].cell),
     )  # fmt: skip
     noise = float(np.mean(deviation**2)) if contacts.count else 0.0
     return Slip(soft_slip(ut, scale, deviation / SLIP_SIGMAS, settings), scale**2 / (scale**2 + noise))

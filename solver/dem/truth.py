@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import Sides
 
 WALL_NAMES = ("bottom", "right", "top", "left")
 STABLE_DAMPING = 0.14  # greatest damping ratio × time step factor: at 0.17 packings were seen to shake themselves
@@ -25,6 +26,8 @@ class DemSettings:
     length: float = 0.06  # [m], of the rods
     friction: float = 0.25
     wall_friction: float = 0.25
+    rolling_friction: float = 0.0  # greatest rolling moment over f_n and the rolling radius R_i R_j / (R_i + R_j)
+    base_friction: float = 0.0  # [m/s²] coefficient × 9.81 of a base on which the rods lie; 0: none
     pressure: float = 50e3  # [Pa] on the plate; NaN: the plate is held
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
     normal_stiffness: float = 2e7  # [N/m]
@@ -41,7 +44,14 @@ class DemSettings:
         for name in ("density", "length", "normal_stiffness", "stiffness_ratio", "inertial_number"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-        for name in ("friction", "wall_friction", "damping_ratio", "plate_damping"):
+        for name in (
+            "friction",
+            "wall_friction",
+            "rolling_friction",
+            "base_friction",
+            "damping_ratio",
+            "plate_damping",
+        ):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
         if not 0.0 < self.time_step_factor <= 0.4:
@@ -63,8 +73,9 @@ class DemFrame:
     ft: Array  # (c,) [N]
     unbalance: float  # mean |ΣF| of a grain / mean f_n
     plate_unbalance: float  # |force on the plate − load| / load
-    shear: float  # [rad]
+    shear: float  # [rad]; of a periodic cell how far b leans over a, of its height
     pause: int  # steps that the frame stood still before the photograph
+    cell: Array | None = None  # (2, 2) [m] vectors of the periodic cell, in place of walls
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,13 +95,23 @@ class DemTruth:
     unbalance: Array  # (f,) mean |ΣF| of a grain / mean f_n
     shear: Array  # (f,) [rad]
     settings: DemSettings
+    cell: Array | None = None  # (f, 2, 2) [m] vectors of the periodic cell, in place of walls
+    side: Sides = None  # (w,) which walls are circles; None: none
 
     @property
     def frame_count(self) -> int:
         return len(self.unbalance)
 
     @classmethod
-    def of_frames(cls, radius: Array, frames: list[DemFrame], settings: DemSettings) -> DemTruth:
+    def of_frames(
+        cls,
+        radius: Array,
+        frames: list[DemFrame],
+        settings: DemSettings,
+        *,
+        wall_names: tuple[str, ...] = WALL_NAMES,
+        side: Sides = None,
+    ) -> DemTruth:
         """Collect photographs; raise UnbalancedError if one of them was not at rest."""
         for k, frame in enumerate(frames):
             if not max(frame.unbalance, frame.plate_unbalance) <= settings.unbalance_limit:
@@ -103,7 +124,7 @@ class DemTruth:
             position=np.stack([frame.position for frame in frames]),
             rotation=np.stack([frame.rotation for frame in frames]),
             endpoints=np.stack([frame.endpoints for frame in frames]),
-            wall_names=WALL_NAMES,
+            wall_names=wall_names if frames[0].cell is None else (),
             offset=np.concatenate([[0], np.cumsum([len(frame.i) for frame in frames])]).astype(np.int64),
             i=np.concatenate([frame.i for frame in frames]),
             j=np.concatenate([frame.j for frame in frames]),
@@ -112,7 +133,31 @@ class DemTruth:
             unbalance=np.array([frame.unbalance for frame in frames]),
             shear=np.array([frame.shear for frame in frames]),
             settings=settings,
+            cell=None if frames[0].cell is None else np.stack([np.asarray(frame.cell) for frame in frames]),
+            side=side,
         )
+
+    def without_wall(self, name: str) -> DemTruth:
+        """The same without a wall that no grain touches; ValueError if one does."""
+        row, n = self.wall_names.index(name), len(self.radius)
+        if np.any(self.j == n + row):
+            raise ValueError(f"wall {name} bears force")
+        return replace(
+            self,
+            endpoints=np.delete(self.endpoints, row, axis=1),
+            side=None if self.side is None else np.delete(self.side, row),
+            wall_names=tuple(other for other in self.wall_names if other != name),
+            j=np.where(self.j > n + row, self.j - 1, self.j).astype(np.int32),
+        )
+
+    def without_walls(self) -> DemTruth:
+        """The same of the grains alone: walls are gone, and contacts with them."""
+        keep = self.j < len(self.radius)
+        before = np.concatenate([[0], np.cumsum(keep)])
+        return replace(
+            self, endpoints=self.endpoints[:, :0], wall_names=(), side=None, offset=before[self.offset],
+            i=self.i[keep], j=self.j[keep], fn=self.fn[keep], ft=self.ft[keep],
+        )  # fmt: skip
 
     def frames(self, start: int, stop: int) -> DemTruth:
         """The photographs start … stop − 1 alone."""
@@ -121,5 +166,6 @@ class DemTruth:
             self.radius, self.position[part], self.rotation[part], self.endpoints[part], self.wall_names,
             self.offset[start : stop + 1] - self.offset[start],
             self.i[rows], self.j[rows], self.fn[rows], self.ft[rows],
-            self.unbalance[part], self.shear[part], self.settings,
+            self.unbalance[part], self.shear[part], self.settings, None if self.cell is None else self.cell[part],
+            self.side,
         )  # fmt: skip

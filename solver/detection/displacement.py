@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from solver.bodies.cell import Cell
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import walls_moved
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
 from solver.contacts.kinematics import relative_motion
@@ -22,14 +24,20 @@ def contact_displacement(
     rotation: tuple[Array, Array],
     walls: Walls,
     endpoints: tuple[Array, Array],
+    cells: tuple[Array | None, Array | None] = (None, None),
 ) -> tuple[Array, Array]:
     """Give the measured relative displacement at the contacts between two frames (u_n, u_t), each (c,) [m].
 
     position: earlier and later (n, 2) [m], NaN where a grain is missing; rotation: both (n,) [rad]; endpoints: both
-    (w, 2, 2) [m]. Contacts, walls and radius (n,) [m] are those of the frame whose forces are sought: its normals and
-    points hold for the whole interval. A contact of a grain missing in either frame gets NaN.
+    (w, 2, 2) [m]; cells: vectors (2, 2) [m] of both, where there is a cell. Contacts, walls and radius (n,) [m] are
+    those of the frame whose forces are sought: its normals and points hold for the whole interval. A contact of a
+    grain missing in either frame gets NaN.
     """
-    moved = Walls(walls.endpoints, endpoints[1] - endpoints[0], walls.load)
+    cell, (before, after) = walls.cell, cells
+    if cell is not None and before is not None and after is not None:
+        cell = Cell(cell.vectors, after - before)
+    way = walls_moved(*endpoints, walls.side, at=walls.endpoints)
+    moved = Walls(walls.endpoints, way, walls.load, walls.side, cell)
     return relative_motion(contacts, radius, position[1] - position[0], rotation[1] - rotation[0], moved)
 
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
-from solver.bodies.walls import Walls
 from solver.contacts.contacts import detect_contacts, measure_contacts
 
 REACH = 0.02  # [mean diameter] pairs beyond it cannot touch
@@ -50,14 +49,18 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     return Precision(sigma, overlap, len(mean))
 
 
+def contradiction(found: Precision, stated: float) -> float:
+    """Measured over stated standard deviation [m] where the measurement contradicts it, else 1."""
+    factor = found.sigma / stated
+    return 1.0 if 1.0 / CONTRADICTION <= factor <= CONTRADICTION else factor
+
+
 def believed_precision(found: Precision, stated: Sequence[float], overlap: float) -> tuple[float, float]:
     """Factor on the stated standard deviations (f,) [m], and the overlap [m] to go on with.
 
     overlap [m] is the assumed one. Both stay as they are where the measurement does not contradict them.
     """
-    factor = found.sigma / float(np.median(stated))
-    if 1.0 / CONTRADICTION <= factor <= CONTRADICTION:
-        factor = 1.0
+    factor = contradiction(found, float(np.median(stated)))
     # What the noise hides of the overlap is not held against the assumption.
     unsure = UNSURE * found.sigma**2
     variance = float(np.clip(overlap**2, found.overlap**2 - unsure, found.overlap**2 + unsure))
@@ -71,7 +74,7 @@ def with_precision(snapshots: Sequence[Snapshot], factor: float) -> list[Snapsho
 
 def _gaps_in_a_row(grains: Grains, three: Sequence[Snapshot]) -> Array:
     """Gaps (3, c) [m] of near pairs of grains that all three snapshots show."""
-    walls = [Walls.at_rest(s.endpoints) for s in three]
+    walls = [s.walls for s in three]
     present = three[0].present & three[1].present & three[2].present
     near = detect_contacts(grains, three[1].position, present, walls[1], REACH * 2.0 * float(grains.radius.mean()))
     i, j = near.i[~near.with_wall], near.j[~near.with_wall]

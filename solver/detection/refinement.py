@@ -13,22 +13,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.motion import Snapshot
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, measure_contacts, measure_pairs
 from solver.contacts.pairs import Keys, are_there, make_keys, recall
-from solver.detection.band_inverse import band_inverse
 from solver.detection.displacement import displacement_scale
+from solver.detection.position_network import PositionNetwork
 from solver.detection.touch_probability import (
     AHEAD,
     BACK,
-    Candidates,
     ContactProbabilitySettings,
     find_candidates,
     smooth_gaps,
@@ -94,13 +89,13 @@ def refine(
     position = np.stack([each.position for each in snapshots])
     present = np.stack([each.present for each in snapshots])
     sigma = np.repeat([[each.sigma] for each in snapshots], grains.count, axis=1).astype(np.float64)
-    walls = [Walls.at_rest(s.endpoints) for s in snapshots]
+    walls = [s.walls for s in snapshots]
     seen = np.where(present[:, :, None], position, np.nan)
     pairs = find_candidates(grains, position, present, sigma, walls, settings)
     scale = np.array([
         displacement_scale(seen[f], seen[f + 1], 0.5 * (sigma[f] + sigma[f + 1])) for f in range(len(snapshots) - 1)
     ])  # fmt: skip
-    network = _Network.of(grains, pairs)
+    network = PositionNetwork.of(grains, pairs)
     normal = np.stack([
         measure_contacts(grains, seen[f], walls[f], pairs.i, pairs.j).normal for f in range(len(snapshots))
     ])  # fmt: skip
@@ -121,85 +116,13 @@ def refine(
         part = DAMPING if step else 1.0
         weight, pull = weight + part * (new_weight - weight), pull + part * (new_pull - pull)
         for f in range(len(snapshots)):
-            shift[f], gap, variance, slide[f] = network.solve(normal[f], pairs.gap[f], weight[f], pull[f], sigma[f])
+            told = network.refine(normal[f], pairs.gap[f], weight[f], pull[f], sigma[f])
+            shift[f], slide[f] = told.displacement, told.slide_variance
+            variance = told.gap_variance
             with np.errstate(divide="ignore"):
                 left = np.maximum(1.0 / variance - weight[f], LEAST_CAVITY / variance)
-            doubt[f] = np.where(np.isfinite(gap), 1.0 / left, doubt[f])
-            cavity[f] = (gap / variance - pull[f]) / left
+            doubt[f] = np.where(np.isfinite(told.gap), 1.0 / left, doubt[f])
+            cavity[f] = (told.gap / variance - pull[f]) / left
     touch = smooth_gaps(cavity, np.sqrt(doubt + spread), scale, settings).touch
     bodies = grains.count + (walls[0].count if walls else 0)
     return RefinedBlock(start, make_keys(pairs.i, pairs.j, bodies), touch, seen + shift, slide)
-
-
-@dataclass(frozen=True, slots=True)
-class _Network:
-    """The candidates of a block as a banded problem in the grains' displacements."""
-
-    i: NDArray[np.int64]  # (c,) place of the grain in the ordering
-    j: NDArray[np.int64]  # (c,) place of the other; where it is a wall, that of the grain itself
-    wall: NDArray[np.bool_]  # (c,)
-    place: NDArray[np.int64]  # (n,) of each grain in the ordering
-    band: int  # entries below the diagonal
-
-    @classmethod
-    def of(cls, grains: Grains, pairs: Candidates) -> _Network:
-        n = grains.count
-        wall = pairs.j >= n
-        i, j = pairs.i.astype(np.int64), np.where(wall, pairs.i, pairs.j).astype(np.int64)
-        graph = coo_array((np.ones(2 * len(i)), (np.append(i, j), np.append(j, i))), shape=(n, n)).tocsr()
-        place = np.empty(n, np.int64)
-        place[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(n)
-        widest = int(np.abs(place[i] - place[j]).max(initial=0))
-        return cls(place[i], place[j], wall, place, 2 * widest + 1)
-
-    def solve(
-        self, normal: Array, gap: Array, weight: Array, pull: Array, sigma: Array
-    ) -> tuple[Array, Array, Array, Array]:
-        """Displacements (n, 2) that agree best with the messages, and what they make of the pairs.
-
-        normal (c, 2); gap (c,) [m] as measured; weight (c,) [1/m²] and pull (c,) [1/m] of the messages; sigma (n,)
-        [m]. The pairs' gaps (c,) [m], their variance and that along the tangent (c,) [m²].
-        """
-        n = len(self.place)
-        known = np.isfinite(gap)
-        normal, gap = np.where(known[:, None], normal, 0.0), np.where(known, gap, 0.0)
-        weight, pull = np.where(known, weight, 0.0), np.where(known, pull, 0.0)
-        matrix, right = np.zeros((self.band + 1, 2 * n)), np.zeros(2 * n)
-        matrix[0, np.repeat(2 * self.place, 2) + np.tile([0, 1], n)] = np.repeat(sigma**-2.0, 2)
-        force = (pull - weight * gap)[:, None] * normal
-        other = ~self.wall
-        low, high = np.minimum(self.i, self.j), np.maximum(self.i, self.j)
-        for a in range(2):
-            np.add.at(right, 2 * self.i + a, -force[:, a])
-            np.add.at(right, 2 * self.j[other] + a, force[other, a])
-            for b in range(2):
-                block = weight * normal[:, a] * normal[:, b]
-                if b <= a:
-                    np.add.at(matrix[a - b], 2 * self.i + b, block)
-                    np.add.at(matrix[a - b], 2 * self.j[other] + b, block[other])
-                down = 2 * (high - low)[other] + a - b
-                np.add.at(matrix, (down, 2 * low[other] + b), -block[other])
-        factor, inverse = band_inverse(matrix)
-        moved = cho_solve_banded((factor, True), right, check_finite=False).reshape(n, 2)
-        between = np.where(self.wall[:, None], 0.0, moved[self.j]) - moved[self.i]
-        found = gap + np.einsum("ca,ca->c", normal, between)
-        tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        nan = np.where(known, 0.0, np.nan)
-        return (
-            moved[self.place], found + nan,
-            self._variance(inverse, normal) + nan, self._variance(inverse, tangent) + nan,
-        )  # fmt: skip
-
-    def _variance(self, inverse: Array, direction: Array) -> Array:
-        """Of the pairs' relative positions along directions (c, 2), from the inverse within the band (c,) [m²]."""
-        low, high = np.minimum(self.i, self.j), np.maximum(self.i, self.j)
-        total = np.zeros(len(direction))
-        for a in range(2):
-            for b in range(2):
-                product = direction[:, a] * direction[:, b]
-                own = inverse[2 * self.i + min(a, b), abs(a - b)]
-                partner = inverse[2 * self.j + min(a, b), abs(a - b)]
-                down = np.maximum(2 * (high - low) + a - b, 0)
-                cross = inverse[2 * low + b, down]
-                total += product * np.where(self.wall, own, own + partner - 2.0 * cross)
-        return np.maximum(total, 1e-30)

@@ -94,7 +94,7 @@ def probable_contacts(
     position = np.stack([snapshot.position for snapshot in window])
     present = np.stack([snapshot.present for snapshot in window])
     sigma = np.repeat([[snapshot.sigma] for snapshot in window], grains.count, axis=1).astype(np.float64)
-    walls = [Walls.at_rest(snapshot.endpoints) for snapshot in window]
+    walls = [snapshot.walls for snapshot in window]
     seen = np.where(present[:, :, None], position, np.nan)
     candidates = find_candidates(grains, position, present, sigma, walls, settings)
     scale = np.array(

@@ -47,10 +47,17 @@ class ChainStep:
 
 
 def force_scale(packing: Packing, settings: ChainSettings) -> float:
-    """f₀ = σ L d [N], with the mean pressure of the plates and the mean diameter."""
+    """f₀ = σ L d [N], with the mean diameter and the mean pressure of the plates, or that of the packing's weight.
+
+    The weight presses on average with half of what all of it does on a square packing's base.
+    """
+    diameter = 2.0 * float(packing.grains.radius.mean())
     loaded = np.isfinite(packing.pressure)
-    pressure = float(packing.pressure[loaded].mean()) if loaded.any() else settings.reference_pressure
-    return pressure * packing.length * 2.0 * float(packing.grains.radius.mean())
+    if loaded.any():
+        return float(packing.pressure[loaded].mean()) * packing.length * diameter
+    if any(packing.material.gravity):
+        return 0.5 * float(np.linalg.norm(packing.weight.sum(axis=0))) / float(np.sqrt(packing.grains.count))
+    return settings.reference_pressure * packing.length * diameter
 
 
 def advance_chain(
@@ -63,7 +70,7 @@ def advance_chain(
     impedance, kappa = _impedance(packing, motion, settings, steps)
     nlgs = NlgsSettings(sweeps, settings.force_change, None, settings.relaxation)
     recorder = SweepRecorder(steps * sweeps, settings.keep)
-    load = packing.load(motion.endpoints)
+    load = packing.load(motion.endpoints, motion.side, motion.load)
 
     def contacts_at(fraction: float) -> tuple[ContactProblem, Contacts, Walls]:
         state, walls = motion.at(fraction, load)

@@ -20,7 +20,7 @@ from solver.nlgs.grain_records import WIDTH, gather_records, scatter_records
 from solver.nlgs.ordering import GROUP as L
 
 THIRD = 1.0 / 3.0  # W_nn over W_tt between two solid rods
-PAIR, IDS = 4 * L, 2 * L  # numbers in a block
+PAIR, IDS = 5 * L, 2 * L  # numbers in a block
 U = np.uint64
 U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 
@@ -102,7 +102,7 @@ def _relax_group(pair, ids, body, force, work, block, relaxation, mu):  # type: 
         bx, by, bw, cj = work[4 * L + k], work[5 * L + k], work[6 * L + k], work[7 * L + k]
         dx, dy = bx - ax, by - ay
         un = dx * nx + dy * ny + pair[p + 3 * L + k]
-        ut = dy * nx - dx * ny - aw - bw
+        ut = dy * nx - dx * ny - aw - bw + pair[p + 4 * L + k]
         fn, ft = force[f + 2 * k], force[f + 2 * k + 1]
         new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
         force[f + 2 * k] = new_n
@@ -128,7 +128,7 @@ def _relax_pair(pair, ids, body, force, c, relaxation, mu):  # type: ignore[no-u
     nx, ny, wn, ci, cj = pair[p], pair[p + L], relaxation * pair[p + 2 * L], body[i + U3], body[j + U3]
     dx, dy = body[j] - body[i], body[j + U1] - body[i + U1]
     un = dx * nx + dy * ny + pair[p + 3 * L]
-    ut = dy * nx - dx * ny - body[i + U2] - body[j + U2]
+    ut = dy * nx - dx * ny - body[i + U2] - body[j + U2] + pair[p + 4 * L]
     fn, ft = force[2 * c], force[2 * c + 1]
     new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
     force[2 * c] = new_n
@@ -247,7 +247,7 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
             nx, ny, wn = pair[p + k], pair[p + L + k], pair[p + 2 * L + k]
             dx, dy = work[4 * L + k] - work[k], work[5 * L + k] - work[L + k]
             un = dx * nx + dy * ny + pair[p + 3 * L + k]
-            ut = dy * nx - dx * ny - work[2 * L + k] - work[6 * L + k]
+            ut = dy * nx - dx * ny - work[2 * L + k] - work[6 * L + k] + pair[p + 4 * L + k]
             work[8 * L + k] += _miss(f[e + 2 * k], f[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
     total = 0.0
     for k in range(L):
@@ -258,7 +258,7 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
         nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
         dx, dy = flat[j] - flat[i], flat[j + U1] - flat[i + U1]
         un = dx * nx + dy * ny + pair[p + 3 * L]
-        ut = dy * nx - dx * ny - flat[i + U2] - flat[j + U2]
+        ut = dy * nx - dx * ny - flat[i + U2] - flat[j + U2] + pair[p + 4 * L]
         total += _miss(f[2 * c], f[2 * c + 1], un, ut, wn, THIRD * wn, mu)
     for c in range(len(problem.wall)):
         i, w, row = U4 * U(problem.wall_body[c, 0]), U(problem.wall_body[c, 1]), 2 * (first + c)

@@ -36,7 +36,8 @@ class ContactProblem(NamedTuple):
     body: Float[Array, "n 4"]  # free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Float[Array, "w 2"]  # free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
     pair_body: Int32[NDArray[np.int32], "blocks 2 L"]  # grains i, j
-    pair: Float[Array, "blocks 4 L"]  # nx, ny, 1/W_nn, and the velocity [m/s] added to u_n: gap to close
+    # nx, ny, 1/W_nn, and what is added to u_n, u_t [m/s]: gap to close, motion of the cell between both
+    pair: Float[Array, "blocks 5 L"]
     grouped: int  # a multiple of L, at most p
     wall_body: Int32[NDArray[np.int32], "q 2"]  # grain, wall
     # nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
@@ -84,9 +85,10 @@ def assemble(
     n = grains.count
     if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
         raise ValueError("a contact names a grain that is not present")
-    compliance = 1.0 / impedance
+    moved = motion.present & grains.free  # by forces; the others move as they were seen
+    compliance = np.where(grains.free, 1.0 / impedance, 0.0)
     weight = grains.weight(material.gravity)
-    weight[~motion.present] = 0.0
+    weight[~moved] = 0.0
     body = np.zeros((n, 4))
     body[:, :2] = motion.velocity + weight * compliance[:, None]
     body[:, 2] = motion.spin * grains.radius
@@ -109,15 +111,23 @@ def assemble(
     closing = np.zeros(contacts.count) if closing is None else closing
 
     pair_w = compliance[i[rows_pair]] + compliance[j[rows_pair]]
-    pair = np.column_stack([contacts.normal[rows_pair], 1.0 / pair_w, closing[rows_pair]])
+    drift = np.zeros((len(rows_pair), 2))
+    if walls.cell is not None and contacts.shift is not None:
+        drift = walls.cell.drift(contacts.shift[rows_pair])
+    pair = np.column_stack([
+        contacts.normal[rows_pair],
+        _inverse(pair_w),
+        closing[rows_pair] + np.einsum("ij,ij->i", drift, contacts.normal[rows_pair]),
+        np.einsum("ij,ij->i", drift, contacts.tangent[rows_pair]),
+    ])  # fmt: skip
 
     wall_body = np.stack([i[rows_wall], j[rows_wall] - n], axis=1)
     wall_w = compliance[wall_body[:, 0]]
     velocity = walls.velocity_at(wall_body[:, 1], point[rows_wall])
     wall = np.column_stack([
         contacts.normal[rows_wall],
-        1.0 / (wall_w + plate[wall_body[:, 1], 1]),
-        1.0 / (3.0 * wall_w),
+        _inverse(wall_w + plate[wall_body[:, 1], 1]),
+        _inverse(3.0 * wall_w),
         np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall]) + closing[rows_wall],
         np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall]),
     ])  # fmt: skip
@@ -134,6 +144,11 @@ def assemble(
         weight,
         np.concatenate([rows_pair, rows_wall]),
     )
+
+
+def _inverse(value: Array) -> Array:
+    """1 / value (c,); 0 where that is 0: between two bodies whose motion is imposed, forces change nothing."""
+    return np.divide(1.0, value, out=np.zeros_like(value), where=value > 0.0)
 
 
 def aligned_zeros(shape: tuple[int, ...], kind: type = np.float64) -> NDArray:

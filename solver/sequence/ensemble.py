@@ -16,17 +16,22 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.bodies.motion import Snapshot
-from solver.contacts.contacts import Contacts
-from solver.contacts.pairs import are_among
+from solver.contacts.contacts import Contacts, measure_pairs
+from solver.contacts.pairs import are_among, are_there, join_keys, recall
 from solver.contacts.verdicts import apply_verdicts
 from solver.convex.members import RefinedMotion, Slip, advance_member, read_slip, steady_slip
 from solver.convex.program import Balance, assemble_balance, polish
 from solver.detection.displacement import find_reversals, member_intervals
 from solver.detection.networks import PairProbability, ProbablePairs
+from solver.mixture.mixing import offered_pairs
 from solver.nlgs.chain import ChainStep, advance_chain, force_scale
 from solver.nlgs.warm_start import ForceMemory
+from solver.posterior.frame_posterior import FramePosterior
+from solver.sequence.demand import NO_DEMAND, ROUNDS, WINS, Demand, find_demand
 from solver.sequence.frame_problem import FrameProblem
+from solver.sequence.judgement import SETTLED_DIFFERENCE
 from solver.statistics.agreement import relative_change
+from solver.statistics.bearing import cone_share
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +47,30 @@ class EnsembleState:
     wide: ForceMemory  # convex, (k − 2, k + 2)
     steady: ForceMemory  # convex, what (k − 1, k) and (k, k + 1) have in common
     pairs: PairProbability
+    agreeing: int = 0  # frames running in which H was below its level
+
+    @property
+    def start_forgotten(self) -> bool:
+        """Whether two starts agreed for so long that the chain from another start tells nothing more."""
+        return self.agreeing >= AGREEING_FRAMES
 
     @classmethod
     def first(cls) -> EnsembleState:
         memory = ForceMemory.empty()
         return cls(memory, memory, memory, memory, memory, memory, memory, memory, PairProbability.none())
 
+    def renewed(self, contacts: Contacts, force: Array, present: NDArray[np.bool_]) -> EnsembleState:
+        """The same network, all members going on from these forces (c, 2) [N]."""
+        memory = self.last.renew(contacts, force, present)
+        return EnsembleState(
+            memory, memory, self.other, memory, memory, memory, memory, memory, self.pairs, self.agreeing
+        )
 
+
+AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
+CHAINS = 2  # the first of MEMBERS
 MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programs
+CHAINS = 2  # of the MEMBERS, the first
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +86,11 @@ class EnsembleForces:
     worth: Array  # (m,) weight of each member in the mean, at most 1
     place: NDArray[np.intp]  # (m,) of each member in MEMBERS
     state: EnsembleState
-    start_difference: float  # H, NaN where no motion leads to the frame
+    start_difference: float  # H, NaN where no motion leads to the frame and once the start is forgotten
     remark: str  # what went otherwise than it should, or empty
     forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
+    demand: Demand  # pairs among those of `step` that were not detected but demanded by the balance
 
     @property
     def member_force(self) -> Array:
@@ -76,6 +98,10 @@ class EnsembleForces:
         force = np.full((self.member_fn.shape[1], len(MEMBERS), 2), np.nan)
         force[:, self.place, 0], force[:, self.place, 1] = self.member_fn.T, self.member_ft.T
         return force
+
+    def cone_share(self, friction: Array) -> Array:
+        """Shares of the convex members and of the chains whose force is on the Coulomb cone (c, 2); friction (c,)."""
+        return cone_share(self.member_fn, self.member_ft, friction, self.place >= CHAINS)
 
     @property
     def spread_fn(self) -> Array:
@@ -91,16 +117,29 @@ class EnsembleForces:
     def disagreement(self) -> float:
         """D: rms spread of f_n over the rms of f_n; 0 where no contact bears force."""
         size = float(np.linalg.norm(self.fn))
-        return float(np.linalg.norm(self.spread_fn)) / size if size > 0 else 0.0
+        return float(np.linalg.norm(_spread(self.member_fn, self.worth))) / size if size > 0 else 0.0
 
 
-def solve_ensemble(problem: FrameProblem, state: EnsembleState) -> EnsembleForces:
-    """Solve one frame of a sequence with all members."""
-    touching = _find_touching(problem)
-    chains = _advance_chains(problem, state, touching)
-    balance = _assemble_balance(problem, touching.contacts, chains.soft)
-    members = _advance_members(problem, state, touching, balance, chains)
+def solve_ensemble(
+    problem: FrameProblem,
+    state: EnsembleState,
+    positions: FramePosterior | None = None,
+    demand: Demand = NO_DEMAND,
+) -> EnsembleForces:
+    """Solve one frame of a sequence with all members; positions: what they alone say of the frame, if they were asked.
+
+    Pairs that bear force by the positions are offered to the members of the motion, and such as the balance demands;
+    demand: those that are known already.
+    """
+    touching, chains, balance, members = _solve_members(problem, state, positions, demand)
+    for _ in range(ROUNDS):
+        more = find_demand(problem, touching.contacts, balance, members.convex)
+        if more.count == 0:
+            break
+        demand = demand.joined(more)
+        touching, chains, balance, members = _solve_members(problem, state, positions, demand)
     fn, ft, remark = _average(problem, balance, members)
+    remark += _tell_demand(touching.contacts, fn, demand)
     # A member that had nothing to read here goes on from the reported field.
     force = np.column_stack([fn, ft])
     reported = state.last.renew(touching.contacts, force, problem.snapshot.present)
@@ -109,10 +148,29 @@ def solve_ensemble(problem: FrameProblem, state: EnsembleState) -> EnsembleForce
     return EnsembleForces(
         chains.soft, fn, ft, touching.told, members.force[:, :, 0], members.force[:, :, 1], np.array(members.worth),
         np.array(members.place),
-        EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs),
+        EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing),
         chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
-        touching.forbidden_probability,
+        touching.forbidden_probability, demand.only(touching.contacts.key),
     )  # fmt: skip
+
+
+def _solve_members(
+    problem: FrameProblem, state: EnsembleState, positions: FramePosterior | None, demand: Demand
+) -> tuple[_Touching, _Chains, Balance, _Members]:
+    """All members on the contacts that were detected, offered and demanded."""
+    touching = _find_touching(problem, positions, demand)
+    chains = _advance_chains(problem, state, touching)
+    balance = assemble_frame_balance(problem, touching.contacts, chains.soft)
+    return touching, chains, balance, _advance_members(problem, state, touching, balance, chains)
+
+
+def _tell_demand(contacts: Contacts, fn: Array, demand: Demand) -> list[str]:
+    """How many pairs were demanded, and how many of them bear force."""
+    asked = are_among(contacts.key, demand.key)
+    if not asked.any():
+        return []
+    bearing = int((fn[asked] > WINS * fn[fn > 0].mean()).sum()) if (fn > 0).any() else 0
+    return [f"the balance demanded {asked.sum()} pairs that were not detected, of which {bearing} bear force"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +196,7 @@ class _Chains:
     stiff: ChainStep
     other: ForceMemory  # of the first chain from another start
     start_difference: float  # H
+    agreeing: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +209,20 @@ class _Members:
     memories: list[ForceMemory | None]  # of the five convex members; None: it had nothing to read
     remarks: list[str]
 
+    @property
+    def convex(self) -> list[Array]:
+        """The fields (c, 2) [N] of the convex members."""
+        return [force for force, place in zip(self.force, self.place, strict=True) if place >= CHAINS]
 
-def _find_touching(problem: FrameProblem) -> _Touching:
+
+def _find_touching(problem: FrameProblem, positions: FramePosterior | None, demand: Demand) -> _Touching:
     packing, snapshot, verdicts, refined = problem.packing, problem.snapshot, problem.verdicts, problem.refined
     assert refined is not None
     least = problem.settings.ensemble.probability.least
     detected, touch = refined.contacts_at(snapshot, problem.k, packing.grains, problem.walls, least)
+    if positions is not None:
+        detected, touch = _with_offered(problem, detected, touch, positions)
+    detected, touch = _with_demanded(problem, detected, touch, demand)
     contacts, before = apply_verdicts(
         detected, verdicts, packing.grains, snapshot.position, snapshot.present, problem.walls
     )
@@ -166,6 +233,29 @@ def _find_touching(problem: FrameProblem) -> _Touching:
     return _Touching(contacts, told, probability, detected.select(forbidden), touch[forbidden])
 
 
+def _with_offered(
+    problem: FrameProblem, detected: Contacts, touch: Array, positions: FramePosterior
+) -> tuple[Contacts, Array]:
+    """Contacts and P(touch) with the pairs added that bear force by the positions: nothing else brings them back."""
+    offered = offered_pairs(positions)
+    here = are_there(offered.key, problem.snapshot.present, offered.body_count)
+    key = join_keys(detected.key, offered.key[here])
+    contacts = measure_pairs(problem.packing.grains, problem.snapshot.position, problem.walls, key)
+    bears = recall(key, positions.contacts.key, positions.bears, fill=0.0)
+    told = recall(key, detected.key, touch, fill=0.0)
+    return contacts, np.where(are_among(key, offered.key), np.maximum(told, bears), told)
+
+
+def _with_demanded(problem: FrameProblem, detected: Contacts, touch: Array, demand: Demand) -> tuple[Contacts, Array]:
+    """Contacts and P(touch) with the pairs added that the balance demands."""
+    if demand.count == 0:
+        return detected, touch
+    key = join_keys(detected.key, demand.key)
+    contacts = measure_pairs(problem.packing.grains, problem.snapshot.position, problem.walls, key)
+    asked = recall(key, demand.key, demand.probability, fill=0.0)
+    return contacts, np.maximum(recall(key, detected.key, touch, fill=0.0), asked)
+
+
 def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touching) -> _Chains:
     packing, motion, contacts = problem.packing, problem.motion, touching.contacts
     chain = problem.settings.chain
@@ -174,21 +264,22 @@ def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touc
     assert chain.kappa is not None
     stiff_chain = replace(chain, kappa=chain.kappa * problem.settings.ensemble.stiffer, keep="none")
     stiff = advance_chain(packing, motion, state.stiff, stiff_chain, network)
-    if not motion.spans:
-        return _Chains(soft, stiff, state.other, np.nan)
+    if not motion.spans or state.start_forgotten:
+        return _Chains(soft, stiff, state.other, np.nan, state.agreeing)
     other = state.other
     if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
         uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
         other = other.renew(contacts, uniform, problem.snapshot.present)
     again = advance_chain(packing, motion, other, replace(chain, keep="none"), network)
     difference = relative_change(contacts.key, soft.solution.force, contacts.key, again.solution.force)
-    return _Chains(soft, stiff, again.memory, difference)
+    agreeing = state.agreeing + 1 if difference <= SETTLED_DIFFERENCE else 0
+    return _Chains(soft, stiff, again.memory, difference, agreeing)
 
 
-def _assemble_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep) -> Balance:
+def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep) -> Balance:
     packing, walls = problem.packing, problem.walls
-    # Without a load forces are known up to a scale: that of the first chain.
-    wall_total = None if walls.loaded.any() else float(soft.solution.fn[contacts.with_wall].sum())
+    # Without load and weight forces are known up to a scale: that of the first chain.
+    wall_total = None if packing.scale_is_known else float(soft.solution.fn[contacts.gauge].sum())
     return assemble_balance(
         contacts, packing.grains, walls, present=problem.snapshot.present,
         friction=packing.material.friction_at(contacts.with_wall),
@@ -255,4 +346,5 @@ def _slips(problem: FrameProblem, contacts: Contacts) -> tuple[Slip | None, ...]
 
 def _intervals(snapshots: Sequence[Snapshot], k: int) -> tuple[tuple[int, int] | None, ...]:
     position = np.stack([np.where(s.present[:, None], s.position, np.nan) for s in snapshots])
-    return member_intervals(k, find_reversals(np.stack([s.endpoints for s in snapshots]), position))
+    bounds = np.stack([s.endpoints if s.cell is None else s.cell[None] for s in snapshots])
+    return member_intervals(k, find_reversals(bounds, position))

@@ -10,18 +10,25 @@ from solver.bodies.grains import Array
 from solver.bodies.holes import find_holes
 from solver.bodies.motion import shear_over
 from solver.contacts.contacts import Contacts, detect_contacts
-from solver.contacts.pairs import are_among
+from solver.contacts.pairs import align, are_among
+from solver.convex.program import polish
 from solver.detection.networks import NearPairs
+from solver.mixture.mixing import Field, Mixture, mix_on
 from solver.nlgs.chain import ChainStep, advance_chain
 from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.ensemble import EnsembleState, solve_ensemble
+from solver.posterior.frame_posterior import FramePosterior
+from solver.sequence.demand import NO_DEMAND, Demand
+from solver.sequence.ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
 from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.judgement import Evidence, is_suspect
+from solver.sequence.information import measure_information
+from solver.sequence.judgement import Evidence, is_suspect, trust
 from solver.sequence.state import SequenceState
+from solver.statistics.agreement import pearson
 from solver.statistics.balance import worst_unbalance
 from solver.statistics.stress import love_weber_stress, packing_area
 
 NEGLIGIBLE_KAPPA = 1e-5  # below it measured motion has no influence on the forces
+MOTION_SUFFICES = 0.9  # trust of the motion's field from which on positions alone add nothing
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
 
 
@@ -40,9 +47,16 @@ class Estimate:
     spread_fn: Array | None = None  # (c,) [N] among the members, None of a single chain
     spread_ft: Array | None = None  # (c,) [N]
     member_force: Array | None = None  # (c, m, 2) [N]
+    cone_share: Array | None = (
+        None  # (c, 2) of the convex members and of the chains on the Coulomb cone; None: no members
+    )
     disagreement: float = np.nan  # D
     start_difference: float = np.nan  # H
+    motion: Field | None = None  # what the motion alone says, where it was mixed
+    mixture: Mixture | None = None  # with what positions alone say; None: they were not asked
+    overlap: float = np.nan  # [m] per mean force, as the positions show it
     threshold: float = 0.0  # [m] of the gap, of a single chain
+    demand: Demand = NO_DEMAND  # pairs that were not detected, but that the balance demands
 
     @property
     def contacts(self) -> Contacts:
@@ -57,15 +71,61 @@ def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimat
     """Solve a frame from the state that the frame before it left behind."""
     if problem.refined is None:
         return _estimate_by_chain(problem, state)
-    estimate = _estimate_by_ensemble(problem, state)
-    return estimate, gather_evidence(problem, estimate, state)
+    estimate = _estimate_by_ensemble(problem, state, None, NO_DEMAND)
+    evidence = gather_evidence(problem, estimate, state)
+    if not _ask_positions(problem, evidence):
+        return estimate, evidence
+    assert problem.sequence.positions is not None
+    positions = problem.sequence.positions.at(problem.k, problem.verdicts)
+    if positions is None or not (positions.fn.any() and estimate.fn.any()):
+        return estimate, evidence
+    offered = _estimate_by_ensemble(problem, state, positions, estimate.demand)
+    told = trust(gather_evidence(problem, offered, state))
+    mixed = _mix(problem, offered, positions, told)
+    return mixed, gather_evidence(problem, mixed, state)
+
+
+def _ask_positions(problem: FrameProblem, evidence: Evidence) -> bool:
+    """Whether the motion says so little of this frame that positions alone are to be asked, too."""
+    settings = problem.settings
+    if problem.sequence.positions is None:
+        return False
+    if settings.positions == "always" or settings.soft or not evidence.assessed:
+        return True
+    if not problem.packing.scale_is_known:
+        return True  # loading without sliding looks like agreement, and no load contradicts it
+    # That rods were inferred lowers the trust, but positions know nothing better of them.
+    return not trust(replace(evidence, inferred=0)) >= MOTION_SUFFICES
+
+
+def _mix(problem: FrameProblem, estimate: Estimate, positions: FramePosterior, motion_trust: float) -> Estimate:
+    """The motion's field mixed with what positions say, and brought into balance."""
+    contacts = estimate.contacts
+    assert estimate.spread_fn is not None
+    assert estimate.spread_ft is not None
+    field = Field(estimate.fn, estimate.ft, estimate.spread_fn, estimate.spread_ft)
+    known, soft = problem.packing.scale_is_known, problem.settings.soft_trust if problem.settings.soft else None
+    mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft)
+    balance = assemble_frame_balance(problem, contacts, estimate.step)
+    polished = polish(balance, mixture.fn, mixture.ft, problem.settings.ensemble.convex)
+    fn, ft = (polished.fn, polished.ft) if polished.converged else (mixture.fn, mixture.ft)
+    members = estimate.members
+    if not problem.motion.spans:  # no member has a history of its own yet
+        members = members.renewed(contacts, np.column_stack([fn, ft]), problem.snapshot.present)
+    told = f"positions alone count {100 * mixture.share:.0f} % here"
+    return replace(
+        estimate, fn=fn, ft=ft, members=members, spread_fn=mixture.spread_fn, spread_ft=mixture.spread_ft,
+        motion=field, mixture=mixture, overlap=positions.overlap,
+        remark="; ".join(part for part in (estimate.remark, told) if part),
+    )  # fmt: skip
 
 
 def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
-    """Half the trace of the stress of the reported field [Pa]."""
+    """Half the trace of the stress of the motion's field [Pa], which is comparable from frame to frame."""
+    fn, ft = (estimate.fn, estimate.ft) if estimate.motion is None else (estimate.motion.fn, estimate.motion.ft)
     position, walls = problem.snapshot.position, estimate.step.walls
     area = packing_area(walls, position[problem.snapshot.present])
-    stress = love_weber_stress(estimate.contacts, estimate.fn, estimate.ft, position, area, problem.packing.length)
+    stress = love_weber_stress(estimate.contacts, fn, ft, position, area, problem.packing.length)
     return 0.5 * float(np.trace(stress))
 
 
@@ -73,11 +133,12 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
     """Evidence on the reported field; ε and ū are the chain's."""
     packing, snapshot, step = problem.packing, problem.snapshot, estimate.step
     pressure = mean_stress(problem, estimate)
-    # Back from a faulty frame is no jump.
-    former = [p for p in (state.pressure, state.sound_pressure) if p > 0]
+    load = packing.mean_pressure(snapshot)
+    # Back from a faulty frame is no jump, nor is what the measured loads did.
+    before = packing.mean_pressure(problem.sequence.snapshots[max(problem.k - 1, 0)])
+    risen = load / before if before > 0 and load > 0 else 1.0
+    former = [risen * p for p in (state.pressure, state.sound_pressure) if p > 0]
     jump = min((abs(pressure - p) / p for p in former), default=np.nan)
-    plates = np.isfinite(packing.pressure)
-    load = float(packing.pressure[plates].mean()) if plates.any() else 0.0
     return Evidence(
         reset=len(state.members.soft.key) == 0,
         # Inertia alone corrects nothing that could be measured: there is no ε then.
@@ -86,15 +147,32 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
         load_share=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
-        unbalance=worst_unbalance(step.contacts, estimate.fn, estimate.ft, packing.weight, snapshot.present),
+        unbalance=worst_unbalance(
+            step.contacts, estimate.fn, estimate.ft, packing.weight, snapshot.present & packing.grains.free
+        ),
         shear=shear_over(problem.motion),
         frames_since_event=state.frames_since_event + 1,
         start_difference=estimate.start_difference,
+        inferred=problem.sequence.inferred,
+        start_forgotten=estimate.members.start_forgotten,
         holes=len(find_holes(packing.grains, snapshot.position, snapshot.present, step.walls)),
         grains=int(snapshot.present.sum()),
         reach=estimate.threshold / (2.0 * float(packing.grains.radius.mean())),
         assessed=problem.motion.spans,
+        mixed_trust=np.nan if estimate.mixture is None else estimate.mixture.trust,
+        positions_share=0.0 if estimate.mixture is None else estimate.mixture.share,
+        unseen_share=1.0 - float(problem.seen.sum()) / max(problem.sequence.known, 1),
+        information=measure_information(problem, estimate.contacts, estimate.fn, step.walls),
+        force_change=_force_change(estimate, state),
     )
+
+
+def _force_change(estimate: Estimate, state: SequenceState) -> float:
+    """1 − correlation of f_n with that of the frame before, a contact that only one has counting as zero."""
+    if len(state.reported.key) == 0:
+        return np.nan
+    _, now, then = align(estimate.contacts.key, estimate.fn, state.reported.key, state.reported.force[:, 0])
+    return 1.0 - pearson(now, then)
 
 
 def _estimate_by_chain(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
@@ -135,10 +213,13 @@ def _advance_chain(problem: FrameProblem, state: SequenceState, reach: float, th
     )
 
 
-def _estimate_by_ensemble(problem: FrameProblem, state: SequenceState) -> Estimate:
-    found = solve_ensemble(problem, state.members)
+def _estimate_by_ensemble(
+    problem: FrameProblem, state: SequenceState, positions: FramePosterior | None, demand: Demand
+) -> Estimate:
+    found = solve_ensemble(problem, state.members, positions, demand)
+    friction = problem.packing.material.friction_at(found.step.contacts.with_wall)
     return Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
         found.remark, found.spread_fn, found.spread_ft, found.member_force if problem.settings.keep_members else None,
-        found.disagreement, found.start_difference,
+        found.cone_share(friction), found.disagreement, found.start_difference, demand=found.demand,
     )  # fmt: skip

@@ -39,7 +39,7 @@ def pose_frame(
     window = window_of(k, len(snapshots))
     snapshot, bridged = bridge_lost([snapshots[f] for f in window], k - window.start)
     if np.isfinite(state.time):
-        motion = motion_to(snapshot, state.seen, state.time, state.endpoints)
+        motion = motion_to(snapshot, state.seen, state.time, state.endpoints, state.cell)
     else:
         motion = motion_from(snapshot, snapshots[k + 1]) if k + 1 < len(snapshots) else no_motion(snapshot)
     return FrameProblem(sequence, k, snapshot, bridged, motion, refined, verdicts)
@@ -72,6 +72,7 @@ def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForce
         seen=state.seen.renewed(problem.snapshot),
         time=problem.snapshot.time,
         endpoints=problem.snapshot.endpoints,
+        cell=problem.snapshot.cell,
         pressure=pressure,
         sound_pressure=state.sound_pressure if standing.status is FrameStatus.SUSPECT else pressure,
         evidence=evidence,
@@ -85,6 +86,8 @@ def _compare_with_former(problem: FrameProblem, frame: FrameForces, state: Seque
     """Say how the frame differs from the one before; the first differs from nothing."""
     if not np.isfinite(state.time):
         return replace(frame, gained_count=0.0, parted_count=0.0)
+    if state.frames_since_event == 0 and len(state.reported.key) == 0:
+        return frame  # the frame before it failed
     changes = find_changes(state.reported, frame.contacts, frame.fn, problem.seen)
     return replace(frame, similarity=changes.similarity, gained_count=changes.gained, parted_count=changes.parted)
 

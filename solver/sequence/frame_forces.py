@@ -60,14 +60,18 @@ class FrameForces:
     kappa: Annotated[float, Quantity("kinematic number w m v_rms / (δt σ L d)")]
     correction: Annotated[float, Quantity("ε: how much the forces must correct the measured motion")]
     old_unbalance: Annotated[float, Quantity("ū: mean |ΣF| of the former forces on this network / mean f_n")]
-    trust: Annotated[float, Quantity("T, an estimate of the correlation with the true forces, given these inputs")]
+    trust: Annotated[
+        float, Quantity("T: the correlation with the true forces is below it in at most one frame of twenty")
+    ]
     frames_since_reset: Annotated[int, Quantity("frames since the last reset", absent=0)]
     history: SweepHistory
     member_force: Annotated[
         Array | None,
         Quantity("forces of the members, NaN: nothing to read", "N", "contact member component", path="members/force"),
     ] = None
-    start_difference: Annotated[float, Quantity("H: of two chains started differently, over the rms")] = float("nan")
+    start_difference: Annotated[
+        float, Quantity("H: of two chains started differently, over the rms; NaN once forgotten")
+    ] = float("nan")
     unseen_grains: Annotated[int, Quantity("holes inside the walls that a rod would fit into")] = 0
     hidden_share: Annotated[float, Quantity("1 − correlation with the field less bridged grains")] = 0.0
     similarity: Annotated[
@@ -77,6 +81,15 @@ class FrameForces:
     parted_count: Annotated[
         float, Quantity("contacts of the frame before that are gone, lost grains aside", since=2)
     ] = NAN
+    force_change: Annotated[
+        float, Quantity("1 − correlation of f_n with that of the frame before, on the contacts of either", since=2)
+    ] = NAN
+    strain: Annotated[
+        Array | None,
+        Quantity("logarithmic strain of the packing since frame 0, extension positive", dims="xy axis", since=2),
+    ] = None
+    shear: Annotated[float, Quantity("difference of the principal strains since frame 0", "rad", since=2)] = NAN
+    shear_step: Annotated[float, Quantity("the same since the frame before", "rad", since=2)] = NAN
     warm_residual: Annotated[float, Quantity("natural map after one sweep from the former forces", since=2)] = NAN
     cold_residual: Annotated[
         Array | None, Quantity("natural map after 1, 2, 4, … sweeps from zero forces", dims="cold_sweep", since=2)
@@ -90,3 +103,15 @@ class FrameForces:
             "|ΣF| / mean f_n of the reported field, NaN: not there", dims="grain", path="grains/unbalance", since=2
         ),
     ] = None
+    bearing_probability: Annotated[
+        Array | None, Quantity("P(bears force), as distinct from probability, P(touch)", dims="contact", since=2)
+    ] = None
+    sliding_probability: Annotated[Array | None, Quantity("P(slides), if it bears force", dims="contact", since=2)] = (
+        None
+    )
+    overlap: Annotated[
+        float, Quantity("overlap of soft grains per mean force, where positions were asked", "m", since=2)
+    ] = NAN
+    positions_share: Annotated[float, Quantity("what positions alone count in the reported field", since=2)] = 0.0
+    doubt: Annotated[str, Quantity("what lowers the trust and what to do about it, the worst first", since=2)] = ""
+    failed_reason: Annotated[str, Quantity("why it could not be solved; empty where it was", since=2)] = ""

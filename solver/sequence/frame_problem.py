@@ -13,6 +13,7 @@ from solver.bodies.packing import Packing
 from solver.bodies.walls import Walls
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts
 from solver.detection.refinement import RefinedBlock
+from solver.mixture.positions import Positions
 from solver.sequence.settings import SequenceSettings
 
 
@@ -23,6 +24,9 @@ class SequenceProblem:
     packing: Packing
     snapshots: Sequence[Snapshot]
     settings: SequenceSettings
+    inferred: int = 0  # grains that no photograph shows
+    positions: Positions | None = None  # as a witness of their own; None: never asked
+    known: int = 0  # grains that any frame shows
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +52,7 @@ class FrameProblem:
     @property
     def walls(self) -> Walls:
         """The walls at the frame, at rest and under their loads."""
-        return self.packing.walls(self.snapshot.endpoints)
+        return self.packing.walls_of(self.snapshot)
 
     @property
     def seen(self) -> NDArray[np.bool_]:

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.bodies.packing import Material
 from solver.bodies.quantity import columns
+from solver.bodies.strain import displacement_gradient, logarithmic_strain, shear_of
 from solver.contacts.contacts import Contacts, ContactSource, ContactState
 from solver.contacts.kinematics import relative_motion
-from solver.contacts.pairs import are_there, recall
+from solver.contacts.pairs import are_among, are_there, recall
 from solver.contacts.verdicts import sources
+from solver.nlgs.starts import measure_starts
+from solver.sequence.doubts import lower_bound, tell_doubts
 from solver.sequence.estimate import Estimate
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frame_problem import FrameProblem
@@ -23,13 +26,13 @@ from solver.sequence.judgement import (
     free_standard_deviation,
     hidden_share,
     tangential_standard_deviation,
-    trust,
 )
-from solver.sequence.starts import measure_starts
 from solver.sequence.state import SequenceState
 from solver.statistics.balance import grain_unbalance
+from solver.statistics.bearing import bearing_probability, sliding_probability
+from solver.statistics.force_statistics import mobilisation
 
-SLIDING_TOLERANCE = 1e-6  # of μ f_n
+EVEN = 0.5  # P(slides) above which a contact counts as sliding
 
 
 def report_frame(
@@ -43,8 +46,11 @@ def report_frame(
     if problem.bridged.any():
         frame = _without_bridged(frame, problem.bridged)
         evidence = replace(evidence, hidden_share=frame.hidden_share)
-    unbalance = grain_unbalance(frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen)
-    return replace(frame, trust=trust(evidence), grain_unbalance=unbalance), evidence
+    unbalance = grain_unbalance(
+        frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen & problem.packing.grains.free
+    )
+    told = replace(frame, trust=lower_bound(evidence), doubt=tell_doubts(evidence), grain_unbalance=unbalance)
+    return told, evidence
 
 
 def find_ages(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
@@ -52,13 +58,20 @@ def find_ages(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
     return recall(contacts.key, state.age_key, state.age, fill=-1) + np.int32(1)
 
 
-def contact_state(material: Material, contacts: Contacts, fn: Array, ft: Array) -> NDArray[np.uint8]:
-    """ContactState of forces (c,) [N]."""
-    friction = material.friction_at(contacts.with_wall)
-    state = np.full(contacts.count, ContactState.STICKING, np.uint8)
-    state[np.abs(ft) >= friction * fn * (1.0 - SLIDING_TOLERANCE)] = ContactState.SLIDING
+def contact_state(fn: Array, slides: Array) -> NDArray[np.uint8]:
+    """ContactState of forces fn (c,) [N] that slide with a probability (c,)."""
+    state = np.where(slides > EVEN, ContactState.SLIDING, ContactState.STICKING).astype(np.uint8)
     state[fn <= 0] = ContactState.OPEN
     return state
+
+
+def _odds(material: Material, estimate: Estimate) -> tuple[Array, Array]:
+    """P(bears force) and P(slides, if it does) of the contacts (c,)."""
+    contacts, fn, ft = estimate.contacts, estimate.fn, estimate.ft
+    people_saw = estimate.probability == 0.0  # detected is only what has more
+    bears = bearing_probability(fn, np.where(people_saw, 1.0, estimate.probability))
+    used = mobilisation(fn, ft, material.friction_at(contacts.with_wall))
+    return bears, sliding_probability(used, estimate.cone_share)
 
 
 def _describe(
@@ -69,6 +82,8 @@ def _describe(
     fn, ft = estimate.fn, estimate.ft
     un, ut = _measured_motion(problem, contacts, estimate)
     starts = measure_starts(step)
+    bears, slides = _odds(material, estimate)
+    strain = _strain_since_start(problem)
     reason = (estimate.remark, standing.reason, step.solution.stop.value)
     return FrameForces(
         frame=problem.k,
@@ -79,9 +94,9 @@ def _describe(
         nlgs_ft=step.solution.ft,
         un=un,
         ut=ut,
-        state=contact_state(material, contacts, fn, ft),
+        state=contact_state(fn, slides),
         age=ages,
-        source=sources(contacts, estimate.probability, problem.verdicts),
+        source=_sources(problem, estimate),
         probability=estimate.probability,
         fn_sd=free_standard_deviation(fn, estimate.spread_fn),
         ft_sd=tangential_standard_deviation(fn, material.friction, estimate.spread_ft),
@@ -99,10 +114,33 @@ def _describe(
         frames_since_reset=0,
         history=step.history,
         member_force=estimate.member_force,
+        force_change=evidence.force_change,
+        strain=strain,
+        shear=shear_of(strain),
+        shear_step=evidence.shear if problem.motion.spans else 0.0,
         warm_residual=starts.warm,
         cold_residual=starts.cold,
         sweeps_saved=starts.saved,
+        bearing_probability=bears,
+        sliding_probability=slides,
+        overlap=estimate.overlap,
+        positions_share=0.0 if estimate.mixture is None else estimate.mixture.share,
     )
+
+
+def _sources(problem: FrameProblem, estimate: Estimate) -> NDArray[np.uint8]:
+    source = sources(estimate.contacts, estimate.probability, problem.verdicts)
+    demanded = are_among(estimate.contacts.key, estimate.demand.key) & (source == ContactSource.DETECTED)
+    source[demanded] = ContactSource.DEMANDED
+    return source
+
+
+def _strain_since_start(problem: FrameProblem) -> Array:
+    """Strain (2, 2) since the first snapshot, of the grains that both show."""
+    start, now = problem.sequence.snapshots[0], problem.snapshot
+    both = start.present & problem.seen
+    gradient = displacement_gradient(start.position, now.position - start.position, both)
+    return logarithmic_strain(gradient)
 
 
 def _measured_motion(problem: FrameProblem, contacts: Contacts, estimate: Estimate) -> tuple[Array, Array]:
@@ -135,6 +173,7 @@ def _show_forbidden(problem: FrameProblem, frame: FrameForces, estimate: Estimat
         "state": np.full(forbidden.count, ContactState.OPEN),
         "source": np.full(forbidden.count, ContactSource.FORBIDDEN_BY_REVIEWER),
         "probability": estimate.forbidden_probability, "un": un, "ut": ut,
+        "bearing_probability": np.zeros(forbidden.count), "sliding_probability": np.zeros(forbidden.count),
     }  # fmt: skip
     listed = {
         name: np.concatenate([value, _rows_of(value, forbidden.count, known.get(name))])[order]
@@ -142,8 +181,9 @@ def _show_forbidden(problem: FrameProblem, frame: FrameForces, estimate: Estimat
     }
     nothing = np.zeros((len(history.recorded), forbidden.count), np.float32)
     geometry = {
-        name: np.concatenate([getattr(contacts, name), getattr(forbidden, name)])[order]
+        name: np.concatenate([value, getattr(forbidden, name)])[order]
         for name in columns(Contacts, "contact")
+        if (value := getattr(contacts, name)) is not None  # no shift without a periodic cell
     }
     merged = Contacts(**geometry, grain_count=contacts.grain_count, wall_count=contacts.wall_count)
     return replace(

@@ -1,15 +1,24 @@
-"""Frames in order: each is solved from what the one before it left behind, and judged."""
+"""Frames in order: each is solved from what the one before it left behind, and judged.
+
+Whatever goes wrong in one frame, the frames around it are solved: it is reported as failed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
+
+from solver.bodies.bridging import bridge_frames
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
-from solver.contacts.verdicts import NO_VERDICTS, Verdicts, without_ignored
+from solver.contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
 from solver.detection.precision import believed_precision, measure_precision, with_precision
-from solver.detection.refinement import block_of, refine
+from solver.detection.refinement import RefinedBlock, block_of, refine
+from solver.mixture.positions import Positions
+from solver.sequence.failure import describe_error, failed_frame, find_fault, find_unseen, forget_forces
 from solver.sequence.frame import pose_frame, solve_frame
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frame_problem import SequenceProblem
@@ -25,29 +34,81 @@ def solve_sequence(
     state: SequenceState | None = None,
     first: int = 0,
     verdicts: Mapping[int, Verdicts] | None = None,
+    failed: Mapping[int, str] | None = None,
+    observer: Callable[[int, Exception], None] | None = None,
 ) -> Iterator[tuple[FrameForces, SequenceState]]:
     """Solve the frames first, first + 1, … one after the other; yields each frame with the state after it.
 
-    The motion that leads to a frame is that since the frame before. Nothing leads to frame 0: it takes the motion
-    that follows it. After it a single chain starts afresh, the ensemble from what its convex members read of frame 0.
-    verdicts: what people said of frames, by frame.
+    The motion that leads to a frame is that since the last frame that was solved. Nothing leads to frame 0: it takes
+    the motion that follows it. After it a single chain starts afresh, the ensemble from what its convex members read
+    of frame 0.
+    verdicts: what people said of frames, by frame. failed: frames that are not to be solved, and why; others that
+    show nothing, or cannot be solved, join them. observer: hears what a frame could not be solved for.
+    Raises ValueError where times do not ascend.
     """
+    _check_times(snapshots)
     state = SequenceState.first(packing) if state is None else state
     verdicts = {} if verdicts is None else verdicts
-    snapshots = without_ignored(snapshots, verdicts)
-    settings = settings.for_radii(packing.grains.radius)
-    snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
-    sequence = SequenceProblem(packing, snapshots, settings)
-    refined, number = None, -1
+    failed = find_unseen(snapshots) | dict(failed or {})
+    settings, remark = settings.for_radii(packing.grains.radius), ""
+    known = int(np.any([each.present for each in snapshots], axis=0).sum()) if snapshots else 0
+    unbelieved = find_ignored(verdicts) | failed.keys()
+    if unbelieved.issuperset(range(len(snapshots))):
+        failed = dict.fromkeys(range(len(snapshots)), "no frame is believed that it could be solved beside") | failed
+    else:
+        snapshots = bridge_frames(snapshots, unbelieved)
+        snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
+    asked = settings.asks_positions and len(snapshots) > 1
+    positions = Positions(packing, snapshots, settings.posterior) if asked else None
+    sequence = SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known)
+    blocks = _Blocks(sequence)
     for k in range(first, len(snapshots)):
-        if settings.estimator == "ensemble" and len(snapshots) > 1 and block_of(k, len(snapshots))[0] != number:
-            number, start, end = block_of(k, len(snapshots))
-            refined = refine(packing.grains, snapshots[start:end], settings.ensemble.probability, start=start)
-        problem = pose_frame(sequence, k, state, refined, verdicts.get(k, NO_VERDICTS))
-        frame, state = solve_frame(problem, state)
+        frame = following = None
+        reason = failed.get(k, "")
+        if not reason:
+            try:
+                problem = pose_frame(sequence, k, state, blocks.find(k), verdicts.get(k, NO_VERDICTS))
+                frame, following = solve_frame(problem, state)
+                reason = find_fault(frame)
+            except MemoryError:  # not the frame's fault
+                raise
+            except Exception as error:
+                reason = f"it could not be solved ({describe_error(error)})"
+                if observer is not None:
+                    observer(k, error)
+        if frame is None or following is None or reason:
+            n, w = packing.grains.count, len(packing.pressure)
+            frame = failed_frame(k, reason, n, w, with_members=settings.keep_members)
+            following = forget_forces(state)
         if remark and k == 0:
             frame = replace(frame, reason=f"{remark}; {frame.reason}")
+        state = following
         yield frame, state
+
+
+def _check_times(snapshots: Sequence[Snapshot]) -> None:
+    for before, after in pairwise(snapshots):
+        if not after.time > before.time:
+            raise ValueError(f"the time of a frame ({after.time} s) is not after that of the frame before it")
+
+
+class _Blocks:
+    """The blocks of frames that are refined together, one at a time."""
+
+    def __init__(self, sequence: SequenceProblem) -> None:
+        self._sequence = sequence
+        self._number, self._block = -1, None
+
+    def find(self, k: int) -> RefinedBlock | None:
+        """The block that frame k belongs to; None where a single chain solves it."""
+        packing, snapshots, settings = self._sequence.packing, self._sequence.snapshots, self._sequence.settings
+        if settings.estimator != "ensemble" or len(snapshots) < 2:
+            return None
+        number, start, end = block_of(k, len(snapshots))
+        if number != self._number:
+            self._block = refine(packing.grains, snapshots[start:end], settings.ensemble.probability, start=start)
+            self._number = number
+        return self._block
 
 
 def _with_measured_precision(

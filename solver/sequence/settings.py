@@ -8,7 +8,9 @@ from typing import Literal
 from solver.bodies.grains import Array
 from solver.convex.program import ConvexSettings
 from solver.detection.touch_probability import ContactProbabilitySettings
+from solver.mixture.softness import SEEN_AT_MOST
 from solver.nlgs.chain import ChainSettings
+from solver.posterior.settings import PosteriorSettings
 
 SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
 
@@ -25,6 +27,10 @@ class SequenceSettings:
     estimator: Literal["ensemble", "nlgs"] = "ensemble"
     chain: ChainSettings = field(default_factory=ChainSettings)  # nlgs: the estimator; ensemble: its first member
     ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
+    positions: Literal["needed", "always", "never"] = "needed"  # ensemble: ask positions alone where motion says little
+    posterior: PosteriorSettings = field(default_factory=PosteriorSettings)
+    soft: bool = False  # grains overlap by more than noise and errors: positions are asked of every frame
+    soft_trust: float = SEEN_AT_MOST  # the most that their overlaps are believed
     keep_members: bool = False  # ensemble: keep the field of every member
     measure_precision: bool = True  # from the gaps, where they contradict what is stated
     measure_overlap: bool = True  # likewise
@@ -34,6 +40,11 @@ class SequenceSettings:
     reset_to_zero: bool = False  # the paper's reset at a rearrangement
     reset_frames: frozenset[int] = frozenset()  # frames that start from zero forces whatever is found
     kept_frames: frozenset[int] = frozenset()  # frames that never do
+
+    @property
+    def asks_positions(self) -> bool:
+        """Whether positions alone may be asked of forces and radii."""
+        return self.estimator == "ensemble" and self.positions != "never"
 
     def for_radii(self, radius: Array) -> SequenceSettings:
         """The same for grains of these radii (n,) [m], their overlap told to all that ask for it."""

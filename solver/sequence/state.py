@@ -32,6 +32,7 @@ class SequenceState:
     frames_since_reset: int
     frames_since_event: int
     reported: ForceMemory  # the last frame's forces, as they were reported
+    cell: Array | None = None  # (2, 2) [m] of the last frame
 
     @classmethod
     def first(cls, packing: Packing) -> SequenceState:

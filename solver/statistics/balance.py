@@ -43,6 +43,10 @@ def grain_unbalance(contacts: Contacts, fn: Array, ft: Array, weight: Array, pre
 
 
 def worst_unbalance(contacts: Contacts, fn: Array, ft: Array, weight: Array, present: NDArray[np.bool_]) -> float:
-    """Worst |ΣF| on a present grain over the mean f_n of the contacts that bear force; 0 where none does."""
+    """Worst |ΣF| on a present grain over the mean f_n of the contacts that bear force; 0 where none does, NaN of
+    forces that are not finite.
+    """
+    if not (np.isfinite(fn).all() and np.isfinite(ft).all()):
+        return float("nan")
     mean = mean_normal_force(fn)
     return float(unbalances(contacts, fn, ft, weight)[present].max(initial=0.0) / mean) if np.isfinite(mean) else 0.0

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from solver.bodies.grains import Array
+from solver.statistics.weighted import weighted_mean, weights_of
 
 DEGENERATE = 1e-6  # variance of cos 2θ or sin 2θ below which directions cannot tell an amplitude from a mean
 
@@ -51,11 +52,11 @@ class Anisotropies:
         return 0.5 * total / (1.0 + 0.5 * products)
 
 
-def contact_fabric(normal: Array) -> Array:
-    """Second-order fabric tensor, the mean of n ⊗ n over contacts (c, 2); isotropic without contacts (2, 2)."""
-    if len(normal) == 0:
-        return 0.5 * np.eye(2)
-    return normal.T @ normal / len(normal)
+def contact_fabric(normal: Array, weight: Array | None = None) -> Array:
+    """Second-order fabric tensor (2, 2): mean of n ⊗ n over contacts (c, 2) by weight (c,); isotropic without any."""
+    weight = weights_of(weight, len(normal))
+    total = float(weight.sum())
+    return (normal.T * weight) @ normal / total if total > 0 else 0.5 * np.eye(2)
 
 
 def fabric_anisotropy(fabric: Array) -> float:
@@ -64,53 +65,52 @@ def fabric_anisotropy(fabric: Array) -> float:
     return float(2.0 * (major - minor))
 
 
-def anisotropies(normal: Array, branch: Array, fn: Array, ft: Array) -> Anisotropies:
-    """Anisotropies of the contacts given, all of which should bear force.
+def anisotropies(normal: Array, branch: Array, fn: Array, ft: Array, weight: Array | None = None) -> Anisotropies:
+    """Anisotropies of the contacts given.
 
-    normal (c, 2) from i to j; branch (c, 2) [m] centre to centre; fn, ft (c,) [N] that i exerts on j.
+    normal (c, 2) from i to j; branch (c, 2) [m] centre to centre; fn, ft (c,) [N] that i exerts on j; weight (c,): how
+    likely each bears force.
     """
-    force = value_harmonic(normal, fn)
+    weight = weights_of(weight, len(normal))
+    force = value_harmonic(normal, fn, weight)
     return Anisotropies(
-        contact=contact_harmonic(normal),
-        branch=value_harmonic(normal, np.linalg.norm(branch, axis=1)),
+        contact=contact_harmonic(normal, weight),
+        branch=value_harmonic(normal, np.linalg.norm(branch, axis=1), weight),
         normal=force,
-        tangential=tangential_harmonic(normal, ft, force.mean),
+        tangential=tangential_harmonic(normal, ft, force.mean, weight),
     )
 
 
-def contact_harmonic(normal: Array) -> Harmonic:
+def contact_harmonic(normal: Array, weight: Array | None = None) -> Harmonic:
     """Second harmonic of the density of contact directions (c, 2), over the isotropic density."""
+    weight = weights_of(weight, len(normal))
     cosine, sine = _double_angle(normal)
-    if len(normal) == 0:
-        return Harmonic(1.0, 0.0, 0.0)
-    return _harmonic(1.0, 2.0 * float(cosine.mean()), 2.0 * float(sine.mean()))
+    return _harmonic(1.0, 2.0 * weighted_mean(cosine, weight), 2.0 * weighted_mean(sine, weight))
 
 
-def value_harmonic(normal: Array, value: Array) -> Harmonic:
+def value_harmonic(normal: Array, value: Array, weight: Array | None = None) -> Harmonic:
     """Second harmonic of a positive quantity (c,) over the directions (c, 2) of the contacts that carry it.
 
     Least squares over contacts, so that neither uneven nor missing directions bias it; the mean of the quantity and
     its mean over n ⊗ n are kept exactly. Directions along one axis only have no amplitude.
     """
-    if len(normal) == 0:
-        return Harmonic(0.0, 0.0, 0.0)
+    weight = weights_of(weight, len(normal))
     cosine, sine = _double_angle(normal)
-    design = np.stack([cosine - cosine.mean(), sine - sine.mean()], axis=1)
-    x, y = _least_squares(design, value)
-    mean = float(value.mean() - x * cosine.mean() - y * sine.mean())
+    design = np.stack([cosine - weighted_mean(cosine, weight), sine - weighted_mean(sine, weight)], axis=1)
+    x, y = _least_squares(design, value, weight)
+    mean = weighted_mean(value, weight) - x * weighted_mean(cosine, weight) - y * weighted_mean(sine, weight)
     return _harmonic(mean, x, y)
 
 
-def tangential_harmonic(normal: Array, ft: Array, mean_force: float) -> Harmonic:
+def tangential_harmonic(normal: Array, ft: Array, mean_force: float, weight: Array | None = None) -> Harmonic:
     """a_t of tangential forces ft (c,) [N], which follow −f₀ a_t sin 2(θ − θ_t) over directions; mean_force is f₀ [N].
 
     Least squares over contacts. Tangential forces have no mean over directions: a grain in balance has no torque.
     """
-    if len(normal) == 0:
-        return Harmonic(mean_force, 0.0, 0.0)
+    weight = weights_of(weight, len(normal))
     cosine, sine = _double_angle(normal)
     # −sin 2(θ − θ_t) = cos 2θ_t (−sin 2θ) + sin 2θ_t (cos 2θ)
-    x, y = _least_squares(np.stack([-sine, cosine], axis=1), ft)
+    x, y = _least_squares(np.stack([-sine, cosine], axis=1), ft, weight)
     return _harmonic(mean_force, x, y)
 
 
@@ -120,11 +120,12 @@ def _double_angle(normal: Array) -> tuple[Array, Array]:
     return x * x - y * y, 2.0 * x * y
 
 
-def _least_squares(design: Array, value: Array) -> tuple[float, float]:
+def _least_squares(design: Array, value: Array, weight: Array) -> tuple[float, float]:
     """Two coefficients of smallest norm; a combination of columns that hardly varies gets none."""
-    variance, axes = np.linalg.eigh(design.T @ design / len(design))
+    total = max(float(weight.sum()), np.finfo(np.float64).tiny)
+    variance, axes = np.linalg.eigh((design.T * weight) @ design / total)
     seen = variance > DEGENERATE
-    slope = axes.T @ (design.T @ value / len(design))
+    slope = axes.T @ ((design.T * weight) @ value / total)
     x, y = axes @ np.where(seen, slope / np.where(seen, variance, 1.0), 0.0)
     return float(x), float(y)
 

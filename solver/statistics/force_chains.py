@@ -54,9 +54,9 @@ def grain_stresses(contacts: Contacts, fn: Array, ft: Array, position: Array, gr
     force = fn[:, None] * contacts.normal + ft[:, None] * contacts.tangent
     total = np.zeros((contacts.grain_count, 2, 2))
     pair = ~contacts.with_wall
-    i, j = contacts.i, contacts.j[pair]
+    i, j, centre = contacts.i, contacts.j[pair], contacts.second_centre(position)[pair]
     np.add.at(total, i, np.einsum("ca,cb->cab", force, contacts.point - position[i]))
-    np.add.at(total, j, np.einsum("ca,cb->cab", -force[pair], contacts.point[pair] - position[j]))
+    np.add.at(total, j, np.einsum("ca,cb->cab", -force[pair], contacts.point[pair] - centre))
     total += total.transpose(0, 2, 1).copy()
     return total / (2.0 * np.pi * grains.radius**2 * length)[:, None, None]
 

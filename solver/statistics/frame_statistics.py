@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
 from solver.bodies.packing import Material
-from solver.bodies.quantity import Quantity
+from solver.bodies.quantity import Quantity, quantities
 from solver.bodies.walls import Walls
 from solver.contacts.connectivity import coordination_number, rattlers
-from solver.contacts.contacts import Contacts, ContactState
+from solver.contacts.contacts import Contacts
 from solver.statistics.fabric import anisotropies, contact_fabric, fabric_anisotropy
 from solver.statistics.force_chains import find_force_chains
 from solver.statistics.force_statistics import (
+    FORCE_EDGES,
+    MOBILISATION_EDGES,
     force_density,
     mobilisation,
     mobilisation_density,
@@ -31,14 +33,37 @@ from solver.statistics.stress import (
     love_weber_stress,
     packing_area,
     principal_stresses,
+    sums_on_walls,
     wall_forces,
     wall_ratio_angle,
 )
+from solver.statistics.weighted import weighted_mean
+
+KNOWN_SLIDING = 0.99  # |f_t| / (μ f_n) of exact forces from which on a contact slides
+EVEN = 0.5  # P(bears force) above which a contact counts where all or nothing is asked: rattlers
+
+
+@dataclass(frozen=True, slots=True)
+class Likely:
+    """What the contacts (c,) of a frame do, as far as that is known."""
+
+    bears: Array  # (c,) P(bears force)
+    slides: Array  # (c,) P(slides), if it does
+
+    @classmethod
+    def of_known(cls, fn: Array, ft: Array, friction: Array) -> Likely:
+        """Where forces are exact: what has f_n bears it, what is on the Coulomb cone slides; friction (c,)."""
+        bearing = fn > 0
+        slides = bearing & (mobilisation(fn, ft, friction) >= KNOWN_SLIDING)
+        return cls(bearing.astype(np.float64), slides.astype(np.float64))
 
 
 @dataclass(frozen=True, slots=True)
 class FrameStatistics:
-    """Statistics of one frame. Means and shares over contacts are over those that carry force."""
+    """Statistics of one frame.
+
+    Means, shares and counts over contacts are over those that bear force, each counted as it is likely to.
+    """
 
     area: Annotated[float, Quantity("area of the polygon between the walls", "m2")]
     stress: Annotated[Array, Quantity("Love-Weber stress, compression positive", "Pa", "xy axis")]
@@ -46,14 +71,14 @@ class FrameStatistics:
     friction_angle: Annotated[float, Quantity("asin((σ₁−σ₂)/(σ₁+σ₂))", "rad")]
     wall_ratio_angle: Annotated[float, Quantity("atan(|T|/N) on the loaded plate, NaN without one", "rad")]
     principal_direction: Annotated[float, Quantity("direction of σ₁, in (−π/2, π/2]", "rad")]
-    coordination_number: Annotated[float, Quantity("contacts with force per grain, walls counted once")]
+    coordination_number: Annotated[float, Quantity("contacts with force per grain, those with walls counted once")]
     coordination_number_without_rattlers: Annotated[float, Quantity("contacts with force per grain that is no rattler")]
     rattler_count: Annotated[int, Quantity("grains that cannot be in balance: fewer than two contacts")]
-    contact_count: Annotated[int, Quantity("contacts carrying force")]
-    sliding_fraction: Annotated[float, Quantity("share of the contacts carrying force that slide")]
-    mean_fn: Annotated[float, Quantity("mean f_n over contacts carrying force", "N")]
+    contact_count: Annotated[int, Quantity("contacts bearing force, as many as are expected to")]
+    sliding_fraction: Annotated[float, Quantity("share of the contacts bearing force that slide")]
+    mean_fn: Annotated[float, Quantity("mean f_n over contacts bearing force", "N")]
     max_fn: Annotated[float, Quantity("greatest f_n", "N")]
-    fabric: Annotated[Array, Quantity("mean n⊗n over contacts carrying force", dims="xy axis")]
+    fabric: Annotated[Array, Quantity("mean n⊗n over contacts between grains that bear force", dims="xy axis")]
     fabric_anisotropy: Annotated[float, Quantity("2 (F₁ − F₂) of the fabric")]
     sigma_1: Annotated[float, Quantity("greatest principal stress", "Pa")]
     sigma_2: Annotated[float, Quantity("smallest principal stress", "Pa")]
@@ -84,13 +109,19 @@ class FrameStatistics:
     ]
     chain_count: Annotated[int, Quantity("force chains, Peters et al. 2005")]
     chain_grain_share: Annotated[float, Quantity("share of the grains present that belong to a force chain")]
+    wall_normal_force: Annotated[
+        Array | None, Quantity("sum of the normal forces on each wall", "N", "wall", since=2)
+    ] = None
+    wall_tangential_force: Annotated[
+        Array | None, Quantity("sum of the tangential forces on each wall, towards end 1", "N", "wall", since=2)
+    ] = None
 
 
 def frame_statistics(
     contacts: Contacts,
     fn: Array,
     ft: Array,
-    state: NDArray[np.uint8],
+    likely: Likely,
     position: Array,
     present: NDArray[np.bool_],
     walls: Walls,
@@ -101,38 +132,43 @@ def frame_statistics(
 ) -> FrameStatistics:
     """Gather the statistics of one frame.
 
-    fn, ft (c,) [N]; state (c,) ContactState; position (n, 2) [m]; present (n,); length of the rods [m].
+    fn, ft (c,) [N]; likely: which contacts bear force and which slide; position (n, 2) [m]; present (n,); length of
+    the rods [m].
     """
     bearing = fn > 0
-    carried, held = fn[bearing], ft[bearing]
+    carried, held, weight, slides = fn[bearing], ft[bearing], likely.bears[bearing], likely.slides[bearing]
+    surely = bearing & (likely.bears > EVEN)
+    counted = present & grains.free  # a boundary grain stands by itself
     area = packing_area(walls, position[present])
     stress = love_weber_stress(contacts, fn, ft, position, area, length)
     sigma_1, sigma_2, direction = principal_stresses(stress)
-    fabric = contact_fabric(contacts.normal[bearing])
-    on_walls = wall_forces(contacts, fn, ft)
+    on_walls, sums = wall_forces(contacts, fn, ft), sums_on_walls(contacts, fn, ft)
 
     force, branch = contact_force_vectors(contacts, fn, ft), branch_vectors(contacts, position)
     between = bearing & ~contacts.with_wall
-    parts = anisotropies(contacts.normal[between], branch[between], fn[between], ft[between])
+    fabric = contact_fabric(contacts.normal[between], likely.bears[between])
+    parts = anisotropies(contacts.normal[between], branch[between], fn[between], ft[between], likely.bears[between])
     kinds = (parts.contact, parts.branch, parts.normal, parts.tangential)
     friction = material.friction_at(contacts.with_wall)
     mobilised = mobilisation(carried, held, friction[bearing])
-    tail, plateau = tail_exponent(carried), plateau_ratio(carried)
-    strong = strong_network(carried, force[bearing], branch[bearing])
+    tail, plateau = tail_exponent(carried, weight), plateau_ratio(carried, weight)
+    strong = strong_network(carried, force[bearing], branch[bearing], weight)
     chains = find_force_chains(contacts, fn, ft, position, present, grains, length)
     return FrameStatistics(
         area=area,
         stress=stress,
         pressure=0.5 * float(np.trace(stress)),
         friction_angle=friction_angle(stress),
-        wall_ratio_angle=wall_ratio_angle(walls, on_walls),
+        wall_ratio_angle=wall_ratio_angle(walls, sums),
         principal_direction=direction,
-        coordination_number=coordination_number(contacts, bearing, present),
-        coordination_number_without_rattlers=coordination_number(contacts, bearing, present, without_rattlers=True),
-        rattler_count=int(rattlers(contacts, bearing, present).sum()),
-        contact_count=int(bearing.sum()),
-        sliding_fraction=float(np.mean(state[bearing] == ContactState.SLIDING)) if bearing.any() else 0.0,
-        mean_fn=float(carried.mean()) if bearing.any() else 0.0,
+        coordination_number=coordination_number(contacts, surely, counted, weight=likely.bears),
+        coordination_number_without_rattlers=coordination_number(
+            contacts, surely, counted, without_rattlers=True, weight=likely.bears
+        ),
+        rattler_count=int(rattlers(contacts, surely, counted).sum()),
+        contact_count=round(float(weight.sum())),
+        sliding_fraction=weighted_mean(slides, weight),
+        mean_fn=weighted_mean(carried, weight),
         max_fn=float(fn.max(initial=0.0)),
         fabric=fabric,
         fabric_anisotropy=fabric_anisotropy(fabric),
@@ -145,10 +181,10 @@ def frame_statistics(
         tangential_force_anisotropy=parts.tangential.amplitude,
         anisotropy_direction=np.array([each.direction for each in kinds]),
         friction_angle_of_anisotropies=float(np.arcsin(np.clip(parts.sine_of_friction_angle(direction), -1.0, 1.0))),
-        mobilisation=float(mobilised.mean()) if len(mobilised) else 0.0,
-        mobilisation_density=mobilisation_density(mobilised),
-        fn_density=force_density(carried),
-        ft_density=force_density(np.abs(held)),
+        mobilisation=weighted_mean(slides + (1.0 - slides) * np.minimum(mobilised, 1.0), weight),
+        mobilisation_density=mobilisation_density(mobilised, weight, slides),
+        fn_density=force_density(carried, weight),
+        ft_density=force_density(np.abs(held), weight),
         tail_exponent=tail.value,
         tail_exponent_sd=tail.standard_error,
         plateau_ratio=plateau.value,
@@ -158,4 +194,17 @@ def frame_statistics(
         strong_deviator_share=strong.deviator_share,
         chain_count=chains.count,
         chain_grain_share=float(np.mean(chains.chain[present] >= 0)) if present.any() else 0.0,
+        wall_normal_force=sums[:, 0],
+        wall_tangential_force=sums[:, 1],
     )
+
+
+def no_statistics(wall_count: int) -> FrameStatistics:
+    """The statistics of a frame without forces: nothing is counted, and nothing else is known."""
+    sizes = {"xy": 2, "axis": 2, "wall": wall_count, "anisotropy": 4}
+    sizes |= {"force_bin": len(FORCE_EDGES) - 1, "mobilisation_bin": len(MOBILISATION_EDGES) - 1}
+    values: dict[str, Any] = {}
+    for each in quantities(FrameStatistics):
+        shape = tuple(sizes[name] for name in each.quantity.dims.split())
+        values[each.name] = np.full(shape, np.nan) if shape else 0 if each.dtype.kind == "i" else np.nan
+    return FrameStatistics(**values)

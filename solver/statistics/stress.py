@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import IN, OUT
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
+
+CORNERS = 2048  # of the polygon that stands for a circle
 
 
 def polygon_area(corners: Array) -> float:
@@ -16,12 +20,44 @@ def polygon_area(corners: Array) -> float:
 
 
 def packing_area(walls: Walls, fallback: Array) -> float:
-    """Area between the walls [m²]: the polygon their lines bound, taken in the order of their directions.
+    """Area between the walls [m²]: the polygon their lines bound, in the order of their directions, or of the cell.
 
-    fallback (n, 2) [m]: points whose convex hull counts where the walls do not close a polygon.
+    A circle around the packing is cut by these lines; one within it is taken off. fallback (n, 2) [m]: points whose
+    convex hull counts where the walls do not close anything.
     """
-    if walls.count >= 3:
-        order = np.argsort(np.arctan2(walls.direction[:, 1], walls.direction[:, 0]))
+    if walls.cell is not None:
+        return walls.cell.area
+    radius, around = 0.5 * walls.length, np.flatnonzero(walls.sides == IN)
+    within = float(np.pi * np.sum(radius[walls.sides == OUT] ** 2))
+    if len(around):
+        narrowest = int(around[np.argmin(radius[around])])
+        return _area_in_circle(walls, narrowest) - within
+    return _area_between_lines(walls, np.flatnonzero(~walls.curved), fallback) - within
+
+
+def _area_in_circle(walls: Walls, circle: int) -> float:
+    """Area [m²] of a circle on the packing's side of all straight walls: of a polygon that has the circle's area."""
+    turn = 2.0 * np.pi / CORNERS
+    radius = 0.5 * walls.length[circle] * np.sqrt(turn / np.sin(turn))
+    angle = turn * np.arange(CORNERS)
+    corners = walls.centre[circle] + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for w in np.flatnonzero(~walls.curved):
+        inside = (walls.endpoints[w, 0] - corners) @ walls.outward[w]
+        following, further = np.roll(corners, -1, axis=0), np.roll(inside, -1)
+        kept: list[Array] = []
+        for here, there, a, b in zip(corners, following, inside, further, strict=True):
+            kept += [here] if a >= 0.0 else []
+            kept += [here + a / (a - b) * (there - here)] if (a >= 0.0) != (b >= 0.0) else []
+        if not kept:
+            return 0.0
+        corners = np.array(kept)
+    return polygon_area(corners)
+
+
+def _area_between_lines(walls: Walls, straight: NDArray[np.intp], fallback: Array) -> float:
+    if len(straight) >= 3:
+        direction = walls.direction[straight]
+        order = straight[np.argsort(np.arctan2(direction[:, 1], direction[:, 0]))]
         start, direction = walls.endpoints[order, 0], walls.direction[order]
         corners = np.empty_like(start)
         for k in range(len(order)):
@@ -48,7 +84,7 @@ def branch_vectors(contacts: Contacts, position: Array) -> Array:
     """From the centre of i to the centre of j, or to the contact point on a wall (c, 2) [m]."""
     end = contacts.point.copy()
     pair = ~contacts.with_wall
-    end[pair] = position[contacts.j[pair]]
+    end[pair] = contacts.second_centre(position)[pair]
     return end - position[contacts.i]
 
 
@@ -88,10 +124,20 @@ def wall_forces(contacts: Contacts, fn: Array, ft: Array) -> Array:
     return total
 
 
+def sums_on_walls(contacts: Contacts, fn: Array, ft: Array) -> Array:
+    """Sums of the normal and of the tangential forces on every wall (w, 2) [N]; of a circle no force comes of them."""
+    on_wall = contacts.with_wall
+    total = np.zeros((contacts.wall_count, 2))
+    np.add.at(total, contacts.j[on_wall] - contacts.grain_count, np.column_stack([fn, ft])[on_wall])
+    return total
+
+
 def wall_ratio_angle(walls: Walls, force: Array) -> float:
-    """atan(|T| / N) [rad] of the force (w, 2) [N] on the first loaded wall; NaN without one, or without load on it."""
+    """atan(|T| / N) [rad] of the first loaded wall; NaN without one, or without load on it.
+
+    force (w, 2) [N]: sums of the normal and of the tangential forces on every wall.
+    """
     if not walls.loaded.any():
         return float("nan")
-    w = int(np.argmax(walls.loaded))
-    normal, tangential = float(force[w] @ walls.outward[w]), float(force[w] @ walls.direction[w])
+    normal, tangential = force[int(np.argmax(walls.loaded))].tolist()
     return float(np.arctan2(abs(tangential), normal)) if normal > 0 else float("nan")

@@ -22,7 +22,8 @@ import rerun as rr
 from rich.console import Console
 from rodsight import pipeline
 from rodsight.cli.watching import watching
-from rodsight.experiment.experiment import load_experiment, read_tracks, read_walls
+from rodsight.experiment.experiment import load_experiment, read_tracks
+from rodsight.experiment.walls import read_walls
 from rodsight.inference.inference import Inputs, infer_frames
 from rodsight.inference.settings import material_of, settings_of
 from rodsight.recording.files.recorder import BATCHES, Recorder

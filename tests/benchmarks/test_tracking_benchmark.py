@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.experiment.experiment import load_experiment, read_walls
+from rodsight.experiment.experiment import load_experiment
 from rodsight.experiment.photographs import LUMA
 from rodsight.experiment.scaling import make_scale
+from rodsight.experiment.walls import read_walls
 from rodsight.tracking.registration.poses import FramePoses
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracking.walls.bar_depth import visible_depth

@@ -20,7 +20,7 @@ WORDS = st.text(st.characters(exclude_categories=("Cc", "Cs", "Z")), min_size=1,
 LENGTHS = st.floats(1e-5, 1e-2)
 
 
-@given(st.lists(st.tuples(st.integers(0, 2**62), NUMBERS, WORDS), min_size=1, max_size=6))
+@given(st.lists(st.tuples(st.integers(0, 2**53), NUMBERS, WORDS), min_size=1, max_size=6))
 def test_a_table_gives_back_every_digit(rows):
     frame, value, name = zip(*rows, strict=True)
     with tempfile.TemporaryDirectory() as folder:

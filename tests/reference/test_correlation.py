@@ -6,13 +6,17 @@ levels; what is derived from them keeps four to five.
 
 import numpy as np
 import pytest
+from numba import njit
 from rodsight.tracking.correlation import kernels
 from rodsight.tracking.correlation.interpolation import interpolate, interpolate_finely, sample
+from rodsight.tracking.correlation.noise import image_noise
 from rodsight.tracking.correlation.search import disc, search_patch, turns_to_try
 from rodsight.tracking.correlation.search_parts import search_parts
+from rodsight.tracking.correlation.sifting import take_most_similar
+from rodsight.tracking.correlation.spline_vectors import add_projections, read_cubic, read_quintic
 from rodsight.tracking.correlation.splines import fine_coefficients, spline_coefficients
 from rodsight.tracking.detection.edges import sample_rays
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import correlate, gaussian_filter
 
 from tests.reference.twins.correlation import (
     best_places,
@@ -28,6 +32,22 @@ pytestmark = pytest.mark.unit
 
 SINGLE = 2e-5
 CENTRE, REACH = (30.3, 27.8), 9.2
+
+
+@njit
+def read_all(coefficients, at, finely):
+    """The spline at points (p, 2): what several taps at once read is read by compiled code alone."""
+    found = np.empty(len(at))
+    for k in range(len(at)):
+        ix, iy = int(at[k, 0]), int(at[k, 1])
+        tx, ty = np.float32(at[k, 0] - ix), np.float32(at[k, 1] - iy)
+        found[k] = read_quintic(coefficients, ix, iy, tx, ty) if finely else read_cubic(coefficients, ix, iy, tx, ty)
+    return found
+
+
+@njit
+def project(sums, data, p, g):
+    add_projections(sums, data, p, g)
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +70,14 @@ def fill(picture, coefficients=None):
     return good, data, inverse, facts
 
 
+def fit_rigidly(coefficients, data, inverse, leash, hopeless, tolerance, limit, pose, fit):
+    coarse = np.empty((5, 5))
+    kernels.fill_coarse(data, coarse)
+    kernels.fit_rigid(
+        coefficients, data, coarse, inverse, REACH, leash, hopeless, tolerance, limit, pose, fit, np.empty(4)
+    )
+
+
 def moved(picture, shift, turn, gain=1.3, level=-20.0):
     """The picture turned about the patch's centre and shifted, under another light; and the pose to be found."""
     c, s = np.cos(turn), np.sin(turn)
@@ -70,6 +98,52 @@ def test_between_the_pixels_lies_the_spline(picture):
         found = [read(coefficients, int(x), int(y), np.float32(x - int(x)), np.float32(y - int(y))) for x, y in at]
         expected = [value(coefficients, x, y, degree) for x, y in at]
         assert found == pytest.approx(expected, rel=SINGLE)
+
+
+def test_whole_rows_of_taps_read_the_same_spline(picture):
+    at = np.random.default_rng(2).uniform([4.0, 4.0], [59.0, 55.0], (40, 2))
+    for coefficients, degree in ((spline_coefficients(picture), 3), (fine_coefficients(picture), 5)):
+        found = read_all(coefficients, at, degree == 5)
+        assert found == pytest.approx([value(coefficients, x, y, degree) for x, y in at], rel=SINGLE)
+
+
+def test_projections_are_added_to_those_before():
+    rng = np.random.default_rng(3)
+    data, sums = rng.normal(size=(7, 6)).astype(np.float32), rng.normal(size=4)
+    expected = sums + 2.5 * data[3, 2:].astype(np.float64)
+    project(sums, data, 3, np.float32(2.5))
+    assert sums == pytest.approx(expected, rel=1e-15)
+
+
+def test_some_of_the_pixels_lead_as_all_of_them_would():
+    rng = np.random.default_rng(4)
+    data = rng.normal(size=(kernels.COARSE_PIXELS * 3 + 5, 6)).astype(np.float32)
+    coarse = np.empty((5, 5))
+    kernels.fill_coarse(data, coarse)
+    chosen = data[::3].astype(np.float64)
+    design = np.column_stack([chosen[:, 3:], chosen[:, 2], np.ones(len(chosen))])
+    assert coarse == pytest.approx(np.linalg.inv(design.T @ design), rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(64, 96), (70, 100), (20, 23)])
+def test_noise_is_the_mask_s_mean_answer_on_calm_tiles(shape):
+    image = np.random.default_rng(6).normal(100.0, 3.0, shape).astype(np.float32)
+    tile = min(32, *shape)
+    mask = np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0])
+    answer = np.abs(correlate(image.astype(np.float64), mask, mode="mirror"))
+    rows, columns = shape[0] // tile, shape[1] // tile
+    tiles = answer[: rows * tile, : columns * tile].reshape(rows, tile, columns, tile).mean(axis=(1, 3))
+    assert image_noise(image) == pytest.approx(np.percentile(tiles, 10.0) / np.sqrt(2.0 / np.pi) / 6.0, rel=1e-5)
+    assert image_noise(image) == pytest.approx(3.0, rel=0.2)
+
+
+def test_the_most_similar_places_are_distinct():
+    places = np.array([[5.0, 5.0, 0.1, 0.7], [6.0, 5.0, 0.2, 0.9], [5.5, 5.0, 2.0, 0.5], [30.0, 5.0, 0.1, 0.6],
+                       [0.0, 0.0, 0.0, -1.0]])  # fmt: skip
+    best = np.empty((4, 4))
+    take_most_similar(places, 3.0, best)
+    assert best[:3].tolist() == [places[1].tolist(), places[3].tolist(), places[2].tolist()]
+    assert best[3, 3] == -1.0
 
 
 def test_points_and_rays_are_read_within_the_photograph_alone(picture):
@@ -119,7 +193,7 @@ def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
     coefficients = fine_coefficients(image)
     _, data, inverse, _ = fill(picture)
     pose, fit = np.array([*CENTRE, 0.0]), np.zeros(kernels.FIT_COLUMNS)
-    kernels.fit_rigid(coefficients, data, inverse, REACH, 4.0, 0.0, 1e-3, 40, pose, fit)
+    fit_rigidly(coefficients, data, inverse, 4.0, 0.0, 1e-3, 40, pose, fit)
     expected, zncc, residual, gain, offset = fit_plainly(coefficients, patch, REACH, np.array([*CENTRE, 0.0]))
     assert fit[kernels.CODE] == kernels.CONVERGED
     # Either stops at steps below a thousandth of a pixel.
@@ -130,7 +204,7 @@ def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
     assert fit[[kernels.GAIN, kernels.OFFSET]] == pytest.approx([gain, offset], rel=1e-4)
     # With no step allowed it only looks.
     still, look = true.copy(), np.zeros(kernels.FIT_COLUMNS)
-    kernels.fit_rigid(coefficients, data, inverse, REACH, 4.0, 0.0, 1e-3, 0, still, look)
+    fit_rigidly(coefficients, data, inverse, 4.0, 0.0, 1e-3, 0, still, look)
     assert np.array_equal(still, true)
     assert look[kernels.CODE] == kernels.UNFINISHED
     assert look[kernels.ZNCC] > 0.99
@@ -143,9 +217,7 @@ def test_a_fit_gives_up_where_it_should(picture):
 
     def code(start, *, leash=4.0, hopeless=0.0, limit=40):
         fit = np.zeros(kernels.FIT_COLUMNS)
-        kernels.fit_rigid(
-            coefficients, data, inverse, REACH, leash, hopeless, 1e-3, limit, np.array([*start, 0.0]), fit
-        )
+        fit_rigidly(coefficients, data, inverse, leash, hopeless, 1e-3, limit, np.array([*start, 0.0]), fit)
         return fit[kernels.CODE]
 
     assert code((11.0, 28.0)) == kernels.LEFT_IMAGE

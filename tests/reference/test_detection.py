@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from solver.detection.band_inverse import band_inverse
 from solver.detection.touch_probability import ContactProbabilitySettings, smooth_gaps
 from tests.reference.twins.touch_probability import plain_smooth
 
@@ -61,26 +60,3 @@ def test_one_photograph_alone_has_its_say(gaps):
     touch, mean, _ = plain_smooth(measured[:1], sigma[:1], SCALES[:0], 0.0)
     assert found.touch == pytest.approx(touch, abs=ROUNDING)
     assert found.mean == pytest.approx(mean, abs=ROUNDING * np.abs(mean).max())
-
-
-@pytest.mark.parametrize(("count", "band"), [(1, 0), (9, 2), (30, 11)])
-def test_the_inverse_within_the_band_is_that_of_the_whole_matrix(count, band):
-    rng = np.random.default_rng(count)
-    whole = np.zeros((count, count))
-    for _ in range(3 * count):  # springs between neighbours, as contacts are
-        a = rng.integers(count)
-        b = min(a + rng.integers(band + 1), count - 1)
-        spring = np.zeros(count)
-        spring[a] += 1.0
-        spring[b] -= 0.7
-        whole += rng.uniform(0.5, 2.0) * np.outer(spring, spring)
-    whole += 0.1 * np.eye(count)
-    lower = np.zeros((band + 1, count))
-    for d in range(band + 1):
-        for k in range(count - d):
-            lower[d, k] = whole[k + d, k]
-    _, found = band_inverse(lower)
-    expected = np.linalg.inv(whole)
-    for k in range(count):
-        for d in range(min(band, count - 1 - k) + 1):
-            assert found[k, d] == pytest.approx(expected[k + d, k], abs=1e-10 * np.abs(expected).max())

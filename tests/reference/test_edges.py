@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from rodsight.tracking.detection.edges import fit_circle
+from rodsight.tracking.detection.edges import centre_variance, find_steepest, fit_circle
 from rodsight.tracking.detection.rim_profile import locate_edges
+from rodsight.tracking.detection.rings import without_overlap
 from scipy.optimize import least_squares
 
-from tests.reference.twins.edges import circle_step, rim, rim_misfit
+from tests.reference.twins.edges import apart, circle_step, rim, rim_misfit, sandwich_variance, steepest
 
 pytestmark = pytest.mark.unit
 
@@ -70,3 +71,44 @@ def test_a_rim_is_where_the_plain_fit_finds_it():
         rest = rays[p][chosen] - dark[p] - rim(r[chosen], *plain.x, width)
         assert misfit[p] == pytest.approx(np.sqrt(np.mean(rest**2)), rel=0.05)
         assert edge[p] == pytest.approx(edges[p], abs=0.1)
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_the_steepest_descent_of_a_ray_is_the_plain_one(narrow):
+    rng = np.random.default_rng(8)
+    first, radius, window = 14.0, 19.0, 2.5
+    r = first + 0.25 * np.arange(45)
+    edge = np.array([18.2, 20.1, 19.0, 30.0, 18.7])
+    rays = 40.0 + 120.0 / (1.0 + np.exp((r - edge[:, None]) / 0.4)) + rng.normal(0.0, 1.0, (5, len(r)))
+    rays[3] = 100.0 + r  # rises all the way
+    rays = rays.astype(np.float32)
+    rays[4, 40] = np.nan  # leaves the photograph
+    edges, in_view = np.empty((5, 3)), np.empty(5, np.bool_)
+    find_steepest(rays, first, radius, window, narrow, edges, in_view)
+    assert in_view.tolist() == [True] * 4 + [False]
+    for p in range(3):
+        assert edges[p] == pytest.approx(steepest(rays[p].astype(float), first, radius, window, narrow), rel=1e-4)
+    assert np.isnan(edges[3:, 0]).all()
+    assert edges[3:, 1].tolist() == [0.0, 0.0]
+
+
+def test_circles_strike_out_the_later_ones_that_overlap_them():
+    rng = np.random.default_rng(9)
+    x, y, radius = rng.uniform(0.0, 60.0, 150), rng.uniform(5.0, 40.0, 150), rng.uniform(1.0, 7.0, 150)
+    kept = without_overlap(x, y, radius, allowed=0.2)
+    assert kept.tolist() == apart(x, y, radius, 0.2)
+    assert 10 < len(kept) < 100
+    assert without_overlap(x[:0], y[:0], radius[:0], allowed=0.2).tolist() == []
+
+
+@pytest.mark.parametrize("scatter", [np.inf, 0.1])
+def test_the_variance_of_a_centre_is_that_of_the_scores(scatter):
+    rng = np.random.default_rng(10)
+    radius, angle = 20.0, np.linspace(0.0, 6.2, 60)
+    stretch = (angle * radius / 8.0).astype(int)
+    w = rng.uniform(0.1, 1.0, 60)
+    w[(stretch == 2) | (stretch == 9)] = 0.0
+    score, root = rng.normal(size=(stretch.max() + 1, 3)), rng.normal(size=(3, 3))
+    inverse = root @ root.T
+    expected = sandwich_variance(score, np.bincount(stretch, w), inverse, 0.07, scatter)
+    assert centre_variance(angle, radius, w, score, inverse, 0.07, scatter) == pytest.approx(expected, rel=1e-12)

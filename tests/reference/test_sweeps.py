@@ -16,9 +16,9 @@ pytestmark = pytest.mark.unit
 ROUNDING = 1e-11
 
 
-@pytest.fixture(scope="module")
-def case():
-    return make_case()
+@pytest.fixture(scope="module", params=["walls", "boundary grains and a cell"])
+def case(request):
+    return make_case(with_boundary=request.param != "walls")
 
 
 @pytest.fixture(scope="module")

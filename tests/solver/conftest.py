@@ -6,9 +6,12 @@ from pathlib import Path
 
 import pytest
 
-# Thousands of sweeps, time steps or bands, or nothing that is compiled: interpreted they would take minutes, or
-# say nothing new. The kernels that they stand on are compared with plain twins in tests/reference.
-COMPILED_ALONE = ("calibration", "convex", "dem", "sequence", "test_acceleration.py", "test_refinement.py")
+# Thousands of sweeps or time steps, or nothing that is compiled: interpreted they would take minutes, or
+# say nothing new. Their kernels are compared with plain twins in tests/reference, the posterior's with integrals.
+COMPILED_ALONE = (
+    "calibration", "convex", "dem", "sequence", "test_acceleration.py", "test_refinement.py", "test_frame_posterior.py",
+    "test_radii.py", "test_simulated_forces.py",
+)  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

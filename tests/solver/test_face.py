@@ -12,7 +12,7 @@ import pytest
 
 import solver
 
-HEAVY = ("numpy", "numba", "scipy", "clarabel")
+HEAVY = ("numpy", "numba", "scipy")
 
 
 def said_by_a_fresh_python(program: str) -> str:

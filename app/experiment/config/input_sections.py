@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
-from .section import Finite, Positive, Section, key
+from .section import Finite, Length, Pixels, Section, Switch, above, between, key, whole
+
+OUTER = "outer"  # in place of a table: the outermost grains
 
 
 def _pixel_size(value: Any) -> Any:
     """One side or both, in one line of complaint: a union's own would name its branches."""
     sides = value if isinstance(value, list | tuple) else [value]
     numbers = all(isinstance(side, int | float) and not isinstance(side, bool) for side in sides)
-    if len(sides) not in (1, 2) or not numbers or not all(0 < side < float("inf") for side in sides):
-        raise ValueError(f"value {value!r}: must be a positive number [m], or [along rows, along columns]")
+    if len(sides) not in (1, 2) or not numbers or not all(0 < side <= 1 for side in sides):
+        raise ValueError(f"value {value!r}: must be a number > 0, ≤ 1 [m], or [along rows, along columns]")
     return tuple(float(side) for side in sides) if isinstance(value, list | tuple) else float(value)
 
 
 class LensSection(Section):
     """How the lens bends the picture: OpenCV's model, or Brown's with capital letters as p-tracker writes it."""
 
-    fx: Positive | None = key("Focal length along the rows, OpenCV's model.", unit="px", default=None)
-    fy: Positive | None = key("Focal length along the columns; absent: as fx.", unit="px", default=None)
+    fx: Pixels | None = key("Focal length along the rows, OpenCV's model.", unit="px", default=None)
+    fy: Pixels | None = key("Focal length along the columns; absent: as fx.", unit="px", default=None)
     cx: Finite | None = key("Column of the optical axis, OpenCV's model.", unit="px", default=None)
     cy: Finite | None = key("Row of the optical axis, OpenCV's model.", unit="px", default=None)
     k1: Finite = key("Radial distortion, second order, OpenCV's model.", default=0.0)
@@ -57,13 +59,16 @@ class KnownDistance(Section):
 
     start: tuple[Finite, Finite] = key("Column and row of one point.", unit="px")
     end: tuple[Finite, Finite] = key("Column and row of the other point.", unit="px")
-    metres: Positive = key("Distance of the two points; the farther apart they are, the better.", unit="m")
+    metres: Length = key("Distance of the two points; the farther apart they are, the better.", unit="m")
 
     @model_validator(mode="after")
     def _apart(self) -> KnownDistance:
         if self.start == self.end:
             raise ValueError(f"value {list(self.start)!r}: start and end are the same point")
         return self
+
+
+Column = Annotated[int, whole(0, 10**6)]
 
 
 class PhotographsSection(Section):
@@ -80,17 +85,35 @@ class PhotographsSection(Section):
         "A distance measured in the first photograph, in place of pixel_size.", default=None
     )
     lens: LensSection | None = key("Distortion by the lens; absent: the picture is straight.", default=None)
-    interval: Positive | None = key("Time between photographs. Give this or times.", unit="s", default=None)
+    interval: Annotated[float, above(0, 1e9)] | None = key(
+        "Time between photographs. Give this or times.", unit="s", default=None
+    )
     times: str | None = key("Table frame,time of photographs at uneven times, in place of interval.", default=None)
     grains: str | None = key(
         "Table id,x,y,radius in pixels of the rods on the first photograph; absent: they are detected. The "
         "detections.csv of a run, mended by hand, can be given here.",
         default=None,
     )
-    radii: tuple[Positive, ...] = key(
+    radii: tuple[Length, ...] = key(
         "Known radius classes of the rods. They make detection sure and tell an error of pixel_size.",
         unit="m",
         default=(),
+    )
+    channel: Literal["grey", "red", "green", "blue"] = key(
+        "What of colour photographs is looked at: where the rods stand out best.", default="grey"
+    )
+    region: tuple[Column, Column, Column, Column] | None = key(
+        "First column and row, last column and row of what is looked at; nothing outside is.", unit="px", default=None
+    )
+    follow: Literal["texture", "outline"] = key(
+        "What of the rods is followed. texture: what is painted on them, with their rotation; outline: their rims, for "
+        "discs that are plain, or that change inside as photoelastic ones do; their rotation stays unknown.",
+        default="texture",
+    )
+    max_pixels: Annotated[int, whole(1, 10**10)] = key(
+        "Pixels that a photograph may claim to have: a file of a few bytes can claim any number.",
+        unit="px",
+        default=200_000_000,
     )
     corrections: str | None = key(
         "Table frame,id,x,y,theta of poses told by hand in pixels and radians, or the word lost.", default=None
@@ -102,6 +125,12 @@ class PhotographsSection(Section):
             raise ValueError("pixel_size is missing: give it or distance = {start, end, metres}")
         if self.pixel_size is not None and self.distance is not None:
             raise ValueError("give either pixel_size or distance")
+        return self
+
+    @model_validator(mode="after")
+    def _region_has_sides(self) -> PhotographsSection:
+        if self.region is not None and not (self.region[0] < self.region[2] and self.region[1] < self.region[3]):
+            raise ValueError(f"region value {list(self.region)!r}: must be [x0, y0, x1, y1] with x0 < x1 and y0 < y1")
         return self
 
     @model_validator(mode="after")
@@ -117,7 +146,12 @@ class GivenTracks(Section):
     positions: str = key("Table frame,id,x,y,theta of poses in metres and radians; a missing row is a lost grain.")
     grains: str = key("Table id,radius of the grains in metres.")
     times: str = key("Table frame,time of the photographs in seconds.")
-    precision: Positive = key(
+    radius_offset: Literal["estimate"] | Finite = key(
+        "An error that all radii share, to be added to each, or estimate: found from the gaps of touching grains.",
+        unit="m",
+        default="estimate",
+    )
+    precision: Annotated[float, above(0, 1)] = key(
         "Standard deviation of a position component. Change it to what your tracker reaches: pairs are judged by it, "
         "unless the gaps of touching rods contradict it.",
         unit="m",
@@ -128,22 +162,42 @@ class GivenTracks(Section):
 class Plate(Section):
     """What is known of one wall beside its position."""
 
-    pressure: Positive | None = key(
+    pressure: Annotated[float, between(1e-3, 1e11)] | None = key(
         "Pressure that loads this wall; absent: its measured velocity is imposed. One loaded wall sets the scale of "
         "all forces.",
         unit="Pa",
         default=None,
     )
 
+    ends: Literal["auto", "bar", "corner"] = key(
+        "What the two points of this wall are. bar: points of the bar itself; corner: where bars meet, which slides "
+        "along the bar; auto: corners where their distance changes.",
+        default="auto",
+    )
+
 
 class WallsSection(Section):
-    """The walls: a table of their ends, and a table [walls.NAME] of what else is known of one."""
+    """The walls: tables of straight and of circular ones, and a table [walls.NAME] of what else is known of one."""
 
-    file: str = key("Table frame,wall,x1,y1,x2,y2 of the walls' ends in metres; the packing lies to the left of 1 → 2.")
-    track: bool | None = key(
+    file: str | None = key(
+        "Table frame,wall,x1,y1,x2,y2 of straight walls' ends in metres; the packing lies to the left of 1 → 2.",
+        default=None,
+    )
+    arcs: str | None = key(
+        "Table frame,wall,x,y,radius,side of circular walls in metres; side: in where the packing is inside the "
+        "circle, out where it is outside. Told in frame 0 alone, a circle stays. A column theta in radians says how it "
+        "turns.",
+        default=None,
+    )
+    load: str | None = key(
+        "Table frame,wall,force of the normal force in newtons that was measured on walls, in every photograph: it "
+        "loads them instead of a pressure.",
+        default=None,
+    )
+    track: Switch | None = key(
         "Follow walls in the photographs where the table has no row; absent: where it has frame 0 alone.", default=None
     )
-    thickness: Positive | None = key(
+    thickness: Length | None = key(
         "Thickness of the bars seen beside the walls' inner faces; absent: measured on the picture.",
         unit="m",
         default=None,
@@ -153,6 +207,12 @@ class WallsSection(Section):
         default=None,
     )
     plates: dict[str, Plate] = key("What is known of walls by their names: the tables [walls.NAME].", default={})
+
+    @model_validator(mode="after")
+    def _some_walls(self) -> WallsSection:
+        if self.file is None and self.arcs is None:
+            raise ValueError("file is missing: give a table of straight walls, or arcs, a table of circular ones")
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -164,3 +224,27 @@ class WallsSection(Section):
             **{key: value for key, value in data.items() if not isinstance(value, dict)},
             "plates": {key: value for key, value in data.items() if isinstance(value, dict)},
         }
+
+
+class BoundarySection(Section):
+    """What bounds the packing where it is no wall: some of its grains, or the edges of a periodic cell."""
+
+    grains: str | None = key(
+        "Table id of the grains that are the boundary, or outer: the outermost ones, found on the first photograph. "
+        "They move as they were seen and carry forces, and no balance is asked of them.",
+        default=None,
+    )
+    periodic: str | None = key(
+        "Table frame,ax,ay,bx,by of the vectors of a periodic cell in metres, instead of walls.", default=None
+    )
+
+    @property
+    def found(self) -> bool:
+        """Whether the boundary's grains are to be found."""
+        return self.grains == OUTER
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> BoundarySection:
+        if (self.grains is None) == (self.periodic is None):
+            raise ValueError("give either grains or periodic")
+        return self

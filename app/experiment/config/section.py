@@ -7,11 +7,34 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticUndefined
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-AtLeastOne = Annotated[int, Field(ge=1)]
-Frame = Annotated[int, Field(ge=0)]
+GREATEST = 2**53  # whole numbers up to it are exact wherever they are stored
+
+
+def _number(**bounds: Any) -> Any:
+    """A number within bounds: neither true nor quoted, finite."""
+    return Field(strict=True, allow_inf_nan=False, **bounds)
+
+
+def above(low: float, high: float) -> Any:
+    """low < value ≤ high."""
+    return _number(gt=low, le=high)
+
+
+def between(low: float, high: float) -> Any:
+    """low ≤ value ≤ high."""
+    return _number(ge=low, le=high)
+
+
+def whole(low: int, high: int) -> Any:
+    """A whole number, low ≤ value ≤ high."""
+    return Field(strict=True, ge=low, le=high)
+
+
+Finite = Annotated[float, _number()]
+Frame = Annotated[int, whole(0, GREATEST)]
+Length = Annotated[float, above(0, 1e3)]  # [m]
+Pixels = Annotated[float, above(0, 1e6)]  # [px]
+Switch = Annotated[bool, Field(strict=True)]
 
 
 class Section(BaseModel):

@@ -32,6 +32,7 @@ def unused_keys(config: InferenceSections) -> dict[str, str]:
                 found[f"solver.{key}"] = PAPER
     if paper or solver.estimator == "nlgs":
         found["solver.keep_members"] = ONE_CHAIN
+        found["solver.positions"] = ONE_CHAIN
         if contacts.threshold is not None:
             found["contacts.threshold_sigmas"] = "has no effect beside contacts.threshold: leave out one of them"
     else:

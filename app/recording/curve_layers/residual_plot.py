@@ -13,8 +13,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.nlgs.starts import COLD_SWEEPS
 from solver.nlgs.sweep_record import SweepHistory
-from solver.sequence.starts import COLD_SWEEPS
 
 from ..look import entities
 from ..look.axes import Axes

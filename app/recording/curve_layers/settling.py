@@ -7,8 +7,9 @@ import rerun as rr
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 
+from ...tracks import Tracks, TrackStatus
 from ..look import entities
-from ..look.colours import SERIES, Rgba
+from ..look.colours import INFERRED, SERIES, Rgba
 from ..look.scene import Clock, Scene
 from ..look.texts import printable
 from ..look.values import log_scalar
@@ -22,7 +23,16 @@ STATUS_COLOURS: dict[FrameStatus, Rgba] = {
     FrameStatus.SETTLED: (62, 150, 104, 255),
     FrameStatus.FAILED: (158, 32, 74, 255),
 }
-ALL_TRACKED, SOME_LOST = "all tracked", "grains lost"
+DOUBTED = 0.9  # T below which its reasons are told
+# The lane of tracking: the first of them that holds of a frame is shown.
+SOME_LOST, SOME_CUT, SOME_INFERRED = "grains lost", "grains beyond the border", "seen ones tracked, some inferred"
+ALL_TRACKED = "all tracked"
+TRACKING_COLOURS: dict[str, Rgba] = {
+    ALL_TRACKED: (58, 84, 108, 255),
+    SOME_INFERRED: INFERRED,
+    SOME_CUT: (142, 118, 214, 255),
+    SOME_LOST: (226, 92, 82, 255),
+}
 
 _LEVELS = {
     FrameStatus.FAILED: "ERROR",
@@ -46,9 +56,9 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
     stream.log(
         entities.TRACKING_LANE,
         rr.StateConfiguration(
-            values=[ALL_TRACKED, SOME_LOST],
-            labels=[ALL_TRACKED, SOME_LOST],
-            colors=[(58, 84, 108, 255), (226, 92, 82, 255)],
+            values=list(TRACKING_COLOURS),
+            labels=list(TRACKING_COLOURS),
+            colors=list(TRACKING_COLOURS.values()),
         ),
         static=True,
     )
@@ -72,9 +82,8 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
 def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log lanes, trust and flags of one frame."""
     clock.start()
-    lost = ~scene.tracks.present[clock.frame]
     clock.stream.log(entities.STATUS_LANE, rr.StateChange(state=forces.status.name.lower()))
-    clock.stream.log(entities.TRACKING_LANE, rr.StateChange(state=SOME_LOST if lost.any() else ALL_TRACKED))
+    clock.stream.log(entities.TRACKING_LANE, rr.StateChange(state=tracking_state(scene.tracks, clock.frame)))
     _log_flags(clock, scene, forces)
     clock.end()
     for path, value in (
@@ -93,15 +102,30 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         log_scalar(clock, path, float(value))
 
 
+def tracking_state(tracks: Tracks, frame: int) -> str:
+    """What the lane of tracking says of a frame."""
+    if tracks.lost[frame].any():
+        return SOME_LOST
+    if tracks.out_of_frame[frame].any():
+        return SOME_CUT
+    return SOME_INFERRED if (tracks.status[frame] == TrackStatus.INFERRED).any() else ALL_TRACKED
+
+
 def _log_flags(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     present = scene.tracks.present
     before = present[clock.frame - 1] if clock.frame else np.ones(present.shape[1], bool)
     now = present[clock.frame]
     if forces.status in _LEVELS:
         _log_flag(clock, f"{forces.status.name.lower()}: {forces.reason}", _LEVELS[forces.status])
-    if (before & ~now).any():
-        ids = _listed(scene, before & ~now)
+    if forces.doubt and forces.trust < DOUBTED:
+        _log_flag(clock, f"T = {forces.trust:.2f}: {forces.doubt}", "INFO")
+    cut = scene.tracks.out_of_frame[clock.frame]
+    if (before & ~now & ~cut).any():
+        ids = _listed(scene, before & ~now & ~cut)
         _log_flag(clock, f"lost grain {ids}: takes no part from here", "WARN")
+    if (before & cut).any():
+        ids = _listed(scene, before & cut)
+        _log_flag(clock, f"grain {ids} is cut by the picture's border: takes no part from here", "INFO")
     if clock.frame and (now & ~before).any():
         _log_flag(clock, f"grain {_listed(scene, now & ~before)} found again", "INFO")
 

@@ -62,7 +62,7 @@ def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> N
     clock.end()
     for path, value in statistic_values(statistics):
         log_scalar(clock, path, float(value))
-    for path, values in wall_values(scene.walls.endpoints[clock.frame], statistics):
+    for path, values in wall_values(scene.walls_at(clock.frame), statistics):
         log_scalars(clock, path, values)
 
 
@@ -99,11 +99,14 @@ def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ..
     )
 
 
-def wall_values(endpoints: Array, statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
-    """Entity and values (w,) [N] of the curves of the walls; endpoints (w, 2, 2) [m] of the frame."""
-    walls = Walls.at_rest(endpoints)
+def wall_values(walls: Walls, statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
+    """Entity and values (w,) [N] of the curves of the walls of the frame.
+
+    Files of earlier versions have no sums over a wall's contacts; those of straight walls follow from its force.
+    """
     force = np.broadcast_to(statistics.wall_force, (walls.count, 2))
-    return (
-        (entities.WALL_NORMAL_FORCE, np.einsum("wk,wk->w", force, walls.outward)),
-        (entities.WALL_TANGENTIAL_FORCE, np.einsum("wk,wk->w", force, walls.direction)),
-    )
+    normal, tangential = statistics.wall_normal_force, statistics.wall_tangential_force
+    if normal is None or tangential is None:
+        normal = np.einsum("wk,wk->w", force, walls.outward)
+        tangential = np.einsum("wk,wk->w", force, walls.direction)
+    return ((entities.WALL_NORMAL_FORCE, normal), (entities.WALL_TANGENTIAL_FORCE, tangential))

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 import rerun as rr
 from rerun.chunk import RrdReader
@@ -22,7 +21,6 @@ from rerun.chunk import RrdReader
 from ..look import entities
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import read_layout
-from ..viewing.headless import free_port
 from ..viewing.viewer import viewer_binary
 from .properties import EXPERIMENT, OUTCOME
 
@@ -100,19 +98,10 @@ def serve(files: Sequence[Path]) -> Iterator[str]:
         yield f"{server.url()}/dataset/{dataset.id}"
 
 
-def show_together(address: str | Sequence[Path], *, web: bool) -> tuple[subprocess.Popen[bytes], str]:
-    """Open the viewer on a catalogue, or on several recordings at once; gives its process and, for the web, a page."""
+def show_together(address: str | Sequence[Path]) -> subprocess.Popen[bytes]:
+    """Open the viewer's window on a catalogue, or on several recordings at once; gives its process."""
     shown = [address] if isinstance(address, str) else [str(file) for file in address]
-    options = ["--hide-welcome-screen"]
-    page = ""
-    if web:
-        port, data = free_port(), free_port()
-        options = ["--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(port), "--port", str(data)]
-        served = address if isinstance(address, str) else f"rerun+http://127.0.0.1:{data}/proxy"
-        page = f"http://127.0.0.1:{port}/?url={quote(served, safe='')}"
-        shown = [] if isinstance(address, str) else shown
-    process = subprocess.Popen(
-        [str(viewer_binary()), *options, *shown],
+    return subprocess.Popen(
+        [str(viewer_binary()), "--hide-welcome-screen", *shown],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
-    return process, page

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 import warnings
 from collections.abc import Callable
@@ -12,19 +13,24 @@ from pathlib import Path
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from ...errors import RunError
 from ...experiment.units import Scale
 from ...results.results import Results, TruthContacts
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.force_style import ForceRange, ForceStyle
-from ..look.scene import Scene
+from ..look.scene import Scene, tracks_in_cell
 from ..packing_layers.network import SweepChoice
 from ..tabs.axis_ranges import find_extremes
 from ..tabs.blueprint import Layout, Tab, make_blueprint
 from ..tabs.layout_property import send_layout
 from .recorder import BATCHES, SWEEPS_KEPT, PhotographSource, Recorder
+from .writing import writing
 
 FrameProgress = Callable[[int, int], None]  # frames done, frames in all
+
+LEAST_ROWS = 4  # sweeps of a frame that even a short solve keeps
+BYTES_PER_CONTACT = 8  # and row, at least: a width and a colour
 
 # What is tried in turn to keep a recording below a size: sweeps per frame.
 THINNER = (40, 20, 10, 0)
@@ -66,10 +72,12 @@ def write_recording(
     if photograph is not None and scale is None:
         raise ValueError("photographs need the scale that says where the grains are in them")
     path, begin = Path(path), time.perf_counter()
+    _ask_for_room(path.parent, results, SweepChoice(sweeps), max_size)
     first = photograph(0) if photograph else None
-    canvas = Canvas.around(results.tracks, scale, None if first is None else (first.shape[0], first.shape[1]))
+    tracks = tracks_in_cell(results.tracks, results.walls)
+    canvas = Canvas.around(tracks, scale, None if first is None else (first.shape[0], first.shape[1]))
     scene = Scene(
-        results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
+        results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, ForceRange.of(results.frames)), truth, tolerance, results.radius_tuning,
     )  # fmt: skip
     run = _Run(results, scene, photograph, active, progress)
@@ -141,26 +149,40 @@ def _write(run: _Run, part: Path, plan: _Plan, notes: tuple[str, ...], max_size:
     results, photograph = run.results, run.photograph
     stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
     layout = layout_of(results, run.scene, photographs=photograph is not None)
-    stream.save(part, default_blueprint=make_blueprint(layout, active=run.active))
-    try:
-        recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept)
+    with writing(stream, part, make_blueprint(layout, active=run.active)) as written:
+        recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept, flush=written.flush)
         recorder.start(run.scene)
         send_layout(stream, layout)
         for done, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
             recorder.frame(forces, statistics, photograph(forces.frame) if photograph else None)
             if run.progress:
                 run.progress(done + 1, len(results.frames))
-            if max_size is not None and part.stat().st_size > max_size:
+            written.check()
+            if max_size is not None and written.size > max_size:
                 return None
         recorder.finish(notes)
-    finally:
-        stream.disconnect()
     _check_whole(part)
     return recorder
 
 
+def _ask_for_room(folder: Path, results: Results, choice: SweepChoice, max_size: int | None) -> None:
+    """Raise RunError where not even the forces of all frames would find room: better now than after minutes."""
+    contacts = [forces.contacts.count for forces in results.frames]
+    rows = 1 if choice is SweepChoice.NONE or max_size is not None else 1 + LEAST_ROWS
+    needed, free = sum(contacts) * rows * BYTES_PER_CONTACT, shutil.disk_usage(folder).free
+    if free < needed:
+        raise RunError(
+            f"{folder}: has {_megabytes(free)} free, and the recording needs more than {_megabytes(needed)}: make "
+            "room, or take another --out"
+        )
+
+
 def _check_whole(part: Path) -> None:
     """Raise OSError where the end of the file is not there: the stream writes in the background and does not tell."""
+    try:
+        os.fspath(part).encode()
+    except UnicodeEncodeError:  # a name that is no text: the reader cannot open it
+        return
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # of a missing end: store() raises for it

@@ -1,24 +1,25 @@
-"""A recording that can be watched while it is made: a server for viewers on this machine beside a file.
+"""A recording that can be watched while it is made: a file, and a page on this machine that shows it as it grows.
 
-The server answers on 127.0.0.1 only and keeps at most MEMORY_LIMIT of what was logged; a viewer that opens late sees
-what it still has. The file has everything, and every finished frame reaches it before the next one begins, so that a
-run that is interrupted, or killed, leaves a recording that opens. So as to keep up with the solve it keeps fewer
-sweeps than the full recording, which takes its place at the end. It runs in a
+The page is behind the gate: it answers on 127.0.0.1 only, to the address that was printed. Every finished frame reaches
+the file before the next one begins, so that a run that is interrupted, or killed, leaves a recording that opens. So as
+to keep up with the solve it keeps fewer sweeps than the full recording, which takes its place at the end. It runs in a
 process of its own (live_process), which the solve does not wait for.
 
-To watch a run on another machine, forward both ports, under the same numbers, and open the printed address here:
+To watch a run on another machine, forward the port, under the same number, and open the printed address here:
 
-    ssh -L 9090:localhost:9090 -L 9876:localhost:9876 HOST
+    ssh -L 9090:localhost:9090 HOST
 """
 
 from __future__ import annotations
 
-import shlex
 import socket
 import subprocess
+import threading
+import webbrowser
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 import rerun as rr
@@ -32,17 +33,17 @@ from ...results.results import Results
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.force_style import ForceRange, ForceStyle
-from ..look.scene import Scene
+from ..look.scene import Scene, tracks_in_cell
 from ..packing_layers.network import SweepChoice
 from ..tabs.blueprint import Layout, make_blueprint
 from ..tabs.layout_property import send_layout
 from ..viewing.headless import free_port
+from ..viewing.recording_server import RecordingServer, grown
 from ..viewing.viewer import ViewerKind, has_display, viewer_binary
 from .recorder import BATCHES, Recorder
+from .writing import WrittenFile, writing
 
-MEMORY_LIMIT = "512MiB"  # of what the server keeps for viewers that open late; the oldest goes first
-DATA_PORT, PAGE_PORT = 9876, 9090  # where they are free
-FLUSH_SECONDS = 5.0  # for one frame to reach the file
+PAGE_PORT = 9090  # where it is free
 SWEEPS_KEPT = 20  # per frame: the pictures must keep up with the solve
 HEADROOM = 1.3  # of the drawn range over the greatest forces of the first frame: those of the run are not known yet
 
@@ -62,34 +63,34 @@ class LiveRecording:
         sweeps: SweepChoice | str = SweepChoice.LOG,
     ) -> None:
         self.path = Path(path)
-        self.address = ""  # of the page, or of the data for a native viewer
+        self.address = ""  # of the page, where there is one
         self.hint = ""  # one line that says how to watch
         self.notes: list[str] = []  # what went wrong with watching, if anything
         self._kind = ViewerKind(viewer)
         self._photograph, self._scale = photograph, scale
         self._sweeps = SweepChoice(sweeps)
         self._stream: rr.RecordingStream | None = None
+        self._server: RecordingServer | None = None
         self._viewer: subprocess.Popen[bytes] | None = None
+        self._whole = threading.Event()
+        self._written: WrittenFile | None = None
+        self._open = ExitStack()
         self._recorder: Recorder | None = None
         self._run: Results | None = None
 
     def start(self, run: Results) -> None:
         """Open the server, the file and the viewer; `run` has bodies and motion, its frames are still to come."""
+        run = replace(run, tracks=tracks_in_cell(run.tracks, run.walls))
         self._run = run
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        port = _port(DATA_PORT)
-        data = f"rerun+http://127.0.0.1:{port}/proxy"
         stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
         first = self._photograph(0) if self._photograph else None
         canvas = Canvas.around(run.tracks, self._scale, None if first is None else (first.shape[0], first.shape[1]))
         self._canvas = canvas
-        stream.set_sinks(
-            rr.GrpcServerSink("127.0.0.1", port, server_memory_limit=MEMORY_LIMIT),
-            rr.FileSink(self.path),
-            default_blueprint=make_blueprint(self._layout(run, canvas), following=True),
-        )
+        blueprint = make_blueprint(self._layout(run, canvas), following=True)
+        self._written = self._open.enter_context(writing(stream, self.path, blueprint))
         self._stream = stream
-        self._open_viewer(data)
+        self._open_viewer()
 
     def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
         """Record one finished frame."""
@@ -98,10 +99,8 @@ class LiveRecording:
             recorder = self._recorder = self._begin(forces)
         photograph = self._photograph(forces.frame) if self._photograph else None
         recorder.frame(forces, statistics, photograph)
-        try:
-            stream.flush(timeout_sec=FLUSH_SECONDS)
-        except (RuntimeError, TimeoutError, ValueError) as error:  # a slow disk or viewer must not end the run
-            self.notes.append(f"Frame {forces.frame} did not reach the file within {FLUSH_SECONDS:g} s: {error}")
+        assert self._written is not None
+        self._written.flush(stream)
 
     def finish(self, notes: tuple[str, ...] = ()) -> None:
         """Write the summary."""
@@ -109,14 +108,15 @@ class LiveRecording:
             self._recorder.finish((*notes, *self.notes))
 
     def close(self) -> None:
-        """End server, file and page. What a viewer has got stays on its screen."""
-        if self._stream is not None:
-            self._stream.disconnect()
+        """End file, server and page. What a viewer has got stays on its screen."""
+        try:
+            self._open.close()
+        finally:
             self._stream = None
-        if self._viewer is not None and self._kind is ViewerKind.WEB:
-            self._viewer.terminate()
-            self._viewer.wait(10)
-        self._viewer = None
+            self._whole.set()
+            if self._server is not None:
+                self._server.close()
+                self._server = None
 
     def _begin(self, forces: FrameForces) -> Recorder:
         run = self._run
@@ -135,30 +135,31 @@ class LiveRecording:
         photographs = self._photograph is not None
         return Layout(canvas, scene.rod_length, run.tracks.frame_count, photographs, False, run.walls.count)
 
-    def _open_viewer(self, data: str) -> None:
-        """Start the viewer or the page; where there is no display, only say how to look."""
-        options: list[str] = []
-        self.address = data
+    def _open_viewer(self) -> None:
+        """Serve the page, or start the viewer; where there is no display, only say how to look."""
         if self._kind is ViewerKind.WEB:
-            port = _port(PAGE_PORT)
-            self.address = f"http://127.0.0.1:{port}/?url={quote(data, safe='')}"
-            how = "--web-viewer" if has_display() else "--serve-web"
-            options = [how, "--bind", "127.0.0.1", "--web-viewer-port", str(port), data]
-            page, server = port, int(data.rsplit(":", 1)[1].split("/")[0])
-            self.hint = (
-                f"Watch it at {self.address} (from another machine: ssh -L {page}:localhost:{page} "
-                f"-L {server}:localhost:{server} HOST)"
-            )
+            self._server = RecordingServer([self.path], _port(PAGE_PORT), grows=True)
+            self.address, port = self._server.address, self._server.port
+            self.hint = f"Watch it at {self.address} (from another machine: ssh -L {port}:localhost:{port} HOST)"
+            if has_display():
+                webbrowser.open(self.address)
         elif self._kind is ViewerKind.NATIVE and has_display():
-            options = ["--connect", data, "--hide-welcome-screen"]
+            self._viewer = subprocess.Popen(
+                [str(viewer_binary()), "--hide-welcome-screen", "-"],
+                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            )  # fmt: skip
+            threading.Thread(target=self._feed, args=(self._viewer,), daemon=True).start()
             self.hint = "Watch it in the viewer's window."
         elif self._kind is ViewerKind.NATIVE:
-            self.hint = f"No display here. To watch it: rerun --connect {shlex.quote(data)}, or --view web"
-        if options:
-            self._viewer = subprocess.Popen(
-                [str(viewer_binary()), *options],
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-            )  # fmt: skip
+            self.hint = "No display here. To watch it in a browser: --view web"
+
+    def _feed(self, viewer: subprocess.Popen[bytes]) -> None:
+        """Hand a viewer the file as it grows: what it reads from no port, no stranger can."""
+        assert viewer.stdin is not None
+        with suppress(OSError), self.path.open("rb") as file, viewer.stdin as pipe:  # its window was closed
+            for piece in grown(file, self._whole):
+                pipe.write(piece)
+                pipe.flush()
 
     def _running(self) -> rr.RecordingStream:
         if self._stream is None:

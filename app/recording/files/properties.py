@@ -19,7 +19,7 @@ EXPERIMENT, OUTCOME, SETTINGS = "experiment", "outcome", "settings"
 
 def send_experiment(stream: rr.RecordingStream, scene: Scene) -> None:
     """Send what the run was given."""
-    pressure = scene.walls.pressure[np.isfinite(scene.walls.pressure)]
+    pressure = scene.walls.usual_pressure(scene.rod_length)[scene.walls.loaded]
     stream.send_property(
         EXPERIMENT,
         rr.AnyValues(

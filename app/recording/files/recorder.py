@@ -65,10 +65,12 @@ class Recorder:
         sweeps: SweepChoice = SweepChoice.LOG,
         kept: int = SWEEPS_KEPT,
         flush_every: int = FLUSHED_FRAMES,
+        flush: Callable[[rr.RecordingStream], None] = rr.RecordingStream.flush,
     ) -> None:
+        """flush: has what was logged on its way, every flush_every frames."""
         rr.set_strict_mode(True)  # else the SDK warns and leaves out what it could not write
         self._stream = stream
-        self._sweeps, self._kept, self._flush_every = sweeps, kept, flush_every
+        self._sweeps, self._kept, self._flush_every, self._flush = sweeps, kept, flush_every, flush
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._stack: StackWriter | None = None
@@ -138,10 +140,10 @@ class Recorder:
         self._former = forces
         self._clipped += scene.style.clipped(forces.fn)
         self._drawn += len(forces.fn)
-        lost = int((~scene.tracks.present[forces.frame]).sum())
+        lost = int(scene.tracks.lost[forces.frame].sum())
         self._facts.append(FrameFacts.of(forces, statistics, lost=lost, agreement=agreement))
         if len(self._facts) % self._flush_every == 0:
-            self._stream.flush()
+            self._flush(self._stream)
 
     def finish(self, notes: tuple[str, ...] = ()) -> None:
         """Write the summary."""

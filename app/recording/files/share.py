@@ -18,6 +18,7 @@ from ..look import entities
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import PROPERTY, read_layout, send_layout
 from ..viewing.viewer import viewer_binary
+from .writing import writing
 
 JPEG_QUALITY = 70  # of photographs made smaller
 
@@ -56,15 +57,13 @@ def share_recording(
         stream = rr.RecordingStream(
             entities.APPLICATION_ID, recording_id=f"{entry.recording_id}-{first}-{stop}", send_properties=False
         )
-        stream.save(loose, default_blueprint=make_blueprint(layout))
         try:
-            stream.set_log_time_enabled(False)
-            rr.send_chunks(_chosen(chunks, first, stop, sweeps, scale), recording=stream)
-            send_layout(stream, layout)
-            stream.disconnect()
+            with writing(stream, loose, make_blueprint(layout)):
+                stream.set_log_time_enabled(False)
+                rr.send_chunks(_chosen(chunks, first, stop, sweeps, scale), recording=stream)
+                send_layout(stream, layout)
             run_tool("optimize", loose, "-o", part)
         finally:
-            stream.disconnect()
             loose.unlink(missing_ok=True)
     return SharedRecording(target, target.stat().st_size, source.stat().st_size, stop - first)
 

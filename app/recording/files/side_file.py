@@ -16,6 +16,7 @@ from ..look.scene import Clock
 from ..packing_layers.network import SweepChoice, send_sweeps, visible_sweeps
 from ..tabs.layout_property import read_layout
 from .recorder import BATCHES
+from .writing import writing
 
 
 def write_side_file(results: Results, recording: Path, target: Path, frames: Sequence[int]) -> str:
@@ -48,19 +49,17 @@ def record_side_file(results: Results, recording: Path | str, target: Path | str
         entry.application_id, recording_id=entry.recording_id, send_properties=False, batcher_config=BATCHES
     )
     try:
-        stream.save(part)
-        stream.set_log_time_enabled(False)
-        first = 0
-        for forces in results.frames:
-            span = forces.history.count + 1
-            if forces.frame in frames and forces.contacts.count:
-                clock = Clock(stream, forces.frame, first, first + span - 1)
-                rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
-                send_sweeps(clock, style, rows[1:], fn[1:], thin=True)  # the first has the geometry: not again
-            first += span
-        stream.disconnect()
+        with writing(stream, part):
+            stream.set_log_time_enabled(False)
+            first = 0
+            for forces in results.frames:
+                span = forces.history.count + 1
+                if forces.frame in frames and forces.contacts.count:
+                    clock = Clock(stream, forces.frame, first, first + span - 1)
+                    rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
+                    send_sweeps(clock, style, rows[1:], fn[1:], thin=True)  # the first has the geometry: not again
+                first += span
         os.replace(part, target)
     finally:
-        stream.disconnect()
         part.unlink(missing_ok=True)
     return target.stat().st_size

@@ -30,10 +30,12 @@ SWEEP = "sweep"
 
 PHOTOGRAPH = "/photograph"
 WALLS = "/walls"
+CELL = "/walls/cell"
 GRAINS = "/grains"
 GRAIN_SPINS = "/grains/spin"
 GRAINS_LOST = "/grains/lost"
 FORCES = "/contacts/force"
+FORCES_ACROSS = "/contacts/force/across"
 SLIDING = "/contacts/sliding"
 GAPS = "/contacts/gap"
 GAINED = "/contacts/gained"
@@ -173,6 +175,7 @@ class Condition(Enum):
     TRUTH = "with a truth"
     RADII = "where radii were tuned by the coordination number"
     FLAGS = "where something was flagged"
+    CELL = "of a periodic cell"
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +217,7 @@ SCHEMA: tuple[Entity, ...] = (
         _of("EncodedImage", "blob", "media_type", "opacity", "draw_order"), When.START, Condition.PHOTOGRAPHS,
     ),
     Entity(WALLS, "walls, one strip each; loaded plates brighter", _STRIPS | {"name", "drive"}, When.START),
+    Entity(CELL, "edges of the periodic cell", _STRIPS, When.START, Condition.CELL),
     Entity(
         GRAINS, "outline of every grain, instance = row; lost ones where they were last seen",
         _of("Ellipses2D", "centers", "half_sizes", "line_radii", "colors", "draw_order") | _GRAIN_VALUES, When.START,
@@ -223,6 +227,10 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(
         FORCES, "contacts, centre to centre (wall: centre to contact point); width and colour grow with f_n",
         _STRIPS | _CONTACT_VALUES, When.START_AND_SWEEPS,
+    ),
+    Entity(
+        FORCES_ACROSS, "second halves of the contacts across the edge of a periodic cell, as reported",
+        _STRIPS, When.START, Condition.CELL,
     ),
     Entity(SLIDING, "contacts at the Coulomb limit", _POINTS, When.START_AND_END),
     Entity(GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from solver.bodies.cell import Cell
 from solver.bodies.grains import Array, Grains
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
@@ -59,18 +60,73 @@ class Scene:
         return [printable(self.walls.name[b - n]) if b >= n else str(self.tracks.id[b]) for b in bodies.tolist()]
 
     def walls_at(self, frame: int) -> Walls:
-        """The walls of one frame, at rest: for measuring, not for solving."""
-        return Walls.at_rest(self.walls.endpoints[frame])
+        """The walls of one frame, or its cell, at rest: for measuring, not for solving."""
+        walls = self.walls
+        cell = None if walls.cell is None else walls.cell[frame]
+        return Walls.at_rest(walls.endpoints[frame], side=walls.side, cell=cell)
 
     def branches(self, frame: int, contacts: Contacts) -> NDArray[np.float32]:
-        """Lines to draw for contacts (c, 2, 2) [px]: centre to centre; for a wall, centre to contact point."""
+        """Lines to draw for contacts (c, 2, 2) [px], of `lines`."""
+        return self.canvas.points(self.lines(frame, contacts)).astype(np.float32)
+
+    def lines(self, frame: int, contacts: Contacts) -> Array:
+        """From centre to centre (c, 2, 2) [m]; for a wall, and across the edge of a cell, to the contact point."""
         position = self.tracks.position[frame]
         wall = contacts.with_wall
         ends = np.empty((contacts.count, 2, 2))
         ends[:, 0] = position[contacts.i]
         ends[~wall, 1] = position[contacts.j[~wall]]
         ends[wall, 1] = contacts.point[wall]
-        return self.canvas.points(ends).astype(np.float32)
+        across = self.across(frame, contacts)
+        ends[across, 1] = self.contact_points(frame, contacts)[across]
+        return ends
+
+    def far_halves(self, frame: int, contacts: Contacts) -> tuple[NDArray[np.intp], Array]:
+        """The contacts across the edge of a cell (a,), and lines (a, 2, 2) [m] from j to where they are."""
+        rows = np.flatnonzero(self.across(frame, contacts))
+        start = self.tracks.position[frame][contacts.j[rows]]
+        reach = self.grains.radius[contacts.j[rows]] + 0.5 * contacts.gap[rows]
+        return rows, np.stack([start, start - reach[:, None] * contacts.normal[rows]], axis=1)
+
+    def across(self, frame: int, contacts: Contacts) -> NDArray[np.bool_]:
+        """Which contacts reach across the edge of the cell as it is drawn (c,)."""
+        if self.walls.cell is None:
+            return np.zeros(contacts.count, np.bool_)
+        apart = self.tracks.position[frame][contacts.j] - self.tracks.position[frame][contacts.i]
+        return np.linalg.norm(apart, axis=1) > 2.0 * self.grains.radius.max() + np.abs(contacts.gap)
+
+    def contact_points(self, frame: int, contacts: Contacts) -> Array:
+        """Where contacts are drawn (c, 2) [m]: in a cell at the rim of i, wherever that was wrapped to."""
+        if self.walls.cell is None:
+            return contacts.point
+        reach = self.grains.radius[contacts.i] + 0.5 * contacts.gap
+        return self.tracks.position[frame][contacts.i] + reach[:, None] * contacts.normal
+
+    def outline(self, frame: int) -> Array:
+        """Corners (k, 2) [m] of what bounds the packing in a frame: walls, the cell, or a box around all grains."""
+        if self.walls.cell is not None:
+            return cell_corners(self.walls.cell[frame])
+        if self.walls.count:
+            return self.walls.endpoints[frame].reshape(-1, 2)
+        seen = self.tracks.position[self.tracks.present]
+        (left, bottom), (right, top) = seen.min(axis=0), seen.max(axis=0)
+        return np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
+
+
+def cell_corners(vectors: Array) -> Array:
+    """Corners (4, 2) [m] of a cell of vectors (2, 2) [m]."""
+    a, b = vectors
+    return np.array([np.zeros(2), a, a + b, b])
+
+
+def tracks_in_cell(tracks: Tracks, walls: WallTracks) -> Tracks:
+    """The tracks as they are drawn: wrapped into the cell where there is one."""
+    if walls.cell is None:
+        return tracks
+    inside = np.stack([
+        Cell.at_rest(cell).wrapped(place) for cell, place in zip(walls.cell, tracks.position, strict=True)
+    ])  # fmt: skip
+    return replace(tracks, position=inside)
 
 
 @dataclass(frozen=True, slots=True)

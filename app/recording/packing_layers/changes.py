@@ -66,7 +66,7 @@ def _log_gaps(clock: Clock, scene: Scene, contacts: Contacts) -> None:
     clock.stream.log(
         entities.GAPS,
         rr.Points2D(
-            scene.canvas.points(contacts.point).astype(np.float32),
+            scene.canvas.points(scene.contact_points(clock.frame, contacts)).astype(np.float32),
             radii=np.float32(0.17 * scene.canvas.grain_radius),
             colors=gap_colours(contacts.gap, gap_range(scene)),
             draw_order=28.0,

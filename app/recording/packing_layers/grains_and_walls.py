@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.sequence.frame_forces import FrameForces
 
-from ...tracks import TrackStatus
+from ...tracks import TrackStatus, WallTracks
 from ..look import entities
-from ..look.colours import INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
-from ..look.scene import Clock, Scene
+from ..look.colours import BOUNDARY, INFERRED, INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
+from ..look.scene import Clock, Scene, cell_corners
 from ..look.texts import printable
 from ..look.values import known
 
@@ -38,24 +38,40 @@ def last_seen(position: Array, frame: int) -> Array:
 
 def _log_walls(clock: Clock, scene: Scene) -> None:
     walls, canvas = scene.walls, scene.canvas
-    loaded = np.isfinite(walls.pressure)
+    if walls.cell is not None:
+        _log_cell(clock, scene, walls.cell[clock.frame])
+    loaded = walls.loaded
     clock.stream.log(
         entities.WALLS,
         rr.LineStrips2D(
-            canvas.points(walls.endpoints[clock.frame]).astype(np.float32),
+            [canvas.points(line).astype(np.float32) for line in walls.outlines(clock.frame)],
             radii=np.where(loaded, 0.14, 0.09) * canvas.grain_radius,
             colors=np.where(loaded, packed_one(LOADED_WALL), packed_one(WALL)).astype(np.uint32),
             draw_order=5.0,
         ),
         rr.AnyValues(
             name=[printable(name) for name in walls.name],
-            drive=[_drive(pressure) for pressure in walls.pressure.tolist()],
+            drive=[_drive(walls, row, clock.frame) for row in range(walls.count)],
         ),
     )
 
 
-def _drive(pressure: float) -> str:
-    return f"{1e-3 * pressure:g} kPa" if np.isfinite(pressure) else "motion imposed"
+def _log_cell(clock: Clock, scene: Scene, vectors: Array) -> None:
+    corners = scene.canvas.points(cell_corners(vectors)[[0, 1, 2, 3, 0]])
+    clock.stream.log(
+        entities.CELL,
+        rr.LineStrips2D(
+            corners[None].astype(np.float32), radii=np.float32(0.05 * scene.canvas.grain_radius),
+            colors=packed_one(WALL), draw_order=5.0,
+        ),
+    )  # fmt: skip
+
+
+def _drive(walls: WallTracks, row: int, frame: int) -> str:
+    load = walls.load_at(frame)
+    if load is not None and np.isfinite(load[row]):
+        return f"{load[row]:.4g} N measured"
+    return f"{1e-3 * walls.pressure[row]:g} kPa" if np.isfinite(walls.pressure[row]) else "motion imposed"
 
 
 def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
@@ -65,14 +81,15 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     radius = canvas.lengths(tracks.radius)
     status = tracks.status[frame]
     unbalance = np.full(tracks.grain_count, np.nan) if forces.grain_unbalance is None else forces.grain_unbalance
-    line = np.where(present & (status != TrackStatus.SUSPECT), 0.02, 0.05) * canvas.grain_radius
+    plain = present & ~np.isin(status, (TrackStatus.SUSPECT, TrackStatus.INFERRED))
+    line = np.where(plain, 0.02, 0.05) * canvas.grain_radius
     clock.stream.log(
         entities.GRAINS,
         rr.Ellipses2D(
             centers=centre.astype(np.float32),
             half_sizes=np.repeat(radius[:, None], 2, axis=1).astype(np.float32),
             line_radii=line.astype(np.float32),
-            colors=grain_colours(status, present),
+            colors=grain_colours(status, present, tracks.boundary),
             draw_order=10.0,
         ),
         rr.AnyValues(
@@ -108,9 +125,15 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     )
 
 
-def grain_colours(status: NDArray[np.uint8], present: NDArray[np.bool_]) -> NDArray[np.uint32]:
-    """Outline colours: grey, amber where the pose is doubtful, red where there is none (n,)."""
-    colours = np.where(status == TrackStatus.SUSPECT, packed_one(SUSPECT), packed_one(OUTLINE))
+def grain_colours(
+    status: NDArray[np.uint8], present: NDArray[np.bool_], boundary: NDArray[np.bool_] | None = None
+) -> NDArray[np.uint32]:
+    """Outline colours (n,): grey, of the boundary sand, doubtful amber, inferred blue, red where there is no pose."""
+    usual = np.full(len(status), packed_one(OUTLINE))
+    if boundary is not None:
+        usual[boundary] = packed_one(BOUNDARY)
+    colours = np.where(status == TrackStatus.SUSPECT, packed_one(SUSPECT), usual)
+    colours = np.where(status == TrackStatus.INFERRED, packed_one(INFERRED), colours)
     return np.where(present, colours, packed_one(LOST)).astype(np.uint32)
 
 

@@ -13,7 +13,7 @@ from solver.bodies.grains import Array
 from ..look import entities
 from ..look.axes import log_texts
 from ..look.canvas import Canvas
-from ..look.colours import ADDED, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
+from ..look.colours import ADDED, BOUNDARY, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
 from ..look.scene import Scene
 from .changes import gap_colours, gap_range
 from .touching import probability_colours
@@ -56,6 +56,8 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     values = [(0.0, "0"), (mean, f"mean {mean:.3g} N"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
     values.append((top, f"≥ {top:.3g} N"))
     notes = [(0.5, "point: sliding contact", SLIDING)]
+    if scene.tracks.boundary is not None:
+        notes.append((0.9, "rim: boundary", BOUNDARY))
     places = [(value / top, text) for value, text in values]
     _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places, notes)
 

@@ -51,9 +51,26 @@ def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepCh
         ),
         contact_values(scene, forces),
     )
+    if scene.walls.cell is not None:
+        _log_far_halves(clock, scene, forces)
     sent = send_sweeps(clock, style, rows[1:], fn[1:], thin=choice is SweepChoice.ALL) if contacts.count else 0
     _log_sliding(clock, scene, forces)
     return 1 + sent
+
+
+def _log_far_halves(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    """The second halves of contacts across the edge of the cell, as reported: the first ones are with the others."""
+    rows, lines = scene.far_halves(clock.frame, forces.contacts)
+    fn = np.nan_to_num(forces.fn[rows])
+    clock.stream.log(
+        entities.FORCES_ACROSS,
+        rr.LineStrips2D(
+            scene.canvas.points(lines).astype(np.float32),
+            radii=scene.style.radii(fn),
+            colors=scene.style.colours(fn),
+            draw_order=20.0,
+        ),
+    )
 
 
 def visible_sweeps(
@@ -151,7 +168,7 @@ def send_sweeps(
 
 def _log_sliding(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     sliding = (forces.state == ContactState.SLIDING) & (forces.fn > 0.0)
-    point = scene.canvas.points(forces.contacts.point[sliding]).astype(np.float32)
+    point = scene.canvas.points(scene.contact_points(clock.frame, forces.contacts)[sliding]).astype(np.float32)
     if clock.last > clock.first:
         clock.start()
         _log_sliding_points(clock, scene, point[:0], forces.fn[:0])

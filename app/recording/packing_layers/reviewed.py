@@ -13,10 +13,12 @@ from ..look import entities
 from ..look.colours import ADDED, FORBIDDEN, packed_one
 from ..look.scene import Clock, Scene
 
+BY_PEOPLE = (ContactSource.ADDED_BY_REVIEWER, ContactSource.FORBIDDEN_BY_REVIEWER)
+
 
 def log_reviewed(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     """Log the contacts of one frame whose source is a person."""
-    rows = np.flatnonzero(forces.source != ContactSource.DETECTED)
+    rows = np.flatnonzero(np.isin(forces.source, BY_PEOPLE))
     contacts, source = forces.contacts.select(rows), forces.source[rows]
     added = source == ContactSource.ADDED_BY_REVIEWER
     clock.start()

@@ -11,7 +11,7 @@ from solver.sequence.frame_forces import FrameForces
 
 from ...tracks import TrackStatus
 from ..look import entities
-from ..look.colours import LOST, SUSPECT, packed_one
+from ..look.colours import BOUNDARY, INFERRED, LOST, SUSPECT, packed_one
 from ..look.scene import Clock, Scene
 
 ALUMINIUM = (128, 136, 150, 255)
@@ -26,6 +26,9 @@ def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     status = tracks.status[clock.frame]
     doubtful = status == TrackStatus.SUSPECT
     shade = np.where(doubtful, packed_one(SUSPECT), packed_one(ALUMINIUM))
+    if tracks.boundary is not None:
+        shade = np.where(tracks.boundary, packed_one(BOUNDARY), shade)
+    shade = np.where(status == TrackStatus.INFERRED, packed_one(INFERRED), shade)
     shade = np.where(status == TrackStatus.LOST, packed_one(LOST), shade)
     centre = np.column_stack([position, np.full(len(position), -0.5 * scene.rod_length)])
     clock.stream.log(
@@ -44,11 +47,7 @@ def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 def _log_chains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     contacts, style = forces.contacts, scene.style
     strong = np.nan_to_num(forces.fn) > style.range.mean
-    wall = contacts.with_wall[strong]
-    position = scene.tracks.position[clock.frame]
-    start = position[contacts.i[strong]]
-    end = contacts.point[strong].copy()
-    end[~wall] = position[contacts.j[strong][~wall]]
+    start, end = scene.lines(clock.frame, contacts)[strong].transpose(1, 0, 2)
     branch = end - start
     height = np.full(len(start), 0.6 * CHAIN_RADIUS_SHARE * scene.tracks.radius.max())  # just clear of the ends
     share = np.clip(forces.fn[strong] / style.range.top, 0.0, 1.0)

@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import STRAIGHT
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
@@ -36,8 +37,8 @@ class StackWriter:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._frames = layer_frames(scene.tracks.frame_count)
-        x, y = (scene.walls.endpoints[..., axis] for axis in (0, 1))
-        self._height = STACK_HEIGHT_SHARE * float(max(np.nanmax(x) - np.nanmin(x), np.nanmax(y) - np.nanmin(y)))
+        corners = np.stack([scene.outline(frame) for frame in range(scene.tracks.frame_count)]).reshape(-1, 2)
+        self._height = STACK_HEIGHT_SHARE * float(np.max(np.nanmax(corners, axis=0) - np.nanmin(corners, axis=0)))
 
     def log(self, clock: Clock, forces: FrameForces) -> None:
         """Log one frame: its layer, static, where it has one; where it lies in the stack; the stack of its sweeps."""
@@ -88,12 +89,7 @@ class StackWriter:
         self, forces: FrameForces, fn: NDArray[np.floating], depths: Array, strong: float
     ) -> tuple[Array, Array]:
         """Lines (s, 2, 3) [m] and f_n (s,) [N] of the strong contacts of fn (layers, c) at their depths (layers,)."""
-        contacts, position = forces.contacts, self._scene.tracks.position[forces.frame]
-        wall = contacts.with_wall
-        ends = np.empty((contacts.count, 2, 2))
-        ends[:, 0] = position[contacts.i]
-        ends[~wall, 1] = position[contacts.j[~wall]]
-        ends[wall, 1] = contacts.point[wall]
+        ends = self._scene.lines(forces.frame, forces.contacts)
         layer, row = np.nonzero(np.nan_to_num(fn) > strong * self._scene.style.range.mean)
         lines = np.empty((len(row), 2, 3))
         lines[..., :2] = ends[row]
@@ -101,7 +97,7 @@ class StackWriter:
         return lines, np.asarray(fn[layer, row], np.float64)
 
     def _lines(self, lines: Array, fn: Array, outlines: list[Array]) -> rr.LineStrips3D:
-        """Lines (s, 2, 3) [m] coloured and wide by force (s,) [N], and faint outlines of the walls (2 w, 2, 3) [m]."""
+        """Lines (s, 2, 3) [m] coloured and wide by force (s,) [N], and faint outlines of the walls (l, 2, 3) [m]."""
         style, sides = self._scene.style, sum(len(outline) for outline in outlines)
         share = np.clip(fn / style.range.top, 0.0, 1.0)
         radii = np.concatenate([THICKEST * self._grain * share, np.full(sides, 0.04 * self._grain)])
@@ -112,14 +108,21 @@ class StackWriter:
         return rr.LineStrips3D(strips, radii=radii.astype(np.float32), colors=colours.astype(np.uint32))
 
     def _outline(self, frame: int, depth: float) -> Array:
-        """The walls of a frame and what joins them, as lines (2 w, 2, 3) [m]."""
-        corners = self._scene.walls.endpoints[frame].reshape(-1, 2)
-        ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        """The walls of a frame and what joins straight ones, or the cell, as lines (l, 2, 3) [m]."""
+        walls = self._scene.walls
+        corners = self._scene.outline(frame)
+        circles = [line for line, side in zip(walls.outlines(frame), walls.sides, strict=True) if side != STRAIGHT]
+        if circles:
+            corners = walls.endpoints[frame, walls.sides == STRAIGHT].reshape(-1, 2)
+        ends = np.concatenate([
+            np.stack([corners, np.roll(corners, -1, axis=0)], axis=1),
+            *(np.stack([line[:-1], line[1:]], axis=1) for line in circles),
+        ])  # fmt: skip
         return np.concatenate([ends, np.full((*ends.shape[:2], 1), depth)], axis=2)
 
     def _label(self, frame: int, depths: list[float], names: list[str]) -> rr.Points3D:
         """Names of layers at their lower right corners."""
-        corners = self._scene.walls.endpoints[frame].reshape(-1, 2)
+        corners = self._scene.outline(frame)
         corner = corners[np.argmax(corners[:, 0] - corners[:, 1])]
         return rr.Points3D(
             np.array([[*corner, depth] for depth in depths], np.float32),

@@ -37,7 +37,7 @@ def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: Swe
     change = np.full(fn.shape, np.nan)
     change[1:] = np.hypot(np.diff(fn, axis=0), np.diff(ft, axis=0)) / mean
     lost = ~scene.tracks.present[clock.frame]
-    unbalance[:, lost] = np.nan
+    unbalance[:, lost | ~scene.grains.free] = np.nan  # no balance is asked of the boundary
     clock.start()
     clock.stream.log(
         entities.UNBALANCE_MAP,

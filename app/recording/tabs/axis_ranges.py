@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from solver.bodies.walls import Walls
+
 from ...results.results import Results
 from ..curve_layers.statistic_curves import statistic_values, wall_values
 from ..look import entities
@@ -29,7 +31,8 @@ def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
             values.append((entities.EXPECTED_COUNT, float(np.nansum(forces.probability))))
         if frame:
             values.append((entities.SIMILARITY, forces.similarity))
-        for path, several in wall_values(results.walls.endpoints[frame], statistics):
+        walls = Walls.at_rest(results.walls.endpoints[frame], side=results.walls.side)
+        for path, several in wall_values(walls, statistics):
             values += [(path, float(value)) for value in several]
         for path, value in values:
             if np.isfinite(value):

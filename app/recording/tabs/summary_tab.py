@@ -20,6 +20,7 @@ from ..look.scene import Scene, setting
 from ..look.texts import printable
 from ..packing_layers.stack import STRONG, STRONG_SWEEPS
 
+MOST_DOUBTS = 5  # frames whose reasons are told
 PACKAGES = ("rodsight", "numpy", "numba", "scipy", "rerun-sdk")
 
 
@@ -39,6 +40,7 @@ class FrameFacts:
     friction_angle: float  # [rad]
     lost: int
     agreement: Agreement | None
+    doubt: str = ""
 
     @classmethod
     def of(
@@ -52,6 +54,7 @@ class FrameFacts:
         return cls(
             forces.frame, forces.status, forces.reason, forces.trust, forces.similarity, forces.sweeps,
             forces.natural_map, forces.unbalance, statistics.contact_count, statistics.friction_angle, lost, agreement,
+            forces.doubt,
         )  # fmt: skip
 
 
@@ -83,10 +86,10 @@ def write_summary(scene: Scene, facts: list[FrameFacts], clipped: int, drawn: in
 
 
 def _counts(scene: Scene, facts: list[FrameFacts]) -> str:
+    walls, usual = scene.walls, scene.walls.usual_pressure(scene.rod_length)
     pressures = ", ".join(
-        f"{name} {1e-3 * pressure:g} kPa"
-        for name, pressure in zip(scene.walls.name, scene.walls.pressure.tolist(), strict=True)
-        if np.isfinite(pressure)
+        f"{walls.name[w]} {1e-3 * usual[w]:.4g} kPa{' on average, measured' if np.isnan(walls.pressure[w]) else ''}"
+        for w in np.flatnonzero(walls.loaded)
     )
     said = setting(scene.configuration, "material", "length") is not None
     return (
@@ -109,7 +112,7 @@ def _trust(facts: list[FrameFacts]) -> str:
         ("similarity with the frame before (median, least)", _spread([f.similarity for f in facts], np.nanmin)),
         ("worst grain unbalance over mean f_n (median, greatest)", _spread([f.unbalance for f in facts], np.nanmax)),
         ("natural-map residual reached (median, greatest)", _spread([f.natural_map for f in facts], np.nanmax)),
-        ("grains without a pose, most in a frame", str(max(f.lost for f in facts))),
+        ("grains lost, most in a frame", str(max(f.lost for f in facts))),
     ]
     return (
         "## How far to trust it\n\n| | |\n|---|---|\n"
@@ -117,6 +120,13 @@ def _trust(facts: list[FrameFacts]) -> str:
         + "\n\nT estimates the correlation with the true forces *given these inputs*: it does not see a wrong friction "
         "coefficient, wrong radii or a missed contact. Read forces of frames that are not *settled* with care."
     )
+
+
+def _doubts(facts: list[FrameFacts]) -> str:
+    """The reasons of the least trusted frames."""
+    doubted = sorted((f.trust, f.frame, f.doubt) for f in facts if f.doubt and np.isfinite(f.trust))
+    rows = [f"- frame {frame}, T {trust:.2f}: {_cell(doubt)}" for trust, frame, doubt in doubted[:MOST_DOUBTS]]
+    return "\n".join(rows) if rows else "- nothing that is worth words."
 
 
 def _accuracy(facts: list[FrameFacts]) -> str:
@@ -153,6 +163,7 @@ def _legend(scene: Scene, clipped: int, drawn: int) -> str:
         f"{clipped} of {drawn} forces are above and drawn as {force.top:.3g} N.\n"
         "- **Cyan dots**: contacts at the Coulomb limit (sliding).\n"
         "- **Strokes at the rim** show rotation: they pointed up in frame 0. Amber outline: doubtful pose. "
+        "Blue outline: a rod that no photograph shows, inferred from its neighbours. "
         "Red cross: no pose, drawn where the grain was last seen.\n"
         "- **Click** a contact or a grain and open the right panel for its values (fn, ft, gap_um, fn_sd, "
         "mobilisation, state, age, probability …): they are those of the reported field.\n"

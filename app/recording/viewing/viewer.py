@@ -6,6 +6,7 @@ import os
 import shlex
 import subprocess
 import sys
+import webbrowser
 from enum import StrEnum
 from pathlib import Path
 
@@ -27,10 +28,9 @@ def viewer_binary() -> Path:
     return Path(rerun_cli.__file__).parent / name
 
 
-def view_command(path: Path | str, *also: Path | str, web: bool = False) -> list[str]:
-    """The command that shows a recording, with its side files; with `web`, to a browser on this machine only."""
-    options = ["--web-viewer", "--bind", "127.0.0.1"] if web else []
-    return [str(viewer_binary()), *options, *map(str, (path, *also))]
+def view_command(path: Path | str, *also: Path | str) -> list[str]:
+    """The command that shows a recording, with its side files, in a window."""
+    return [str(viewer_binary()), *map(str, (path, *also))]
 
 
 def has_display() -> bool:
@@ -43,7 +43,7 @@ def has_display() -> bool:
 def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE, *also: Path | str) -> str | None:
     """Show a recording, with its side files, and return at once; the viewer lives on.
 
-    Returns None where a viewer was started, else one line that says how to look at the recording.
+    Returns None where a window was opened, else one line that says how to look at the recording, or where.
     Raises FileNotFoundError where there is no recording.
     """
     kind = ViewerKind(kind)
@@ -54,8 +54,15 @@ def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE, *a
         return f"To look at it: rodsight view {shown}"
     if kind is ViewerKind.NATIVE and not has_display():
         return f"No display here. In a browser: rodsight view --web {shown}; elsewhere: rerun {shown}"
+    if kind is ViewerKind.WEB:
+        from .recording_server import IDLE, serve_apart
+
+        address = serve_apart([Path(each) for each in (path, *also)])
+        if has_display():
+            webbrowser.open(address)
+        return f"At {address} until nobody has asked for {IDLE / 3600.0:g} h."
     subprocess.Popen(
-        view_command(path, *also, web=kind is ViewerKind.WEB),
+        view_command(path, *also),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from solver.bodies.grains import Array
 from solver.bodies.walls import Walls
@@ -72,7 +72,8 @@ def find_candidate_pairs(results: Results, frame: int, threshold: float | None =
 
 def walls_at(results: Results, frame: int) -> Walls:
     """The walls of one frame, at rest."""
-    return Walls.at_rest(results.walls.endpoints[frame])
+    cell = None if results.walls.cell is None else results.walls.cell[frame]
+    return Walls.at_rest(results.walls.endpoints[frame], side=results.walls.side, cell=cell)
 
 
 def gap_sigma(contacts: Contacts, deviation: float) -> Array:
@@ -85,7 +86,7 @@ def _detection(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """P(touch) and whether the pair was detected (c,)."""
     forces = results.frames[frame]
-    from_gap = norm.cdf((threshold - contacts.gap) / np.maximum(sigma, 1e-12))
+    from_gap = ndtr((threshold - contacts.gap) / np.maximum(sigma, 1e-12))
     listed = are_among(contacts.key, forces.contacts.key)
     told = recall(contacts.key, forces.contacts.key, forces.probability, fill=np.nan)
     detector = forces.source == ContactSource.DETECTED  # of an added contact even the plain detector tells P = 0

@@ -19,8 +19,8 @@ export function drawOutlines(svg, pair, zoom, shown) {
   for (const style of ["halo", "grain"]) {
     pair.circles.forEach(([cx, cy, r], n) => make(svg, "circle", { cx, cy, r, class: n && style === "grain" ? "grain second" : style }));
     if (pair.wall) {
-      const [[x1, y1], [x2, y2]] = pair.wall;
-      make(svg, "line", { x1, y1, x2, y2, class: style === "grain" ? "grain second" : style });
+      const points = pair.wall.map((point) => point.join(",")).join(" ");
+      make(svg, "polyline", { points, class: style === "grain" ? "grain second" : style });
     }
   }
 }

@@ -59,7 +59,7 @@ class Picture:
         here = tracks.present[frame]
         image = self.photograph(frame) if self.photograph is not None else None
         return self.layer.backdrop(
-            Backdrop(image, tracks.position[frame, here], tracks.radius[here], self.results.walls.endpoints[frame])
+            Backdrop(image, tracks.position[frame, here], tracks.radius[here], self.results.walls.outlines(frame))
         )
 
     def marks(self, marked: Marked, pair: tuple[int, int] | None, frame: int, point: Array | None) -> bytes:

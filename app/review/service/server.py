@@ -10,15 +10,15 @@ import json
 import threading
 from collections.abc import Callable
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from ...errors import InputError
+from ...recording.viewing.gate import SAFE_HEADERS, Gate, QuietServer
 from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
 from ...verdicts.log import Flag, Origin, Verdict
-from .gate import SAFE_HEADERS, Gate
 from .session import BadRequest, ReviewSession, Viewpoint
 
 LARGEST_BODY = 64 * 1024  # bytes of a question
@@ -47,8 +47,7 @@ class ReviewServer:
         class Handler(_Handler):
             review = server
 
-        self._http = ThreadingHTTPServer(("127.0.0.1", port), Handler)
-        self._http.daemon_threads = True
+        self._http = QuietServer(("127.0.0.1", port), Handler)
         self.gate = Gate(self._http.server_address[1])
         page = files(__name__.rsplit(".", 2)[0]) / "page"
         self.assets = {path: (page.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
@@ -263,7 +262,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _post(self, path: str, body: bytes) -> None:
         try:
             values = json.loads(body)
-        except ValueError:
+        except (ValueError, RecursionError):
             raise BadRequest("this is not JSON") from None
         if not path.startswith("/ask/") or not isinstance(values, dict):
             raise BadRequest("there is no such question")
@@ -282,17 +281,11 @@ class _Handler(BaseHTTPRequestHandler):
                 self._say(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
 
     def _refused(self, *, changes: bool, entering: bool = False) -> bool:
-        for name in ("Host", "Origin"):
-            if len(self.headers.get_all(name) or []) > 1:
-                self.close_connection = True
-                self._say(HTTPStatus.BAD_REQUEST, f"{name} stands twice")
-                return True
-        headers = {name: value for name in _HEADERS if (value := self.headers.get(name)) is not None}
-        objection = self.review.gate.objection(headers, changes=changes, entering=entering)
-        if objection is not None:
+        refusal = self.review.gate.refusal(self.headers, changes=changes, entering=entering)
+        if refusal is not None:
             self.close_connection = True  # the body, if any, was not read
-            self._say(HTTPStatus.FORBIDDEN, objection)
-        return objection is not None
+            self._say(*refusal)
+        return refusal is not None
 
     def _say(self, status: HTTPStatus, sentence: str) -> None:
         self._send(sentence.encode(), "text/plain; charset=utf-8", status)
@@ -308,9 +301,6 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(content)
-
-
-_HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
 
 
 def _whole(query: dict[str, str], name: str) -> int:

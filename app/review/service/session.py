@@ -122,7 +122,7 @@ class ReviewSession:
         ]
         wall = None
         if j >= self.results.grains.count:
-            wall = canvas.points(self.results.walls.endpoints[frame, j - self.results.grains.count]).tolist()
+            wall = canvas.points(self.results.walls.outlines(frame)[j - self.results.grains.count]).tolist()
         told: dict[str, Any] = {
             "frame": frame, "key": str(key), "a": self.bodies.name(i), "b": self.bodies.name(j),
             "point": canvas.points(pair.point[0]).tolist(), "circles": circles, "wall": wall,

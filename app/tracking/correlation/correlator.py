@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,7 @@ from solver.bodies.grains import Array
 
 from . import kernels as kernels
 from .patches import Patches
-from .search import angle_steps, is_same_turn, search_patch
-from .search_parts import search_parts
+from .sifting import search_all, search_parts_all, sift_all
 from .splines import HALFWAY_VARIANCE, Pyramid
 
 Rows = NDArray[np.intp]
@@ -27,10 +26,6 @@ CHUNK = 32
 # paint.
 SIFTED_REACH = 4.5
 SIFTED_COARSEST = 4
-# Half width of the look at such a place, in pixels of the finer level; and how many more places are looked at once one
-# is beyond doubt, so that the second best is known, too.
-LOOK = 2.0
-RUNNERS_UP = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +87,15 @@ class Correlator:
         hopeless = patches.accidental_zncc[rows]
         limit = self._limit if steps is None else steps
 
-        def one(k: int) -> None:
-            row = rows[k]
-            kernels.fit_rigid(
-                coefficients, patches.data[row],
-                patches.hessian_inverse[row], patches.reach[row], leash[k],
-                hopeless[k], self._tolerance, limit, pose[k], fit[k],
+        rows, leash = np.ascontiguousarray(rows, np.intp), np.ascontiguousarray(leash, np.float64)
+
+        def some(part: slice) -> None:
+            kernels.fit_all(
+                coefficients, patches.data, patches.start, patches.coarse_inverse, patches.hessian_inverse,
+                patches.reach, rows[part], leash[part], hopeless[part], self._tolerance, limit, pose[part], fit[part],
             )  # fmt: skip
 
-        self._each(len(rows), one)
+        self._in_parts(len(rows), some)
         gain = fit[:, kernels.GAIN]
         with np.errstate(divide="ignore", invalid="ignore"):
             scale = fit[:, kernels.RESIDUAL] / gain**2 * _interpolation_loss(pose, patches.reach[rows])
@@ -119,7 +114,7 @@ class Correlator:
         def one(k: int) -> None:
             row = rows[k]
             kernels.fit_robust(
-                coefficients, patches.data[row], patches.reach[row],
+                coefficients, patches.data[patches.start[row] : patches.start[row + 1]], patches.reach[row],
                 leash[k], noise, gain[k], offset[k], 2 * self._limit, pose[k], fit[k], covariance[k],
             )  # fmt: skip
 
@@ -143,25 +138,46 @@ class Correlator:
         """
         patches = self.patches
         best = np.empty((len(rows), count, 4))
-        factor = patches.search_factor[rows]
-        sifted = self.sifts(rows) & (looks > 0)
-        for level in np.unique(np.concatenate([factor, 2 * factor[sifted]])):  # made before the threads ask for them
-            photograph.level(int(level))
-            for source in {id(each): each for each in (patches.source(row) for row in rows)}.values():
-                source.coefficients(int(level))
-
-        beyond_doubt = np.minimum(patches.accidental_zncc[rows] + 0.2, 0.9)
-
-        def one(k: int) -> None:
-            level = _Level(photograph, patches, int(rows[k]), int(factor[k]))
-            pose, window = within.middle[k], float(within.window[k])
-            if sifted[k]:
-                level.sift(pose, window, within.sweep, best[k], looks, float(beyond_doubt[k]))
-            else:
-                level.search(pose, window, within.sweep, best[k], parts=parts)
-
-        self._each(len(rows), one)
+        factor, sifted = patches.search_factor[rows], self.sifts(rows) & (looks > 0)
+        source = np.array([row if int(row) in patches.renewed else -1 for row in rows])
+        # What is looked for with the same pictures on the same level is one task of many grains.
+        for level, own, coarser in sorted(set(zip(factor.tolist(), source.tolist(), sifted.tolist(), strict=True))):
+            these = np.flatnonzero((factor == level) & (source == own) & (sifted == coarser))
+            self._search_alike(
+                photograph, rows[these], _some(within, these), best, these, level, looks * coarser, parts
+            )
         return best
+
+    def _search_alike(
+        self, photograph: Pyramid, rows: Rows, within: SearchRange, best: Array, at: Rows, factor: int, looks: int,
+        parts: bool,
+    ) -> None:  # fmt: skip
+        """Write best[at] (m, c, 4) of grains `rows` (m,) whose reference is one picture, on the level `factor`."""
+        patches = self.patches
+        picture = patches.source(int(rows[0]))
+        levels = (factor, 2 * factor) if looks else (factor,)
+        pictures = [each for level in levels for each in (picture.coefficients(level), photograph.level(level))]
+        pose = self._from_reference(rows, within.middle)
+        window = np.ascontiguousarray(within.window, np.float64)
+        place, reach = patches.place[rows], patches.reach[rows]
+        beyond_doubt = np.minimum(patches.accidental_zncc[rows] + 0.2, 0.9)
+        found = np.empty((len(rows), best.shape[1], 4))
+
+        def some(part: slice) -> None:
+            told = place[part], reach[part], pose[part], window[part]
+            if looks:
+                sift_all(
+                    pictures[0], pictures[1], pictures[2], pictures[3], factor, *told, within.sweep, looks,
+                    beyond_doubt[part], found[part],
+                )  # fmt: skip
+            elif parts:
+                search_parts_all(pictures[0], pictures[1], factor, *told, within.sweep, found[part])
+            else:
+                search_all(pictures[0], pictures[1], factor, *told, within.sweep, found[part])
+
+        self._in_parts(len(rows), some)
+        found[:, :, 2] += patches.turn[rows, None]
+        best[at] = found
 
     def _from_reference(self, rows: Rows, pose: Array) -> Array:
         """Poses (m, 3) whose rotation counts from where each patch was cut, as a new array."""
@@ -179,78 +195,24 @@ class Correlator:
         )  # fmt: skip
 
     def _each(self, count: int, one: Callable[[int], None]) -> None:
-        def chunk(first: int) -> None:
-            for k in range(first, min(first + CHUNK, count)):
+        def some(part: slice) -> None:
+            for k in range(part.start, part.stop):
                 one(k)
 
+        self._in_parts(count, some)
+
+    def _in_parts(self, count: int, some: Callable[[slice], None]) -> None:
+        parts = [slice(first, min(first + CHUNK, count)) for first in range(0, count, CHUNK)]
         if self._workers == 1 or count <= CHUNK:
-            for first in range(0, count, CHUNK):
-                chunk(first)
+            for part in parts:
+                some(part)
             return
         with ThreadPoolExecutor(self._workers) as pool:
-            list(pool.map(chunk, range(0, count, CHUNK)))
+            list(pool.map(some, parts))
 
 
-@dataclass(frozen=True, slots=True)
-class _Level:
-    """One grain on one level of the pyramids. Poses are in pixels of the photograph."""
-
-    photograph: Pyramid
-    patches: Patches
-    row: int
-    factor: int  # by which the photographs are shrunk
-
-    def search(
-        self, pose: Array, window: float, sweep: float, best: Array, spacing: float = 3.0, *, parts: bool = False
-    ) -> None:
-        """Search about a pose (3,); best (c, 4) is written; spacing in pixels of the level."""
-        patches, row, factor = self.patches, self.row, self.factor
-        shift = 0.5 * (factor - 1)
-        search = search_parts if parts else search_patch
-        search(
-            patches.source(row).coefficients(factor), self.photograph.level(factor),
-            (patches.place[row, 0] - shift) / factor, (patches.place[row, 1] - shift) / factor,
-            patches.reach[row] / factor, (pose[0] - shift) / factor, (pose[1] - shift) / factor,
-            pose[2] - patches.turn[row], window / factor, sweep, spacing, best,
-        )  # fmt: skip
-        best[:, :2] = best[:, :2] * factor + shift
-        best[:, 2] += patches.turn[row]
-
-    def sift(self, pose: Array, window: float, sweep: float, best: Array, looks: int, beyond_doubt: float) -> None:
-        """Search the next coarser level, and look at its `looks` best places on this one.
-
-        beyond_doubt: ZNCC of a place after which few more are looked at.
-        """
-        coarse = replace(self, factor=2 * self.factor)
-        places = np.empty((looks, 4))
-        coarse.search(pose, window, sweep, places, spacing=2.0)
-        # Half a step of the coarse angles to either side, and a pixel of the coarse level.
-        half = 0.6 * sweep / angle_steps(float(self.patches.reach[self.row]) / coarse.factor, sweep)
-        looked = np.full((looks, 1, 4), -1.0)
-        last = looks
-        for m in np.flatnonzero(places[:, 3] > 0.0):
-            if m >= last:
-                break
-            self.search(places[m, :3], LOOK * self.factor, half, looked[m])
-            if looked[m, 0, 3] > beyond_doubt:
-                last = min(last, m + 1 + RUNNERS_UP)
-        best[:] = _most_similar(looked[:, 0], len(best), 3.0 * self.factor)
-
-
-def _most_similar(places: Array, count: int, spacing: float) -> Array:
-    """The best `count` (count, 4) of places (m, 4), distinct by `spacing` [px] or in angle, else ZNCC −1."""
-    best = np.full((count, 4), 0.0)
-    best[:, 3] = -1.0
-    found = 0
-    for m in np.argsort(-places[:, 3], kind="stable"):
-        if found == count or not places[m, 3] > 0.0:
-            break
-        away = np.hypot(best[:found, 0] - places[m, 0], best[:found, 1] - places[m, 1])
-        turned = [is_same_turn(float(angle), float(places[m, 2])) for angle in best[:found, 2]]
-        if not ((away < spacing) & np.array(turned, dtype=np.bool_)).any():
-            best[found] = places[m]
-            found += 1
-    return best
+def _some(within: SearchRange, rows: Rows) -> SearchRange:
+    return SearchRange(within.middle[rows], within.window[rows], within.sweep)
 
 
 def _interpolation_loss(pose: Array, reach: Array) -> Array:

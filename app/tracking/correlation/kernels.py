@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .interpolation import interpolate, interpolate_finely
+from .spline_vectors import add_projections, read_cubic, read_quintic
 
 CONVERGED = 0
 LEFT_IMAGE = 1
@@ -31,6 +31,8 @@ TUKEY_WIDTH = 4.685
 HELD_STEPS = 3
 # A step [px] below which the patch is interpolated with all six taps; before that four of them show the way.
 FINE_STEP = 0.1
+# Pixels that show the way before that: more tell it no better than the last steps put right.
+COARSE_PIXELS = 400
 # Steps after which a fit must be promising. A step is a pixel and a half at most, and a fit's basin two or three.
 PATIENCE = 5
 # Steps after which most of a patch must fit robustly, and the share of its contrast by which it may then be off: a ZNCC
@@ -125,18 +127,38 @@ def fill_patch(image, coefficients, cx, cy, reach, data, hessian_inverse, facts)
     return True
 
 
+@njit(cache=True, nogil=True)
+def coarse_stride(count):
+    """Of every so many pixels of a patch one leads a fit to where all of them end it."""
+    return max(count // COARSE_PIXELS, 1)
+
+
+@njit(cache=True, nogil=True)
+def fill_coarse(data, coarse):
+    """Write the inverse normal matrix (5, 5) of jx, jy, jr, f and 1 over the pixels that lead a fit."""
+    normal = np.zeros((5, 5))
+    row = np.ones(5)
+    for p in range(0, len(data), coarse_stride(len(data))):
+        row[0], row[1], row[2], row[3] = data[p, 3], data[p, 4], data[p, 5], data[p, 2]
+        for k in range(5):
+            for m in range(5):
+                normal[k, m] += row[k] * row[m]
+    coarse[:, :] = np.linalg.inv(normal)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def fit_rigid(coefficients, data, hessian_inverse, reach, leash, hopeless, tolerance, limit, pose, fit):
+def fit_rigid(coefficients, data, coarse, hessian_inverse, reach, leash, hopeless, tolerance, limit, pose, fit, sums):
     """Move `pose` (x, y, θ) until the patch fits; give up beyond `leash` [px] from where it began.
 
     A fit whose ZNCC is below `hopeless` after some steps is given up, too: at a wrong place it would run to the limit.
     coefficients: of the quintic spline. Read with the cubic one's four taps they show a crisper photograph at the same
-    place, which is enough for every step but the last.
+    place, which is enough for every step but the last, and so is a part of the pixels; coarse: see `fill_coarse`.
     fit: ZNCC, residual variance per pixel [grey²], gain, offset [grey] (image = gain · f + offset, f of
-    unit norm), share of the pixels kept, code.
+    unit norm), share of the pixels kept, code. sums (4,): room to work in.
     """
     height, width = coefficients.shape
     count = len(data)
+    stride = coarse_stride(count)
     x0, y0 = pose[0], pose[1]
     margin = int(reach) + 2
     fit[CODE] = UNFINISHED
@@ -151,36 +173,44 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, hopeless, toler
         ox, oy = np.float32(pose[0] - bx), np.float32(pose[1] - by)
         cos, sin = np.float32(np.cos(pose[2])), np.float32(np.sin(pose[2]))
         level = coefficients[int(pose[1]), int(pose[0])]
-        s0, s1, sf, sx, sy, sr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for p in range(count):
+        s0, s1 = 0.0, 0.0
+        sums[:] = 0.0
+        for p in range(0, count, 1 if fine else stride):
             dx, dy = data[p, 0], data[p, 1]
             x = ox + cos * dx - sin * dy
             y = oy + sin * dx + cos * dy
             ix, iy = int(x), int(y)
             if fine:
-                g = interpolate_finely(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
+                g = read_quintic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
             else:
-                g = interpolate(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
+                g = read_cubic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy)) - level
             s0 += g
             s1 += np.float64(g) * g
-            sf += np.float64(g) * data[p, 2]
-            sx += np.float64(g) * data[p, 3]
-            sy += np.float64(g) * data[p, 4]
-            sr += np.float64(g) * data[p, 5]
-        power = s1 - s0 * s0 / count
-        fit[ZNCC] = sf / np.sqrt(power) if power > 0.0 else 0.0
-        fit[RESIDUAL] = max(power - sf * sf, 0.0) / max(count - 5, 1)
-        fit[GAIN] = sf
-        fit[OFFSET] = s0 / count + level
-        if not sf > 0.0 or (step == PATIENCE and fit[ZNCC] < hopeless):
+            add_projections(sums, data, p, g)
+        used = count if fine else (count + stride - 1) // stride
+        power = s1 - s0 * s0 / used
+        sf, sx, sy, sr = sums[0], sums[1], sums[2], sums[3]
+        if fine:
+            gain = sf
+            h = hessian_inverse
+            tx = (h[0, 0] * sx + h[0, 1] * sy + h[0, 2] * sr) / gain
+            ty = (h[1, 0] * sx + h[1, 1] * sy + h[1, 2] * sr) / gain
+            tr = (h[2, 0] * sx + h[2, 1] * sy + h[2, 2] * sr) / gain
+        else:
+            c = coarse
+            gain = c[3, 0] * sx + c[3, 1] * sy + c[3, 2] * sr + c[3, 3] * sf + c[3, 4] * s0
+            tx = (c[0, 0] * sx + c[0, 1] * sy + c[0, 2] * sr + c[0, 3] * sf + c[0, 4] * s0) / gain
+            ty = (c[1, 0] * sx + c[1, 1] * sy + c[1, 2] * sr + c[1, 3] * sf + c[1, 4] * s0) / gain
+            tr = (c[2, 0] * sx + c[2, 1] * sy + c[2, 2] * sr + c[2, 3] * sf + c[2, 4] * s0) / gain
+        fit[ZNCC] = gain * np.sqrt(used / count / power) if power > 0.0 else 0.0
+        fit[RESIDUAL] = max(power - gain * gain * used / count, 0.0) / max(used - 5, 1)
+        fit[GAIN] = gain
+        fit[OFFSET] = s0 / used + level
+        if not gain > 0.0 or (step == PATIENCE and fit[ZNCC] < hopeless):
             fit[CODE] = WANDERED
             return
         if step == limit:
             return
-        h = hessian_inverse
-        tx = (h[0, 0] * sx + h[0, 1] * sy + h[0, 2] * sr) / sf
-        ty = (h[1, 0] * sx + h[1, 1] * sy + h[1, 2] * sr) / sf
-        tr = (h[2, 0] * sx + h[2, 1] * sy + h[2, 2] * sr) / sf
         _compose(pose, tx, ty, tr, reach)
         if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > leash * leash:
             fit[CODE] = WANDERED
@@ -193,6 +223,20 @@ def fit_rigid(coefficients, data, hessian_inverse, reach, leash, hopeless, toler
             # its ZNCC differing by less than the square of the tolerance.
             fit[CODE] = CONVERGED
             return
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fit_all(
+    coefficients, data, start, coarse, hessian_inverse, reach, rows, leash, hopeless, tolerance, limit, pose, fit
+):
+    """Fit the patches `rows` (m,), the pixels of patch k being data[start[k] : start[k + 1]]; see `fit_rigid`."""
+    sums = np.empty(4)
+    for m in range(len(rows)):
+        k = rows[m]
+        fit_rigid(
+            coefficients, data[start[k] : start[k + 1]], coarse[k], hessian_inverse[k], reach[k],
+            leash[m], hopeless[m], tolerance, limit, pose[m], fit[m], sums,
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -242,7 +286,7 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             x = ox + cos * data[p, 0] - sin * data[p, 1]
             y = oy + sin * data[p, 0] + cos * data[p, 1]
             ix, iy = int(x), int(y)
-            g[p] = interpolate_finely(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
+            g[p] = read_quintic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
             misfit[p] = abs(g[p] - a * data[p, 2] - b)
         scale = max(np.quantile(misfit, CALM) / NORMAL_CALM, noise)
         if step == ROBUST_PATIENCE and scale > HOPELESS_MISFIT * a / np.sqrt(count):

@@ -34,8 +34,10 @@ class Patches:
     norm: Array  # (n,) [grey] norm of the disc about its mean
     mean: Array  # (n,) [grey]
     correlation_length: Array  # (n,) [px], of the speckle
-    data: tuple[Image, ...]  # (n,) of (pixels, 6), see correlation_kernels
+    data: Image  # (p, 6) the pixels of one patch after the other, see kernels
+    start: NDArray[np.intp]  # (n + 1,) where each patch begins in them
     hessian_inverse: Array  # (n, 3, 3) [px², px, 1] for a reference of unit norm
+    coarse_inverse: Array  # (n, 5, 5) the same with the light, for the pixels that lead a fit
     reference: Pyramid
     place: Array  # (n, 2) [px] of the centre in the picture that the disc was cut out of
     turn: Array  # (n,) [rad] of the grain there
@@ -48,12 +50,13 @@ class Patches:
         n = len(centre)
         usable = np.zeros(n, dtype=np.bool_)
         inverse, facts, data = np.full((n, 3, 3), np.nan), np.full((n, 3), np.nan), []
+        coarse = np.full((n, 5, 5), np.nan)
         for k in range(n):
-            patch, usable[k] = _cut_one(photograph, centre[k], float(reach[k]), inverse[k], facts[k])
+            patch, usable[k] = _cut_one(photograph, centre[k], float(reach[k]), inverse[k], coarse[k], facts[k])
             data.append(patch)
         return cls(
-            centre, reach, usable, facts[:, 0], facts[:, 1], np.sqrt(facts[:, 2]), tuple(data), inverse, photograph,
-            centre, np.zeros(n), np.zeros(n), {},
+            centre, reach, usable, facts[:, 0], facts[:, 1], np.sqrt(facts[:, 2]), *_one_after_the_other(data), inverse,
+            coarse, photograph, centre, np.zeros(n), np.zeros(n), {},
         )  # fmt: skip
 
     def renew(self, photograph: Image, rows: NDArray[np.intp], pose: Array, sigma: Array) -> Patches:
@@ -66,8 +69,9 @@ class Patches:
             np.stack([self.norm, self.mean, self.correlation_length**2], axis=1),
             self.hessian_inverse.copy(),
         )
+        coarse = self.coarse_inverse.copy()
         place, turn, variance = self.place.copy(), self.turn.copy(), self.variance.copy()
-        data, renewed = list(self.data), dict(self.renewed)
+        data, renewed = np.split(self.data, self.start[1:-1]), dict(self.renewed)
         height, width = photograph.shape
         for k, row in enumerate(rows):
             side = self.reach[row] + SURROUNDINGS
@@ -75,14 +79,16 @@ class Patches:
             right, bottom = min(int(pose[k, 0] + side) + 1, width), min(int(pose[k, 1] + side) + 1, height)
             picture = Pyramid(np.ascontiguousarray(photograph[top:bottom, left:right], dtype=np.float32))
             centre = pose[k, :2] - (left, top)
-            found, told = np.full((3, 3), np.nan), np.full(3, np.nan)
-            patch, good = _cut_one(picture, centre, float(self.reach[row]), found, told)
+            found, leading, told = np.full((3, 3), np.nan), np.full((5, 5), np.nan), np.full(3, np.nan)
+            patch, good = _cut_one(picture, centre, float(self.reach[row]), found, leading, told)
             if good:
-                data[row], inverse[row], fact[row], renewed[int(row)] = patch, found, told, picture
+                data[row], inverse[row], coarse[row], fact[row] = patch, found, leading, told
+                renewed[int(row)] = picture
                 place[row], turn[row], variance[row] = centre, pose[k, 2], sigma[k] ** 2
+        packed, start = _one_after_the_other(data)
         return replace(
-            self, norm=fact[:, 0], mean=fact[:, 1], correlation_length=np.sqrt(fact[:, 2]), data=tuple(data),
-            hessian_inverse=inverse, place=place, turn=turn, variance=variance, renewed=renewed,
+            self, norm=fact[:, 0], mean=fact[:, 1], correlation_length=np.sqrt(fact[:, 2]), data=packed, start=start,
+            hessian_inverse=inverse, coarse_inverse=coarse, place=place, turn=turn, variance=variance, renewed=renewed,
         )  # fmt: skip
 
     def source(self, row: int) -> Pyramid:
@@ -91,7 +97,7 @@ class Patches:
 
     @property
     def pixel_count(self) -> NDArray[np.int64]:
-        return np.array([len(patch) for patch in self.data], dtype=np.int64)
+        return np.diff(self.start)
 
     @property
     def accidental_zncc(self) -> Array:
@@ -114,8 +120,10 @@ class Patches:
         return 2 ** np.clip(np.floor(np.log2(self.reach / COARSE_REACH)), 0, 3).astype(np.int64)
 
 
-def _cut_one(photograph: Pyramid, centre: Array, reach: float, inverse: Array, facts: Array) -> tuple[Image, bool]:
-    """One disc's rows of data, and whether it is usable; its inverse Hessian and facts are written."""
+def _cut_one(
+    photograph: Pyramid, centre: Array, reach: float, inverse: Array, coarse: Array, facts: Array
+) -> tuple[Image, bool]:
+    """One disc's rows of data, and whether it is usable; its inverse matrices and facts are written."""
     height, width = photograph.image.shape
     if not kernels.inside(height, width, centre[0], centre[1], reach):
         return np.empty((0, 6), np.float32), False
@@ -123,4 +131,11 @@ def _cut_one(photograph: Pyramid, centre: Array, reach: float, inverse: Array, f
     good = kernels.fill_patch(
         photograph.image, photograph.coefficients(), centre[0], centre[1], reach, data, inverse, facts
     )  # fmt: skip
+    if good:
+        kernels.fill_coarse(data, coarse)
     return data, bool(good)
+
+
+def _one_after_the_other(data: list[Image]) -> tuple[Image, NDArray[np.intp]]:
+    start = np.cumsum([0, *(len(patch) for patch in data)], dtype=np.intp)
+    return np.concatenate([np.empty((0, 6), np.float32), *data]), start

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .interpolation import interpolate
+from .spline_vectors import read_cubic
 
 # Two maxima at one place are distinct when their angles differ by more than this [rad]. A maximum is a speckle's size
 # wide, which is much less at the rim of any patch that can be told from another.
@@ -172,7 +172,7 @@ def turn_template(reference, origin_x, origin_y, turn, offset_x, offset_y, templ
         x = min(max(x, 1.0), width - 2.001)
         y = min(max(y, 1.0), height - 2.001)
         ix, iy = int(x), int(y)
-        template[q] = interpolate(reference, ix, iy, np.float32(x - ix), np.float32(y - iy))
+        template[q] = read_cubic(reference, ix, iy, np.float32(x - ix), np.float32(y - iy))
         mean += template[q]
     mean /= len(template)
     power = 0.0

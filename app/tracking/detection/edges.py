@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 
 from ...experiment.photographs import Image
-from ..correlation.kernels import interpolate
+from ..correlation.interpolation import interpolate
 
 # Samples along a radius [1/px].
 DENSITY = 4
+HALF, TWICE, NOWHERE = np.float32(0.5), np.float32(2.0), np.float32(np.inf)
 
 # Points of the outline, one per pixel, that one dot of paint may spoil together.
 POINTS_OF_A_STRETCH = 8.0
@@ -62,34 +63,49 @@ def trace_outline(
     count = int(np.ceil(2.0 * (window + margin) * DENSITY)) + 1
     ray = np.empty((len(angle), count), np.float32)
     sample_rays(coefficients, x, y, angle, first, 1.0 / DENSITY, ray)
-    # A second difference over half a pixel to each side: the slope, smoothed by less than the lens's blur.
+    edges = np.empty((len(angle), 3))
+    in_view = np.empty(len(angle), np.bool_)
+    find_steepest(ray, first, radius, window, narrow, edges, in_view)
+    strength, beyond = edges[:, 1].astype(np.float32), edges[:, 2].astype(np.float32)
+    return Outline(angle, edges[:, 0], strength, beyond, in_view, ray, first)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def find_steepest(ray, first, radius, window, narrow, edges, in_view):
+    """Write of every ray (p, s) the edge [px], NaN where there is none, its slope, and the grey level beyond it (p, 3).
+
+    first [px]: where the rays begin; in_view (p,): whether the whole ray lies in the photograph; narrow: the darkest
+    level up to two pixels outside counts, not the one there.
+    """
+    samples = ray.shape[1]
     half = DENSITY // 2
-    slope = (ray[:, : -2 * half] - ray[:, 2 * half :]) * (DENSITY / (2.0 * half))
-    where = first + (np.arange(slope.shape[1]) + half) / DENSITY
-    allowed = np.abs(where - radius) <= window
-    in_view: NDArray[np.bool_] = np.asarray(np.isfinite(ray).all(axis=1), dtype=np.bool_)
-    masked = np.where(allowed[None, :] & np.isfinite(slope), slope, -np.inf)
-    top = np.argmax(masked, axis=1)
-    rows = np.arange(len(angle))
-    top = np.clip(top, 1, slope.shape[1] - 2)
-    before, at, after = slope[rows, top - 1], slope[rows, top], slope[rows, top + 1]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        shift = 0.5 * (before - after) / (before - 2.0 * at + after)
-    # A maximum at the window's end is not one.
-    peaked = in_view & (at >= before) & (at >= after) & (np.abs(shift) <= 1.0) & (at > 0.0)
-    distance = np.where(peaked, where[top] + shift / DENSITY, np.nan)
-    outside = np.clip(top + half + int(2.0 * DENSITY), 0, count - 1)
-    beyond = ray[rows, outside]
-    if narrow:
-        _take_darkest(ray, top + half, outside, beyond)
-    return Outline(angle, distance, np.where(peaked, at, 0.0), beyond, in_view, ray, first)
-
-
-@njit(cache=True, nogil=True)
-def _take_darkest(ray, start, end, beyond):
-    for p in range(len(beyond)):
-        for k in range(start[p], end[p]):
-            beyond[p] = min(beyond[p], ray[p, k])
+    # A second difference over half a pixel to each side: the slope, smoothed by less than the lens's blur.
+    scale = np.float32(DENSITY / (2.0 * half))
+    slopes = samples - 2 * half
+    slope = np.empty(slopes, np.float32)
+    for p in range(len(ray)):
+        in_view[p] = True
+        for k in range(samples):
+            in_view[p] = in_view[p] and np.isfinite(ray[p, k])
+        top, best = 0, -np.inf
+        for k in range(slopes):
+            slope[k] = (ray[p, k] - ray[p, k + 2 * half]) * scale
+            here = first + (k + half) / DENSITY
+            if abs(here - radius) <= window and slope[k] > best:
+                top, best = k, slope[k]
+        top = min(max(top, 1), slopes - 2)
+        before, at, after = slope[top - 1], slope[top], slope[top + 1]
+        bend = before - TWICE * at + after
+        shift = HALF * (before - after) / bend if bend != 0.0 else NOWHERE
+        # A maximum at the window's end is not one.
+        peaked = in_view[p] and at >= before and at >= after and abs(shift) <= 1.0 and at > 0.0
+        edges[p, 0] = first + (top + half) / DENSITY + shift / DENSITY if peaked else np.nan
+        edges[p, 1] = at if peaked else 0.0
+        outside = min(max(top + half + 2 * DENSITY, 0), samples - 1)
+        edges[p, 2] = ray[p, outside]
+        if narrow:
+            for k in range(top + half, outside):
+                edges[p, 2] = min(edges[p, 2], ray[p, k])
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,24 +138,19 @@ def fit_circle(
     points at once.
     """
     # Start from the radius that the points themselves have, lest a common shift make outliers of them.
-    start = _weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
+    start = weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
     residual, w = np.empty_like(distance), np.empty_like(distance)
-    shift, scale, inverse, score = _fit(
+    shift, scale, inverse, score = fit_points(
         angle, distance, np.asarray(weight, dtype=np.float64), radius, start, radius_scatter, scale_least, residual, w
     )
-    score = score[np.bincount((angle * radius / POINTS_OF_A_STRETCH).astype(np.intp), w, len(score)) > 0.0]
-    spread = inverse @ (score.T @ score) @ inverse * len(score) / max(len(score) - 3, 1)
-    # What the radius' prior leaves open counts too.
-    prior = np.diag([0.0, 0.0, (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH])
-    spread += inverse @ prior @ inverse * scale**2 * POINTS_OF_A_STRETCH
-    variance = 0.5 * (spread[0, 0] + spread[1, 1])
+    variance = centre_variance(angle, radius, w, score, inverse, scale, radius_scatter)
     # Where too few points are left to fix a circle, nothing but rounding errors is.
     sigma = float(np.sqrt(variance)) if variance >= 0.0 else np.inf
     return Circle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
 
 
 @njit(cache=True, nogil=True)
-def _fit(angle, distance, weight, radius, start, radius_scatter, scale_least, residual, w):
+def fit_points(angle, distance, weight, radius, start, radius_scatter, scale_least, residual, w):
     """Shift (3,) of centre and radius, scale, inverse normal matrix (3, 3) and the scores (s, 3) of the stretches.
 
     residual, w (p,): filled with the last residuals and weights.
@@ -156,7 +167,7 @@ def _fit(angle, distance, weight, radius, start, radius_scatter, scale_least, re
             length = np.hypot(ex, ey)
             residual[p] = length - radius - shift[2]
             design[p, 0], design[p, 1] = ex / length, ey / length
-        scale = max(_weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
+        scale = max(weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
         prior = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
         normal, right = np.zeros((3, 3)), np.zeros(3)
         for p in range(count):
@@ -181,7 +192,29 @@ def _fit(angle, distance, weight, radius, start, radius_scatter, scale_least, re
 
 
 @njit(cache=True, nogil=True)
-def _weighted_median(value, weight):
+def centre_variance(angle, radius, w, score, inverse, scale, radius_scatter):
+    """Variance of a component of the centre [px²], from the scores (s, 3) of those stretches that weigh anything."""
+    weight = np.zeros(len(score))
+    for p in range(len(angle)):
+        weight[int(angle[p] * radius / POINTS_OF_A_STRETCH)] += w[p]
+    stretches, variance, squares = 0, 0.0, 0.0
+    for k in range(len(score)):
+        if weight[k] > 0.0:
+            stretches += 1
+            for i in range(2):
+                step = inverse[i, 0] * score[k, 0] + inverse[i, 1] * score[k, 1] + inverse[i, 2] * score[k, 2]
+                squares += step * step
+    variance = squares * stretches / max(stretches - 3, 1)
+    # What the radius' prior leaves open counts too.
+    prior = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
+    for i in range(2):
+        variance += inverse[i, 2] * prior * inverse[2, i] * scale**2 * POINTS_OF_A_STRETCH
+    return 0.5 * variance
+
+
+@njit(cache=True, nogil=True)
+def weighted_median(value, weight):
+    """The value (p,) with half of the weight (p,) on either side."""
     order = np.argsort(value)
     total = np.cumsum(weight[order])
     return value[order[min(np.searchsorted(total, 0.5 * total[-1]), len(value) - 1)]]

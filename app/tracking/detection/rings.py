@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.spatial import KDTree
+from numba import njit
 
 from solver.bodies.grains import Array
 
@@ -62,19 +62,36 @@ def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.
     """
     if len(x) == 0:
         return np.empty(0, np.intp)
-    point = np.stack([x, y], axis=1)
-    tree = KDTree(point)
+    x, y, radius = (np.ascontiguousarray(value, np.float64) for value in (x, y, radius))
     alive = np.ones(len(x), dtype=np.bool_)
     largest = float(radius.max())
-    for k in range(len(x)):
-        if not alive[k]:
-            continue
-        near = np.asarray(tree.query_ball_point(point[k], radius[k] + largest), dtype=np.intp)
-        near = near[near > k]
-        distance = np.linalg.norm(point[near] - point[k], axis=1)
-        limit = radius[near] + radius[k] - allowed * np.minimum(radius[near], radius[k])
-        alive[near[distance < limit]] = False
+    columns, rows = (int((value.max() - value.min()) / largest) + 1 for value in (x, y))
+    strike_out(x, y, radius, allowed, largest, np.full((rows, columns), -1, np.intp), np.empty(len(x), np.intp), alive)
     return np.flatnonzero(alive)
+
+
+@njit(cache=True, nogil=True)
+def strike_out(x, y, radius, allowed, cell, head, following, alive):
+    """Clear alive (n,) where a circle overlaps an earlier one that is alive.
+
+    cell [px]: side of the squares of a grid, no less than the greatest radius; head (rows, columns), −1, and following
+    (n,): the circles of each square that are alive, one after the other.
+    """
+    rows, columns = head.shape
+    left, top = x.min(), y.min()
+    for k in range(len(x)):
+        column, row = int((x[k] - left) / cell), int((y[k] - top) / cell)
+        for j in range(max(row - 2, 0), min(row + 3, rows)):
+            for i in range(max(column - 2, 0), min(column + 3, columns)):
+                other = head[j, i]
+                while other >= 0 and alive[k]:
+                    distance = np.sqrt((x[other] - x[k]) ** 2 + (y[other] - y[k]) ** 2)
+                    if distance < radius[k] + radius[other] - allowed * min(radius[k], radius[other]):
+                        alive[k] = False
+                    other = following[other]
+        if alive[k]:
+            following[k] = head[row, column]
+            head[row, column] = k
 
 
 def tile_size(radius: float) -> int:

@@ -29,6 +29,7 @@ class FramePoses:
     second_zncc: Array  # (n,) of the best other place where a search found the grain, 0: none; NaN: not searched
     status: NDArray[np.uint8]  # (n,) TrackStatus
     reference: NDArray[np.int32]  # (n,) photograph that the reference patch was cut out of
+    failed_reason: str = ""  # why the photograph shows nothing; empty where it does
 
     @property
     def has_pose(self) -> NDArray[np.bool_]:
@@ -75,6 +76,13 @@ def found_poses(registration: Registration, first: FramePoses, reference: NDArra
         pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank,
         findings.second_zncc * blank, status, reference,
     )  # fmt: skip
+
+
+def no_poses(reference: NDArray[np.int32], reason: str) -> FramePoses:
+    """The poses in a photograph that shows nothing, and why it does not."""
+    nothing = np.full(len(reference), np.nan)
+    status = np.full(len(reference), TrackStatus.LOST, np.uint8)
+    return FramePoses(nothing, nothing, nothing, nothing, nothing, nothing, status, reference, reason)
 
 
 def _leave_photograph(patches: Patches, place: Array) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import STRAIGHT
 
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
@@ -107,7 +108,8 @@ def _detected(tracked: Tracked, reference: Image) -> Facts:
     ]
     walls = []
     if tracked.walls is not None and tracked.first_frame == 0:
-        for name, ends in zip(tracked.walls.name, tracked.scale.to_pixels(tracked.walls.endpoints[0]), strict=True):
+        bars = tracked.walls.select(np.flatnonzero(tracked.walls.sides == STRAIGHT))  # circles were not looked for
+        for name, ends in zip(bars.name, tracked.scale.to_pixels(bars.endpoints[0]), strict=True):
             (x1, y1), (x2, y2) = (ends + 0.5) * scale
             walls.append({"name": name, "x1": x1, "y1": y1, "x2": x2, "y2": y2})
     photograph = {"data": as_data(picture), "width": width, "height": height}

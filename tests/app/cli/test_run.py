@@ -31,6 +31,7 @@ def test_a_tracked_experiment_runs_to_results_recording_and_summary(tracked, tmp
     assert "Against the truth" in told
     assert "rodsight view" in told
     assert sorted(file.name for file in out.iterdir() if file.is_file()) == [
+        "manifest.json",
         "recording.rrd",
         "results.h5",
         "summary.json",
@@ -115,7 +116,7 @@ def test_a_killed_run_goes_on_where_it_stopped(tracked, tmp_path, capsys):
         run.kill()
     kept = cut / ".unfinished" / "solving"
     assert not (cut / "results.h5").exists(), "the run ended before it could be killed"
-    assert sorted(file.name for file in kept.glob("*.npz"))[:2] == ["000000.npz", "000001.npz"]
+    assert sorted(file.name for file in kept.glob("*.piece"))[:2] == ["000000.piece", "000001.piece"]
     assert rodsight("solve", tracked, "--out", cut, *slow) == 0
     capsys.readouterr()
     assert same_frames(load_results(whole / "results.h5"), load_results(cut / "results.h5"))
@@ -151,7 +152,12 @@ def test_a_range_of_frames_is_scored_against_its_own_truth(tracked, tmp_path, ca
     assert summary["accuracy"]["r_fn"][3] > 0.8
     capsys.readouterr()
     assert rodsight("score", str(out), "--json") == 0
-    assert json.loads(capsys.readouterr().out) == summary["accuracy"]
+    told = json.loads(capsys.readouterr().out)
+    baselines = told.pop("baselines")
+    assert told == summary["accuracy"]
+    assert set(baselines) == {"r_ours", "r_static", "r_overlap", "r_uniform"}
+    assert all(len(values) == 4 for values in baselines.values())
+    assert baselines["r_ours"][3] > baselines["r_uniform"][3] > 0.2
 
 
 def test_scoring_the_truth_against_itself_is_perfect(tracked, tmp_path, capsys):

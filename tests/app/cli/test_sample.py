@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.cli.main import main
-from rodsight.experiment.experiment import load_experiment, read_walls
+from rodsight.experiment.experiment import load_experiment
 from rodsight.experiment.photographs import Photographs
 from rodsight.experiment.tables import read_table
+from rodsight.experiment.walls import read_walls
 from rodsight.recording.viewing.viewer import viewer_binary
 from rodsight.synthetic.speckle import SpeckleSettings, render_scene
 
@@ -94,7 +95,7 @@ def test_the_truth_is_in_balance():
 @pytest.mark.screen
 def test_the_sample_runs_to_trustworthy_forces_and_a_sound_recording(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
-        main(["run", str(SAMPLE), "--out", str(tmp_path / "run")])
+        main(["run", str(SAMPLE), "--out", str(tmp_path / "run"), "--set", golden.SETTING])
     assert stop.value.code == 0
     assert "Against the truth" in capsys.readouterr().out
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())

@@ -30,7 +30,7 @@ def test_what_is_not_known_is_null(with_a_loss):
     tables = make_tables(with_a_loss)
     lost = tables["grains"].column("x").is_null().to_numpy()
     assert np.flatnonzero(lost).tolist() == [2 * 40 + 3, 3 * 40 + 3]
-    assert tables["frames"].column("trust").null_count == 1  # of frame 0
+    assert tables["frames"].column("old_unbalance").null_count == 1  # of frame 0
 
 
 def test_walls_have_their_names_and_columns_their_units(results):

@@ -24,7 +24,7 @@ MISTAKES = {
         lambda f: edit(f, "friction = 0.25", "formal_weight = 0.7\nfriction = 0.25"),
         ["formal_weight", "0.7"],
     ),
-    "missing column": (TRACKS, lambda f: edit(f, "theta", "angle"), ["column theta"]),
+    "missing column": (TRACKS, lambda f: edit(f, "id,x", "id,u"), ["column x"]),
     "diameters": (GRAINS, lambda f: scale_radii(f, 2.0), ["grains.csv", "radius", "overlap", "0.50"]),
     "small radii": (GRAINS, lambda f: scale_radii(f, 0.5), ["grains.csv", "radius", "stand apart", "2.00"]),
     "millimetres": (GRAINS, lambda f: scale_radii(f, 1e3), ["grains.csv", "radius", "in metres"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -9,8 +10,9 @@ from types import ModuleType, SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from rodsight.errors import InputError
-from rodsight.experiment.photographs import Photographs, read_photograph
+from rodsight.errors import InputError, RunError
+from rodsight.experiment.input_files import InputFiles
+from rodsight.experiment.photographs import Look, Photographs, ReadAhead, read_photograph
 
 ROUNDING = 1e-3  # [grey] float32 arithmetic on values up to 255
 
@@ -137,7 +139,7 @@ def fake_rawpy(pixels: np.ndarray | None, asked: dict[str, object]) -> ModuleTyp
         def __exit__(self, *_: object) -> None:
             pass
 
-    def imread(_: str) -> Raw:
+    def imread(_: io.BytesIO) -> Raw:
         if pixels is None:
             raise LibRawError("Unsupported file format")
         return Raw()
@@ -151,6 +153,7 @@ def test_raw_files_are_developed_alike_and_to_full_depth(tmp_path: Path, monkeyp
     red_green_blue = np.array([[[65535, 0, 0], [0, 65535, 0], [0, 0, 65535], [257, 257, 257]]], np.uint16)
     asked: dict[str, object] = {}
     monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(red_green_blue, asked))
+    (tmp_path / "a.NEF").write_bytes(b"raw")
     image = read_photograph(tmp_path / "a.NEF")
     assert image[0] == pytest.approx([0.299 * 255, 0.587 * 255, 0.114 * 255, 1.0], abs=ROUNDING)
     assert asked["output_bps"] == 16
@@ -160,11 +163,82 @@ def test_raw_files_are_developed_alike_and_to_full_depth(tmp_path: Path, monkeyp
 
 def test_a_raw_file_without_its_reader_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rawpy", None)
+    (tmp_path / "a.CR2").write_bytes(b"raw")
     with pytest.raises(InputError, match=r"a\.CR2.*rodsight\[raw\]"):
         read_photograph(tmp_path / "a.CR2")
 
 
 def test_a_raw_file_that_is_none_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(None, {}))
+    (tmp_path / "a.dng").write_bytes(b"raw")
     with pytest.raises(InputError, match=r"a\.dng.*Unsupported file format"):
         read_photograph(tmp_path / "a.dng")
+
+
+def test_a_photograph_that_is_replaced_is_not_taken_for_the_one_before(tmp_path: Path) -> None:
+    for name in ("0.png", "1.png"):
+        cv2.imwrite(str(tmp_path / name), np.full((4, 4), 7, np.uint8))
+    photographs = Photographs.matching(tmp_path, "*.png")
+    photographs = Photographs(photographs.files, inputs=InputFiles())
+    assert photographs[1][0, 0] == 7
+    cv2.imwrite(str(tmp_path / "1.png"), np.full((4, 4), 9, np.uint8))
+    with pytest.raises(RunError, match=r"1\.png: has changed"):
+        photographs[1]
+    assert photographs[0][0, 0] == 7
+
+
+@pytest.fixture
+def coloured(tmp_path) -> Path:
+    """A photograph of 6 x 8 pixels, blue 10, green 20, red 30, with one bright column."""
+    image = np.full((6, 8, 3), (10, 20, 30), np.uint8)
+    image[:, 3] = 200
+    cv2.imwrite(str(tmp_path / "a.png"), image)
+    return tmp_path / "a.png"
+
+
+@pytest.mark.parametrize(("channel", "level"), [("red", 30), ("green", 20), ("blue", 10)])
+def test_one_colour_alone_is_looked_at(coloured, channel, level):
+    image = Photographs([coloured], look=Look(channel))[0]
+    assert image[0, 0] == level
+    assert image[0, 3] == 200
+
+
+def test_nothing_outside_the_region_is_seen(coloured):
+    image = Photographs([coloured], look=Look("red", (3, 1, 6, 4)))[0]
+    assert image.shape == (6, 8)
+    assert np.all(image[1:5, 3] == 200)
+    assert np.all(image[[0, 5]] == 30)  # the middle grey of the region
+    assert np.all(image[:, 7] == 30)
+
+
+def test_a_region_beyond_the_photograph_is_refused(coloured):
+    with pytest.raises(InputError, match=r"photographs\.region = \[0, 0, 8, 4\].*8 x 6 pixels"):
+        Photographs([coloured], look=Look("grey", (0, 0, 8, 4)))[0]
+
+
+class Counted:
+    """Photographs that note in which order they are asked for."""
+
+    def __init__(self, broken: int = -1) -> None:
+        self.asked: list[int] = []
+        self._broken = broken
+
+    def __getitem__(self, frame: int) -> np.ndarray:
+        self.asked.append(frame)
+        if frame == self._broken:
+            raise InputError("a.png", "", "is broken")
+        return np.full((2, 2), float(frame), np.float32)
+
+
+def test_the_next_photograph_is_read_ahead_once_and_none_beyond_the_last():
+    photographs = Counted()
+    with ReadAhead(photographs, 4) as coming:
+        assert [float(coming[k][0, 0]) for k in range(4)] == [0.0, 1.0, 2.0, 3.0]
+    assert photographs.asked == [0, 1, 2, 3]
+
+
+def test_a_broken_photograph_is_complained_of_when_it_is_asked_for():
+    with ReadAhead(Counted(broken=2), 4) as coming:
+        assert coming[1][0, 0] == 1.0
+        with pytest.raises(InputError, match="broken"):
+            coming[2]

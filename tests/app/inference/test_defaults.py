@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from rodsight.experiment.experiment import load_experiment, read_tracks, read_walls
+from rodsight.experiment.experiment import load_experiment, read_tracks
+from rodsight.experiment.walls import read_walls
 from rodsight.inference.inference import Inputs, correct_sequence
 from rodsight.inference.settings import material_of, settings_of
 

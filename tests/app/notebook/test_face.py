@@ -110,7 +110,7 @@ def test_settings_and_material_of_a_call_are_obeyed(run, poses, walls):
 @pytest.mark.parametrize(
     ("spoil", "told"),
     [
-        (lambda p, w: (p.drop(columns="theta"), w, {}), "tracks: column theta: there is no such column"),
+        (lambda p, w: (p.drop(columns="x"), w, {}), "tracks: column x: there is no such column"),
         (
             lambda p, w: (p.assign(x=p["x"].where(p.index != 3)), w, {}),
             "tracks: row 3, x = 'nan': is not a finite number",

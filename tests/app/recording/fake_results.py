@@ -12,11 +12,11 @@ from solver.bodies.grains import Grains
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, ContactState, detect_contacts
 from solver.contacts.radius_tuning import RadiusTuning
+from solver.nlgs.starts import COLD_SWEEPS
 from solver.nlgs.sweep_record import SweepHistory
 from solver.nlgs.warm_start import ForceMemory
 from solver.sequence.changes import find_changes
 from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.starts import COLD_SWEEPS
 from solver.statistics.balance import grain_unbalance
 from solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
 from solver.statistics.frame_statistics import FrameStatistics
@@ -180,6 +180,7 @@ def _statistics(forces: FrameForces, grain_count: int) -> FrameStatistics:
         "mean_fn": float(forces.fn[loaded].mean()), "max_fn": float(forces.fn.max()), "fabric": fabric,
         "fabric_anisotropy": 2.0 * float(values[1] - values[0]),
         "sigma_1": float(high), "sigma_2": float(low), "wall_force": _wall_forces(forces),
+        "wall_normal_force": np.arange(4.0), "wall_tangential_force": 0.1 * np.arange(4.0),
         "contact_anisotropy": 0.2, "branch_anisotropy": 0.01, "normal_force_anisotropy": 0.3,
         "tangential_force_anisotropy": 0.05, "friction_angle_of_anisotropies": 0.25, "mobilisation": 0.5,
         "tail_exponent": 1.2, "plateau_ratio": 1.1, "strong_share": 0.4, "strong_pressure_share": 0.75,

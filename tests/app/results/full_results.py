@@ -7,15 +7,20 @@ from dataclasses import replace
 import numpy as np
 from rodsight.results.results import Results
 
+from solver.bodies.wall_shapes import OUT, STRAIGHT
+from solver.boundary.bars import Bars
+from solver.boundary.boundary import Boundary
+from solver.boundary.camera_pose import CameraPose
 from solver.calibration.calibrate import Calibration
 from solver.calibration.priors import CalibrationPriors
 from solver.calibration.statistics import GapStatistics
 from solver.convex.friction_check import FrictionCheck
+from solver.nlgs.starts import COLD_SWEEPS
 from solver.sequence.ensemble import MEMBERS
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.starts import COLD_SWEEPS
 from tests.app.recording.fake_results import make_results, make_tuning
 
+CELL = np.array([[0.3, 0.01], [0.02, 0.4]])  # [m]
 WORLD = {"columns": 4, "rows": 3, "sweeps": 6}
 
 
@@ -32,22 +37,45 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         centre_sigma=rng.random(n),
         second_zncc=rng.random((f, n)),
         reference_frame=rng.integers(0, f, (f, n)).astype(np.int32),
+        inferred=np.arange(n) > n - 3,
+        boundary=np.arange(n) % 4 == 1,
         status=rng.integers(0, 7, (f, n)).astype(np.uint8),
+        failed_reason=tuple(f"photograph {k} was black" for k in range(f)),
     )
-    walls = replace(results.walls, force=rng.random((f, w, 2)), sigma=rng.random((f, w)))
+    walls = replace(
+        results.walls,
+        force=rng.random((f, w, 2)),
+        sigma=rng.random((f, w)),
+        told=np.arange(w, dtype=np.int8) % 3 - 1,
+        side=np.where(np.arange(w) == 3, OUT, STRAIGHT).astype(np.int8),
+        load=np.where(np.arange(w) == 1, 40.0, np.nan) * np.ones((f, 1)),
+        cell=CELL + 0.01 * np.arange(4 * f).reshape(f, 2, 2),
+    )
     tuning = make_tuning()
     tuning = replace(tuning, frame_coordination_number=np.repeat(tuning.frame_coordination_number, f, axis=1))
     return replace(
         results,
         tracks=tracks,
+        grains=replace(results.grains, boundary=tracks.boundary),
         walls=walls,
         frames=[_full_frame(frame, rng) for frame in results.frames],
         statistics=[_varied(each, rng) for each in results.statistics],
         calibration=_calibration(n, w, rng),
-        friction_check=FrictionCheck(0.25, 0.24, 0.2, 0.28, 0, f - 1, True, rng.random(5), rng.random(5)),
+        friction_check=FrictionCheck(
+            0.25, 0.24, 0.2, 0.28, 0, f - 1, True, rng.random(5), rng.random(5), 0.2, 0.15, 0.24
+        ),
         radius_tuning=tuning,
+        boundary=_boundary(f, w, np.random.default_rng(seed + 1)),
         ensemble_size=2,
     )
+
+
+def _boundary(f: int, w: int, rng: np.random.Generator) -> Boundary:
+    bars = Bars(rng.random((f, w)), rng.random(w) < 0.5, rng.random(w), rng.random(w))
+    camera = CameraPose(
+        rng.random((f, 2)), rng.random(f), rng.random(f), rng.random((f, 2)), rng.random(2), 7.0, applied=True
+    )
+    return Boundary(bars, camera, rng.random((w, 2)))
 
 
 def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
@@ -58,6 +86,7 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         values[1::2] = np.nan  # measured every other sweep
     return replace(
         frame,
+        contacts=replace(frame.contacts, shift=(np.arange(c) % 5 == 3)[:, None] * CELL[0]),
         history=replace(history, **residuals),
         **{name: rng.random(c) for name in ("nlgs_fn", "nlgs_ft", "un", "ut", "probability", "fn_sd", "ft_sd")},
         age=rng.integers(0, 9, c).astype(np.int32),
@@ -69,15 +98,28 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         similarity=float(rng.random()),
         gained_count=float(rng.integers(1, 9)),
         parted_count=float(rng.integers(1, 9)),
+        doubt=f"frame {frame.frame} is doubted",
+        force_change=0.125 + 0.01 * frame.frame,
+        strain=np.array([[0.1, 0.02], [0.02, -0.1]]) * (1 + frame.frame),
+        shear=0.2 + frame.frame,
+        shear_step=0.3 + frame.frame,
         warm_residual=float(rng.random()),
         cold_residual=rng.random(len(COLD_SWEEPS)),
         sweeps_saved=float(rng.random()),
         grain_unbalance=rng.random(frame.contacts.grain_count),
+        bearing_probability=np.linspace(0.2, 0.8, c),
+        sliding_probability=np.linspace(0.9, 0.1, c),
+        overlap=0.25 + frame.frame,
+        positions_share=0.5 + 0.01 * frame.frame,
     )
 
 
+SINCE = ("wall_normal_force", "wall_tangential_force")  # the stored file was made of draws without these
+
+
 def _varied(statistics, rng: np.random.Generator):
-    named = {name: np.asarray(getattr(statistics, name)) for name in statistics.__dataclass_fields__}
+    fields = [name for name in statistics.__dataclass_fields__ if name not in SINCE]
+    named = {name: np.asarray(getattr(statistics, name)) for name in fields}
     return replace(
         statistics,
         **{
@@ -95,7 +137,8 @@ def _calibration(n: int, w: int, rng: np.random.Generator) -> Calibration:
     return Calibration(
         offset=rng.random((n, 2)), radius=rng.random(n), wall=rng.random(w), wall_tilt=rng.random(w), pixel_size=0.01,
         lens=0.02, walls_follow=True, offset_sd=rng.random((n, 2)), radius_sd=rng.random(n), wall_sd=rng.random(w),
-        wall_tilt_sd=rng.random(w), pixel_size_sd=0.03, lens_sd=0.04, gap_sd=0.05,
+        wall_tilt_sd=rng.random(w), radius_offset=0.06, radius_offset_sd=0.07, pixel_size_sd=0.03, lens_sd=0.04,
+        gap_sd=0.05,
         priors=CalibrationPriors(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7), noise_factor=1.5,
         before=GapStatistics(*rng.random(5).tolist()), after=GapStatistics(*rng.random(5).tolist()), rounds=3,
         applied=True, verdict="was applied: it is “better” ≤ ½",

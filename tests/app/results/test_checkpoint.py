@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+import pytest
 from rodsight.results.checkpoint import Checkpoint, flatten
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
@@ -37,12 +37,38 @@ def test_another_fingerprint_finds_nothing(tmp_path):
     assert Checkpoint(tmp_path / "solving", "other").finished() == 0
 
 
-def test_what_an_earlier_version_did_not_keep_has_its_default(tmp_path):
+def test_what_an_earlier_version_did_not_keep_has_its_default(tmp_path, monkeypatch):
     checkpoint = Checkpoint(tmp_path / "solving", "fingerprint")
-    checkpoint.save(0, make_full_results().frames[0])
-    file = next((tmp_path / "solving").glob("*.npz"))
-    with np.load(file) as arrays:
-        kept = {name: values for name, values in arrays.items() if name not in ("0.hidden_share", "0.member_force")}
-    np.savez(file, **kept)
+    frame = make_full_results().frames[0]
+    kept = {name: values for name, values in flatten(frame) if name not in ("hidden_share", "member_force")}
+    monkeypatch.setattr("rodsight.results.checkpoint.flatten", lambda value: list(kept.items()))
+    checkpoint.save(0, frame)
     frame = checkpoint.load(0, FrameForces)[0]
     assert (frame.hidden_share, frame.member_force) == (0.0, None)
+
+
+@pytest.mark.parametrize("at", [3, 40, -5])
+def test_a_damaged_frame_is_done_again_with_those_after_it_and_said(tmp_path, at):
+    notes: list[str] = []
+    checkpoint = Checkpoint(tmp_path / "solving", "fingerprint", notes)
+    for k in range(3):
+        checkpoint.save(k, make_full_results().frames[k])
+    file = tmp_path / "solving" / "000001.piece"
+    content = bytearray(file.read_bytes())
+    content[at] ^= 1
+    file.write_bytes(content)
+    assert checkpoint.finished() == 1
+    assert notes == ["Frame 1 of the unfinished solving is damaged: it is done again."]
+    with pytest.raises(ValueError, match=r"000001\.piece is damaged"):
+        checkpoint.load(1, FrameForces)
+
+
+def test_a_frame_of_another_run_or_place_is_none(tmp_path):
+    one, other = Checkpoint(tmp_path / "one", "a"), Checkpoint(tmp_path / "other", "b")
+    for checkpoint in (one, other):
+        for k in range(2):
+            checkpoint.save(k, make_full_results().frames[k])
+    (tmp_path / "other" / "000000.piece").replace(tmp_path / "one" / "000001.piece")
+    assert one.finished() == 1
+    (tmp_path / "one" / "000001.piece").write_bytes((tmp_path / "one" / "000000.piece").read_bytes())
+    assert one.finished() == 1

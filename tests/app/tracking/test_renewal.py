@@ -106,7 +106,7 @@ def test_a_resumed_run_and_other_workers_give_the_same_bits(
     rods: Rods, photographs: Photographs, tracks: Tracks, tmp_path: Path, kept: int
 ) -> None:
     follow(rods, photographs, tmp_path / "c")
-    for file in sorted((tmp_path / "c").glob("*.npz"))[kept:]:
+    for file in sorted((tmp_path / "c").glob("*.piece"))[kept:]:
         file.unlink()
     again = follow(rods, photographs, tmp_path / "c", workers=2)
     for name in ("position", "rotation", "sigma", "zncc", "second_zncc", "status", "reference_frame"):

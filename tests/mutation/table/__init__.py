@@ -2,12 +2,15 @@
 
 from tests.mutation.mutant import Mutant
 from tests.mutation.table import (
+    baselines,
     bodies,
     calibration,
     contacts,
     convex,
     dem,
     detection,
+    exchange,
+    factor,
     nlgs,
     results,
     sequence,
@@ -16,6 +19,20 @@ from tests.mutation.table import (
 
 MUTANTS: tuple[Mutant, ...] = tuple(
     mutant
-    for part in (bodies, contacts, detection, calibration, nlgs, convex, statistics, sequence, dem, results)
+    for part in (
+        bodies,
+        factor,
+        contacts,
+        detection,
+        calibration,
+        nlgs,
+        convex,
+        statistics,
+        sequence,
+        dem,
+        results,
+        baselines,
+        exchange,
+    )
     for mutant in part.MUTANTS
 )

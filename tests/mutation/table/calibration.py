@@ -7,6 +7,13 @@ SCALE = "tests/solver/calibration/test_scale.py"
 
 MUTANTS = [
     *mutants_of(
+        "app/inference/radii.py",
+        "tests/app/inference/test_radii.py",
+        ("radius=tracks.radius + found.correction", "radius=tracks.radius - found.correction"),
+        ("radius=then.radius + found.correction", "radius=then.radius"),
+        ("first is None or not radii_scatter(", "first is None or radii_scatter("),
+    ),
+    *mutants_of(
         "solver/calibration/equations.py",
         CALIBRATE,
         ("(2 * grain, of_grain * jx)", "(2 * grain, -of_grain * jx)"),

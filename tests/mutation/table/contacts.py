@@ -15,6 +15,8 @@ MUTANTS = [
             "gap[~wall] = distance - 2.0 * grains.radius[a]",
         ),
         ("(gap > -radius[:, None]) & beside", "(gap > -radius[:, None])"),
+        ("some = ~(grains.boundary[i] & grains.boundary[j])", "some = ~(grains.boundary[i] | grains.boundary[j])"),
+        ("branch += shift[~wall]", "branch -= shift[~wall]"),
         ("near = gap < threshold", "near = gap < 0.5 * threshold"),
         ("threshold if wall_threshold is None else wall_threshold", "threshold"),
     ),
@@ -26,6 +28,7 @@ MUTANTS = [
             "turn[~wall] -= radius[j[~wall]] * rotation[j[~wall]]",
             "turn[~wall] += radius[j[~wall]] * rotation[j[~wall]]",
         ),
+        ("motion += walls.cell.drift(contacts.shift)", "motion -= walls.cell.drift(contacts.shift)"),
         ("motion[wall] += walls.velocity_at", "motion[wall] -= walls.velocity_at"),
         (
             "add(2 * n + j[pair], c + column[pair], -radius[j[pair]])",
@@ -43,8 +46,9 @@ MUTANTS = [
         (TESTS, "tests/solver/statistics/test_stress.py"),
         ("(contacts_per_grain(contacts, bearing) < 2)", "(contacts_per_grain(contacts, bearing) < 1)"),
         ("np.bincount(i, minlength=n) + np.bincount(j[j < n], minlength=n)[:n]", "2 * np.bincount(i, minlength=n)"),
-        ("counted &= ~loose", "counted &= present"),
-        ("kept = bearing & ~loose[contacts.i]", "kept = bearing.copy()"),
+        ("counted = present & ~loose", "counted = present"),
+        ("held[pair] &= ~loose[j]", "pass"),
+        ("weight @ (held & counted[i]) +", "2.0 * weight @ (held & counted[i]) +"),
     ),
     *mutants_of(
         "solver/contacts/radius_tuning.py",
@@ -62,7 +66,6 @@ MUTANTS = [
             "join_keys(contacts.key, forced)",
         ),
         ("verdicts.forced[are_there(verdicts.forced, present, contacts.body_count)]", "verdicts.forced"),
-        ("position=(1.0 - share) * one.position + share * two.position", "position=one.position"),
     ),
     *mutants_of(
         "solver/contacts/pairs.py",

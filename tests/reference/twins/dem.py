@@ -31,16 +31,24 @@ class PlainCell:
     plate_mass: float  # [kg]
     load: float | None  # [N]; None: the plate is held
     plate_damping: float  # [N s/m]
+    spread: float  # [m/s] of the right side, outwards
+    side: tuple[float, float, float] | None  # mass [kg], load [N], damping [N s/m] of the right side; None: driven
+    base_limit: Array  # (n,) [N]
     law: Law
     pairs: list[tuple[int, int]]
     wall_pairs: list[tuple[int, int]]
     damping: dict[tuple[str, int, int], float]
     spring: dict[tuple[str, int, int], float] = field(default_factory=dict)
+    roll: dict[tuple[str, int, int], float] = field(default_factory=dict)
+    held: dict[int, Array] = field(default_factory=dict)  # elastic friction of the base, by grain
     contact: dict[tuple[str, int, int], tuple[float, float]] = field(default_factory=dict)
     seen: set[str] = field(default_factory=set)  # branches taken
 
-    def step(self, rate: float) -> float:
-        """Take one step at a shear rate [rad/s]; how much two bodies may have approached in it [m]."""
+    def step(self, rate: float, rise: float = 0.0, spread: float = 0.0) -> float:
+        """Take one step at a shear rate [rad/s]; how much two bodies may have approached in it [m].
+
+        rise, spread [m/s]: velocities of the plate and of the right side where no load moves them.
+        """
         dt, law = self.law.time_step, self.law
         gravity = np.array([law.gravity_x, law.gravity_y])
         fastest = 0.0
@@ -54,41 +62,79 @@ class PlainCell:
         self.force[:], self.torque[:] = 0.0, 0.0
         self.shear += dt * rate
         self.height += dt * self.rise
+        self.width += dt * self.spread
         for i, j in self.pairs:
             apart = self.position[j] - self.position[i]
             distance = float(np.hypot(*apart))
             normal = apart / distance
             self._touch("pair", i, j, normal, distance - self.radius[i] - self.radius[j], self.velocity[j])
-        push = 0.0
+        push, side_push = 0.0, 0.0
         for i, w in self.wall_pairs:
-            outward, distance, velocity = self._wall(w, self.position[i], rate)
-            self._touch("wall", i, w, outward, distance - self.radius[i], velocity)
-            if SIDES[w] == "top":
-                push += self.contact["wall", i, w][0]
-        if self.load is not None:
+            outward, distance, velocity, turn = self._wall(w, self.position[i], rate)
+            self._touch("wall", i, w, outward, distance - self.radius[i], velocity, turn)
+            push += self.contact["wall", i, w][0] if SIDES[w] == "top" else 0.0
+            side_push += self.contact["wall", i, w][0] if SIDES[w] == "right" else 0.0
+        for k in range(len(self.mass)):
+            self._rub(k)
+        if self.load is None:
+            self.rise = rise
+        else:
             self.rise += dt * (push - self.load - self.plate_damping * self.rise) / self.plate_mass
-        wall_speed = (abs(self.rise) + abs(rate) * self.height) / np.cos(self.shear) ** 2
+        if self.side is None:
+            self.spread = spread
+        else:
+            mass, load, damping = self.side
+            self.spread += dt * (side_push - load - damping * self.spread) / mass
+        wall_speed = (abs(self.rise) + abs(rate) * self.height) / np.cos(self.shear) ** 2 + abs(self.spread)
         return dt * (fastest + max(fastest, wall_speed))
 
-    def _wall(self, w: int, place: Array, rate: float) -> tuple[Array, float, Array]:
-        """Outward normal, distance of a place [m] and the wall's velocity there [m/s]."""
+    def _rub(self, k: int) -> None:
+        """Friction of the base on grain k: a spring and a dashpot against sliding, another against turning."""
+        law, limit = self.law, self.base_limit[k]
+        if limit == 0.0:
+            self.seen.add("no base")
+            return
+        slide = np.array([*self.velocity[k], self.radius[k] * self.spin[k]])
+        elastic = self.held.get(k, np.zeros(3)) - law.tangential_stiffness * law.time_step * slide
+        total = elastic - np.sqrt(law.tangential_stiffness * self.mass[k]) * slide
+        if np.hypot(*total[:2]) > limit:
+            self.seen.add("base slides")
+            total[:2] *= limit / np.hypot(*total[:2])
+            elastic[:2] = total[:2]
+        else:
+            self.seen.add("base sticks")
+        if abs(total[2]) > 2.0 / 3.0 * limit:
+            self.seen.add("base turns " + ("forth" if total[2] > 0 else "back"))
+            total[2] = elastic[2] = np.sign(total[2]) * 2.0 / 3.0 * limit
+        self.held[k] = elastic
+        self.force[k] += total[:2]
+        self.torque[k] += self.radius[k] * total[2]
+
+    def _wall(self, w: int, place: Array, rate: float) -> tuple[Array, float, Array, float]:
+        """Outward normal, distance of a place [m], the wall's velocity there [m/s] and its spin [rad/s]."""
         along = np.array([np.sin(self.shear), np.cos(self.shear)])  # the sides, upwards
         if SIDES[w] == "bottom":
-            return np.array([0.0, -1.0]), place[1], np.zeros(2)
+            return np.array([0.0, -1.0]), place[1], np.zeros(2), 0.0
         if SIDES[w] == "top":  # its ends run along the sides: x = h tan γ
             speed = self.rise * np.tan(self.shear) + self.height * rate / np.cos(self.shear) ** 2
-            return np.array([0.0, 1.0]), self.height - place[1], np.array([speed, self.rise])
+            return np.array([0.0, 1.0]), self.height - place[1], np.array([speed, self.rise]), 0.0
         foot = np.array([self.width if SIDES[w] == "right" else 0.0, 0.0])
         outward = np.array([along[1], -along[0]]) * (1.0 if SIDES[w] == "right" else -1.0)
         arm = float((place - foot) @ along)  # of the turn about the foot, clockwise
-        return outward, float((foot - place) @ outward), arm * rate * np.array([along[1], -along[0]])
+        velocity = arm * rate * np.array([along[1], -along[0]])
+        if SIDES[w] == "right":
+            velocity = velocity + np.array([self.spread, 0.0])
+        return outward, float((foot - place) @ outward), velocity, -rate
 
-    def _touch(self, kind: str, i: int, j: int, normal: Array, gap: float, velocity: Array) -> None:
-        """Spring, dashpot and friction of one contact; velocity [m/s] is that of the other body's centre or surface."""
+    def _touch(self, kind: str, i: int, j: int, normal: Array, gap: float, velocity: Array, turn: float = 0.0) -> None:
+        """Spring, dashpot and friction of one contact; velocity [m/s] is that of the other body's centre or surface.
+
+        turn [rad/s]: spin of a wall.
+        """
         key, law = (kind, i, j), self.law
         if gap >= 0.0:
             self.seen.add(f"{kind} open" + (" again" if self.spring.get(key, 0.0) != 0.0 else ""))
-            self.spring[key], self.contact[key] = 0.0, (0.0, 0.0)
+            self.spring[key], self.roll[key], self.contact[key] = 0.0, 0.0, (0.0, 0.0)
             return
         tangent = np.array([-normal[1], normal[0]])
         surface = self.velocity[i] + self.spin[i] * self.radius[i] * tangent
@@ -116,3 +162,17 @@ class PlainCell:
         if kind == "pair":
             self.force[j] += force
             self.torque[j] -= self.radius[j] * ft
+        arm = self.radius[i] * (self.radius[j] / (self.radius[i] + self.radius[j]) if kind == "pair" else 1.0)
+        turning = arm * ((self.spin[j] if kind == "pair" else turn) - self.spin[i])
+        elastic = self.roll.get(key, 0.0) - law.tangential_stiffness * turning * law.time_step
+        moment = elastic - law.tangential_damping * damping * turning
+        most = law.rolling_friction * fn
+        if abs(moment) > most:
+            self.seen.add(f"{kind} rolls {'forth' if moment > 0 else 'back'}")
+            moment = elastic = most if moment > 0.0 else -most
+        else:
+            self.seen.add(f"{kind} does not roll")
+        self.roll[key] = elastic
+        self.torque[i] -= arm * moment
+        if kind == "pair":
+            self.torque[j] += arm * moment

@@ -53,3 +53,38 @@ def rim_misfit(
     edge, a, c = values
     pull = 3.0 / (scatter * max(level, 1.0)) / np.sqrt(step)
     return np.append(ray - dark - rim(r, edge, a, c, width), -pull * (c - expected * a))
+
+
+def steepest(ray: Array, first: float, radius: float, window: float, narrow: bool) -> tuple[float, float, float]:
+    """Edge, slope and level beyond it of one ray sampled in quarters of a pixel; NaN and 0 where there is none."""
+    r = first + 0.25 * np.arange(len(ray))
+    slope = (ray[:-4] - ray[4:]) * 1.0  # over a pixel
+    where = r[2:-2]
+    top = int(np.argmax(np.where(np.abs(where - radius) <= window, slope, -np.inf)))
+    top = min(max(top, 1), len(slope) - 2)
+    end = min(top + 2 + 8, len(ray) - 1)
+    beyond = float(ray[top + 2 : end + 1].min() if narrow else ray[end])
+    parabola = np.polyfit([-1.0, 0.0, 1.0], slope[top - 1 : top + 2], 2)
+    if not (slope[top] > 0.0 and slope[top] >= slope[top - 1] and slope[top] >= slope[top + 1]):
+        return np.nan, 0.0, beyond
+    return float(where[top] - 0.25 * parabola[1] / (2.0 * parabola[0])), float(slope[top]), beyond
+
+
+def apart(x: Array, y: Array, radius: Array, allowed: float) -> list[int]:
+    """The circles that overlap none of those before them that remain."""
+    kept: list[int] = []
+    for k in range(len(x)):
+        away = [np.hypot(x[k] - x[m], y[k] - y[m]) for m in kept]
+        least = [radius[k] + radius[m] - allowed * min(radius[k], radius[m]) for m in kept]
+        if all(a >= b for a, b in zip(away, least, strict=True)):
+            kept.append(k)
+    return kept
+
+
+def sandwich_variance(score: Array, weight: Array, inverse: Array, scale: float, scatter: float) -> float:
+    """Variance of a component of the centre: H⁻¹ SᵀS H⁻¹ over the stretches that weigh anything, and the prior's."""
+    used = score[weight > 0.0]
+    spread = inverse @ (used.T @ used) @ inverse * len(used) / max(len(used) - 3, 1)
+    prior = np.diag([0.0, 0.0, (scale / scatter) ** 2 * 8.0])
+    spread = spread + inverse @ prior @ inverse * scale**2 * 8.0
+    return 0.5 * float(spread[0, 0] + spread[1, 1])

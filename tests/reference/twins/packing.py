@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.bodies.cell import Cell
 from solver.bodies.grains import Array, GrainMotion, Grains
 from solver.bodies.packing import Material
 from solver.bodies.walls import Walls
@@ -35,8 +36,10 @@ class Case:
         )
 
 
-def make_case(seed: int = 7) -> Case:
+def make_case(seed: int = 7, *, with_boundary: bool = False) -> Case:
     """A disordered packing between walls that move, turn and press.
+
+    with_boundary: some grains are boundary, and contacts reach across a cell that deforms, as if there were one, too.
 
     Masses follow neither the radii nor the impedances, some grains are lost and their rows hold nonsense, some
     contacts must close before they bear force, and friction with walls is not that between grains.
@@ -59,7 +62,18 @@ def make_case(seed: int = 7) -> Case:
     contacts = detect_contacts(grains, position, present, walls, 3e-4)
     closing = np.where(rng.random(contacts.count) < 0.3, rng.uniform(0, 3e-5, contacts.count), 0.0)
     material = Material(0.3, 0.15, 0.1, (0.7, -9.81))
-    return Case(grains, motion, walls, contacts, material, rng.uniform(500.0, 2000.0, n), closing)
+    case = Case(grains, motion, walls, contacts, material, rng.uniform(500.0, 2000.0, n), closing)
+    return _bounded(case, rng) if with_boundary else case
+
+
+def _bounded(case: Case, rng: np.random.Generator) -> Case:
+    boundary = np.isin(np.arange(case.grains.count), (17, 60, 85, 120))
+    cell = Cell(np.array([[0.3, 0.02], [-0.1, 0.25]]), rng.normal(0, 3e-5, (2, 2)))
+    image = np.where(case.contacts.with_wall[:, None], 0, rng.integers(-1, 2, (case.contacts.count, 2)))
+    return replace(
+        case, grains=replace(case.grains, boundary=boundary), walls=replace(case.walls, cell=cell),
+        contacts=replace(case.contacts, shift=image @ cell.vectors),
+    )  # fmt: skip
 
 
 def make_guess(case: Case, seed: int = 3) -> Array:

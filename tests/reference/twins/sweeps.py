@@ -41,10 +41,12 @@ class PlainSolver:
         closing: Array | None = None,
     ) -> None:
         self.grains, self.motion, self.walls, self.contacts = grains, motion, walls, contacts
-        self.material, self.impedance = material, impedance
+        self.material = material
         self.closing = np.zeros(contacts.count) if closing is None else closing
-        self.inertia = 0.5 * impedance * grains.radius**2
         self.plate_impedance = PLATE * float(np.mean([z for z, p in zip(impedance, motion.present, strict=True) if p]))
+        # No force moves a grain of the boundary.
+        self.impedance = np.where(grains.free, impedance, np.inf)
+        self.inertia = 0.5 * self.impedance * grains.radius**2
 
     def friction(self, c: int) -> float:
         wall = self.contacts.j[c] >= self.grains.count
@@ -70,7 +72,7 @@ class PlainSolver:
         t = np.array([-n[1], n[0]])
         surface_i = world.velocity[i] + world.spin[i] * self.grains.radius[i] * t
         if j < self.grains.count:
-            surface_j = world.velocity[j] - world.spin[j] * self.grains.radius[j] * t
+            surface_j = world.velocity[j] - world.spin[j] * self.grains.radius[j] * t + self._drift(c)
         else:
             w = j - self.grains.count
             surface_j = self._wall_velocity(w, self.contacts.point[c]) + world.plate[w] * self.walls.outward[w]
@@ -124,7 +126,8 @@ class PlainSolver:
             total[i] = total[i] - vector
             if j < self.grains.count:
                 total[j] = total[j] + vector
-        size = [float(np.hypot(*total[k])) for k in range(self.grains.count) if self.motion.present[k]]
+        there = self.motion.present & self.grains.free
+        size = [float(np.hypot(*total[k])) for k in range(self.grains.count) if there[k]]
         return max(size), sum(size) / len(size)
 
     def _push(self, world: World, c: int, fn: float, ft: float) -> None:
@@ -137,6 +140,13 @@ class PlainSolver:
             world.spin[j] -= self.grains.radius[j] * ft / self.inertia[j]  # lever −R n, force f
         elif np.isfinite(self.walls.load[j - self.grains.count]):
             world.plate[j - self.grains.count] += fn / self.plate_impedance
+
+    def _drift(self, c: int) -> Array:
+        """Velocity of the image of j that i touches, beyond that of j: as often that of a and b as it lies beyond."""
+        if self.walls.cell is None or self.contacts.shift is None:
+            return np.zeros(2)
+        a, b = np.linalg.solve(self.walls.cell.vectors.T, self.contacts.shift[c])
+        return round(a) * self.walls.cell.velocity[0] + round(b) * self.walls.cell.velocity[1]
 
     def _vector(self, c: int, fn: float, ft: float) -> Array:
         n = self.contacts.normal[c]

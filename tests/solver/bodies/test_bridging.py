@@ -1,6 +1,7 @@
 import numpy as np
+import pytest
 
-from solver.bodies.bridging import bridge_lost
+from solver.bodies.bridging import bridge_frames, bridge_lost
 from solver.bodies.motion import Snapshot
 
 EXACT = 1e-12  # rounding of centimetres
@@ -62,3 +63,23 @@ def test_the_way_between_is_shared_by_the_time_on_either_side():
     start = first.position[7]
     np.testing.assert_allclose(frame.position[7], start + 48.0 / 60.0 * (last.position[7] - start), atol=EXACT)
     np.testing.assert_allclose(frame.rotation[7], 48.0 / 60.0 * 0.02, atol=EXACT)
+
+
+def test_a_frame_that_is_not_believed_is_put_between_its_neighbours():
+    place, ends = np.array([[0.0, 0.0], [0.02, 0.0], [0.04, 0.0], [0.5, 0.5]]), np.arange(8.0).reshape(2, 2, 2)
+
+    def snapshot(time, shift, sigma=1e-5, present=(True,) * 4):
+        return Snapshot(time, place + shift, np.full(4, 10.0 * shift), np.array(present), ends + shift, sigma)
+
+    half = [True, True, False, True]
+    shown = [snapshot(0.0, 0.0, present=half), snapshot(10.0, 9.9), snapshot(40.0, 0.04, 2e-5), snapshot(50.0, 7.7)]
+    found = bridge_frames(shown, {1, 3, 9})
+    assert found[1].position == pytest.approx(place + 0.01)
+    assert found[1].rotation == pytest.approx(np.full(4, 0.1))
+    assert found[1].endpoints == pytest.approx(ends + 0.01)
+    assert (found[1].time, found[1].sigma) == (10.0, 2e-5)
+    assert found[1].present.tolist() == half
+    assert found[3].position == pytest.approx(place + 0.04)  # behind the last believed one it stands still
+    assert found[0] is shown[0]
+    with pytest.raises(ValueError, match="no frame is believed"):
+        bridge_frames(shown[:1], {0})

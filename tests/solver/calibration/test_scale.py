@@ -124,6 +124,30 @@ def test_what_is_known_exactly_is_not_corrected(rng):
     assert held.pixel_size_sd == 0.0
 
 
+@pytest.mark.parametrize("offset", [-3e-4, 3e-4])
+def test_an_error_that_all_radii_share_is_told_from_the_pixel_size(rng, offset):
+    true, classes = scatter_pairs(rng, noise=5e-6)
+    measured = replace(true, radius=true.radius - offset)
+    found = find_scale(measured, replace(PRIORS, radius_offset=4e-5), 0.0, classes)
+    assert found.told_apart
+    assert abs(found.radius_offset - offset) < 3 * np.hypot(found.radius_offset_sd, FEW_MICROMETRES)
+    assert abs(found.pixel_size) < 3 * found.pixel_size_sd
+    assert found.correct(measured, classes).radius == pytest.approx(true.radius, abs=5e-6)
+
+
+def test_rods_of_one_size_cannot_tell_it_which_is_said(rng):
+    true, _ = scatter_pairs(rng, noise=5e-6)
+    middle = true.position.reshape(4, -1, 2, 2).mean(axis=2, keepdims=True)
+    away = true.position.reshape(4, -1, 2, 2) - middle
+    distance = np.linalg.norm(away, axis=-1, keepdims=True)
+    sum_of_radii = true.radius.reshape(-1, 2).sum(axis=1)[None, :, None, None]
+    same = middle + away / distance * (distance + 8e-3 - 0.5 * sum_of_radii)  # the same gaps between rods of 8 mm
+    measured = replace(true, radius=np.full_like(true.radius, 8e-3 - 3e-5), position=same.reshape(true.position.shape))
+    found = find_scale(measured, replace(PRIORS, radius_offset=4e-5), 0.0, None)
+    assert found.found
+    assert not found.told_apart
+
+
 def test_calibration_tells_and_applies_the_pixel_size(rng):
     true, classes = scatter_pairs(rng, noise=5e-6)
     measured = replace(true, position=true.position / 1.005)

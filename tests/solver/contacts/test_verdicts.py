@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from solver.bodies.motion import Snapshot
 from solver.contacts.contacts import ContactSource, detect_contacts
-from solver.contacts.verdicts import NO_VERDICTS, Verdicts, apply_verdicts, sources, without_ignored
+from solver.contacts.verdicts import NO_VERDICTS, Verdicts, apply_verdicts, find_ignored, sources
 from tests.packings import box, motion, rods
 
 GRAINS = rods(0.01, 0.01, 0.01, 0.01)
@@ -63,19 +62,5 @@ def test_a_pair_cannot_be_both():
         Verdicts(forced=keys(FAR), forbidden=keys(FAR))
 
 
-def test_an_ignored_photograph_is_put_between_its_neighbours():
-    def snapshot(time, shift, sigma=1e-5, present=HERE):
-        return Snapshot(time, PLACE + shift, np.full(4, 10.0 * shift), present, WALLS.endpoints + shift, sigma)
-
-    half = np.array([True, True, False, True])
-    shown = [snapshot(0.0, 0.0, present=half), snapshot(10.0, 9.9), snapshot(40.0, 0.04, 2e-5), snapshot(50.0, 7.7)]
-    found = without_ignored(shown, {1: Verdicts(ignored=True), 3: Verdicts(ignored=True), 9: Verdicts(ignored=True)})
-    assert found[1].position == pytest.approx(PLACE + 0.01)
-    assert found[1].rotation == pytest.approx(np.full(4, 0.1))
-    assert found[1].endpoints == pytest.approx(WALLS.endpoints + 0.01)
-    assert (found[1].time, found[1].sigma) == (10.0, 2e-5)
-    assert found[1].present.tolist() == half.tolist()
-    assert found[3].position == pytest.approx(PLACE + 0.04)  # behind the last believed one it stands still
-    assert found[0] is shown[0]
-    with pytest.raises(ValueError, match="every frame is ignored"):
-        without_ignored(shown[:1], {0: Verdicts(ignored=True)})
+def test_frames_that_people_flagged_are_found():
+    assert find_ignored({1: Verdicts(ignored=True), 2: Verdicts(reset=True), 9: Verdicts(ignored=True)}) == {1, 9}

@@ -4,7 +4,15 @@ import pytest
 from solver.bodies.grains import Grains
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import detect_contacts
-from solver.convex.friction_estimate import SlidingFrame, _least, estimate_friction, relative_power_gap
+from solver.convex.friction_estimate import (
+    FACTORS,
+    SlidingFrame,
+    _jackknife,
+    _least,
+    _walk_into_valley,
+    estimate_friction,
+    relative_power_gap,
+)
 from solver.convex.program import assemble_balance
 
 EXACT = 1e-12  # rounding of a few terms of order one
@@ -89,3 +97,30 @@ def test_every_trial_is_solved_with_its_own_friction():
     gap = estimate_friction([twisted], factors=(0.5, 1.0, 2.0)).gap
     # With more friction the grain can work against more of this sliding.
     assert gap[0] > 1.1 * gap[1] > 1.2 * gap[2]
+
+
+def valleys(lowest: np.ndarray) -> np.ndarray:
+    """Gaps of frames with their least at these factors (f,), at every one of FACTORS (f, q)."""
+    return 0.1 + np.log(np.array(FACTORS) / lowest[:, None]) ** 2
+
+
+@pytest.mark.parametrize("lowest", [0.3, 0.55, 0.75, 0.92, 1.0, 1.1, 1.5, 2.5])
+def test_the_walk_finds_what_all_trials_would(lowest: float):
+    every, trial = valleys(lowest * np.linspace(0.9, 1.1, 8)), np.array(FACTORS)
+    tried, gap = _walk_into_valley(trial, lambda factor: every[:, FACTORS.index(factor)])
+    assert _least(tried, gap.mean(axis=0)) == _least(trial, every.mean(axis=0))
+    assert _jackknife(tried, gap) == _jackknife(trial, every)
+
+
+def test_few_trials_are_needed_where_the_friction_is_as_told():
+    every = valleys(np.full(8, 0.92))
+    tried, _ = _walk_into_valley(np.array(FACTORS), lambda factor: every[:, FACTORS.index(factor)])
+    assert len(tried) <= 6
+
+
+def test_frames_that_disagree_are_walked_to_wherever_one_left_out_leads():
+    every = valleys(np.array([0.5, 1.0, 2.0]))  # without one of them: 0.71, 1 or 1.41
+    tried, gap = _walk_into_valley(np.array(FACTORS), lambda factor: every[:, FACTORS.index(factor)])
+    assert tried[0] < 0.7
+    assert tried[-1] > 1.45
+    assert _jackknife(tried, gap) == _jackknife(np.array(FACTORS), every)

@@ -4,8 +4,8 @@ import pytest
 from solver.bodies.grains import Grains
 from solver.bodies.motion import Snapshot
 from solver.detection.displacement import contact_displacement
-from solver.detection.refinement import BLOCK, RefinedBlock, _Network, block_of, refine
-from solver.detection.touch_probability import Candidates, ContactProbabilitySettings
+from solver.detection.refinement import BLOCK, RefinedBlock, block_of, refine
+from solver.detection.touch_probability import ContactProbabilitySettings
 from tests.solver.convex.test_members import box
 
 R, SIDE, FRAMES = 0.01, 12, 8
@@ -93,32 +93,6 @@ def test_every_frame_lies_in_its_block_with_room_on_both_sides(count: int):
         assert number == k // BLOCK
         assert start <= max(k - 4, 0)
         assert end >= min(k + 4, count)
-
-
-def test_positions_and_variances_are_those_of_the_dense_least_squares():
-    """Every message is one equation: the pair's gap, with its weight; every position one more, with its noise."""
-    rng = np.random.default_rng(4)
-    grains = Grains.of_rods(np.full(4, R), density=2700.0, length=0.06)
-    i, j = np.array([0, 0, 0, 1, 2], np.int32), np.array([1, 3, 4, 2, 3], np.int32)  # the third with a wall
-    angle, gap = rng.uniform(-3, 3, 5), rng.normal(0, 1e-5, 5)
-    normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    weight, aim = rng.uniform(0.5, 2.0, 5) * 1e10, rng.normal(0, 1e-6, 5)
-    sigma = np.array([1e-5, 2e-5, 1.5e-5, 1e-5])
-    network = _Network.of(grains, Candidates(i, j, gap[None], np.full((1, 5), 1e-5)))
-    found = network.solve(normal, gap, weight, weight * aim, sigma)
-
-    design, tangent = np.zeros((5, 8)), np.zeros((5, 8))
-    for c in range(5):
-        for row, n in ((design, normal[c]), (tangent, np.array([-normal[c, 1], normal[c, 0]]))):
-            row[c, 2 * i[c] : 2 * i[c] + 2] = -n
-            if j[c] < 4:
-                row[c, 2 * j[c] : 2 * j[c] + 2] = n
-    covariance = np.linalg.inv(design.T @ np.diag(weight) @ design + np.diag(np.repeat(sigma**-2.0, 2)))
-    moved = covariance @ design.T @ (weight * (aim - gap))
-    assert found[0].ravel() == pytest.approx(moved, rel=1e-9)
-    assert found[1] == pytest.approx(gap + design @ moved, rel=1e-9)
-    assert found[2] == pytest.approx(np.diag(design @ covariance @ design.T), rel=1e-9)
-    assert found[3] == pytest.approx(np.diag(tangent @ covariance @ tangent.T), rel=1e-9)
 
 
 def test_contacts_come_with_their_own_probability():

@@ -10,9 +10,10 @@ from solver.contacts.verdicts import Verdicts
 from solver.nlgs.chain import ChainSettings
 from solver.nlgs.sweep_record import recorded_sweeps
 from solver.nlgs.warm_start import ForceMemory
+from solver.sequence import ensemble
+from solver.sequence.doubts import lower_bound
 from solver.sequence.frame_forces import FrameStatus
 from solver.sequence.frames import solve_sequence
-from solver.sequence.judgement import trust
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
 from tests.packings import LENGTH, squeezed_heap
@@ -259,12 +260,23 @@ def test_only_the_ensemble_compares_two_starts():
     assert ensemble[3] < ensemble[1]
 
 
+def test_two_starts_are_compared_until_they_agreed_for_three_frames_and_again_after_a_reset():
+    packing, snapshots = sheared_frames(8)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ensemble, "SETTLED_DIFFERENCE", 10.0)  # any two starts agree so far
+        solved = run(packing, snapshots, replace(ENSEMBLE, reset_frames=frozenset([6])))
+    known = [bool(np.isfinite(frame.start_difference)) for frame, _ in solved]
+    assert known == [False, True, True, True, False, False, True, True]
+    assert [state.evidence.start_forgotten for _, state in solved] == [False] * 3 + [True] * 3 + [False] * 2
+
+
 def test_what_a_lost_grain_hides_lowers_the_trust():
     packing, snapshots = sheared_frames(5, lost=[(2, 14)])
     (seen, _), (holed, state) = run(packing, snapshots)[1:3]
     assert seen.hidden_share == 0.0
     assert 0.0 < holed.hidden_share < 1.0
-    assert holed.trust == pytest.approx(trust(state.evidence))
+    assert holed.trust == pytest.approx(lower_bound(state.evidence))
+    assert holed.trust < lower_bound(replace(state.evidence, hidden_share=0.0))
 
 
 def test_coming_back_from_a_faulty_frame_is_no_jump_of_the_stress():

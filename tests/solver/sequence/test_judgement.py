@@ -8,6 +8,8 @@ from solver.sequence.frame_forces import FrameStatus
 from solver.sequence.judgement import (
     CHAIN_UNBALANCED,
     LOAD_SHARES,
+    MOST_UNSEEN,
+    NEW_FORCES,
     SETTLED_CORRECTION,
     SETTLED_DIFFERENCE,
     SETTLING_FRAMES,
@@ -26,7 +28,7 @@ from solver.sequence.judgement import (
 SHEAR = math.radians(0.25)
 SOUND = Evidence(
     reset=False, correction=0.03, disagreement=0.12, old_unbalance=0.02, pressure_jump=0.03, load_share=1.2,
-    unbalance=1e-3, shear=SHEAR, frames_since_event=10,
+    unbalance=1e-3, shear=SHEAR, frames_since_event=10, start_difference=0.01,
 )  # fmt: skip
 
 
@@ -45,6 +47,7 @@ def test_sound_evidence_is_settled_and_trusted():
         ({"load_share": 1.01 * LOAD_SHARES[1]}, "load"),
         ({"correction": 1.01 * SUSPECT_CORRECTION}, "ε"),
         ({"pressure_jump": 1.01 * SUSPECT_PRESSURE_JUMP}, "jumped"),
+        ({"unseen_share": 1.01 * MOST_UNSEEN}, "not readable"),
     ],
 )
 def test_each_fault_makes_a_frame_suspect_and_is_named(fault, word):
@@ -76,6 +79,16 @@ def test_old_forces_that_no_longer_fit_tell_a_rearrangement():
     assert judge(replace(SOUND, old_unbalance=1.01 * level))[0] is FrameStatus.REARRANGING
     assert judge(replace(SOUND, old_unbalance=0.99 * level))[0] is FrameStatus.SETTLED
     assert rearranging_level(0.5 * SHEAR) < level < rearranging_level(2.0 * SHEAR)
+
+
+def test_forces_that_are_new_in_every_photograph_are_not_settled_and_the_spacing_is_named():
+    sparse = replace(SOUND, shear=4.0 * SHEAR, force_change=0.2)
+    status, why = judge(sparse)
+    assert status is FrameStatus.SETTLING
+    assert "1° of shear" in why
+    assert "every 0.3°" in why
+    assert judge(replace(sparse, force_change=0.99 * NEW_FORCES))[0] is FrameStatus.SETTLED
+    assert "too far apart" not in judge(replace(sparse, shear=SHEAR))[1]
 
 
 def test_a_frame_settles_some_frames_after_an_event_and_when_motion_and_forces_agree():
@@ -169,3 +182,18 @@ def test_levels_are_what_was_fitted():
     assert rearranging_level(2.0 * SHEAR) == pytest.approx(0.037 * 2.0**1.5)
     assert rearranging_level(0.01 * SHEAR) == pytest.approx(0.4 * 0.037)
     assert rearranging_level(100.0 * SHEAR) == pytest.approx(4.0 * 0.037)
+
+
+@pytest.mark.parametrize("unknown", ["unbalance", "correction", "start_difference"])
+def test_what_is_not_known_settles_nothing(unknown):
+    assert judge(replace(SOUND, **{unknown: math.nan}))[0] is not FrameStatus.SETTLED
+
+
+def test_a_start_that_is_forgotten_need_not_be_known():
+    forgotten = replace(SOUND, start_difference=math.nan, start_forgotten=True)
+    assert judge(forgotten)[0] is FrameStatus.SETTLED
+
+
+@pytest.mark.parametrize("unknown", ["correction", "hidden_share"])
+def test_what_is_not_known_earns_no_trust(unknown):
+    assert not trust(replace(SOUND, **{unknown: math.nan})) > 0.0

@@ -49,6 +49,19 @@ def test_a_force_anisotropy_is_found_whatever_the_directions_of_the_contacts():
     assert same_axis(found.direction, 0.2)
 
 
+def test_weights_count_like_repetitions():
+    rng = np.random.default_rng(5)
+    angle, times = rng.uniform(0.0, np.pi, 300), rng.integers(1, 4, 300)
+    branch, fn, ft = normals(angle) * rng.uniform(1.0, 2.0, (300, 1)), rng.exponential(size=300), rng.normal(size=300)
+    weighted = anisotropies(normals(angle), branch, fn, ft, times.astype(float))
+    repeated = anisotropies(*(np.repeat(each, times, axis=0) for each in (normals(angle), branch, fn, ft)))
+    for kind in ("contact", "branch", "normal", "tangential"):
+        one, other = getattr(weighted, kind), getattr(repeated, kind)
+        assert (one.mean, one.amplitude) == (pytest.approx(other.mean), pytest.approx(other.amplitude)), kind
+    tensor = contact_fabric(normals(angle), times.astype(float))
+    assert tensor == pytest.approx(contact_fabric(np.repeat(normals(angle), times, axis=0)))
+
+
 def test_a_tangential_anisotropy_is_found_with_its_sign():
     angle = directions(0.3, 0.8)
     found = tangential_harmonic(normals(angle), -5.0 * 0.12 * np.sin(2.0 * (angle - 0.7)), 5.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.bodies.packing import Material
-from solver.contacts.contacts import Contacts, ContactState
+from solver.contacts.contacts import Contacts
 from solver.statistics.force_statistics import (
     FORCE_BINS,
     FORCE_EDGES,
@@ -17,7 +17,7 @@ from solver.statistics.force_statistics import (
     strong_network,
     tail_exponent,
 )
-from solver.statistics.frame_statistics import frame_statistics
+from solver.statistics.frame_statistics import Likely, frame_statistics
 from solver.statistics.stress import branch_vectors, contact_force_vectors
 from tests.packings import LENGTH, box, rods
 from tests.solver.statistics.test_stress import square_of_four
@@ -121,10 +121,10 @@ def test_an_isotropic_state_has_no_deviator_to_share():
 
 
 def statistics_of(contacts, fn, ft, position, walls, radius=0.01):
-    state = np.where(fn > 0, ContactState.STICKING, ContactState.OPEN).astype(np.uint8)
     n = len(position)
+    likely = Likely.of_known(fn, ft, np.where(contacts.with_wall, 0.5, 0.25))
     return frame_statistics(
-        contacts, fn, ft, state, position, np.ones(n, bool), walls, LENGTH,
+        contacts, fn, ft, likely, position, np.ones(n, bool), walls, LENGTH,
         grains=rods(*[radius] * n), material=Material(0.25, 0.5),
     )  # fmt: skip
 
@@ -166,11 +166,11 @@ def test_only_bearing_contacts_count():
     open_rows = [pair[0], np.flatnonzero(contacts.with_wall)[0]]
     fn = fn.copy()
     fn[open_rows] = 0.0
-    state = np.where(fn > 0, ContactState.STICKING, ContactState.OPEN).astype(np.uint8)
-    sliding = np.flatnonzero(fn > 0)[:3]
-    state[sliding] = ContactState.SLIDING
+    slides = np.zeros_like(fn)
+    slides[np.flatnonzero(fn > 0)[:3]] = 1.0
     found = frame_statistics(
-        contacts, fn, np.zeros_like(fn), state, position, np.ones(4, bool), walls, LENGTH,
+        contacts, fn, np.zeros_like(fn), Likely((fn > 0).astype(float), slides), position, np.ones(4, bool), walls,
+        LENGTH,
         grains=rods(0.01, 0.01, 0.01, 0.01), material=Material(0.25, 0.5),
     )  # fmt: skip
     bearing = fn > 0
@@ -179,13 +179,45 @@ def test_only_bearing_contacts_count():
     assert found.max_fn == fn.max()
     assert found.sliding_fraction == pytest.approx(3 / bearing.sum())
     assert found.pressure == pytest.approx(0.5 * (found.sigma_1 + found.sigma_2))
-    normal = contacts.normal[bearing]
+    normal = contacts.normal[bearing & ~contacts.with_wall]
     assert found.fabric == pytest.approx(normal.T @ normal / len(normal))
     # Anisotropies are of the pairs: one of the horizontal or vertical ones is open, and those with walls do not count.
     left = contacts.normal[bearing & ~contacts.with_wall]
     cosine = left[:, 0] ** 2 - left[:, 1] ** 2
     assert found.contact_anisotropy == pytest.approx(abs(2.0 * cosine.mean()), abs=EXACT)
     assert found.contact_anisotropy > 0.5
+
+
+def test_a_contact_counts_as_it_is_likely_to_bear_force():
+    contacts, fn, position, walls = square_of_four(2e4, 5e4)
+    pair, n = ~contacts.with_wall, 4
+    bears = np.where(pair, 0.75, 1.0)
+    slides = np.where(pair, 0.4, 0.0)
+    found = frame_statistics(
+        contacts, fn, np.zeros_like(fn), Likely(bears, slides), position, np.ones(n, bool), walls, LENGTH,
+        grains=rods(*[0.01] * n), material=Material(0.25, 0.5),
+    )  # fmt: skip
+    assert found.contact_count == round(bears.sum())
+    assert found.coordination_number == pytest.approx((2 * 0.75 * pair.sum() + (~pair).sum()) / n)
+    assert found.mean_fn == pytest.approx(np.average(fn, weights=bears))
+    assert found.sliding_fraction == pytest.approx(np.average(slides, weights=bears))
+    assert found.mobilisation == pytest.approx(found.sliding_fraction)  # nothing else holds by friction here
+    assert found.mobilisation_density[-1] / MOBILISATION_BINS == pytest.approx(found.sliding_fraction)
+    strong = fn > found.mean_fn
+    assert found.strong_share == pytest.approx(np.average(strong, weights=bears))
+    # Stress is what all forces make of it, however doubtful their contacts.
+    assert (found.sigma_1, found.sigma_2) == (pytest.approx(5e4), pytest.approx(2e4))
+
+
+def test_weights_count_like_repetitions():
+    rng = np.random.default_rng(3)
+    force, times = rng.exponential(size=400), rng.integers(1, 4, 400)
+    repeated = np.repeat(force, times)
+    weight = times.astype(float)
+    assert force_density(force, weight) == pytest.approx(force_density(repeated))
+    for estimator in (tail_exponent, plateau_ratio):
+        assert estimator(force, weight).value == pytest.approx(estimator(repeated).value)
+        assert estimator(force, weight).standard_error == pytest.approx(estimator(repeated).standard_error)
 
 
 def test_strong_is_what_bears_more_than_the_mean_not_more_than_half_of_the_contacts():

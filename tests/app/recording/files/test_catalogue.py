@@ -5,8 +5,9 @@ import sys
 import numpy as np
 import pytest
 from rodsight.cli.main import main
-from rodsight.recording.files.catalogue import can_serve, find_recordings, read_properties, serve, show_together
+from rodsight.recording.files.catalogue import can_serve, find_recordings, read_properties, serve
 from rodsight.recording.files.finished_run import write_recording
+from rodsight.recording.viewing.recording_server import RecordingServer
 
 from tests.app.recording.fake_results import make_results, make_truth
 from tests.browser import open_when_served, wait_for_forces
@@ -102,10 +103,9 @@ def test_the_catalogue_server_has_the_properties_as_columns_and_the_tabs_as_blue
 
 @pytest.mark.screen
 def test_recordings_open_together_in_a_browser(folder, page):
-    viewer, address = show_together(find_recordings(folder), web=True)
+    server = RecordingServer(find_recordings(folder))
     try:
-        open_when_served(page, f"{address}&renderer=webgl")
+        open_when_served(page, f"{server.address}&renderer=webgl")
         wait_for_forces(page)
     finally:
-        viewer.terminate()
-        viewer.wait(20)
+        server.close()

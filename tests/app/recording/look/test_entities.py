@@ -3,11 +3,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from rodsight.recording.curve_layers.settling import ALL_TRACKED, SOME_CUT, SOME_INFERRED, SOME_LOST, tracking_state
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.entities import SCHEMA, Condition, describe_schema
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.packing_layers.grains_and_walls import grain_colours
+from rodsight.tracks import TrackStatus
 
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import components, latest, rows
@@ -35,14 +38,14 @@ def written(path) -> dict[str, tuple[set[str], set[str]]]:
 
 
 def test_a_full_recording_holds_exactly_what_the_schema_says(recording):
-    assert written(recording.path) == expected()
+    assert written(recording.path) == expected(Condition.CELL)
 
 
 def test_a_bare_recording_holds_the_unconditional_part_of_the_schema(tmp_path):
     report = write_recording(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
     # The only frame is a reset, so that something is flagged.
     absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
-    assert written(report.path) == expected(*absent)
+    assert written(report.path) == expected(*absent, Condition.CELL)
 
 
 def test_the_described_schema_names_every_entity():
@@ -125,3 +128,37 @@ def test_the_chain_s_own_last_sweep_is_shown_before_the_reported_field(tmp_path)
     assert chain == style.radii(frame.history.fn[-1]).tolist()
     reported = latest(path, entities.FORCES, entities.SWEEP, 50)["LineStrips2D:radii"]
     assert reported == style.radii(frame.fn).tolist() != chain
+
+
+def _with_status(results, *, status, seen: bool, frame: int = 2, row: int = 20):
+    tracks = results.tracks
+    changed, position = tracks.status.copy(), tracks.position.copy()
+    changed[frame, row] = status
+    if not seen:
+        position[frame, row] = np.nan
+    return replace(tracks, status=changed, position=position)
+
+
+def test_the_lane_of_tracking_tells_what_is_lost_from_what_the_border_cuts_and_what_is_inferred():
+    results = make_results(3)
+    assert tracking_state(results.tracks, 2) == ALL_TRACKED
+    assert tracking_state(_with_status(results, status=TrackStatus.LOST, seen=False), 2) == SOME_LOST
+    assert tracking_state(_with_status(results, status=TrackStatus.OUT_OF_FRAME, seen=False), 2) == SOME_CUT
+    inferred = _with_status(results, status=TrackStatus.INFERRED, seen=True)
+    assert tracking_state(inferred, 2) == SOME_INFERRED
+    assert tracking_state(inferred, 1) == ALL_TRACKED
+
+
+def test_what_the_border_cuts_is_not_counted_as_lost():
+    results = make_results(3)
+    cut = _with_status(results, status=TrackStatus.OUT_OF_FRAME, seen=False)
+    assert cut.describe_missing() == "0 poses lost, 1 rod cut by the picture's border (1 pose)"
+    assert not cut.lost.any()
+    unseen = replace(results.tracks, inferred=np.arange(results.grains.count) == 20)
+    assert unseen.describe_missing() == "0 poses lost, 1 rod inferred"
+
+
+def test_an_inferred_rod_has_a_colour_of_its_own():
+    status = np.array([TrackStatus.OK, TrackStatus.SUSPECT, TrackStatus.INFERRED, TrackStatus.LOST], np.uint8)
+    colours = grain_colours(status, np.array([True, True, True, False]))
+    assert len(set(colours.tolist())) == 4

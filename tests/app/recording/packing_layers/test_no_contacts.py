@@ -16,7 +16,8 @@ from tests.app.recording.fake_results import make_results
 
 def without_contacts(frame: FrameForces) -> FrameForces:
     none = np.zeros(frame.contacts.count, bool)
-    nothing = {name: getattr(frame, name)[none] for name in columns(FrameForces, "contact") if name != "member_force"}
+    columns_of_all = {name: getattr(frame, name) for name in columns(FrameForces, "contact")}
+    nothing = {name: value[none] for name, value in columns_of_all.items() if value is not None}
     history = replace(frame.history, fn=frame.history.fn[:, none], ft=frame.history.ft[:, none])
     return replace(frame, contacts=frame.contacts.select(none), history=history, **nothing)
 

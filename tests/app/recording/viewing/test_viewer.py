@@ -20,14 +20,12 @@ def test_the_command_names_the_viewer_of_the_installed_wheel(tmp_path):
     command = view_command(tmp_path / "run.rrd")
     assert command == [str(viewer.viewer_binary()), str(tmp_path / "run.rrd")]
     assert viewer.viewer_binary().is_file()
-    web = view_command(tmp_path / "run.rrd", web=True)
-    assert web[1:4] == ["--web-viewer", "--bind", "127.0.0.1"]
 
 
 def test_the_viewer_knows_the_options_that_are_used():
     known = subprocess.run([viewer.viewer_binary(), "--help"], capture_output=True, text=True, timeout=60).stdout
-    assert "--web-viewer" in known
     assert "--bind" in known
+    assert "--hide-welcome-screen" in known
 
 
 def test_without_a_display_one_line_says_how_to_look(recording, monkeypatch):

@@ -174,7 +174,8 @@ def test_settings_are_checked() -> None:
 
 @pytest.mark.slow
 def test_sample_bars_agree_with_their_table() -> None:
-    from rodsight.experiment.experiment import load_experiment, read_walls
+    from rodsight.experiment.experiment import load_experiment
+    from rodsight.experiment.walls import read_walls
 
     experiment = load_experiment(Path(__file__).parents[4] / "sample_data" / "shear")
     photographs = experiment.photographs()

@@ -1,0 +1,148 @@
+"""Any program's table: commas, semicolons, tabs or blanks between its cells, or Parquet; read as text, row by row."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from ...errors import InputError
+from ...experiment.tables import Table
+
+PARQUET = b"PAR1"
+COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
+NOTHING = frozenset({"", "nan", "NaN", "NA", "null", "None", "-"})  # written where there is no value
+SHOWN = 12  # column names that a complaint lists
+
+
+def read_foreign(file: Path, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
+    """Read the named columns of a table; a file without a header has columns 1, 2, 3, …
+
+    Blank values are empty text; decimal commas become points. Raises InputError naming file, row and value.
+    """
+    header, rows = _open(file)
+    wanted = [*columns, *(name for name in optional if name in header)]
+    for name in wanted:
+        if header.count(name) != 1:
+            listed = ", ".join(header[:SHOWN]) + (" …" if len(header) > SHOWN else "")
+            problem = "there is no such column" if name not in header else "stands twice in the header"
+            raise InputError(file, f"column {name}", f"{problem} (there are: {listed})")
+    place = [header.index(name) for name in wanted]
+    values: dict[str, list[str]] = {name: [] for name in wanted}
+    line = []
+    for number, cells in rows:
+        if len(cells) != len(header):
+            raise InputError(file, f"row {number}", f"has {len(cells)} cells, the header has {len(header)}")
+        line.append(number)
+        for name, at in zip(wanted, place, strict=True):
+            cell = cells[at].strip()
+            values[name].append("" if cell in NOTHING else cell)
+    if not line:
+        raise InputError(file, "", "has no rows")
+    table = Table(file, values, line)
+    for name in wanted:
+        _mend_commas(table, name, values)
+    return table
+
+
+def column_names(file: Path) -> list[str]:
+    """The names in a table's header. Raises InputError."""
+    return _open(file)[0]
+
+
+def read_text(file: Path) -> str:
+    """A text file, whatever wrote it: UTF-8 or UTF-16 with their marks, or Latin-1. Raises InputError."""
+    try:
+        content = file.read_bytes()
+    except FileNotFoundError:
+        raise InputError(file, "", "there is no such file") from None
+    except OSError as error:
+        raise InputError(file, "", f"cannot be read ({error.strerror})") from None
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        encodings = ("utf-16",)
+    else:
+        encodings = ("utf-8-sig", "latin-1")
+    if encodings[0] != "utf-16" and b"\0" in content:
+        raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL: it is not text")
+    for encoding in encodings:
+        try:
+            return content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    raise InputError(file, "", f"is not {encodings[0]} text, which it claims to be")
+
+
+def _open(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    """The header, and the rows with their lines."""
+    try:
+        with file.open("rb") as stream:
+            start = stream.read(4)
+    except FileNotFoundError:
+        raise InputError(file, "", "there is no such file") from None
+    except OSError as error:
+        raise InputError(file, "", f"cannot be read ({error.strerror})") from None
+    return _open_parquet(file) if start == PARQUET else _open_text(file)
+
+
+def _open_parquet(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        table = pyarrow.parquet.read_table(file)
+    except (pyarrow.ArrowException, OSError) as error:
+        raise InputError(file, "", f"cannot be read ({error})") from None
+    columns = [["" if value is None else str(value) for value in column.to_pylist()] for column in table.columns]
+    rows = ((number, list(cells)) for number, cells in enumerate(zip(*columns, strict=True), start=1))
+    return list(table.column_names), rows
+
+
+def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    lines = read_text(file).splitlines()
+    kept = [(number, text) for number, text in enumerate(lines, start=1) if text.strip()]
+    remarks = [text.lstrip("#% \t") for _, text in kept if text.lstrip().startswith(("#", "%"))]
+    kept = [(number, text) for number, text in kept if not text.lstrip().startswith(("#", "%"))]
+    if not kept:
+        raise InputError(file, "", "is empty")
+    delimiter = _delimiter(kept[0][1])
+    cells = [(number, _split(text, delimiter)) for number, text in kept]
+    first = [cell.strip() for cell in cells[0][1]]
+    if not all(NUMBER.fullmatch(cell) or cell in NOTHING for cell in first):
+        return first, iter(cells[1:])
+    named = [cell.strip() for cell in _split(remarks[-1], delimiter)] if remarks else []
+    if len(named) == len(first):
+        return named, iter(cells)
+    return [str(k) for k in range(1, len(first) + 1)], iter(cells)
+
+
+def _delimiter(line: str) -> str | None:
+    """What stands between the cells of a line; None: blanks."""
+    for mark in ("\t", ";"):
+        if mark in line:
+            return mark
+    return "," if "," in line and not _blanks_between_decimals(line) else None
+
+
+def _blanks_between_decimals(line: str) -> bool:
+    """Whether a line is of numbers with decimal commas and blanks between."""
+    cells = line.split()
+    return len(cells) > 1 and all(NUMBER.fullmatch(cell) for cell in cells) and not line.rstrip().endswith(",")
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return line.split()
+    return next(csv.reader(io.StringIO(line), delimiter=delimiter, skipinitialspace=True), [])
+
+
+def _mend_commas(table: Table, name: str, values: dict[str, list[str]]) -> None:
+    """Decimal commas become points; a column that has both is not guessed at."""
+    commas = [row for row, cell in enumerate(values[name]) if COMMA_DECIMAL.fullmatch(cell)]
+    if not commas:
+        return
+    if any("." in cell for cell in values[name]):
+        raise table.error(commas[0], name, "has a comma where other rows have a point: thousands are not told apart")
+    values[name][:] = [cell.replace(",", ".") if COMMA_DECIMAL.fullmatch(cell) else cell for cell in values[name]]

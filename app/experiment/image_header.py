@@ -1,0 +1,54 @@
+"""How many pixels a photograph claims to have, read from its header before anything is allocated for them."""
+
+from __future__ import annotations
+
+import struct
+
+# Markers of a JPEG frame, which tells its size: SOF0 … SOF15 without those that mean something else.
+FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+STANDALONE = frozenset((0x01, *range(0xD0, 0xD9)))  # markers without a length
+WIDTH, HEIGHT = 256, 257  # tags of a TIFF
+SHORT = 3  # a TIFF's type of 16 bits
+
+
+def claimed_size(content: bytes) -> tuple[int, int] | None:
+    """Width and height [px] that the header of a PNG, JPEG or TIFF tells; None where there is none to read."""
+    try:
+        if content.startswith(b"\x89PNG\r\n\x1a\n"):
+            return struct.unpack(">II", content[16:24])
+        if content.startswith(b"\xff\xd8"):
+            return _size_of_jpeg(content)
+        if content[:4] in (b"II*\0", b"MM\0*"):
+            return _size_of_tiff(content)
+    except (struct.error, IndexError):  # cut short: its decoder says so
+        return None
+    return None
+
+
+def _size_of_jpeg(content: bytes) -> tuple[int, int] | None:
+    at = 2
+    while content[at] == 0xFF:
+        marker = content[at + 1]
+        if marker == 0xFF:  # filling
+            at += 1
+        elif marker in STANDALONE:
+            at += 2
+        elif marker in FRAMES:
+            height, width = struct.unpack(">HH", content[at + 5 : at + 9])
+            return width, height
+        else:
+            at += 2 + struct.unpack(">H", content[at + 2 : at + 4])[0]
+    return None
+
+
+def _size_of_tiff(content: bytes) -> tuple[int, int] | None:
+    order = "<" if content.startswith(b"II") else ">"
+    (at,) = struct.unpack(order + "I", content[4:8])
+    (count,) = struct.unpack(order + "H", content[at : at + 2])
+    found: dict[int, int] = {}
+    for entry in range(at + 2, at + 2 + 12 * count, 12):
+        tag, kind = struct.unpack(order + "HH", content[entry : entry + 4])
+        form, size = ("H", 2) if kind == SHORT else ("I", 4)
+        if tag in (WIDTH, HEIGHT):
+            (found[tag],) = struct.unpack(order + form, content[entry + 8 : entry + 8 + size])
+    return (found[WIDTH], found[HEIGHT]) if len(found) == 2 else None

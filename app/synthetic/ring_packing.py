@@ -1,0 +1,66 @@
+"""Dense packings of rods between two circles: the start of a synthetic experiment in a drum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from solver.bodies.grains import Array
+from solver.dem.ring import RingCell
+from solver.dem.simulation import DemSettings, UnbalancedError
+
+from .dense_packing import (
+    JITTER,
+    LOADING_DRAG,
+    LOADING_ROUNDS,
+    LOADING_STEPS,
+    PREPARED,
+    SOFT_DRAG,
+    SOFT_STEPS,
+    SOFTENING,
+    SOLID_FRACTION,
+    choose_radii,
+)
+
+CORE_SHARE = 0.22  # radius of the core over the ring's
+LOOSENESS = 1.06  # first radius of the ring over the dense one
+
+
+def prepare_ring(
+    count: int,
+    rng: np.random.Generator,
+    settings: DemSettings,
+    *,
+    sizes: Callable[[int, np.random.Generator], Array] = choose_radii,
+) -> RingCell:
+    """Compress rods without friction between ring and core; return the cell at rest, friction switched on.
+
+    As `prepare_packing` does it in a box. Raise UnbalancedError if the packing does not come to rest.
+    """
+    radius = sizes(count, rng)
+    area = np.pi * float(np.sum(radius**2)) / SOLID_FRACTION
+    ring = float(np.sqrt(area / (np.pi * (1.0 - CORE_SHARE**2))))
+    core, wide = CORE_SHARE * ring, LOOSENESS * ring
+    position = _scatter(count, rng, core, wide)
+    frictionless = replace(settings, friction=0.0, wall_friction=0.0)
+    soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
+    cell = RingCell(radius, position, ring=wide, core=core, settings=soft, drag=SOFT_DRAG)
+    cell.run(np.zeros(SOFT_STEPS))
+    cell = RingCell(radius, cell.position, ring=wide, core=core, settings=frictionless, drag=LOADING_DRAG)
+    for _ in range(LOADING_ROUNDS):
+        cell.run(np.zeros(LOADING_STEPS))
+        if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
+            return RingCell(radius, cell.position, ring=cell.ring, core=core, settings=settings)
+    raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")
+
+
+def _scatter(count: int, rng: np.random.Generator, core: float, ring: float) -> Array:
+    """Places (n, 2) [m] spread evenly between two circles: in turns about the golden angle, jittered."""
+    share = (np.arange(count) + 0.5) / count
+    away = np.sqrt(core**2 + share * (ring**2 - core**2))
+    angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    cell = np.sqrt(np.pi * (ring**2 - core**2) / count)
+    place = away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return place + 0.3 * JITTER * cell * rng.uniform(-1.0, 1.0, (count, 2))

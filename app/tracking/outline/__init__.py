@@ -1,0 +1,1 @@
+"""Discs followed by their rims, whatever is or changes within them: x and y, no rotation. Uses registration's poses."""

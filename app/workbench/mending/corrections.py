@@ -1,0 +1,66 @@
+"""The table of corrections of an experiment that is being set up: rows added, replaced, taken away, each undone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...experiment.corrections import LOST, read_corrections
+from ..setup.draft import Draft, as_table
+from ..setup.steps import Understood
+
+CORRECTIONS = "corrections.csv"
+COLUMNS = ("frame", "id", "x", "y", "theta")
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """A pose told by hand; None: the rod is not to be seen in that photograph."""
+
+    frame: int
+    id: int
+    pose: tuple[float, float, float | None] | None  # x, y [px]; theta [rad] counter-clockwise, None: to be found
+
+
+def corrections_of(found: Understood) -> list[Correction]:
+    """What the experiment's table says, in its order. Raises InputError."""
+    if found.experiment is None or not found.files:
+        return []
+    told = read_corrections(found.experiment, None, len(found.files))
+    if told is None:
+        return []
+    rows = zip(told.frame.tolist(), told.id.tolist(), told.x, told.y, told.theta, strict=True)
+    return [Correction(frame, name, _pose(x, y, theta)) for frame, name, x, y, theta in rows]
+
+
+def correct(draft: Draft, found: Understood, correction: Correction) -> None:
+    """Write a correction; one of the same rod and photograph gives way."""
+    others = [each for each in corrections_of(found) if (each.frame, each.id) != (correction.frame, correction.id)]
+    _write(draft, found, [*others, correction], f"rod {correction.id} in photograph {correction.frame}")
+
+
+def take_back(draft: Draft, found: Understood, frame: int, name: int) -> None:
+    """Remove a correction."""
+    kept = [each for each in corrections_of(found) if (each.frame, each.id) != (frame, name)]
+    _write(draft, found, kept, f"correction of rod {name} in photograph {frame} taken back")
+
+
+def _write(draft: Draft, found: Understood, corrections: list[Correction], what: str) -> None:
+    file = found.data.get("photographs", {}).get("corrections", CORRECTIONS)
+    rows = [
+        (each.frame, each.id, *_cells(each)) for each in sorted(corrections, key=lambda each: (each.frame, each.id))
+    ]
+    key = {"photographs.corrections": file if rows else None}
+    draft.set_keys(what, key, {file: as_table(COLUMNS, rows) if rows else None})
+
+
+def _cells(correction: Correction) -> tuple[object, object, object]:
+    if correction.pose is None:
+        return LOST, LOST, LOST
+    x, y, theta = correction.pose
+    return round(x, 3), round(y, 3), "" if theta is None else round(theta, 6)
+
+
+def _pose(x: float, y: float, theta: float) -> tuple[float, float, float | None] | None:
+    return None if np.isnan(x) else (float(x), float(y), None if np.isnan(theta) else float(theta))

@@ -1,0 +1,74 @@
+// Elements, questions to the server, sentences for the person. Texts enter the page as text only.
+
+export const at = (id) => document.getElementById(id);
+
+/** An element: h("button", { class: "primary", onclick }, "text", child). */
+export function h(tag, values = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(values ?? {})) {
+    if (value === undefined || value === null || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name === "style") Object.assign(element.style, value);
+    else if (name in element && name !== "list") element[name] = value;
+    else element.setAttribute(name, value === true ? "" : value);
+    if (name === "class") element.className = value;
+  }
+  element.append(...children.flat(9).filter((child) => child !== null && child !== undefined && child !== false));
+  return element;
+}
+
+export async function ask(question, values = {}) {
+  const answer = await fetch(`/ask/${question}`, {
+    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values),
+  });
+  if (!answer.ok) throw new Error(await answer.text());
+  return answer.json();
+}
+
+let timer = 0;
+export function tell(text, wrong = false) {
+  at("toast").textContent = text;
+  at("toast").className = wrong ? "shown wrong" : "shown";
+  clearTimeout(timer);
+  timer = setTimeout(() => { at("toast").className = ""; }, wrong ? 7000 : 2600);
+}
+
+export const SIGNS = { good: "✓", doubtful: "!", missing: "·" };
+export const sign = (mark) => h("span", { class: `sign ${mark}`, title: mark }, SIGNS[mark] ?? "");
+
+/** A number field that tells its value when it is left or Enter is pressed. */
+export function numberField(label, value, unit, onvalue, more = {}) {
+  const input = h("input", { type: "text", inputMode: "decimal", value: value === null || value === undefined ? "" : String(value), ...more,
+    onchange: () => onvalue(input.value.trim()), onkeydown: (event) => event.key === "Enter" && input.blur() });
+  input.id = `field-${label.toLowerCase().replace(/[^a-z]+/g, "-")}`;
+  return h("div", { class: "field" }, h("label", { htmlFor: input.id }, label), h("div", { class: "with-unit" }, input, unit && h("span", {}, unit)));
+}
+
+export const fact = (name, value) => h("div", { class: "fact" }, h("span", {}, name), h("span", {}, value));
+
+/** A number as a person reads it: so many digits that count. */
+export function digits(value, count = 3) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  return String(Number(value.toPrecision(count)));
+}
+
+export function parse(text, what) {
+  const value = Number(text.replace(",", "."));
+  if (text === "" || !Number.isFinite(value)) throw new Error(`${what}: ${text || "nothing"} is not a number`);
+  return value;
+}
+
+/** The canvas of a chart, sharp on every screen; draw gets (context, width, height). */
+export function chart(height, draw, more = {}) {
+  const canvas = h("canvas", { class: "chart", style: { height: `${height}px` }, ...more });
+  requestAnimationFrame(() => {
+    const width = canvas.clientWidth, dense = devicePixelRatio || 1;
+    canvas.width = width * dense; canvas.height = height * dense;
+    const context = canvas.getContext("2d");
+    context.scale(dense, dense);
+    draw(context, width, height);
+  });
+  return canvas;
+}
+
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -1,0 +1,54 @@
+// Time below the photograph: the status of every frame, its trust, its friction angle, its doubts; a click goes there.
+
+import { at, colour, digits, h } from "/page/dom.js";
+
+export const TONES = { settled: "#2fbf93", settling: "#56b4e9", rearranging: "#e69f00", suspect: "#d55e00", failed: "#b02a6f", reset: "#8a8f9a" };
+
+export function showLanes(app, facts) {
+  const count = app.project.files.length;
+  at("time").classList.add("shown");
+  const canvas = h("canvas", { id: "lanes", title: "status · trust · friction angle", "aria-label": "Frames" });
+  const go = (event) => app.show(Math.floor((event.clientX - canvas.getBoundingClientRect().left) / canvas.clientWidth * count));
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); go(event); canvas.onpointermove = go; });
+  canvas.addEventListener("pointerup", () => { canvas.onpointermove = null; });
+  const status = facts?.status[app.frame];
+  const words = facts && app.frame < facts.count
+    ? [h("span", { style: { color: TONES[status] ?? "inherit", fontWeight: 650 } }, status), ` · T ${digits(facts.trust[app.frame], 2)} · φ ${digits(facts.friction_angle[app.frame], 3)}°`]
+    : ["not solved yet"];
+  at("time").replaceChildren(
+    h("button", { class: "quiet", onclick: () => app.show(app.frame - 1), title: "←" }, "◂"), h("button", { class: "quiet", onclick: () => app.show(app.frame + 1), title: "→" }, "▸"),
+    h("div", { class: "frame" }, h("div", {}, `frame ${app.frame} of ${count - 1}`), h("div", { class: "soft", style: { fontSize: "12.5px" } }, words)),
+    canvas,
+    h("button", { class: "quiet", title: "To the next frame in doubt (J)", onclick: () => jump(app, facts) }, "next flag ▸"));
+  requestAnimationFrame(() => draw(app, canvas, facts, count));
+}
+
+/** To the next frame that is suspect, failed, rearranging or has lost rods. */
+export function jump(app, facts) {
+  if (!facts) return;
+  const flagged = facts.status.map((status, k) => ["suspect", "failed", "rearranging"].includes(status) || facts.lost[k] > 0);
+  for (let k = 1; k <= facts.count; k += 1) { const next = (app.frame + k) % facts.count; if (flagged[next]) { app.show(next); return; } }
+  app.tell("No frame is flagged");
+}
+
+function draw(app, canvas, facts, count) {
+  const dense = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+  canvas.width = width * dense; canvas.height = height * dense;
+  const c = canvas.getContext("2d");
+  c.scale(dense, dense);
+  const step = width / count;
+  c.fillStyle = colour("ground"); c.fillRect(0, 0, width, height);
+  for (let k = 0; k < (facts?.count ?? 0); k += 1) {
+    c.fillStyle = TONES[facts.status[k]] ?? "#888"; c.fillRect(k * step + 0.5, 0, Math.max(step - 1, 1), 9);
+    const trust = facts.trust[k];
+    if (trust !== null) { c.globalAlpha = 0.5; c.fillStyle = colour("accent"); c.fillRect(k * step + 0.5, height - trust * (height - 13), Math.max(step - 1, 1), trust * (height - 13)); c.globalAlpha = 1; }
+    if (facts.lost[k] > 0) { c.fillStyle = "#f0e442"; c.beginPath(); c.arc((k + 0.5) * step, 14, 3, 0, 7); c.fill(); }
+  }
+  if (facts?.count > 1) {
+    const angles = facts.friction_angle.filter((v) => v !== null), top = Math.max(...angles) * 1.1 || 1;
+    c.strokeStyle = colour("ink"); c.lineWidth = 1.4; c.beginPath();
+    facts.friction_angle.forEach((v, k) => { if (v === null) return; const x = (k + 0.5) * step, y = height - 3 - v / top * (height - 18); if (k) c.lineTo(x, y); else c.moveTo(x, y); });
+    c.stroke();
+  }
+  c.strokeStyle = colour("ink"); c.lineWidth = 2; c.strokeRect(app.frame * step + 1, 1, Math.max(step - 2, 2), height - 2);
+}

@@ -1,0 +1,76 @@
+// Step 6: the run itself: begun, paused, gone on with, cancelled; forces appear while it goes on.
+
+import { ask, digits, fact, h, tell } from "/page/dom.js";
+import { drawLegend, drawNetwork } from "/page/network.js";
+import { showLanes } from "/page/lanes.js";
+
+let source = null, told = null, facts = null, net = null, watching = null, following = true, alarmed = 0;
+
+export const run = {
+  name: "run", title: "Run",
+  dim: 0.75,
+  mark: (app) => (app.project.run?.frames !== undefined ? "good" : app.project.run?.unfinished ? "doubtful" : "missing"),
+  enter(app) { listen(app); },
+  leave() { source?.close(); source = null; watching = null; net = null; told = null; facts = null; },
+  moved(app) { following = facts ? app.frame >= facts.count - 1 : true; load(app); },
+  panel(app) {
+    const { project } = app, state = told?.state ?? "idle", busy = state === "running" || state === "pausing";
+    return [
+      project.ready ? h("p", {}, "The same as ", h("kbd", {}, `rodsight run ${quoted(project.at)}`), " typed in this folder. Pausing costs one frame at most.") : h("p", {}, "Something is still missing: the steps marked · say what."),
+      h("div", { class: "row" },
+        busy
+          ? [h("button", { id: "pause", disabled: state === "pausing", onclick: () => act(app, "run_pause") }, state === "pausing" ? "Pausing …" : "Pause"), h("button", { disabled: state === "pausing", onclick: () => act(app, "run_cancel") }, "Cancel")]
+          : [h("button", { class: "primary", id: "run", disabled: !project.ready, onclick: () => act(app, "run_start") }, state === "paused" || project.run?.unfinished ? "Go on" : project.run?.frames !== undefined ? "Run again" : "Run"),
+            h("button", { id: "follow", disabled: !project.ready, title: "Wait for further photographs in the folder, and solve them as they come", onclick: () => act(app, "run_start", { follow: true }) }, "Follow a running test")]),
+      told && state !== "idle" ? h("div", { class: "card" },
+        h("div", { class: "fact" }, h("span", {}, "the run"), h("span", { id: "run-state" }, state)),
+        told.stages.map((stage) => h("div", {}, h("div", { class: "fact" }, h("span", {}, stage.words), h("span", {}, `${stage.done} of ${stage.total}${stage.left !== null && stage.done < stage.total && busy ? ` · ${time(stage.left)} left` : ""}`)),
+          h("div", { class: "meter" }, h("i", { style: { width: `${100 * stage.done / Math.max(stage.total, 1)}%` } }))))) : null,
+      told?.alarms.length ? h("div", { class: "says" }, told.alarms.slice(-5).map((each) => h("p", {}, h("span", { class: "sign doubtful" }, "!"), `Frame ${each.frame}: ${each.alarm}`))) : null,
+      facts ? [h("h3", {}, facts.provisional ? "So far" : "Found"),
+        fact("frames", `${facts.count} of ${project.files.length}`),
+        app.frame < facts.count ? [fact("status", facts.status[app.frame]), fact("trust", digits(facts.trust[app.frame], 2)), fact("contacts", String(facts.contacts[app.frame])), fact("mean f_n", `${digits(facts.mean_fn[app.frame], 3)} N`), fact("friction angle", `${digits(facts.friction_angle[app.frame], 3)}°`), fact("rods lost", String(facts.lost[app.frame]))] : null] : null,
+      told?.said.length ? [h("h3", {}, "It says"), h("div", { class: "log", id: "log" }, told.said.slice(-40).join("\n"))] : null,
+    ];
+  },
+  draw(app, c, k) {
+    if (!net || net.frame !== app.frame) return;
+    drawNetwork(c, k, net);
+    drawLegend(app, c, k, net, "fn");
+  },
+  timeline(app) { showLanes(app, facts); },
+};
+
+const quoted = (text) => (/[^\w./-]/.test(text) ? `"${text}"` : text);
+const time = (seconds) => (seconds < 90 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);
+
+function act(app, what, values = {}) { app.queue(async () => { told = await ask(what, { at: app.project.at, ...values }); app.paint(); }); }
+
+function listen(app) {
+  const { at } = app.project;
+  following = true; alarmed = 0;
+  source?.close();
+  source = new EventSource(`/events?${new URLSearchParams({ at })}`);
+  source.onmessage = (event) => {
+    if (app.step !== run || app.project?.at !== at) return;
+    const news = JSON.parse(event.data);
+    const finished = told && told.state !== "finished" && news.job.state === "finished";
+    told = news.job; facts = news.frames ?? facts;
+    if (news.files !== undefined && news.files !== app.project.files.length) finishedNow(app);
+    if (told.alarms.length > alarmed) { alarmed = told.alarms.length; const last = told.alarms.at(-1); tell(`Frame ${last.frame}: ${last.alarm}`, true); }
+    if (facts && following && facts.count) app.frame = facts.count - 1;
+    app.paint(); load(app);
+    if (finished) finishedNow(app);
+  };
+}
+
+function finishedNow(app) { app.queue(async () => { const project = await ask("project", { at: app.project.at }); net = null; app.take(project); load(app); }); }
+
+/** The network of the frame that is shown; the newest while nobody has gone elsewhere. */
+function load(app) {
+  if (!facts || app.frame >= facts.count) return;
+  const wanted = `${app.frame} ${facts.provisional}`;
+  if (watching === wanted && net?.frame === app.frame) return;
+  watching = wanted;
+  ask("network", { at: app.project.at, frame: app.frame }).then((answer) => { if (watching === wanted) { net = answer; app.stage.redraw(); } }, () => { watching = null; });
+}

@@ -1,0 +1,111 @@
+// Step 3: the bars around the packing: drawn or found, named, loaded or followed.
+
+import { digits, h, numberField, parse, tell } from "/page/dom.js";
+import { label } from "/page/scale.js";
+
+const COLOURS = ["#56b4e9", "#e69f00", "#cc79a7", "#f0e442", "#2fbf93", "#d55e00"];
+let chosen = null, line = null, held = null, snap = true;
+
+export const walls = {
+  name: "walls", title: "Walls",
+  hint: (app) => (app.project.pixel ? "Drag along the inner edge of a bar: the line snaps to it. Drag an end to mend one" : "Set the scale first"),
+  keyHelp: [["Delete", "delete the chosen wall"], ["S", "snap to the edge, or not"]],
+  enter: () => { chosen = null; line = null; },
+  tool: (app) => (app.project.pixel ? tool(app) : null),
+  panel(app) {
+    const { project } = app;
+    if (!project.pixel) return h("p", {}, "Walls are told in metres. Set the scale first (step 2); then the bars can be drawn or found here.");
+    return [
+      h("p", {}, "The packing lies between bars. Give a pressure where a plate loads it; every other bar moves as it is seen."),
+      h("div", { class: "row" },
+        h("button", { class: project.walls.length ? "" : "primary", id: "find-walls", disabled: !project.rods, title: project.rods ? "" : "needs the rods: step 4", onclick: () => app.change("find_walls", {}, "Looking for the bars …", (told) => tell(`${told.walls.length} bars found`)) }, "Find the bars by the rods"),
+        h("button", { class: snap ? "on" : "", onclick: () => { snap = !snap; app.paint(); }, title: "S" }, "Snap to edges")),
+      project.walls.map((wall, k) => card(app, wall, k)),
+    ];
+  },
+  draw(app, c, k) {
+    const drawn = app.project.walls.map((wall) => (held && wall.name === held.name ? { ...wall, line } : wall));
+    drawn.forEach((wall, n) => drawWall(app, c, k, wall, COLOURS[n % COLOURS.length]));
+    if (line && !held?.name) drawWall(app, c, k, { name: "", line, pressure: null }, "#ffffff");
+  },
+  key(app, event) {
+    if (event.key === "Delete" && chosen) { app.change("delete_wall", { name: chosen }); chosen = null; return true; }
+    if (event.key === "s") { snap = !snap; app.paint(); return true; }
+    if (event.key === "Escape") { chosen = null; line = null; held = null; app.paint(); return true; }
+    return false;
+  },
+};
+
+function card(app, wall, k) {
+  const long = Math.hypot(wall.line[1][0] - wall.line[0][0], wall.line[1][1] - wall.line[0][1]) * app.project.pixel;
+  const plate = (values) => app.change("set_plate", { name: wall.name, pressure: wall.pressure, ends: wall.ends, ...values });
+  return h("div", { class: `card ${wall.name === chosen ? "here" : ""}`, id: `wall-${wall.name}`, onclick: (event) => { if (event.target.tagName === "DIV" && chosen !== wall.name) { chosen = wall.name; app.paint(); } } },
+    h("div", { class: "row" }, h("span", { class: "swatch", style: { background: COLOURS[k % COLOURS.length] } }),
+      h("input", { value: wall.name, style: { flex: "1", fontWeight: 600 }, "aria-label": "name of the wall", id: `wall-name-${k}`, onchange: (event) => app.change("rename_wall", { name: wall.name, to: event.target.value.trim() }) }),
+      h("span", { class: "soft" }, `${digits(long * 1e3, 4)} mm`),
+      h("button", { class: "quiet", title: "Delete this wall", onclick: () => app.change("delete_wall", { name: wall.name }) }, "✕")),
+    numberField(`pressure ${wall.name}`, wall.pressure === null ? "" : digits(wall.pressure / 1e3, 6), "kPa", (text) => app.queue(async () => {
+      plate({ pressure: text === "" ? null : parse(text, "pressure") * 1e3 });
+    }), { placeholder: "moves as seen" }),
+    h("div", { class: "field" }, h("label", { htmlFor: `ends-${k}`, title: "bar: the ends are points of the bar itself; corners: where bars meet, and the bar slides along; judged: by how their distance changes" }, "its ends are"), h("select", { id: `ends-${k}`, onchange: (event) => plate({ ends: event.target.value }) },
+      [["auto", "judged"], ["bar", "of the bar"], ["corner", "corners"]].map(([value, words]) => h("option", { value, selected: value === wall.ends }, words)))));
+}
+
+function tool(app) {
+  const near = (p) => {
+    for (const wall of app.project.walls) for (const end of [0, 1])
+      if (Math.hypot(wall.line[end][0] - p[0], wall.line[end][1] - p[1]) * app.stage.view.k < 11) return { name: wall.name, end };
+    return null;
+  };
+  return {
+    cross: true, loupe: true,
+    down: (p) => {
+      const found = near(p);
+      held = found ?? { name: null, end: 1 };
+      line = found ? app.project.walls.find((wall) => wall.name === found.name).line.map((end) => [...end]) : [p, p];
+      if (found) chosen = found.name;
+      return true;
+    },
+    drag: (p) => { line = line.map((end, k) => (k === held.end ? p : end)); },
+    up: (p, event, from, moved) => {
+      const drawn = line, name = held.name;
+      if (!moved || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 20) {
+        held = null; line = null;
+        chosen = name ?? nearest(app, p) ?? null;
+        app.paint();
+        return;
+      }
+      app.change("draw_wall", { line: drawn, name, snap: snap && !event.shiftKey }, "", (told) => {
+        chosen = told.wall; held = null; line = null; app.paint();
+        if (told.snapped !== null && told.snapped < 0.34) tell("No clear edge beside that line: it stays as it was drawn", true);
+      }).then(() => { held = null; line = null; app.stage.redraw(); });
+    },
+  };
+}
+
+function nearest(app, p) {
+  const away = ({ line: [a, b] }) => { const l = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1; return Math.abs((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / l; };
+  const [best] = app.project.walls.map((wall) => [away(wall), wall.name]).sort((a, b) => a[0] - b[0]);
+  return best && best[0] * app.stage.view.k < 14 ? best[1] : null;
+}
+
+function drawWall(app, c, k, wall, style) {
+  const [a, b] = wall.line, l = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+  const n = [(b[1] - a[1]) / l, -(b[0] - a[0]) / l]; // towards the packing: y points down
+  const here = wall.name === chosen;
+  for (const [width, paint] of [[here ? 7 : 5, "#000c"], [here ? 3.5 : 2.2, style]]) {
+    c.strokeStyle = paint; c.lineWidth = width / k; c.beginPath(); c.moveTo(...a); c.lineTo(...b); c.stroke();
+  }
+  const loaded = wall.pressure !== null && wall.pressure !== undefined, count = loaded ? 7 : 3, size = (loaded ? 26 : 9) / k;
+  for (let m = 0; m < count; m += 1) {
+    const t = (m + 0.5) / count, x = a[0] + (b[0] - a[0]) * t, y = a[1] + (b[1] - a[1]) * t;
+    const from = loaded ? [x - n[0] * size, y - n[1] * size] : [x, y], to = loaded ? [x, y] : [x + n[0] * size, y + n[1] * size];
+    c.strokeStyle = style; c.lineWidth = 2 / k; c.beginPath(); c.moveTo(...from); c.lineTo(...to);
+    const u = [n[0] * 6 / k, n[1] * 6 / k];
+    c.moveTo(to[0] - u[0] + u[1] * 0.7, to[1] - u[1] - u[0] * 0.7); c.lineTo(...to); c.lineTo(to[0] - u[0] - u[1] * 0.7, to[1] - u[1] + u[0] * 0.7); c.stroke();
+  }
+  c.fillStyle = style;
+  for (const end of [a, b]) { c.beginPath(); c.arc(end[0], end[1], (here ? 5.5 : 4) / k, 0, 2 * Math.PI); c.fill(); }
+  const low = app.stage.toPhotograph(0, app.stage.boxHeight - 14)[1], high = app.stage.toPhotograph(0, 14)[1];
+  if (wall.name) label(c, k, (a[0] + b[0]) / 2 - n[0] * 44 / k, Math.min(Math.max((a[1] + b[1]) / 2 - n[1] * 44 / k, high), low), loaded ? `${wall.name} · ${digits(wall.pressure / 1e3, 4)} kPa` : wall.name, style);
+}

@@ -1,0 +1,217 @@
+"""One experiment that is open in the workbench: its draft, what is understood of it, its photographs as pictures."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ...errors import InputError
+from ...experiment.photographs import Image, read_photograph
+from ...experiment.units import Scale
+from ..inspecting.found import Found, find_run, run_stamp
+from ..mending.mender import Mender
+from ..running.job import Job
+from ..setup.draft import Draft
+from ..setup.folder import run_facts, run_folder
+from ..setup.steps import Understood, judge
+
+KEPT = 4  # photographs in memory
+QUALITY = 90  # of JPEG
+CROP = 240  # [px] of a crop as it is sent
+
+
+class Project:
+    """An experiment's folder under the folder that the workbench was opened on."""
+
+    def __init__(self, root: Path, folder: Path) -> None:
+        self.root, self.folder = root, folder
+        self.draft = Draft(folder)
+        self.lock = threading.RLock()
+        self._photographs: OrderedDict[tuple[Path, int, str], Image] = OrderedDict()
+        self._stamp: Any = None
+        self._understood: Understood | None = None
+        self._job: Job | None = None
+        self._found: tuple[Any, Found | None] = (None, None)
+        self._mender: tuple[Any, Mender] | None = None
+
+    @property
+    def key(self) -> str:
+        """How the page calls it: the path from the root."""
+        return self.folder.relative_to(self.root).as_posix()
+
+    def understood(self) -> Understood:
+        """What the files say now; read again only where one has changed."""
+        with self.lock:
+            data = self.draft.data()
+            stamp = self.draft.stamps(_tables(data)), self._pattern_stamp(data)
+            if self._understood is None or stamp != self._stamp:
+                self._stamp, self._understood = stamp, judge(self.draft)
+            return self._understood
+
+    def photograph(self, frame: int) -> Image:
+        """One photograph, grey; those looked at last are kept."""
+        found = self.understood()
+        if not 0 <= frame < len(found.files):
+            raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
+        file, section = found.files[frame], found.data.get("photographs", {})
+        key = (file, file.stat().st_mtime_ns, section.get("channel", "grey"))
+        with self.lock:
+            if key in self._photographs:
+                self._photographs.move_to_end(key)
+                return self._photographs[key]
+        image = read_photograph(file, channel=key[2])
+        with self.lock:
+            self._photographs[key] = image
+            while len(self._photographs) > KEPT:
+                self._photographs.popitem(last=False)
+        return image
+
+    def picture(self, frame: int, widest: int) -> bytes:
+        """One photograph as JPEG, no wider or higher than so many pixels."""
+        image = self.photograph(frame)
+        shrink = min(1.0, widest / max(image.shape))
+        if shrink < 1.0:
+            image = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+        grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+        return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+
+    @property
+    def name(self) -> str:
+        told = self.draft.data().get("name")
+        return told if isinstance(told, str) else self.folder.name
+
+    @property
+    def results(self) -> Path:
+        """The folder of its run."""
+        return run_folder(self.root, self.name)
+
+    def crop(self, frame: int, x: float, y: float, width: int) -> bytes:
+        """A square of a photograph about a place [px], shifted by parts of a pixel, as JPEG of CROP pixels."""
+        if not 4 <= width <= 4000:
+            raise InputError("crop", f"width = {width}", "is not a width that can be shown")
+        image = self.photograph(frame)
+        grown = CROP / width
+        shift = np.array([[grown, 0.0, 0.5 * CROP - grown * x], [0.0, grown, 0.5 * CROP - grown * y]])
+        square = cv2.warpAffine(image, shift, (CROP, CROP), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        grey = np.clip(np.rint(square), 0, 255).astype(np.uint8)
+        return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+
+    def photograph_count(self) -> int:
+        """How many photographs there are now."""
+        return len(self.understood().files)
+
+    @property
+    def job(self) -> Job:
+        """Its runs, one at a time."""
+        with self.lock:
+            if self._job is None or (self._job.results != self.results and self._job.process is None):
+                self._job = Job(self.root, self.folder, self.results)
+            return self._job
+
+    def found(self) -> Found | None:
+        """What its run has found so far; read again only where something has come."""
+        with self.lock:
+            stamp = self.results, run_stamp(self.results)
+            if self._found[0] != stamp:
+                self._found = stamp, find_run(self.results)
+            return self._found[1]
+
+    def mender(self, make: Callable[[], Mender]) -> Mender:
+        """What correlates its rods again; made anew where the run's rods have changed."""
+        with self.lock:
+            stamp = self.results, run_stamp(self.results)[1]
+            if self._mender is None or self._mender[0] != stamp:
+                self._mender = stamp, make()
+            return self._mender[1]
+
+    def given_scale(self) -> Scale:
+        """What a pixel is told to be. Raises InputError where it is not."""
+        scale = self.understood().scale
+        if scale is None:
+            raise InputError(self.draft.file, "key photographs.pixel_size", "is missing: set the scale first")
+        return scale
+
+    def close(self) -> None:
+        """Pause what runs."""
+        if self._job is not None:
+            self._job.close()
+
+    def glance(self) -> dict[str, Any]:
+        """What the first page shows of it."""
+        told: dict[str, Any] = {"at": self.key, "name": self.folder.name, "run": None, "steps": [], "frames": 0}
+        try:
+            found = self.understood()
+        except InputError as error:
+            return told | {"complaint": str(error)}
+        return told | {
+            "name": self.name, "run": run_facts(self.results), "frames": len(found.files),
+            "steps": [each.mark.value for each in found.steps.values()],
+        }  # fmt: skip
+
+    def describe(self) -> dict[str, Any]:
+        """All that the page shows of the set-up; places in pixels, everything else in SI units."""
+        found = self.understood()
+        section = found.data.get("photographs", {})
+        height, width = found.shape or (0, 0)
+        return {
+            "at": self.key, "name": self.name, "folder": str(self.folder), "ready": found.ready,
+            "steps": [{"name": s.name, "mark": s.mark.value, "says": s.says} for s in found.steps.values()],
+            "others": found.others, "tracked": found.tracked, "width": width, "height": height,
+            "files": [file.name for file in found.files], "photographs": section,
+            "pixel": None if found.scale is None else found.scale.mean_size,
+            "walls": _walls(found), "rods": _rods(found), "material": found.data.get("material", {}),
+            "undo": self.draft.done[-1].what if self.draft.done else None,
+            "redo": self.draft.undone[-1].what if self.draft.undone else None,
+            "run": run_facts(self.results),
+        }  # fmt: skip
+
+    def _pattern_stamp(self, data: dict[str, Any]) -> Any:
+        section = data.get("photographs", {})
+        pattern = section.get("files") if isinstance(section, dict) else None
+        if not isinstance(pattern, str):
+            return None
+        folder = (self.folder / pattern).parent
+        try:
+            return folder.stat().st_mtime_ns
+        except OSError:
+            return None
+
+
+def _tables(data: dict[str, Any]) -> list[str]:
+    """Names of the tables that an experiment file names, as far as it makes sense."""
+    names = []
+    for told in data.values():
+        if isinstance(told, dict):
+            names += [value for value in told.values() if isinstance(value, str) and value.endswith(".csv")]
+    return names
+
+
+def _walls(found: Understood) -> list[dict[str, Any]]:
+    if found.walls is None or found.scale is None:
+        return []
+    ends = found.scale.to_pixels(found.walls.endpoints[0])
+    plates = found.data.get("walls", {})
+    told = []
+    for name, line, pressure in zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True):
+        plate = plates.get(name)
+        told.append({
+            "name": name, "line": line, "pressure": None if pressure != pressure else pressure,
+            "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
+        })  # fmt: skip
+    return told
+
+
+def _rods(found: Understood) -> dict[str, Any] | None:
+    rods = found.rods
+    if rods is None:
+        return None
+    return {
+        "id": rods.id.tolist(), "x": np.round(rods.x, 2).tolist(), "y": np.round(rods.y, 2).tolist(),
+        "r": np.round(rods.radius, 3).tolist(),
+    }  # fmt: skip

@@ -1,0 +1,86 @@
+"""The questions that the page may ask: a name, checked values, an answer of plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, validate_call
+
+from ...errors import InputError
+from .bench import Bench
+
+Question = Callable[..., Any]
+Text = Annotated[str, StringConstraints(max_length=300)]
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e12, le=1e12)]
+Whole = Annotated[int, Field(ge=0, lt=2**53)]
+Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Line = Annotated[list[Point], Field(min_length=2, max_length=2)]
+Numbers = Annotated[list[Number], Field(max_length=1000)]
+
+QUESTIONS: dict[str, Question] = {}
+_RULES = ConfigDict(arbitrary_types_allowed=True, strict=True)
+
+
+class BadRequest(ValueError):
+    """The page asked for something that does not exist."""
+
+
+class Shape(BaseModel):
+    """Values of a question that belong together. Unknown ones are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+def question(function: Question) -> Question:
+    """Let the page ask this by the function's name."""
+    QUESTIONS[function.__name__] = validate_call(config=_RULES)(function)
+    return function
+
+
+def answer(bench: Bench, name: str, values: dict[str, Any]) -> Any:
+    """Answer one question. Raises BadRequest, and InputError as the commands do."""
+    if name not in QUESTIONS or "bench" in values:
+        raise BadRequest(f"there is no question {name}")
+    try:
+        return QUESTIONS[name](bench, **values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise BadRequest(f"{name}: {where}: {first['msg']}") from None
+
+
+@question
+def home(bench: Bench) -> dict[str, Any]:
+    return bench.home()
+
+
+@question
+def sample(bench: Bench) -> dict[str, Any]:
+    return bench.sample().describe()
+
+
+@question
+def begin(bench: Bench, roll: Whole, name: Text) -> dict[str, Any]:
+    return bench.begin(roll, name).describe()
+
+
+@question
+def project(bench: Bench, at: Text) -> dict[str, Any]:
+    return bench.project(at).describe()
+
+
+@question
+def undo(bench: Bench, at: Text) -> dict[str, Any]:
+    opened = bench.project(at)
+    if opened.draft.undo() is None:
+        raise InputError("undo", "", "nothing is left to be undone")
+    return opened.describe()
+
+
+@question
+def redo(bench: Bench, at: Text) -> dict[str, Any]:
+    opened = bench.project(at)
+    if opened.draft.redo() is None:
+        raise InputError("redo", "", "nothing was undone")
+    return opened.describe()

@@ -1,0 +1,239 @@
+"""What may be done to an experiment that is being set up. Every edit is one step of undo; lengths in pixels of the
+photograph come from the page, files hold metres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import STRAIGHT
+
+from ...errors import InputError
+from ...experiment.experiment import GrainGuess
+from ...experiment.photographs import Image
+from ...experiment.units import Scale
+from ...experiment.walls import WALL_COLUMNS
+from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
+from ...tracking.walls.inner_edge import find_bars, meeting_lines, snap_to_edge
+from .draft import Draft, as_table
+from .steps import Understood, judge
+
+GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
+GRAIN_COLUMNS = ("id", "x", "y", "radius")
+SEEN = 0.34  # share of a line's profiles that must show the edge for it to be snapped
+NAMES = ("bottom", "right", "top", "left")
+# Densities of what rods are made of [kg/m³], and friction of dry, clean rods as textbooks have it: to begin with.
+MATERIALS: dict[str, dict[str, float]] = {
+    "aluminium": {"density": 2700.0, "friction": 0.25},
+    "brass": {"density": 8500.0, "friction": 0.25},
+    "steel": {"density": 7850.0, "friction": 0.25},
+    "PVC": {"density": 1400.0, "friction": 0.35},
+    "PMMA": {"density": 1190.0, "friction": 0.4},
+    "wood": {"density": 700.0, "friction": 0.45},
+    "soft photoelastic": {"density": 1060.0, "friction": 0.6},
+}
+
+
+def begin(draft: Draft, name: str, files: str) -> None:
+    """Write the experiment file of photographs that nothing else is known of."""
+    draft.set_keys("new experiment", {"name": name, "photographs.files": files})
+
+
+def set_scale(draft: Draft, keys: dict[str, Any]) -> None:
+    """Set pixel_size, or distance; walls stay where they are in the picture."""
+    before = judge(draft)
+    walls, scale = before.walls, before.scale
+    with draft.one_step("scale"):
+        draft.set_keys("scale", {"photographs.pixel_size": None, "photographs.distance": None, **keys})
+        if walls is None or scale is None:
+            return
+        after = judge(draft).scale
+        if after is not None:
+            bars = walls.sides == STRAIGHT
+            names = [name for name, bar in zip(walls.name, bars, strict=True) if bar]
+            ends = scale.to_pixels(walls.endpoints[0])[bars]
+            draft.write("walls", {walls_file(before): _walls_table(names, ends, after)})
+
+
+def walls_file(found: Understood) -> str:
+    """Name of the walls' table."""
+    walls = found.data.get("walls", {})
+    return walls.get("file", WALLS) if isinstance(walls, dict) else WALLS
+
+
+def snap_wall(image: Image, line: Array, found: Understood) -> tuple[Array, float]:
+    """A drawn line (2, 2) [px] on the edge beside it, the packing on its left; and how much of the edge is seen."""
+    line = towards_packing(line, found)
+    length = float(np.linalg.norm(line[1] - line[0]))
+    snapped, share = snap_to_edge(image, line, min(max(0.03 * length, 8.0), 40.0))
+    return (snapped, share) if share >= SEEN else (line, share)
+
+
+def towards_packing(line: Array, found: Understood) -> Array:
+    """The line the way round that has the packing to its left in the world."""
+    assert found.shape is not None
+    if found.rods is not None:
+        middle = np.array([found.rods.x.mean(), found.rods.y.mean()])
+    else:
+        middle = 0.5 * np.array([found.shape[1], found.shape[0]], dtype=np.float64)
+    along, to = line[1] - line[0], middle - line[0]
+    return line if along[0] * to[1] - along[1] * to[0] < 0.0 else line[::-1].copy()  # y down
+
+
+def find_walls(image: Image, found: Understood) -> Array:
+    """The bars (w, 2, 2) [px] around the rods that are there. Raises InputError where there are too few."""
+    rods = found.rods
+    if rods is None or len(rods.id) < 8:
+        raise InputError(GRAINS, "", "holds too few rods to find bars by: look for rods first, or draw the bars")
+    lines = find_bars(rods.x, rods.y, rods.radius)
+    snapped = [snap_to_edge(image, line, 0.6 * float(np.median(rods.radius))) for line in lines]
+    lines = np.array([moved if share >= SEEN else line for line, (moved, share) in zip(lines, snapped, strict=True)])
+    return meeting_lines(lines)
+
+
+def names_of(lines: Array) -> tuple[str, ...]:
+    """What the bars of a frame are called, in the order in which they are found."""
+    return NAMES if len(lines) == len(NAMES) else tuple(f"wall{k + 1}" for k in range(len(lines)))
+
+
+def set_walls(draft: Draft, found: Understood, walls: Sequence[tuple[str, Array]], what: str) -> None:
+    """Write the walls of frame 0, named, by their ends (2, 2) [px]; what was told of those that go, goes."""
+    if found.scale is None:
+        raise InputError(draft.file, "key photographs.pixel_size", "is missing: set the scale before the walls")
+    told = found.data.get("walls", {})
+    kept = {key: value for key, value in told.items() if not isinstance(value, dict)}
+    names = [name for name, _ in walls]
+    plates = {key: value for key, value in told.items() if isinstance(value, dict) and key in names}
+    if not walls:
+        draft.set_keys(what, {"walls": None}, {walls_file(found): None})
+        return
+    table = _walls_table(names, np.array([line for _, line in walls]), found.scale)
+    draft.set_keys(what, {"walls": {**kept, "file": walls_file(found), **plates}}, {walls_file(found): table})
+
+
+def set_plate(draft: Draft, found: Understood, wall: str, told: dict[str, Any]) -> None:
+    """Set what is known of one wall: its pressure [Pa], what its ends are; None: not told."""
+    plate = {**found.data.get("walls", {}).get(wall, {}), **told}
+    plate = {key: value for key, value in plate.items() if value is not None}
+    draft.set_keys(f"wall {wall}", {f"walls.{wall}": plate or None})
+
+
+def rename_wall(draft: Draft, found: Understood, wall: str, name: str) -> None:
+    """Call a wall something else."""
+    walls, scale = found.walls, found.scale
+    if walls is None or scale is None or wall not in walls.name:
+        raise InputError(draft.file, f"wall {wall!r}", "is not there")
+    if name in walls.name or not name.isidentifier():
+        raise InputError(draft.file, f"wall {name!r}", "must be a word of letters and digits that no other wall has")
+    bars = walls.sides == STRAIGHT
+    if not bars[walls.name.index(wall)]:
+        raise InputError(draft.file, f"wall {wall!r}", "is a circle: its name stands in the table of arcs")
+    names = [name if each == wall else each for each, bar in zip(walls.name, bars, strict=True) if bar]
+    section = {name if key == wall else key: value for key, value in found.data["walls"].items()}
+    table = _walls_table(names, scale.to_pixels(walls.endpoints[0])[bars], scale)
+    draft.set_keys(f"wall {name}", {"walls": section}, {walls_file(found): table})
+
+
+def detect(image: Image, found: Understood, radii: Sequence[float]) -> Detection:
+    """The rods of the first photograph; radii [m]: the known classes, none where they are not known."""
+    pixel = None if found.scale is None else found.scale.mean_size
+    if radii and pixel is None:
+        raise InputError("the scale", "", "is not set: radii in metres say nothing of the picture yet")
+    classes = tuple(radius / pixel for radius in radii) if pixel is not None else ()
+    try:
+        settings = DetectionSettings(classes)
+    except ValueError as error:
+        raise InputError("photographs.radii", str(list(radii)), str(error)) from None
+    detection = detect_grains(image, settings)
+    return _within_walls(detection, found)
+
+
+def set_rods(draft: Draft, what: str, rods: GrainGuess, radii: Sequence[float] | None = None) -> None:
+    """Write the table of rods [px]; radii [m]: the classes, None: as they are told."""
+    rows = zip(
+        rods.id.tolist(), np.round(rods.x, 4).tolist(), np.round(rods.y, 4).tolist(),
+        np.round(rods.radius, 4).tolist(), strict=True,
+    )  # fmt: skip
+    keys: dict[str, Any] = {"photographs.grains": GRAINS if len(rods.id) else None}
+    if radii is not None:
+        keys["photographs.radii"] = list(radii) or None
+    draft.set_keys(what, keys, {GRAINS: as_table(GRAIN_COLUMNS, rows) if len(rods.id) else None})
+
+
+def as_guess(detection: Detection) -> GrainGuess:
+    """Detected rods as the table of rods, numbered from top to bottom."""
+    return GrainGuess(np.arange(detection.count), detection.x, detection.y, detection.radius)
+
+
+def fit_rod(image: Image, found: Understood, x: float, y: float, radius: float) -> tuple[float, float, float]:
+    """Centre and radius [px] of a rod clicked at x, y: on its rim where that is seen, else as it was clicked."""
+    section = found.data.get("photographs", {})
+    classes: list[float] = section.get("radii") or []
+    if classes and found.scale is not None:
+        sizes = np.array(classes) / found.scale.mean_size
+        tried = [refine_grains(image, np.array([x]), np.array([y]), np.array([size])) for size in sizes]
+        best = max(tried, key=lambda each: float(each.quality[0]))
+        if best.quality[0] > 0.0 and np.isfinite(best.sigma[0]):
+            return float(best.x[0]), float(best.y[0]), float(best.radius[0])
+        return x, y, float(sizes[np.abs(sizes - radius).argmin()])
+    free = refine_grains(image, np.array([x]), np.array([y]), np.array([radius]), fixed_radius=False)
+    if free.quality[0] > 0.2 and np.isfinite(free.sigma[0]) and abs(free.radius[0] / radius - 1.0) < 0.3:
+        return float(free.x[0]), float(free.y[0]), float(free.radius[0])
+    return x, y, radius
+
+
+def with_rod(rods: GrainGuess | None, name: int | None, pose: tuple[float, float, float] | None) -> GrainGuess:
+    """The rods with one added (name None), moved, or taken away (pose None)."""
+    table: dict[int, tuple[float, float, float]] = {}
+    if rods is not None:
+        table = dict(zip(rods.id.tolist(), zip(rods.x, rods.y, rods.radius, strict=True), strict=True))
+    if name is None:
+        name = max(table, default=-1) + 1
+    if pose is None:
+        table.pop(name, None)
+    else:
+        table[name] = pose
+    columns = np.array(list(table.values()), dtype=np.float64).reshape(-1, 3).T
+    return GrainGuess(np.array(list(table), dtype=np.int64), *columns)
+
+
+def snapped_to(radii: Sequence[float], rods: GrainGuess, scale: Scale) -> GrainGuess:
+    """The rods with the radius of the nearest class [m]."""
+    sizes = np.array(sorted(radii)) / scale.mean_size
+    nearest = np.abs(rods.radius[:, None] - sizes).argmin(axis=1)
+    return GrainGuess(rods.id, rods.x, rods.y, sizes[nearest])
+
+
+def find_classes(radius: Array, most: int = 8) -> Array:
+    """Radii (k,) at which found ones crowd, in the same unit: gaps in their order part the classes."""
+    ordered = np.sort(radius)
+    if len(ordered) == 0:
+        return ordered
+    gap = np.diff(ordered)
+    parts = np.split(ordered, np.flatnonzero(gap > np.maximum(0.035 * ordered[1:], 3.0 * np.median(gap))) + 1)
+    large = sorted((each for each in parts if len(each) >= max(2, 0.01 * len(ordered))), key=len)[-most:]
+    return np.sort(np.array([np.median(each) for each in large or [ordered]]))
+
+
+def _within_walls(detection: Detection, found: Understood) -> Detection:
+    """Without the circles beyond the walls: screws and wheels of the apparatus are round, too."""
+    if found.walls is None or found.scale is None:
+        return detection
+    start, end = found.scale.to_pixels(found.walls.endpoints[0]).transpose(1, 0, 2)
+    along = end - start
+    place = np.stack([detection.x, detection.y], axis=1)[:, None] - start
+    inside: NDArray[np.bool_] = (along[:, 0] * place[..., 1] - along[:, 1] * place[..., 0] < 0.0).all(axis=1)
+    if inside.mean() < 0.2:
+        return detection
+    columns = (detection.x, detection.y, detection.radius, detection.sigma, detection.quality)
+    return Detection(*(each[inside] for each in columns))
+
+
+def _walls_table(names: Sequence[str], ends: Array, scale: Scale) -> bytes:
+    """The table of walls of frame 0, by their ends (w, 2, 2) [px]."""
+    metres = np.round(scale.to_world(ends), 9).reshape(-1, 4).tolist()
+    return as_table(WALL_COLUMNS, ([0, name, *each] for name, each in zip(names, metres, strict=True)))

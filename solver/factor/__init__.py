@@ -1,0 +1,1 @@
+"""Sparse matrices of small blocks, a block row for each of many neighbours, factorised. Knows no grain."""

@@ -1,0 +1,110 @@
+"""Where the Cholesky factor of a matrix of blocks has entries: all that follows from who is coupled with whom.
+
+Neighbours in a plane eliminate one another with little fill if those with few neighbours go first (minimum degree:
+SciPy's SuperLU orders so). The pattern serves every matrix with these couplings, whatever its numbers.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.linalg import splu
+
+Ids = NDArray[np.int64]
+
+
+class Pattern(NamedTuple):
+    """Entries of the factor column by column, rows and columns in the order of elimination."""
+
+    place: Ids  # (n,) of each node in the order of elimination
+    start: Ids  # (n + 1,) first entry of every column: its diagonal
+    row: Ids  # (k,) of every entry, ascending in a column
+    column: Ids  # (k,)
+    left_start: Ids  # (n + 1,) where the entries of every row begin in `left`
+    left: Ids  # (k − n,) entries left of the diagonal, row by row
+
+    @property
+    def node_count(self) -> int:
+        return len(self.place)
+
+    @property
+    def entry_count(self) -> int:
+        return len(self.row)
+
+    def locate(self, a: Ids, b: Ids) -> Ids:
+        """Entries of coupled nodes a and b (m,), in either order. Errors: ValueError if a pair is not coupled."""
+        first, second = self.place[a], self.place[b]
+        low, high = np.minimum(first, second), np.maximum(first, second)
+        key = self.column * self.node_count + self.row
+        wanted = low * self.node_count + high
+        found = np.minimum(np.searchsorted(key, wanted), len(key) - 1) if len(key) else np.zeros(0, np.int64)
+        if len(found) != len(wanted) or np.any(key[found] != wanted):
+            raise ValueError("a pair of nodes is not coupled in this pattern")
+        return found
+
+
+def find_pattern(node_count: int, a: Ids, b: Ids) -> Pattern:
+    """Order the nodes and find the factor's entries; a, b (m,): nodes that are coupled, in any order and number."""
+    graph = coo_array((np.ones(2 * len(a)), (np.append(a, b), np.append(b, a))), shape=(node_count, node_count)).tocsc()
+    place = _order_by_degree(graph)
+    first, second = place[a], place[b]
+    low, high = np.minimum(first, second), np.maximum(first, second)
+    apart = low < high
+    lower = coo_array((np.ones(apart.sum()), (high[apart], low[apart])), shape=(node_count, node_count)).tocsr()
+    lower.sum_duplicates()
+    neighbour_start, neighbour = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
+    size, left_size = np.empty(node_count, np.int64), np.empty(node_count, np.int64)
+    parent, seen = np.empty(node_count, np.int64), np.empty(node_count, np.int64)
+    _count(neighbour_start, neighbour, parent, seen, size, left_size)
+    start, left_start = np.append(0, np.cumsum(size)), np.append(0, np.cumsum(left_size))
+    row, left = np.empty(start[-1], np.int64), np.empty(left_start[-1], np.int64)
+    _fill(neighbour_start, neighbour, parent, seen, start[:-1].copy(), left_start, row, left)
+    return Pattern(place, start, row, np.repeat(np.arange(node_count), size), left_start, left)
+
+
+def _order_by_degree(graph) -> Ids:  # type: ignore[no-untyped-def]
+    if graph.shape[0] == 0:
+        return np.zeros(0, np.int64)
+    degree = np.asarray(abs(graph).sum(axis=0)).ravel()
+    definite = (diags_array(2.0 * degree + 1.0) - graph).tocsc()
+    factor = splu(definite, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return factor.perm_c.astype(np.int64)
+
+
+@njit(cache=True)
+def _count(neighbour_start, neighbour, parent, seen, size, left_size):  # type: ignore[no-untyped-def]
+    """Liu's elimination tree, and the number of entries of every column and left of every diagonal."""
+    for i in range(len(parent)):
+        parent[i], seen[i], size[i], left_size[i] = -1, i, 1, 0
+        for p in range(neighbour_start[i], neighbour_start[i + 1]):
+            k = neighbour[p]
+            while seen[k] != i:  # the row's entries are a path of the tree from each neighbour up to the row
+                if parent[k] == -1:
+                    parent[k] = i
+                seen[k] = i
+                size[k] += 1
+                left_size[i] += 1
+                k = parent[k]
+
+
+@njit(cache=True)
+def _fill(neighbour_start, neighbour, parent, seen, free, left_start, row, left):  # type: ignore[no-untyped-def]
+    """free (n,): the next free entry of every column; rows come in ascending order, and so do a column's entries."""
+    for i in range(len(parent)):
+        seen[i] = i
+        row[free[i]] = i
+        free[i] += 1
+        q = left_start[i]
+        for p in range(neighbour_start[i], neighbour_start[i + 1]):
+            k = neighbour[p]
+            while seen[k] != i:
+                seen[k] = i
+                row[free[k]] = i
+                left[q] = free[k]
+                free[k] += 1
+                q += 1
+                k = parent[k]

@@ -1,0 +1,157 @@
+"""What is around a place of a packing that no grain fills, in every photograph."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import IN, STRAIGHT, Sides, all_sides, circle_of, reach_of_wall
+
+NEIGHBOURS = 8  # whose motion carries a place on
+NEAR_ROOM = 12  # nearest centres among which those that a rod may touch are sought
+SAME_PLACE = 0.02  # radii: places nearer than that are one
+FLAT = 1e4  # radius of the circle that stands for a wall, over that of the greatest rod
+AROUND = 0.35  # of its radius: bodies as near as that may hold a rod
+ROUNDS = 30  # of re-weighting
+DRIFT = 0.1  # radii that a rod may stray between photographs from where its neighbours carry it
+
+
+class Surroundings:
+    """The grains and walls of a sequence, with a search tree for every photograph. Walls count as flat circles."""
+
+    def __init__(
+        self,
+        radius: Array,
+        position: Array,
+        present: NDArray[np.bool_],
+        endpoints: Array,
+        noise: float,
+        side: Sides = None,
+    ) -> None:
+        """radius (n,), position (f, n, 2), endpoints (f, w, 2, 2) and noise in metres; present (f, n); side (w,)."""
+        self.radius, self.position, self.present, self.noise = radius, position, present, noise
+        self._widest = float(radius.max())
+        self._rows = [np.flatnonzero(here) for here in present]
+        self._tree = [KDTree(position[k][rows]) for k, rows in enumerate(self._rows)]
+        self._walls, self._side = endpoints, all_sides(side, endpoints.shape[1])
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.position)
+
+    def carry(self, place: Array, k: int, to: int) -> Array:
+        """Where the motion of what is around takes a place (2,) of photograph k by photograph `to`."""
+        _, near = self._tree[k].query(place, k=min(NEIGHBOURS, len(self._rows[k])))
+        rows = self._rows[k][np.atleast_1d(near)]
+        rows = rows[self.present[to, rows]]
+        if not len(rows):
+            return place
+        return place + np.mean(self.position[to, rows] - self.position[k, rows], axis=0)
+
+    def gaps(self, place: Array, k: int, size: float) -> Array:
+        """Gaps (b,) [m] of a rod of this size at a place to the grains and walls around it."""
+        centre, rim = self._bodies(place, k, 2.0 * size)
+        return np.linalg.norm(centre - place, axis=1) - rim - size
+
+    def find_places(self, k: int, size: float, tolerance: float, near: Array | None) -> Array:
+        """Places (p, 2) in photograph k where a rod of this size touches three bodies or more and overlaps none.
+
+        Those with most touches first, and none twice; near (q, 2): only around these places, None: everywhere.
+        """
+        crossing = self._crossings(k, size, near)
+        if not len(crossing):
+            return crossing
+        rows = self._rows[k]
+        _, nearest = self._tree[k].query(crossing, k=min(NEAR_ROOM, len(rows)))
+        apart = np.linalg.norm(crossing[:, None] - self.position[k][rows[nearest]], axis=2)
+        gap = np.column_stack([
+            apart - self.radius[rows[nearest]] - size,
+            self._reach(k, crossing)[0] - size,
+        ])  # fmt: skip
+        touches = np.count_nonzero(np.abs(gap) < tolerance, axis=1)
+        fits = (gap.min(axis=1) > -tolerance) & (touches > 2)
+        crossing, touches = crossing[fits], touches[fits]
+        places: list[Array] = []
+        for q in np.argsort(-touches, kind="stable"):
+            if all(np.hypot(*(crossing[q] - each)) > SAME_PLACE * size for each in places):
+                places.append(crossing[q])
+        return np.array(places).reshape(-1, 2)
+
+    def _crossings(self, k: int, size: float, near: Array | None) -> Array:
+        """Places (p, 2) where a rod of this size touches two grains, or a grain and a wall."""
+        rows, tree = self._rows[k], self._tree[k]
+        centre, rim = self.position[k][rows], self.radius[rows]
+        if near is None:
+            pairs = tree.query_pairs(2.0 * (self._widest + size), output_type="ndarray")
+            beside = np.arange(len(rows))
+        else:
+            reach = self._widest + 2.0 * size
+            beside = np.unique(np.concatenate([np.empty(0, int), *tree.query_ball_point(near, reach)])).astype(int)
+            local = KDTree(centre[beside]).query_pairs(2.0 * (self._widest + size), output_type="ndarray")
+            pairs = beside[local]
+        one, two = pairs[:, 0], pairs[:, 1]
+        found = [_cross(centre[one], rim[one] + size, centre[two], rim[two] + size)]
+        depth, outward = self._reach(k, centre[beside])
+        for w, side in enumerate(self._side):
+            close = depth[:, w] < rim[beside] + 2.0 * size
+            at = beside[close]
+            if side == STRAIGHT:
+                wall, wide = self._flat(depth[close, w], outward[close, w], centre[at]), FLAT * self._widest + size
+            else:  # where a rod that touches the circle has its centre
+                middle, wide, _ = circle_of(self._walls[k, w])
+                wall, wide = np.broadcast_to(middle, (len(at), 2)), float(wide) + (-size if side == IN else size)
+            found.append(_cross(centre[at], rim[at] + size, wall, np.full(len(at), wide)))
+        return np.concatenate(found)
+
+    def hold(self, start: Array, k: int, size: float) -> tuple[Array, float]:
+        """Where the bodies around hold a rod of this size near `start` (2,); and a component's deviation [m]."""
+        drift, place, scale = DRIFT * size, start, AROUND * size
+        finest = 2.0 * self.noise + 1e-4 * size
+        information = np.eye(2) / drift**2
+        for _ in range(ROUNDS):
+            centre, rim = self._bodies(place, k, 2.0 * size)
+            apart = centre - place
+            distance = np.linalg.norm(apart, axis=1)
+            gap = distance - rim - size
+            near = gap < AROUND * size
+            gap, toward = gap[near], (apart / distance[:, None])[near]
+            # Overlaps count in full; a gap the less, the wider it is: that body may not touch.
+            weight = np.where(gap < 0.0, 1.0, 1.0 / (1.0 + (gap / scale) ** 2) ** 2) / self.noise**2
+            information = toward.T @ (weight[:, None] * toward) + np.eye(2) / drift**2
+            step = np.linalg.solve(information, toward.T @ (weight * gap) + (start - place) / drift**2)
+            place = place + step * min(1.0, 0.2 * size / max(float(np.hypot(*step)), 1e-300))
+            scale = max(finest, 0.7 * scale)
+        return place, float(np.sqrt(0.5 * np.trace(np.linalg.inv(information))))
+
+    def _bodies(self, place: Array, k: int, reach: float) -> tuple[Array, Array]:
+        """Centres (b, 2) and radii (b,) [m] of the grains whose rims are within reach of a place, and of all walls."""
+        rows = self._rows[k][self._tree[k].query_ball_point(place, reach + self._widest)]
+        depth, outward = self._reach(k, place[None])
+        flat = self._flat(depth[0], outward[0], np.broadcast_to(place, outward[0].shape))
+        return (
+            np.concatenate([self.position[k][rows], flat]),
+            np.concatenate([self.radius[rows], np.full(len(flat), FLAT * self._widest)]),
+        )
+
+    def _reach(self, k: int, place: Array) -> tuple[Array, Array]:
+        """Distance (p, w) [m] of places (p, 2) from the walls of photograph k, and outward normals (p, w, 2)."""
+        return reach_of_wall(self._walls[k][None], self._side[None], place[:, None])
+
+    def _flat(self, depth: Array, outward: Array, near: Array) -> Array:
+        """Centres (m, 2) of great circles that are the wall to places `near` (m, 2), so far before it (m,) [m]."""
+        return near + (depth + FLAT * self._widest)[:, None] * outward
+
+
+def _cross(one: Array, first: Array, two: Array, second: Array) -> Array:
+    """Points (p, 2) where circles about one (m, 2) and two (m, 2), of radii first and second (m,), cross."""
+    apart = two - one
+    distance = np.linalg.norm(apart, axis=1)
+    meet = (distance < first + second) & (distance > np.abs(first - second)) & (distance > 0.0)
+    one, apart, distance, first, second = one[meet], apart[meet], distance[meet], first[meet], second[meet]
+    unit = apart / distance[:, None]
+    along = 0.5 * (distance + (first - second) * (first + second) / distance)
+    across = np.sqrt(np.maximum(first**2 - along**2, 0.0))
+    base, side = one + along[:, None] * unit, across[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    return np.concatenate([base + side, base - side])

@@ -1,0 +1,47 @@
+"""What positions alone say of the forces of a sequence, asked frame by frame where it is needed.
+
+Gathering what all frames tell takes as long as a frame or two; it is done when the first frame asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solver.bodies.motion import Snapshot
+from solver.bodies.packing import Packing
+from solver.contacts.verdicts import NO_VERDICTS, Verdicts
+from solver.posterior.frame_posterior import FramePosterior, infer_frame
+from solver.posterior.sequence_evidence import SequenceEvidence, gather_evidence
+from solver.posterior.settings import PosteriorSettings
+
+SEED = 0  # of the draws, with the number of the frame: the same bits, whatever frame is asked first
+
+
+class Positions:
+    """The positions of a sequence as a witness of its forces."""
+
+    def __init__(self, packing: Packing, snapshots: Sequence[Snapshot], settings: PosteriorSettings) -> None:
+        self._packing, self._snapshots, self._settings = packing, snapshots, settings
+        self._gathered: SequenceEvidence | None = None
+        self._known: dict[int, FramePosterior | None] = {}
+
+    def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
+        """What they say of frame k, in which people saw so much; None where no two bodies are near."""
+        if k not in self._known:
+            # The last one alone: a frame is asked again only while it is being solved.
+            self._known = {k: self._ask(k, verdicts)}
+        return self._known[k]
+
+    def _ask(self, k: int, verdicts: Verdicts) -> FramePosterior | None:
+        if self._gathered is None:
+            try:
+                self._gathered = gather_evidence(self._packing, self._snapshots, self._settings)
+            except ValueError:  # no two bodies are near
+                return None
+        evidence = self._gathered.of_frame(k, verdicts=verdicts)
+        if evidence.contacts.count == 0:
+            return None
+        settings = self._gathered.settings.alone() if k == 0 else self._gathered.settings  # no motion leads to frame 0
+        return infer_frame(evidence, settings, np.random.default_rng([SEED, k]))

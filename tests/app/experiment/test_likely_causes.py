@@ -1,0 +1,146 @@
+"""`check` refuses what cannot be, says what it looks like, and warns of what is possible but hardly meant."""
+
+from __future__ import annotations
+
+import csv
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from rodsight.errors import InputError
+from rodsight.experiment.image_header import claimed_size
+from rodsight.experiment.photographs import read_photograph
+
+from tests.app.experiment.tables import edit
+from tests.program import rodsight
+
+
+def change(file: Path, **columns: Callable[[float], float]) -> None:
+    """Change the numbers of some columns of a table."""
+    with file.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    for row in rows:
+        for name, work in columns.items():
+            row[name] = repr(work(float(row[name])))
+    with file.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def reverse(file: Path) -> None:
+    file.write_text(file.read_text().replace("x1,y1,x2,y2", "x2,y2,x1,y1"))
+
+
+def in_millimetres(x: float) -> float:
+    return 1e3 * x
+
+
+CAUSES = {
+    "radii look like diameters": lambda at: change(at / "grains.csv", radius=lambda r: 2.0 * r),
+    "coordinates look like millimetres": lambda at: change(at / "tracks.csv", x=in_millimetres, y=in_millimetres),
+    "they look like millimetres": lambda at: change(at / "grains.csv", radius=in_millimetres),
+    "walls look reversed": lambda at: reverse(at / "walls.csv"),
+    "walls look like millimetres": lambda at: change(at / "walls.csv", **dict.fromkeys(WALL, in_millimetres)),
+    "walls look y-down": lambda at: change(at / "walls.csv", y1=lambda y: 0.3 - y, y2=lambda y: 0.3 - y),
+}
+WALL = ("x1", "y1", "x2", "y2")
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_a_certain_mistake_is_refused_with_its_likely_cause(tracked, capsys, cause):
+    CAUSES[cause](tracked)
+    assert rodsight("check", tracked) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert cause in told
+
+
+def test_a_pressure_of_next_to_nothing_is_doubted(tracked, capsys):
+    edit(tracked / "experiment.toml", "pressure = 50000.0", "pressure = 50")
+    assert rodsight("check", tracked) == 0
+    assert "did you mean 50e3 Pa?" in capsys.readouterr().out
+
+
+def test_an_open_side_is_told_with_the_walls_beside_it(tracked, capsys):
+    edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', "")  # it knows the wall
+    file = tracked / "walls.csv"
+    edit(tracked / "experiment.toml", 'forces = "wall_forces.csv"', "")
+    file.write_text("\n".join(line for line in file.read_text().splitlines() if ",right," not in line) + "\n")
+    assert rodsight("check", tracked) == 0
+    told = capsys.readouterr().out
+    assert "The boundary is open" in told
+    assert "'bottom'" in told
+    assert "'top'" in told
+
+
+@pytest.mark.parametrize(
+    ("setting", "named"),
+    [
+        ("material.friction=25", "material.friction is a number > 0, ≤ 2"),
+        ("material.friction=true", "valid number"),
+        ('material.friction="0.3"', "valid number"),
+        ("material.density=1e308", "≤ 30000"),
+        ("solver.substeps=1000000000000", "≤ 1000"),
+        (f"solver.sweeps={10**40}", "≤ 1e+06"),
+        ("calibration.enabled=1", "valid boolean"),
+        ('walls.file="a\\u0000b"', "NUL"),
+    ],
+)
+def test_a_setting_that_cannot_be_names_its_range(tracked, capsys, setting, named):
+    assert rodsight("check", tracked, "--set", setting) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert setting.partition("=")[0] in told
+    assert named in told
+    assert len(told) < 500
+
+
+@pytest.mark.parametrize("table", ["grains.csv", "tracks.csv"])
+def test_a_whole_number_beyond_all_bits_is_named(tracked, capsys, table):
+    file = tracked / table
+    head, _, rest = file.read_text().partition("\n")
+    cells = rest.split(",")
+    cells[head.split(",").index("id")] = str(10**30)
+    file.write_text(head + "\n" + ",".join(cells))
+    assert rodsight("check", tracked) == 2
+    assert f"id = '{10**30}'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("broken", ["missing.csv", "grains.csv"])
+def test_a_truth_that_cannot_be_read_is_found_by_check(tracked, capsys, broken):
+    edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', f'truth = "{broken}"')
+    assert rodsight("check", tracked) == 2
+    assert broken in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".tiff"])
+def test_a_header_tells_the_size(tmp_path, suffix):
+    file = tmp_path / f"a{suffix}"
+    cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
+    assert claimed_size(file.read_bytes()) == (70, 30)
+    assert claimed_size(file.read_bytes()[:10]) is None
+
+
+def test_a_small_file_that_claims_to_be_huge_is_refused_unread(tmp_path, monkeypatch):
+    file = tmp_path / "a.jpg"
+    cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
+    content = file.read_bytes().replace(struct.pack(">HH", 30, 70), struct.pack(">HH", 30_000, 30_000))
+    file.write_bytes(content)
+    monkeypatch.setattr(cv2, "imdecode", pytest.fail)
+    with pytest.raises(InputError, match=r"30000 x 30000 pixels: is more than photographs\.max_pixels"):
+        read_photograph(file)
+
+
+def test_what_libraries_say_by_themselves_stays_off_the_screen(tmp_path, capfd):
+    file = tmp_path / "a.png"
+    cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
+    content = file.read_bytes()
+    chunk = b"iCCP" + b"x\0\0nonsense"  # a colour profile that libpng complains of
+    at = content.index(b"IDAT") - 4
+    file.write_bytes(content[:at] + struct.pack(">I", len(chunk) - 4) + chunk + b"\0\0\0\0" + content[at:])
+    assert read_photograph(file).shape == (30, 70)
+    assert capfd.readouterr().err == ""

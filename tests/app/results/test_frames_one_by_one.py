@@ -1,0 +1,91 @@
+"""Frames of a stored run are read when they are asked for, as they were, and take the memory of a few."""
+
+from __future__ import annotations
+
+import pickle
+import tracemalloc
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from rodsight.results.reader import StoredFrames
+from rodsight.results.store import Provenance, load_results, save_results
+
+from tests.app.results.full_results import make_full_results
+from tests.app.results.same import differences
+
+ORIGIN = Provenance("print", "experiment.toml", (0, None), {})
+FRAMES = 40
+
+
+def longer(whole):
+    """The same frames over and over."""
+    found = {each.name: getattr(whole, each.name) for each in fields(whole)}
+    over = {name: value for name, value in found.items() if isinstance(value, np.ndarray) and len(value) == 3}
+    return replace(whole, **{name: value[np.arange(FRAMES) % 3] for name, value in over.items() if name != "name"})
+
+
+@pytest.fixture(scope="module")
+def full():
+    few = make_full_results()
+    frames = [replace(few.frames[k % 3], frame=k) for k in range(FRAMES)]
+    tracks = replace(longer(replace(few.tracks, failed_reason=None)), time=np.arange(FRAMES, dtype=float))
+    walls = longer(few.walls)
+    statistics = [few.statistics[k % 3] for k in range(FRAMES)]
+    return replace(
+        few,
+        frames=frames,
+        statistics=statistics,
+        tracks=tracks,
+        walls=walls,
+        boundary=None,
+        radius_tuning=None,
+        friction_check=None,
+        calibration=None,
+    )
+
+
+@pytest.fixture
+def stored(full, tmp_path):
+    file = tmp_path / "results.h5"
+    save_results(file, full, ORIGIN)
+    return file
+
+
+def test_every_frame_is_what_it_was(stored, full):
+    found = load_results(stored)
+    assert isinstance(found.frames, StoredFrames)
+    assert (
+        differences(replace(full, tracks=found.tracks, walls=found.walls), replace(found, frames=list(found.frames)))
+        == []
+    )
+    assert [each.frame for each in found.frames[-3:]] == [FRAMES - 3, FRAMES - 2, FRAMES - 1]
+    with pytest.raises(IndexError):
+        found.frames[FRAMES]
+
+
+def test_frames_take_the_memory_of_a_few(stored):
+    found = load_results(stored)
+
+    def peak(work) -> int:
+        tracemalloc.start()
+        try:
+            work()
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    one_by_one = peak(lambda: [frame.contacts.count for frame in found.frames])
+    all_at_once = peak(lambda: list(load_results(stored).frames))
+    assert one_by_one < 0.5 * all_at_once
+
+
+def test_a_file_that_is_replaced_meanwhile_is_still_the_one_that_was_opened(stored, full):
+    found = load_results(stored)
+    save_results(stored, replace(full, frames=[replace(each, fn=2.0 * each.fn) for each in full.frames]), ORIGIN)
+    assert np.array_equal(found.frames[7].fn, full.frames[7].fn)
+
+
+def test_frames_go_to_another_process(stored, full):
+    found = pickle.loads(pickle.dumps(load_results(stored)))
+    assert np.array_equal(found.frames[5].fn, full.frames[5].fn)

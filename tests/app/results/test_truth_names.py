@@ -1,0 +1,54 @@
+"""Which true grain a grain of the results is: told ones by their ids, inferred ones by their place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rodsight.errors import InputError
+from rodsight.results.truth import names_of_told, read_truth, true_ids, true_names
+from rodsight.tracks import Tracks, TrackStatus
+
+RADIUS = 0.008  # [m]
+TRUE = {10: (0.1, 0.1), 11: (0.2, 0.1), 12: (0.3, 0.1), 13: (0.4, 0.1)}  # [m]
+
+
+@pytest.fixture
+def poses(tmp_path: Path) -> Path:
+    file = tmp_path / "truth_tracks.csv"
+    file.write_text("frame,id,x,y,theta\n" + "".join(f"0,{k},{x},{y},0\n" for k, (x, y) in TRUE.items()))
+    return file
+
+
+def tracks_of(ids: list[int], place: list[tuple[float, float]], inferred: int = 0) -> Tracks:
+    n = len(ids)
+    return Tracks(
+        np.array(ids), np.full(n, RADIUS), np.zeros(1), np.array(place)[None], np.zeros((1, n)), np.full((1, n), 1e-5),
+        np.full((1, n), np.nan), np.full((1, n), TrackStatus.GIVEN, np.uint8),
+        inferred=np.arange(n) >= n - inferred,
+    )  # fmt: skip
+
+
+def test_told_grains_keep_their_ids_wherever_corrections_have_put_them(poses: Path) -> None:
+    moved = [(x + 0.1, y) for x, y in list(TRUE.values())[:3]]  # each where another one should be
+    assert names_of_told(poses, tracks_of([10, 11, 12], moved), 0).tolist() == [10, 11, 12]
+    assert true_names(poses, tracks_of([0, 1, 2], moved), 0).tolist() == [11, 12, 13]
+
+
+def test_an_inferred_rod_is_the_unseen_one_at_its_place(poses: Path) -> None:
+    told = [TRUE[10], TRUE[11], TRUE[12]]
+    inferred = [(0.403, 0.1), (0.401, 0.101), TRUE[11], (0.6, 0.1)]  # two at one place, on a told one, nowhere
+    names = names_of_told(poses, tracks_of([10, 11, 12, 14, 15, 16, 17], told + inferred, inferred=4), 0)
+    assert names.tolist() == [10, 11, 12, 13, -1, -1, -1]
+
+
+def test_contacts_of_rods_that_nobody_saw_are_passed_over_and_unknown_ids_are_not(poses: Path, tmp_path: Path) -> None:
+    truth = tmp_path / "truth_contacts.csv"
+    truth.write_text("frame,i,j,fn,ft\n0,10,11,5,1\n0,12,13,7,2\n0,13,top,3,0\n")
+    names = np.array([10, 11, 12])
+    found = read_truth(truth, names, ("top",), first_frame=0, frame_count=1, unseen=true_ids(poses))
+    assert found.fn.tolist() == [5.0]
+    truth.write_text("frame,i,j,fn,ft\n0,10,99,5,1\n")
+    with pytest.raises(InputError, match=r"row 2, j = '99': is not the id of a grain"):
+        read_truth(truth, names, ("top",), first_frame=0, frame_count=1, unseen=true_ids(poses))

@@ -1,0 +1,14 @@
+"""Which statistics are held against the truth's."""
+
+import numpy as np
+from rodsight.study.numbers import SHAPES, compared_names
+
+from tests.app.recording.fake_results import make_results
+
+
+def test_what_is_compared_is_a_number_or_a_shape():
+    (statistics, *_) = make_results(1, 12, 12, sweeps=2).statistics
+    names = compared_names()
+    assert {"sliding_fraction", "contact_count", "tail_exponent", *SHAPES} <= set(names)
+    for name in names:
+        assert np.ndim(getattr(statistics, name)) == (name in SHAPES), name

@@ -1,0 +1,158 @@
+"""The table of worlds: what is counted, kept, resumed and said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from rodsight.cli.main import main
+from rodsight.study import worlds
+from rodsight.study.world_score import WorldPlan, WorldScore, score_world
+from rodsight.study.worlds import as_json, print_worlds, study_worlds
+from rodsight.synthetic.worlds.names import WorldName
+from rodsight.synthetic.worlds.table import WORLDS
+
+FEW = 40  # rods
+
+SCORE = WorldScore(
+    "shear", 2, "", r=(0.6, 0.9, None, 0.8, 0.9), scale=1.01, trust=(None, 0.95, 0.88, 0.82, 0.95),
+    status=("reset", "suspect", "failed", "settling", "settled"), coverage=(0.7, 0.94), r_ours=0.86, r_static=0.5,
+    r_overlap=0.75, r_uniform=None, r_overlap_first=0.7, cpu=0.25,
+)  # fmt: skip
+REFUSED = WorldScore("nearly_jammed", 0, "tracks.csv: column theta: there is no such column")
+
+
+def test_means_leave_the_first_frames_and_what_is_unknown_out() -> None:
+    assert SCORE.r_late == pytest.approx(0.85)
+    assert SCORE.trust_mean == pytest.approx((0.95 + 0.88 + 0.82 + 0.95) / 4)
+    assert REFUSED.r_late is None
+    assert REFUSED.trust_mean is None
+
+
+def test_trust_that_is_too_high_is_counted_apart_for_suspect_frames() -> None:
+    """0.95 for r = 0.9 twice: once in a suspect frame, once in a settled one; 0.82 for 0.8 is within the allowance."""
+    assert SCORE.too_trusting(suspect=True) == (1, 1)
+    assert SCORE.too_trusting(suspect=False) == (1, 2)
+
+
+def test_the_table_tells_every_world_and_why_one_was_refused() -> None:
+    text = StringIO()
+    print_worlds(Console(file=text, width=worlds.WIDTH), [SCORE, REFUSED])
+    told = text.getvalue()
+    row = next(line for line in told.splitlines() if line.startswith("shear"))
+    assert row.split() == [
+        "shear", "2", "0.850", "0.600", "0.900", "–", "1.01", "0.90", "1/2", "1/1", "1", "re", "1", "su", "1", "fa",
+        "1", "si", "1", "se", "70", "94", "0.860", "0.500", "0.750", "–", "0.25",
+    ]  # fmt: skip
+    assert "nearly_jammed 0: tracks.csv: column theta" in told
+    assert "Seeds for fitting: 0; for judging: 2." in told
+    assert all(heading in told for heading in worlds.HEADINGS)
+
+
+def test_json_says_the_same_without_nan() -> None:
+    told = json.loads(json.dumps(as_json([SCORE, REFUSED]), allow_nan=False))
+    assert (told["fitted_on"], told["judged_on"]) == ([0], [2])
+    assert told["worlds"][0]["r_late"] == pytest.approx(0.85)
+    assert told["worlds"][0]["too_trusting_suspect"] == [1, 1]
+    assert told["worlds"][0]["status_count"] == {"reset": 1, "suspect": 1, "failed": 1, "settling": 1, "settled": 1}
+    assert told["worlds"][1]["refused"].startswith("tracks.csv")
+
+
+def test_finished_worlds_are_kept_until_settings_or_size_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    solved: list[tuple[WorldName, int]] = []
+
+    def fake(plan: WorldPlan, world: WorldName, seed: int) -> WorldScore:
+        solved.append((world, seed))
+        return replace(SCORE, world=world, seed=seed)
+
+    monkeypatch.setattr(worlds, "score_world", fake)
+    plan = WorldPlan(FEW, tmp_path)
+    first = study_worlds(plan, ["shear", "camera"], [2, 1])
+    assert [(score.world, score.seed) for score in first] == [("shear", 2), ("shear", 1), ("camera", 2), ("camera", 1)]
+    heard: list[tuple[int, int]] = []
+    again = study_worlds(plan, ["shear", "unseen"], [1], progress=lambda _, done, total: heard.append((done, total)))
+    assert again[0] == first[1]
+    assert solved[4:] == [("unseen", 1)]
+    assert heard == [(1, 2), (2, 2)]
+    study_worlds(replace(plan, settings=("solver.kappa=0.2",)), ["shear"], [1])
+    study_worlds(replace(plan, grains=FEW + 1), ["shear"], [1])
+    assert solved[5:] == [("shear", 1), ("shear", 1)]
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Worlds of five photographs."""
+    course = replace(WORLDS["unseen"].course, frames=5)
+    monkeypatch.setitem(WORLDS, "unseen", replace(WORLDS["unseen"], course=course))
+
+
+@pytest.mark.usefixtures("short")
+def test_a_world_is_solved_and_compared_with_its_whole_truth(tmp_path: Path) -> None:
+    score = score_world(WorldPlan(FEW, tmp_path), "unseen", 1)
+    assert score.refused == ""
+    assert len(score.r) == len(score.trust) == len(score.status) == 5
+    assert all(r is not None and -1.0 <= r <= 1.0 for r in score.r)
+    assert score.scale is not None
+    assert score.coverage[0] is not None
+    assert score.coverage[1] is not None
+    assert 0.0 < score.coverage[0] <= score.coverage[1] <= 1.0
+    assert None not in (score.r_ours, score.r_static, score.r_overlap, score.r_uniform, score.cpu)
+    refused = score_world(WorldPlan(FEW, tmp_path, ("contacts.nonsense=1",)), "unseen", 1)
+    assert "nonsense" in refused.refused
+    assert not refused.refused.startswith("/")
+
+
+def test_where_nothing_tells_the_size_of_forces_no_scale_is_told() -> None:
+    told = {name for name, world in WORLDS.items() if not world.scale_known}
+    assert told == {"isotropic", "nearly_jammed", "outer", "periodic"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("study", "worlds", "--jobs", "0"), "--jobs: 0"),
+        (("study", "paper", "--worlds", "shear"), "--worlds with paper"),
+        (("study", "paper", "--json"), "--json with paper"),
+        (("synth", "OUT", "--preset", "camera"), "--photographs with preset camera"),
+        (("synth", "OUT", "--preset", "camera", "--no-photographs", "--reversal"), "--reversal with preset camera"),
+    ],
+    ids=" ".join,
+)
+def test_options_that_do_not_belong_are_named(arguments, named, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments])
+    assert ended.value.code == 2
+    assert named in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_prints_json_of_what_was_asked_for(tmp_path, monkeypatch, capsys) -> None:
+    asked = []
+
+    def fake(plan: WorldPlan, world: WorldName, seed: int) -> WorldScore:
+        asked.append((plan.grains, plan.settings, world, seed))
+        return replace(SCORE, world=world, seed=seed)
+
+    monkeypatch.setattr(worlds, "score_world", fake)
+    arguments = [
+        "study",
+        "worlds",
+        "--seeds",
+        "3",
+        "--worlds",
+        "soft",
+        "--out",
+        str(tmp_path),
+        "--set",
+        "solver.kappa=0.2",
+    ]
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--json", "--estimator", "nlgs", "--quiet"])
+    assert ended.value.code == 0
+    assert asked == [(450, ("solver.kappa=0.2", "solver.estimator=nlgs"), "soft", 3)]
+    assert json.loads(capsys.readouterr().out)["worlds"][0]["world"] == "soft"

@@ -1,0 +1,60 @@
+"""A bar's inner edge is found from a line near it, and the bars of a frame from the rods between them."""
+
+import cv2
+import numpy as np
+import pytest
+from rodsight.tracking.walls.inner_edge import find_bars, meeting_lines, snap_to_edge
+
+
+@pytest.fixture
+def bar():
+    """A bright bar below the line (40, 300) to (460, 280), with paint on it and rods above it."""
+    rng = np.random.default_rng(5)
+    image = np.full((400, 500), 20.0, np.float32)
+    cv2.fillPoly(image, [np.array([[0, 302], [499, 278], [499, 399], [0, 399]])], 170.0)
+    for x, y in rng.uniform((0, 310), (500, 400), (150, 2)):
+        cv2.circle(image, (int(x), int(y)), 4, 70.0, -1)
+    for x in range(60, 460, 55):
+        cv2.circle(image, (x, int(302 - 24 * x / 499 - 26)), 24, 190.0, -1)
+    return cv2.GaussianBlur(image, None, 1.0)
+
+
+def test_a_line_drawn_by_hand_moves_onto_the_edge(bar):
+    found, share = snap_to_edge(bar, np.array([[45.0, 309.0], [455.0, 273.0]]), 20.0)
+    true = 302.0 - 24.0 * found[:, 0] / 499.0
+    assert np.abs(found[:, 1] - true).max() < 1.0
+    assert share > 0.5
+
+
+def test_where_there_is_no_edge_a_line_stays(bar):
+    empty = np.full_like(bar, 50.0)
+    line = np.array([[45.0, 309.0], [455.0, 273.0]])
+    found, share = snap_to_edge(empty, line, 20.0)
+    assert share < 0.34
+    assert np.isfinite(found).all()
+
+
+def test_rods_in_a_sheared_frame_tell_its_bars():
+    row, column = np.mgrid[0:9, 0:12]
+    x = 60.0 + 40.0 * column + 6.0 * (8 - row)
+    y = 50.0 + 40.0 * row
+    bars = find_bars(x.ravel().astype(float), y.ravel(), np.full(x.size, 20.0))
+    assert bars.shape == (4, 2, 2)
+    bottom, right, top, left = bars
+    np.testing.assert_allclose(bottom[:, 1], 390.0, atol=0.2)
+    np.testing.assert_allclose(top[:, 1], 30.0, atol=0.2)
+    assert bottom[0, 0] < bottom[1, 0]
+    assert top[0, 0] > top[1, 0]
+    assert right[0, 1] > right[1, 1]
+    np.testing.assert_allclose((right[1, 0] - right[0, 0]) / (right[0, 1] - right[1, 1]), 6.0 / 40.0, atol=0.01)
+    np.testing.assert_allclose(bottom[1], right[0], atol=1e-6)
+    np.testing.assert_allclose(left[1], bottom[0], atol=1e-6)
+
+
+def test_lines_are_cut_where_they_meet():
+    bottom, right = [[1.0, 9.0], [8.0, 9.0]], [[9.0, 12.0], [9.0, 2.0]]
+    top, left = [[12.0, 1.0], [2.0, 1.0]], [[0.0, 0.0], [0.0, 7.0]]
+    lines = np.array([bottom, right, top, left])
+    met = meeting_lines(lines)
+    np.testing.assert_allclose(met[0], [[0.0, 9.0], [9.0, 9.0]])
+    np.testing.assert_allclose(met[2], [[9.0, 1.0], [0.0, 1.0]])

@@ -1,0 +1,69 @@
+"""Strangers get nothing from the workbench, and every answer carries the safe headers."""
+
+import pytest
+from rodsight.workbench.service.bench import Bench
+
+from .conftest import HOST, Visitor
+
+
+@pytest.fixture
+def stranger(tmp_path):
+    return Visitor(Bench(tmp_path))
+
+
+@pytest.mark.parametrize("path", ["/", "/page/app.js", "/photograph?at=.&frame=0"])
+def test_without_the_cookie_nothing_is_served(stranger, path):
+    assert stranger.client.get(path).status_code == 403
+
+
+def test_the_token_opens_once_it_is_right(stranger):
+    assert stranger.client.get("/", params={"token": "guess"}).status_code == 403
+    cookie = stranger.client.get("/", params={"token": stranger.gate.token}).headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=Strict" in cookie
+    assert stranger.client.get("/").status_code == 200
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [{"Origin": "http://evil.example"}, {"Host": "evil.example"}, {"Sec-Fetch-Site": "cross-site"},
+     {"Content-Type": "text/plain"}],
+)  # fmt: skip
+def test_a_page_elsewhere_may_ask_nothing(visitor, headers):
+    assert visitor.post("home", {}, **headers).status_code == 403
+
+
+def test_a_question_needs_an_origin(visitor):
+    assert visitor.client.post("/ask/home", json={}).status_code == 403
+
+
+def test_every_answer_carries_the_policy(visitor):
+    for path in ("/", "/page/none.js", "/photograph?at=none&frame=0"):
+        headers = visitor.client.get(path).headers
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert headers["Cache-Control"] == "no-store"
+        assert headers["X-Frame-Options"] == "DENY"
+
+
+def test_no_path_leads_out_of_the_folder(visitor):
+    for at in ("..", "/etc", "my photographs/../../.."):
+        assert visitor.post("project", {"at": at}).status_code == 422
+    for name in ("..%2f..%2fcommand.py", "conftest.py", "__init__.py"):
+        assert visitor.client.get(f"/page/{name}").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("question", "values"),
+    [("nothing", {}), ("project", {}), ("project", {"at": 3}), ("begin", {"roll": -1, "name": "x"}),
+     ("home", {"bench": 1}), ("set_scale", {"at": ".", "pixel_size": "1e-4"})],
+)  # fmt: skip
+def test_a_malformed_question_is_refused(visitor, question, values):
+    assert visitor.post(question, values).status_code == 400
+
+
+def test_a_long_question_is_refused(visitor):
+    body = b'{"at": "' + b"x" * 300_000 + b'"}'
+    answer = visitor.client.post(
+        "/ask/home", content=body, headers={"Origin": HOST, "Content-Type": "application/json"}
+    )
+    assert answer.status_code == 413

@@ -1,0 +1,121 @@
+"""Stored numbers are shown as they are stored, and verdicts go to the log that the solver obeys."""
+
+import numpy as np
+import pytest
+from rodsight.results.store import load_results, read_origin
+from rodsight.run_folder import RESULTS
+from rodsight.verdicts.decisions import Bodies, decide
+from rodsight.verdicts.log import VERDICTS, VerdictLog
+
+from tests.golden.stored import unpack
+
+FRAME = 1
+
+
+@pytest.fixture
+def solved(visitor, photographs_only):
+    """A visitor, where the experiment is, its results and their folder."""
+    at = visitor.ask("begin", roll=0, name="mine")["at"]
+    visitor.ask("set_photographs", at=at, interval=30.0)
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    folder = photographs_only / "runs" / "mine"
+    folder.mkdir(parents=True)
+    return visitor, at, load_results(unpack(2, folder)), folder
+
+
+def test_the_network_of_a_frame_is_what_is_stored(solved):
+    visitor, at, results, _ = solved
+    told = visitor.ask("network", at=at, frame=FRAME)
+    forces = results.frames[FRAME]
+    np.testing.assert_allclose(told["fn"], forces.fn, rtol=1e-4)
+    np.testing.assert_allclose(np.array(told["ft"]), forces.ft, rtol=1e-4, atol=1e-9)
+    assert told["status"] == forces.status.name.lower()
+    assert told["i"] == results.tracks.id[forces.contacts.i].tolist()
+    wall = forces.contacts.with_wall.nonzero()[0][0]
+    assert told["j"][wall] == results.walls.name[forces.contacts.j[wall] - results.grains.count]
+    x1, y1, x2, y2 = told["line"][0]
+    length = 2.5e-4 * np.hypot(x2 - x1, y2 - y1)
+    pair = forces.contacts.i[0], forces.contacts.j[0]
+    assert length == pytest.approx(results.grains.radius[list(pair)].sum(), rel=0.02)  # the calibrated pixel
+
+
+def test_frames_are_told_with_their_status_and_what_is_lost(solved):
+    visitor, at, results, _ = solved
+    told = visitor.ask("run_told", at=at)["frames"]
+    assert told["count"] == len(results.frames)
+    assert told["status"] == [frame.status.name.lower() for frame in results.frames]
+    assert not told["provisional"]
+
+
+def test_a_pair_is_told_over_all_frames(solved):
+    visitor, at, results, _ = solved
+    contacts = results.frames[FRAME].contacts
+    i, j = (int(results.tracks.id[row]) for row in (contacts.i[0], contacts.j[0]))
+    told = visitor.ask("pair", at=at, i=i, j=j)
+    assert told["gap"][FRAME] == pytest.approx(contacts.gap[0], rel=1e-3, abs=1e-9)
+    assert told["fn"][FRAME] == pytest.approx(results.frames[FRAME].fn[0], rel=1e-4)
+    assert len(told["gap_sd"]) == len(results.frames)
+    assert visitor.post("pair", {"at": at, "i": i, "j": "nowhere"}).status_code == 400
+
+
+def test_those_pairs_come_first_on_which_most_hangs(solved):
+    visitor, at, _, _ = solved
+    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"]
+    stake = [each["stake"] for each in told]
+    assert stake == sorted(stake, reverse=True)
+    first = told[0]
+    doubt = 1.0 - abs(2.0 * first["probability"] - 1.0)
+    if first["fn"] is not None:
+        assert first["stake"] == pytest.approx(doubt * first["fn"], rel=1e-3)
+
+
+def test_a_verdict_reaches_the_solver_and_is_taken_back(solved):
+    visitor, at, results, folder = solved
+    first = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"][0]
+    i, j = first["i"], first["j"]
+    visitor.ask("judge", at=at, frame=FRAME, i=j, j=i, verdict="no contact", reviewer=" anna ", seconds=2.5)
+    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")
+    assert told["judged"] == 1
+    assert [(each["i"], each["j"]) for each in told["pairs"] if each["verdict"] == "no contact"] == [(i, j)]
+    bodies = Bodies.of(results.tracks, results.walls)
+    log = VerdictLog(folder / VERDICTS)
+    origin = read_origin(folder / RESULTS)
+    assert origin is not None
+    first_frame = origin.frames[0]
+    decided = decide(log, bodies, first_frame=first_frame, frame_count=len(results.frames)).for_solver()
+    rows = bodies.rows()
+    assert decided[FRAME].forbidden.tolist() == [bodies.key(*sorted((rows[i], rows[j])))]
+    assert visitor.ask("unjudge", at=at, reviewer="anna")["undone"] == "no contact"
+    assert visitor.ask("unjudge", at=at, reviewer="anna")["undone"] is None
+    decided = decide(log, bodies, first_frame=first_frame, frame_count=len(results.frames))
+    assert decided.count == 0
+
+
+def test_what_is_no_pair_cannot_be_judged(solved):
+    visitor, at, results, folder = solved
+    name = int(results.tracks.id[0])
+    other = int(results.tracks.id[1])
+    for i, j, verdict in ((name, name, "contact"), (name, 10**6, "contact"), (name, other, "maybe")):
+        values = {"at": at, "frame": FRAME, "i": i, "j": j, "verdict": verdict, "reviewer": "anna"}
+        assert visitor.post("judge", values).status_code == 400
+    assert not (folder / VERDICTS).exists()
+
+
+def test_a_crop_is_a_picture(solved):
+    visitor, at, _, _ = solved
+    answer = visitor.client.get("/crop", params={"at": at, "frame": 1, "x": 12050, "y": 13000, "width": 60})
+    assert answer.headers["Content-Type"] == "image/jpeg"
+    assert visitor.client.get("/crop", params={"at": at, "frame": 1, "x": 1, "y": 1, "width": 1}).status_code == 422
+
+
+def test_forces_without_a_contact_differ_and_nothing_is_written(solved):
+    visitor, at, results, folder = solved
+    before = sorted(file.name for file in folder.iterdir())
+    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"]
+    pair = max((each for each in told if each["fn"]), key=lambda each: each["fn"])
+    answer = visitor.ask("without", at=at, frame=FRAME, i=pair["i"], j=pair["j"])
+    assert min(answer["fn"]) >= 0.0 or min(answer["fn"]) == min(results.frames[FRAME].fn)
+    gone = np.flatnonzero(np.array(answer["fn"]) == 0.0)
+    assert len(gone) >= 1
+    assert sorted(file.name for file in folder.iterdir()) == before
+    assert "no contact" in visitor.refused("without", at=at, frame=FRAME, i=pair["i"], j=pair["i"])

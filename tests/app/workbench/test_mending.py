@@ -1,0 +1,68 @@
+"""A rod is correlated again from where a hand puts it, and what is kept is what the next run reads."""
+
+import numpy as np
+import pytest
+from rodsight.experiment.corrections import read_corrections
+from rodsight.experiment.experiment import load_experiment
+from rodsight.experiment.scaling import make_scale
+from rodsight.experiment.tables import read_table
+from rodsight.workbench.mending.mender import Mender
+
+ALIKE = 1e-3  # a fit ends where steps are short, which may be a hair beside the best
+
+
+@pytest.fixture(scope="module")
+def mended(made_photographs):
+    """A mender, and the true poses of photograph 2 in pixels."""
+    experiment = load_experiment(made_photographs)
+    photographs = experiment.photographs()
+    table = read_table(made_photographs / "grains.csv", ("id", "x", "y", "radius"))
+    circles = np.stack([table.numbers(name) for name in ("x", "y", "radius")], axis=1)
+    true = read_table(made_photographs / "truth_tracks.csv", ("frame", "id", "x", "y", "theta"))
+    here = true.integers("frame") == 2
+    scale = make_scale(experiment.config.photographs, photographs.shape[0])
+    place = scale.to_pixels(np.stack([true.numbers("x")[here], true.numbers("y")[here]], axis=1))
+    pose = np.column_stack([place, scale.angle_to_world(true.numbers("theta")[here])])
+    return Mender(table.integers("id"), circles, photographs.__getitem__), pose
+
+
+@pytest.mark.parametrize("error", [(0.0, 0.0, 0.0), (1.5, -1.0, 0.03), (4.0, 3.0, 0.15)])
+def test_a_rod_is_found_from_a_pose_beside_it(mended, error):
+    mender, pose = mended
+    found = mender.correlate(2, 7, tuple(pose[7] + np.array(error)))
+    assert found.found
+    assert found.zncc > 0.95
+    np.testing.assert_allclose([found.x, found.y], pose[7, :2], atol=0.1)
+    assert found.angle == pytest.approx(pose[7, 2], abs=0.01)
+    assert found.zncc_before <= found.zncc + ALIKE
+    assert found.residual_before >= found.residual - 100.0 * ALIKE
+
+
+def test_where_nothing_correlates_the_hand_is_taken_at_its_word(mended):
+    mender, pose = mended
+    given = (float(pose[7, 0] + 30.0), float(pose[7, 1] + 25.0), 2.0)
+    found = mender.correlate(2, 7, given)
+    assert not found.found
+    assert (found.x, found.y, found.angle) == given
+
+
+def test_an_unknown_rod_is_refused(mended):
+    with pytest.raises(KeyError):
+        mended[0].correlate(2, 999, (50.0, 50.0, 0.0))
+
+
+def test_a_rod_that_is_not_to_be_seen_is_a_correction_until_it_is_taken_back(visitor, photographs_only):
+    at = visitor.ask("begin", roll=0, name="mine")["at"]
+    visitor.ask("set_photographs", at=at, interval=30.0)
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    told = visitor.ask("mark_lost", at=at, frame=2, id=5)
+    told = visitor.ask("mark_lost", at=at, frame=1, id=6)
+    assert [(each["frame"], each["id"], each["x"]) for each in told["corrections"]] == [(1, 6, None), (2, 5, None)]
+    read = read_corrections(load_experiment(photographs_only / "my photographs"), None, 4)
+    assert read.frame.tolist() == [1, 2]
+    assert np.isnan(read.x).all()
+    told = visitor.ask("take_back", at=at, frame=2, id=5)
+    assert len(told["corrections"]) == 1
+    told = visitor.ask("undo", at=at)
+    assert len(read_corrections(load_experiment(photographs_only / "my photographs"), None, 4).id) == 2
+    assert "step Rods" in visitor.refused("mark_lost", at=at, frame=0, id=5)

@@ -1,0 +1,153 @@
+"""The workbench in a real headless Chromium: from a folder of photographs to forces, by mouse and keyboard."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+from rodsight.experiment.experiment import load_experiment
+from rodsight.verdicts.log import VERDICTS, VerdictLog
+from rodsight.workbench.service.bench import Bench
+from rodsight.workbench.service.server import WorkbenchServer
+
+from tests.program import rodsight
+
+pytestmark = pytest.mark.screen
+
+
+@pytest.fixture
+def server(photographs_only):
+    server = WorkbenchServer(Bench(photographs_only))
+    thread = threading.Thread(target=server.serve, daemon=True)
+    thread.start()
+    yield server
+    server.shutdown()
+    thread.join()
+    server.close()
+
+
+@pytest.fixture
+def tab(page: Page, server: WorkbenchServer) -> Iterator[Page]:
+    page.set_viewport_size({"width": 1280, "height": 720})
+    wrong = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.goto(server.address)
+    idle(page)
+    yield page
+    assert wrong == []
+
+
+def idle(tab: Page) -> None:
+    """Wait until the page has done what it was told."""
+    tab.wait_for_function("() => globalThis.bench && bench.done > 0")
+    tab.evaluate("bench.busy.then(() => null)")
+
+
+def go(tab: Page, step: str) -> None:
+    tab.click(f"#step-{step}")
+    idle(tab)
+
+
+def fill(tab: Page, field: str, text: str) -> None:
+    tab.fill(f"#field-{field}", text)
+    tab.keyboard.press("Enter")
+    idle(tab)
+
+
+def on_screen(tab: Page, place: tuple[float, float]) -> tuple[float, float]:
+    """Where a pixel of the photograph is on the page."""
+    x, y = tab.evaluate(
+        """(p) => { const box = bench.stage.canvas.getBoundingClientRect(), s = bench.stage.toScreen(p);
+        return [s[0] + box.left, s[1] + box.top]; }""",
+        list(place),
+    )
+    return x, y
+
+
+def drag(tab: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    tab.mouse.move(*on_screen(tab, start))
+    tab.mouse.down()
+    tab.mouse.move(*on_screen(tab, (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))))
+    tab.mouse.move(*on_screen(tab, end))
+    tab.mouse.up()
+    idle(tab)
+
+
+def mark(tab: Page, step: str) -> str:
+    return tab.locator(f"#step-{step} .sign").get_attribute("title") or ""
+
+
+def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
+    truth = load_experiment(made_photographs).config
+    tab.get_by_text("Set up an experiment from these").click()
+    idle(tab)
+    fill(tab, "interval", "30")
+    assert mark(tab, "photographs") == "good"
+    go(tab, "scale")
+    drag(tab, (100.0, 200.0), (300.0, 200.0))
+    length = tab.evaluate("(() => { const d = bench.project.photographs.distance; return d ?? null; })()")
+    assert length is None  # a length without metres is nothing yet
+    fill(tab, "distance", str(200.0 * truth.photographs.pixel_size * 1e3))
+    assert tab.evaluate("bench.project.pixel") == pytest.approx(truth.photographs.pixel_size, rel=0.01)
+    tab.get_by_role("button", name="The number").click()
+    fill(tab, "pixel-size", str(truth.photographs.pixel_size * 1e3))
+    go(tab, "rods")
+    tab.fill("#field-radii", ", ".join(str(radius * 1e3) for radius in truth.photographs.radii))
+    tab.click("#detect")
+    idle(tab)
+    assert tab.evaluate("bench.project.rods.id.length") == 30
+    x, y = tab.evaluate("[bench.project.rods.x[3], bench.project.rods.y[3]]")
+    tab.mouse.click(*on_screen(tab, (x, y)))
+    tab.keyboard.press("Delete")
+    idle(tab)
+    assert tab.evaluate("bench.project.rods.id.length") == 29
+    tab.keyboard.press("Control+z")
+    idle(tab)
+    assert tab.evaluate("bench.project.rods.id.length") == 30
+    go(tab, "walls")
+    tab.click("#find-walls")
+    idle(tab)
+    fill(tab, "pressure-top", "50")
+    go(tab, "material")
+    tab.get_by_role("button", name="aluminium").click()
+    idle(tab)
+    for step in ("photographs", "scale", "walls", "rods", "material"):
+        assert mark(tab, step) == "good", step
+    go(tab, "run")
+    tab.click("#run")
+    expect(tab.locator("#run-state")).to_have_text("finished", timeout=240_000)
+    idle(tab)
+    assert tab.evaluate("bench.project.run.frames") == 4
+    assert (photographs_only / "runs" / "my photographs" / "results.h5").is_file()
+    judge_by_key(tab, photographs_only / "runs" / "my photographs")
+    assert rodsight("check", photographs_only / "my photographs", "--quiet") == 0
+
+
+def judge_by_key(tab: Page, run: Path) -> None:
+    go(tab, "inspect")
+    tab.wait_for_function("() => document.querySelector('#next') !== null")
+    tab.keyboard.press("ArrowRight")
+    idle(tab)
+    tab.keyboard.press("Space")
+    tab.wait_for_selector("#card")
+    tab.keyboard.press("c")
+    idle(tab)
+    tab.keyboard.press("n")
+    idle(tab)
+    log = VerdictLog(run / VERDICTS)
+    assert [str(entry.verdict) for _, entry in log.verdicts()] == ["contact", "no contact"]
+    tab.keyboard.press("z")
+    idle(tab)
+    assert [str(entry.verdict) for _, entry in log.verdicts()] == ["contact"]
+
+
+def test_the_sample_is_a_click_away(tab, photographs_only):
+    tab.get_by_text("The sample: simple shear").click()
+    idle(tab)
+    assert (photographs_only / "shear" / "experiment.toml").is_file()
+    assert mark(tab, "scale") == "good"
+    assert tab.evaluate("bench.project.files.length") == 24
+    tab.keyboard.press("3")
+    assert tab.evaluate("bench.project.walls.length") == 4
+    expect(tab.locator("#panel h2")).to_have_text("Walls")

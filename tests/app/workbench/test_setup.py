@@ -1,0 +1,172 @@
+"""An experiment is set up from photographs by questions, and what is done is what `rodsight check` reads."""
+
+import numpy as np
+import pytest
+from rodsight.experiment.experiment import load_experiment, read_grain_guess
+from rodsight.experiment.scaling import make_scale
+from rodsight.experiment.tables import read_table
+from rodsight.experiment.walls import read_walls
+from rodsight.workbench.setup.draft import Draft
+
+from tests.program import rodsight
+
+RADII = [0.007, 0.008, 0.011]
+
+
+@pytest.fixture
+def begun(visitor):
+    told = visitor.ask("home")
+    return visitor, visitor.ask("begin", roll=told["rolls"][0]["roll"], name=told["rolls"][0]["name"])
+
+
+def marks(told):
+    return {step["name"]: step["mark"] for step in told["steps"]}
+
+
+def test_photographs_of_no_experiment_become_one(begun, photographs_only):
+    visitor, told = begun
+    assert told["files"] == ["DSC_7.jpg", "DSC_11.jpg", "DSC_15.jpg", "DSC_19.jpg"]
+    assert (photographs_only / "my photographs" / "experiment.toml").is_file()
+    assert visitor.ask("home")["rolls"] == []
+    assert marks(told) == {
+        "photographs": "missing", "scale": "missing", "walls": "missing", "rods": "doubtful", "material": "doubtful",
+    }  # fmt: skip
+
+
+def test_every_step_is_undone_and_done_again(begun):
+    visitor, told = begun
+    at = told["at"]
+    told = visitor.ask("set_photographs", at=at, interval=30.0)
+    assert marks(told)["photographs"] == "good"
+    told = visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    assert marks(told)["scale"] == "good"
+    assert marks(visitor.ask("undo", at=at))["scale"] == "missing"
+    assert marks(visitor.ask("redo", at=at))["scale"] == "good"
+    visitor.ask("undo", at=at)
+    visitor.ask("undo", at=at)
+    assert "nothing" in visitor.refused("undo", at=at)
+
+
+def test_a_known_length_and_known_rods_set_the_scale(begun):
+    visitor, told = begun
+    at = told["at"]
+    told = visitor.ask("set_scale", at=at, line=[[10.0, 20.0], [410.0, 320.0]], metres=0.125)
+    assert told["pixel"] == pytest.approx(2.5e-4)
+    told = visitor.ask("set_scale", at=at, rods=[{"radius": 0.008, "pixels": 32.0}, {"radius": 0.011, "pixels": 44.0}])
+    assert told["pixel"] == pytest.approx(2.5e-4)
+    assert "distance" not in told["photographs"]
+
+
+def test_walls_stay_in_the_picture_when_the_scale_changes(begun):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    before = visitor.ask("draw_wall", at=at, line=[[60.0, 300.0], [300.0, 310.0]], snap=False)["walls"]
+    told = visitor.ask("set_scale", at=at, pixel_size=5e-4)
+    np.testing.assert_allclose(told["walls"][0]["line"], before[0]["line"], atol=1e-4)
+    told = visitor.ask("undo", at=at)
+    assert told["pixel"] == pytest.approx(2.5e-4)
+    np.testing.assert_allclose(told["walls"][0]["line"], before[0]["line"], atol=1e-4)
+
+
+def test_walls_need_the_scale_and_names_are_words(begun):
+    visitor, told = begun
+    at = told["at"]
+    line = [[60.0, 300.0], [300.0, 310.0]]
+    assert "scale" in visitor.refused("draw_wall", at=at, line=line)
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    told = visitor.ask("draw_wall", at=at, line=line, snap=False)
+    assert told["wall"] == "top" or told["wall"] == "bottom"
+    assert "word" in visitor.refused("rename_wall", at=at, name=told["wall"], to="two words")
+    told = visitor.ask("rename_wall", at=at, name=told["wall"], to="plate")
+    told = visitor.ask("set_plate", at=at, name="plate", pressure=5e4)
+    assert (told["walls"][0]["name"], told["walls"][0]["pressure"]) == ("plate", 5e4)
+    told = visitor.ask("delete_wall", at=at, name="plate")
+    assert told["walls"] == []
+
+
+@pytest.mark.screen
+def test_the_whole_set_up_gives_what_check_accepts(begun, made_photographs, photographs_only):
+    visitor, told = begun
+    at, truth = told["at"], load_experiment(made_photographs)
+    section = truth.config.photographs
+    visitor.ask("set_photographs", at=at, name="mine", interval=section.interval)
+    visitor.ask("set_scale", at=at, pixel_size=section.pixel_size)
+    told = visitor.ask("detect_rods", at=at, radii=list(section.radii))
+    true_rods = read_table(made_photographs / "grains.csv", ("x", "y"))
+    assert len(told["rods"]["id"]) == len(true_rods)
+    told = visitor.ask("find_walls", at=at)
+    told = visitor.ask("set_plate", at=at, name="top", pressure=5e4)
+    told = visitor.ask("set_material", at=at, density=2700.0, length=0.06, friction="measured")
+    assert told["ready"]
+    assert marks(told) == dict.fromkeys(("photographs", "scale", "walls", "rods", "material"), "good")
+    folder = photographs_only / "my photographs"
+    assert rodsight("check", str(folder), "--quiet") == 0
+    made = load_experiment(folder)
+    scale = make_scale(made.config.photographs, truth.photographs().shape[0])
+    assert_on_lines(scale, read_walls(made, 4), read_walls(truth, 4))
+    guess = read_grain_guess(made)
+    place = np.stack([true_rods.numbers("x"), true_rods.numbers("y")], axis=1)
+    away = np.linalg.norm(np.stack([guess.x, guess.y], axis=1)[:, None] - place, axis=2).min(axis=1)
+    assert away.max() < 0.5
+
+
+def assert_on_lines(scale, found, true):
+    """Every wall that was found lies on the true one of its name, to a pixel."""
+    for name, ends in zip(found.name, found.endpoints[0], strict=True):
+        a, b = scale.to_pixels(true.endpoints[0, true.name.index(name)])
+        normal = np.array([b[1] - a[1], a[0] - b[0]]) / np.linalg.norm(b - a)
+        assert np.abs((scale.to_pixels(ends) - a) @ normal).max() < 1.0
+
+
+def test_rods_are_added_on_their_rims_moved_and_deleted(begun, made_photographs):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_scale", at=at, pixel_size=load_experiment(made_photographs).config.photographs.pixel_size)
+    table = read_table(made_photographs / "grains.csv", ("x", "y", "radius"))
+    x, y, r = (float(table.numbers(name)[4]) for name in ("x", "y", "radius"))
+    told = visitor.ask("add_rod", at=at, x=x + 1.0, y=y - 1.0, radius=1.05 * r)
+    rods = told["rods"]
+    assert (rods["x"][0], rods["y"][0], rods["r"][0]) == pytest.approx((x, y, r), abs=0.6)
+    told = visitor.ask("move_rod", at=at, id=0, x=50.0, y=60.0, radius=20.0)
+    assert (told["rods"]["x"], told["rods"]["r"]) == ([50.0], [20.0])
+    told = visitor.ask("delete_rods", at=at, ids=[0])
+    assert told["rods"] is None
+    assert "grains" not in told["photographs"]
+
+
+def test_a_complaint_of_check_stands_at_its_step(begun, photographs_only):
+    visitor, told = begun
+    file = photographs_only / "my photographs" / "experiment.toml"
+    file.write_text(file.read_text() + "interval = -3.0\n[material]\nfriction = 7.0\n[photograph]\nx = 1\n")
+    told = visitor.ask("project", at=told["at"])
+    says = {step["name"]: " ".join(step["says"]) for step in told["steps"]}
+    assert "photographs.interval" in says["photographs"]
+    assert "material.friction" in says["material"]
+    assert "did you mean photographs" in told["others"][0]
+    assert not told["ready"]
+
+
+def test_what_somebody_else_writes_is_seen(begun, photographs_only):
+    visitor, told = begun
+    Draft(photographs_only / "my photographs").set_keys("elsewhere", {"photographs.interval": 12.0})
+    assert marks(visitor.ask("project", at=told["at"]))["photographs"] == "good"
+
+
+def test_photographs_come_as_pictures_of_any_size(begun):
+    visitor, told = begun
+    answer = visitor.client.get("/photograph", params={"at": told["at"], "frame": 1, "size": 100})
+    assert answer.headers["Content-Type"] == "image/jpeg"
+    whole = visitor.client.get("/photograph", params={"at": told["at"], "frame": 1})
+    assert len(whole.content) > len(answer.content) > 500
+    assert visitor.client.get("/photograph", params={"at": told["at"], "frame": 99}).status_code == 422
+
+
+def test_the_first_comment_of_an_experiment_stays(tmp_path):
+    (tmp_path / "experiment.toml").write_text("# Mine.\n# Do not touch.\nname = 'a'\n")
+    draft = Draft(tmp_path)
+    draft.set_keys("name", {"name": "b", "photographs.files": "*.png"})
+    assert draft.file.read_text().startswith("# Mine.\n# Do not touch.\nname = ")
+    assert draft.data() == {"name": "b", "photographs": {"files": "*.png"}}
+    draft.undo()
+    assert draft.data() == {"name": "a"}

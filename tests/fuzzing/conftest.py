@@ -1,0 +1,12 @@
+"""Good input of every kind, made once for all that spoil copies of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from .cases import Originals, make_originals
+
+
+@pytest.fixture(scope="session")
+def originals(tmp_path_factory: pytest.TempPathFactory) -> Originals:
+    return make_originals(tmp_path_factory.mktemp("originals"))

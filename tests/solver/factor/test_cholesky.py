@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from solver.factor.cholesky import PAIR, TRIPLE, factorize, solve
+from solver.factor.pattern import find_pattern
+from tests.solver.factor.matrices import lattice
+
+BLOCK = {2: PAIR, 3: TRIPLE}
+EXACT = 1e-10  # relative, of matrices whose eigenvalues span a few hundred
+
+
+@pytest.mark.parametrize("size", [2, 3])
+@pytest.mark.parametrize(("side", "far"), [(1, 0), (2, 0), (7, 0), (7, 20)])
+def test_it_solves_as_the_whole_matrix_does(size: int, side: int, far: int):
+    pattern, blocks, whole = lattice(side, size, far)
+    right = np.random.default_rng(1).normal(size=len(whole))
+    expected = np.linalg.solve(whole, right)
+    assert factorize(pattern, blocks, np.empty(pattern.node_count, np.int64), BLOCK[size])
+    solve(pattern, blocks, right, BLOCK[size])
+    np.testing.assert_allclose(right, expected, rtol=0, atol=EXACT * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_the_factor_is_that_of_the_whole_matrix(size: int):
+    pattern, blocks, whole = lattice(5, size)
+    factorize(pattern, blocks, np.empty(25, np.int64), BLOCK[size])
+    factor = np.linalg.cholesky(whole)
+    for k, found in enumerate(blocks.reshape(-1, size, size)):
+        i, j = pattern.row[k] * size, pattern.column[k] * size
+        expected = factor[i : i + size, j : j + size]
+        expected = np.linalg.inv(expected) if i == j else expected
+        np.testing.assert_allclose(found, expected, rtol=0, atol=EXACT)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+@pytest.mark.parametrize("wrong", [-1.0, 0.0, np.nan])
+def test_a_matrix_that_is_not_positive_definite_is_refused(size: int, wrong: float):
+    pattern = find_pattern(2, np.array([0]), np.array([1]))
+    blocks = np.zeros((3, size, size))
+    blocks[[0, 2]] = np.eye(size)
+    blocks[2, -1, -1] = wrong
+    assert not factorize(pattern, blocks.ravel(), np.empty(2, np.int64), BLOCK[size])

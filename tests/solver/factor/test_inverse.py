@@ -1,0 +1,21 @@
+import numpy as np
+import pytest
+
+from solver.factor.cholesky import PAIR, TRIPLE, factorize
+from solver.factor.inverse import invert_on_pattern
+from tests.solver.factor.matrices import lattice
+
+EXACT = 1e-10  # relative, of matrices whose eigenvalues span a few hundred
+
+
+@pytest.mark.parametrize("block", [PAIR, TRIPLE])
+@pytest.mark.parametrize(("side", "far"), [(1, 0), (2, 0), (6, 0), (6, 20)])
+def test_on_the_pattern_it_is_the_whole_inverse(block: tuple[int, ...], side: int, far: int):
+    size = len(block)
+    pattern, blocks, matrix = lattice(side, size, far)
+    where, found = np.empty(pattern.node_count, np.int64), np.empty_like(blocks)
+    assert factorize(pattern, blocks, where, block)
+    invert_on_pattern(pattern, blocks, found, np.empty_like(blocks), where, block)
+    whole = np.linalg.inv(matrix)
+    expected = whole.reshape(-1, size, pattern.node_count, size).swapaxes(1, 2)[pattern.row, pattern.column]
+    np.testing.assert_allclose(found, expected.ravel(), rtol=0, atol=EXACT * np.abs(whole).max())

@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from solver.factor.pattern import find_pattern
+from tests.solver.factor.matrices import couples, definite, lattice
+
+ZERO = 1e-14  # of an entry of a factor whose numbers are drawn: none vanishes by chance
+
+
+def test_it_has_the_entries_of_the_factor_and_no_others():
+    pattern, _, whole = lattice(6, 1, far=9)
+    row, column = np.nonzero(np.abs(np.linalg.cholesky(whole)) > ZERO)
+    found = set(zip(pattern.row.tolist(), pattern.column.tolist(), strict=True))
+    assert found == set(zip(row.tolist(), column.tolist(), strict=True))
+
+
+def test_columns_begin_with_their_diagonal_and_ascend():
+    pattern = lattice(5, 1)[0]
+    assert np.array_equal(pattern.row[pattern.start[:-1]], np.arange(25))
+    assert np.array_equal(np.sort(pattern.place), np.arange(25))
+    for j in range(25):
+        assert np.all(np.diff(pattern.row[pattern.start[j] : pattern.start[j + 1]]) > 0)
+
+
+def test_rows_list_what_is_left_of_their_diagonal():
+    pattern = lattice(5, 1)[0]
+    for i in range(25):
+        listed = pattern.left[pattern.left_start[i] : pattern.left_start[i + 1]]
+        assert set(listed) == set(np.flatnonzero((pattern.row == i) & (pattern.column < i)))
+
+
+def test_neighbours_in_a_plane_fill_little():
+    """A band of this lattice's width would hold 41 entries a column, nested dissection about 16."""
+    pattern = find_pattern(1600, *couples(40))
+    assert pattern.entry_count < 14 * 1600
+
+
+def test_nodes_are_found_in_either_order():
+    a, b = couples(4, far=3)
+    pattern = find_pattern(17, a, b)
+    entry = pattern.locate(a, b)
+    assert np.array_equal(entry, pattern.locate(b, a))
+    assert np.array_equal(pattern.column[entry], np.minimum(pattern.place[a], pattern.place[b]))
+    assert np.array_equal(pattern.row[entry], np.maximum(pattern.place[a], pattern.place[b]))
+
+
+def test_nodes_that_are_not_coupled_are_refused():
+    pattern = find_pattern(3, np.array([0]), np.array([1]))
+    with pytest.raises(ValueError, match="not coupled"):
+        pattern.locate(np.array([0]), np.array([2]))
+
+
+def test_nodes_without_neighbours_stand_alone():
+    none = np.zeros(0, np.int64)
+    assert find_pattern(0, none, none).entry_count == 0
+    pattern = find_pattern(3, none, none)
+    assert pattern.row.tolist() == [0, 1, 2]
+    assert definite(pattern, none, none, 2)[0].shape == (12,)

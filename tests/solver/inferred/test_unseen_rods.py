@@ -1,0 +1,78 @@
+"""Rods taken out of a packing are put back where they were; where none is missing none is invented."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.bodies.grains import Array
+from solver.inferred.unseen_rods import UnseenRods, infer_unseen
+from tests.golden.forces import NOISE, STORED
+
+pytestmark = pytest.mark.unit
+
+GONE = (11, 36, 50)  # none of them a rattler
+
+
+@pytest.fixture(scope="module")
+def poses() -> dict[str, np.ndarray]:
+    """A simulated shear of 60 rods in 4 photographs."""
+    with np.load(STORED) as stored:
+        return {name.removeprefix("poses/"): stored[name] for name in stored.files if name.startswith("poses/")}
+
+
+def infer(poses: dict[str, np.ndarray], gone: tuple[int, ...], sizes: Array | None) -> UnseenRods:
+    seen = np.setdiff1d(np.arange(len(poses["radius"])), gone)
+    position = poses["position"][:, seen]
+    return infer_unseen(
+        poses["radius"][seen], position, np.isfinite(position).all(axis=2), poses["endpoints"], NOISE, sizes
+    )
+
+
+def test_rods_that_were_taken_out_are_put_back(poses) -> None:
+    found = infer(poses, GONE, np.unique(poses["radius"]))
+    true = poses["position"][:, list(GONE)]
+    for q, rod in enumerate(GONE):
+        away = np.linalg.norm(found.position - true[:, None, q], axis=2).max(axis=0)
+        best = int(np.argmin(away))
+        assert away[best] < 0.05 * poses["radius"][rod]
+        assert found.radius[best] == pytest.approx(poses["radius"][rod], rel=0.01)
+        assert np.all(found.sigma[:, best] < 4 * NOISE)
+
+
+def test_no_rod_is_invented_where_none_is_missing(poses) -> None:
+    assert infer(poses, (), np.unique(poses["radius"])).count == 0
+
+
+def test_an_inferred_rod_overlaps_nothing(poses) -> None:
+    found = infer(poses, GONE, np.unique(poses["radius"]))
+    seen = np.setdiff1d(np.arange(len(poses["radius"])), GONE)
+    for k, position in enumerate(poses["position"][:, seen]):
+        apart = np.linalg.norm(position[None] - found.position[k][:, None], axis=2)
+        gap = apart - poses["radius"][seen][None] - found.radius[:, None]
+        assert np.nanmin(gap) > -10 * NOISE
+
+
+def test_two_photographs_tell_nothing(poses) -> None:
+    short = {name: values[:2] if name in ("position", "endpoints") else values for name, values in poses.items()}
+    assert infer(short, GONE, np.unique(poses["radius"])).count == 0
+
+
+def ring(closing: float) -> UnseenRods:
+    """What is inferred inside six rods around a hole of their own size, one of which closes in after two frames."""
+    r = 8e-3
+    angle = np.pi / 3 * np.arange(6)
+    around = 2 * r * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    far = np.array([[0.05, 0.05], [-0.05, 0.05], [-0.05, -0.05], [0.05, -0.05]])
+    position = np.tile(np.concatenate([around, far]), (4, 1, 1))
+    position[2:, 0] *= 1.0 - closing
+    side = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
+    walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (4, 1, 1, 1))
+    return infer_unseen(np.full(10, r), position, np.ones((4, 10), bool), walls, NOISE, np.array([r]))
+
+
+def test_a_hole_that_others_enter_held_no_rod() -> None:
+    held = ring(closing=0.0)
+    assert held.count == 1
+    assert held.position == pytest.approx(0.0, abs=1e-6)
+    assert ring(closing=0.1).count == 0
