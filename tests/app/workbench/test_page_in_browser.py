@@ -39,9 +39,10 @@ def tab(page: Page, server: WorkbenchServer) -> Iterator[Page]:
 
 
 def idle(tab: Page) -> None:
-    """Wait until the page has done what it was told."""
+    """Wait until the page has done what it was told, and the photograph has the size that the new step leaves it."""
     tab.wait_for_function("() => globalThis.bench && bench.done > 0")
     tab.evaluate("bench.busy.then(() => null)")
+    tab.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn(null))))")
 
 
 def go(tab: Page, step: str) -> None:
