@@ -34,7 +34,7 @@ class Drawing:
 
 
 def export(
-    what: Annotated[Literal["pictures", "video", "tables", "vtk", "dic"], tyro.conf.Positional],
+    what: Annotated[Literal["pictures", "video", "tables", "vtk", "ovito", "graph", "dic"], tyro.conf.Positional],
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
     /,
     out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help="default: beside the results")] = None,
@@ -49,11 +49,16 @@ def export(
     pixel_size: Annotated[float | None, tyro.conf.arg(help="dic: [m]; default: the experiment's")] = None,
     quiet: Quiet = False,
 ) -> int:
-    """Write pictures, a video, tidy tables, VTK files or tracker files.
+    """Write pictures, a video, tidy tables, files for ParaView (vtk) and OVITO, graphs (GraphML) or tracker files.
+
+    Tables come with columns.csv, the dictionary of their columns, and datapackage.json for a data repository. ParaView
+    opens vtk/packing.pvd, OVITO ovito/frame_0000.vtm, and finds the others.
 
     Example: rodsight export video runs/shear --view "Force network"
     """
+    from ..exchange.contact_graph import write_graphs
     from ..exchange.dic_files import write_sequence
+    from ..exchange.ovito_files import write_ovito
     from ..exchange.tidy_tables import write_tables
     from ..exchange.vtk_polydata import write_polydata
     from ..results.store import load_results
@@ -76,6 +81,10 @@ def export(
         files = write_tables(results, target, kind)
     elif what == "vtk":
         files = write_polydata(results, target)
+    elif what == "ovito":
+        files = write_ovito(results, target)
+    elif what == "graph":
+        files = write_graphs(results, target)
     else:
         files = write_sequence(results.tracks, _scale_of(results, pixel_size), target)
     shown = ", ".join(file.name for file in files[:3]) + (f" … {files[-1].name}" if len(files) > 3 else "")

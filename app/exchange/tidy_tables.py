@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pyarrow as pa
@@ -18,22 +18,30 @@ from ..atomic import replacing
 from ..results.results import Results
 from ..results.schema import DIMENSIONS, entries
 from ..results.writer import columns_of_results
+from .data_package import write_description
 
 Kind = Literal["csv", "parquet"]
+TableName = Literal["contacts", "grains", "frames", "walls"]
 
+# Units and meanings of the columns that every table begins with.
 IDENTITY = {
-    "time": "s",
-    "x": "m",
-    "y": "m",
-    "theta": "rad",
-    "radius": "m",
-    **dict.fromkeys(("ax", "ay", "bx", "by"), "m"),
-    "x1": "m",
-    "y1": "m",
-    "x2": "m",
-    "y2": "m",
-    "pressure": "Pa",
-}  # units of columns that every table begins with
+    "frame": ("", "frame, from 0"),
+    "time": ("s", "time of the photograph"),
+    "id": ("", "name of the grain"),
+    "i": ("", "name of the first grain"),
+    "j": ("", "name of the second grain, or of the wall"),
+    "with_wall": ("", "whether j is a wall"),
+    "wall": ("", "name of the wall"),
+    "x": ("m", "place: of a contact its point, of a grain its centre; to the right"),
+    "y": ("m", "place: of a contact its point, of a grain its centre; upwards"),
+    "nx": ("", "normal from i to j"),
+    "ny": ("", "normal from i to j"),
+    "theta": ("rad", "rotation since frame 0, counter-clockwise"),
+    "radius": ("m", "radius"),
+    **{name: ("m", f"vector {name[0]} of the periodic cell") for name in ("ax", "ay", "bx", "by")},
+    **{f"{axis}{end}": ("m", f"end {end} of the wall; of a circle, of a diameter") for end in "12" for axis in "xy"},
+    "pressure": ("Pa", "pressure that loads the wall"),
+}
 SAID = ("time", "i", "j", "point", "normal", "position", "rotation")  # among these, or by other names
 SPREAD = ("xy", "axis", "wall", "anisotropy", "member", "component")  # dimensions that become columns
 
@@ -42,24 +50,33 @@ SPREAD = ("xy", "axis", "wall", "anisotropy", "member", "component")  # dimensio
 class Column:
     values: object
     unit: str = ""
+    meaning: str = ""
 
 
-def make_tables(results: Results) -> dict[str, pa.Table]:
-    """The tables by name. What is not known is null; columns carry their unit as metadata (Parquet keeps it)."""
-    stored = columns_of_results(results)
-    return {
-        "contacts": _table(_contacts(results) | _stored_columns(results, stored, ("contact",))),
-        "grains": _table(_grains(results) | _stored_columns(results, stored, ("frame", "grain"))),
-        "frames": _table(_frames(results) | _stored_columns(results, stored, ("frame",))),
-        "walls": _table(_walls(results) | _stored_columns(results, stored, ("frame", "wall"))),
-    }
+def make_tables(results: Results) -> dict[TableName, pa.Table]:
+    """The tables by name. What is not known is null; columns carry unit and meaning as metadata (Parquet keeps it)."""
+    return {name: make_table(results, name) for name in get_args(TableName)}
+
+
+def make_table(results: Results, name: TableName) -> pa.Table:
+    """One of the tables."""
+    identity, rows = {
+        "contacts": (_contacts, ("contact",)),
+        "grains": (_grains, ("frame", "grain")),
+        "frames": (_frames, ("frame",)),
+        "walls": (_walls, ("frame", "wall")),
+    }[name]
+    return _table(identity(results) | _stored_columns(results, columns_of_results(results), rows))
 
 
 def write_tables(results: Results, folder: Path, kind: Kind = "csv") -> list[Path]:
-    """Write contacts, grains, frames and walls to a folder; returns the files."""
+    """Write contacts, grains, frames and walls to a folder, and what is in them; returns the files.
+
+    columns.csv is the dictionary of all columns, datapackage.json the same as a Frictionless data package.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
-    for name, table in make_tables(results).items():
+    files, tables = [], make_tables(results)
+    for name, table in tables.items():
         file = folder / f"{name}.{kind}"
         with replacing(file) as part:
             if kind == "csv":
@@ -67,7 +84,8 @@ def write_tables(results: Results, folder: Path, kind: Kind = "csv") -> list[Pat
             else:
                 pyarrow.parquet.write_table(table, part)
         files.append(file)
-    return files
+    described = {file.name: table for file, table in zip(files, tables.values(), strict=True)}
+    return [*files, *write_description(folder, described, name=results.name, configuration=results.configuration)]
 
 
 def _contacts(results: Results) -> dict[str, Column]:
@@ -119,7 +137,7 @@ def _walls(results: Results) -> dict[str, Column]:
 
 
 def _identity(**values: object) -> dict[str, Column]:
-    return {name: Column(each, IDENTITY.get(name, "")) for name, each in values.items()}
+    return {name: Column(each, *IDENTITY[name]) for name, each in values.items()}
 
 
 def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tuple[str, ...]) -> dict[str, Column]:
@@ -138,17 +156,22 @@ def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tu
             if each.quantity.names is not None:
                 said = _names(each.quantity.names, said)
             parts = ("".join(named),) if rest == ("xy", "axis") else named  # stress_xy, but wall_force_top_x
-            columns["_".join((each.name, *parts))] = Column(said, each.quantity.unit)
+            columns["_".join((each.name, *parts))] = Column(said, each.quantity.unit, each.quantity.meaning)
     return columns
 
 
 def _table(columns: Mapping[str, Column]) -> pa.Table:
     arrays = [_array(column.values) for column in columns.values()]
     schema = [
-        pa.field(name, array.type, metadata={"unit": column.unit} if column.unit else None)
+        pa.field(name, array.type, metadata=_metadata(column))
         for (name, column), array in zip(columns.items(), arrays, strict=True)
     ]
     return pa.Table.from_arrays(arrays, schema=pa.schema(schema))
+
+
+def _metadata(column: Column) -> dict[str, str]:
+    told = {"unit": column.unit, "meaning": column.meaning}
+    return {key: text for key, text in told.items() if text}
 
 
 def _array(values: object) -> pa.Array:

@@ -1,12 +1,16 @@
-"""Results for ParaView: VTK PolyData files (.vtp, XML, ASCII), one of grains and one of contacts per frame, and a
-collection (.pvd) of each that carries the times. The single numbers of a frame are field data of both.
+"""Results for ParaView: VTK PolyData files (.vtp, XML, ASCII) of grains, contacts and walls for every frame.
 
-Format: The VTK User's Guide, "VTK File Formats", PolyData. Lengths in metres, forces in newtons, z = 0.
+packing.pvd is all of them as one animation with its times; grains.pvd and contacts.pvd are parts of it. The single
+numbers of a frame are field data of grains and contacts.
+
+Format: The VTK User's Guide, "VTK File Formats". Lengths in metres, forces in newtons, stresses in pascals, z = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -14,26 +18,36 @@ import numpy as np
 
 from solver.bodies.grains import Array
 from solver.bodies.quantity import quantities
+from solver.bodies.wall_shapes import STRAIGHT
 from solver.contacts.contacts import Contacts
 from solver.sequence.frame_forces import FrameForces
+from solver.statistics.stress import contact_force_vectors, grain_stresses
 
 from ..atomic import write_atomically
 from ..results.results import Results
 
 UNKNOWN = -1.0  # a probability that was not computed
 
+CORNERS = 96  # of the polygon that is drawn for a circle
+TOPOLOGY = ("connectivity", "offsets")  # lists, whatever their shape
+
 _TYPES = {"f": "Float64", "i": "Int64", "u": "Int64"}
 
 
 def write_polydata(results: Results, folder: Path) -> list[Path]:
-    """Write grains.pvd, contacts.pvd and the files that they name; returns the two collections."""
+    """Write packing.pvd, grains.pvd, contacts.pvd and the files that they name; returns the collections."""
     folder.mkdir(parents=True, exist_ok=True)
-    names: dict[str, list[str]] = {"grains": [], "contacts": []}
+    names: dict[str, list[str]] = {"packing": [], "grains": [], "contacts": []}
     for frame in range(len(results.frames)):
-        for kind, text in (("grains", _grains(results, frame)), ("contacts", _contacts(results, frame))):
-            name = f"{kind}_{frame:04d}.vtp"
-            write_atomically(folder / name, text.encode())
-            names[kind].append(name)
+        parts = {"grains": _grains(results, frame), "contacts": _contacts(results, frame)}
+        if results.walls.count:
+            parts["walls"] = _walls(results, frame)
+        for kind, text in parts.items():
+            write_atomically(folder / f"{kind}_{frame:04d}.vtp", text.encode())
+            names.setdefault(kind, []).append(f"{kind}_{frame:04d}.vtp")
+        write_atomically(folder / f"packing_{frame:04d}.vtm", blocks(parts, frame).encode())
+        names["packing"].append(f"packing_{frame:04d}.vtm")
+    names.pop("walls", None)
     files = []
     for kind, parts in names.items():
         write_atomically(folder / f"{kind}.pvd", _collection(parts, results.tracks.time).encode())
@@ -51,11 +65,12 @@ def _grains(results: Results, frame: int) -> str:
         "rotation": tracks.rotation[frame, here],
         "status": tracks.status[frame, here],
         "loaded_contacts": count[: tracks.grain_count][here],
+        "stress": _stresses(results, frame)[here],
         **({} if tracks.boundary is None else {"boundary": tracks.boundary[here].astype(np.int64)}),
-        **_columns(forces, "grain", here),
+        **columns(forces, "grain", here),
     }
     vertices = np.arange(len(here))[:, None]
-    return _polydata(
+    return polydata(
         tracks.position[frame, here], "Verts", vertices, point_data=data, field_data=_numbers(results, frame)
     )
 
@@ -70,11 +85,44 @@ def _contacts(results: Results, frame: int) -> str:
     points = np.concatenate([position[contacts.i], far])
     lines = np.column_stack([np.arange(contacts.count), np.arange(contacts.count) + contacts.count])
     ids = np.concatenate([results.tracks.id, -1 - np.arange(results.walls.count)])  # walls: −1, −2, …
-    data = {"i": ids[contacts.i], "j": ids[contacts.j], "gap": contacts.gap, **_columns(forces, "contact", slice(None))}
-    return _polydata(points, "Lines", lines, cell_data=data, field_data=_numbers(results, frame))
+    force = spatial(contact_force_vectors(contacts, forces.fn, forces.ft))
+    data = {
+        "i": ids[contacts.i],
+        "j": ids[contacts.j],
+        "gap": contacts.gap,
+        **({} if np.isnan(force).any() else {"force": force}),
+        **columns(forces, "contact", slice(None)),
+    }
+    return polydata(points, "Lines", lines, cell_data=data, field_data=_numbers(results, frame))
 
 
-def _columns(forces: FrameForces, dimension: str, rows: np.ndarray | slice) -> dict[str, np.ndarray]:
+def _walls(results: Results, frame: int) -> str:
+    """Lines from end to end, with what the packing exerts on them; circles as polygons."""
+    walls, ends = results.walls, results.walls.endpoints[frame]
+    turn = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    lines = [ends[w] for w in range(walls.count)]
+    for w in np.flatnonzero(walls.sides != STRAIGHT):
+        centre, radius = ends[w].mean(axis=0), 0.5 * np.linalg.norm(ends[w, 1] - ends[w, 0])
+        lines[w] = centre + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.concatenate(lines)
+    starts = np.cumsum([0, *map(len, lines)])
+    pairs = [np.column_stack([np.arange(a, b - 1), np.arange(a + 1, b)]) for a, b in pairwise(starts)]
+    owner = np.repeat(np.arange(walls.count), [len(each) for each in pairs])
+    force = results.statistics[frame].wall_force[owner]
+    data = {"wall": owner, **({} if np.isnan(force).any() else {"force": spatial(force)})}
+    return polydata(points, "Lines", np.concatenate(pairs), cell_data=data)
+
+
+def _stresses(results: Results, frame: int) -> Array:
+    """Stress of every grain (n, 9) [Pa], as a tensor in space; zero where nothing bears."""
+    forces, length = results.frames[frame], tomllib.loads(results.configuration)["material"]["length"]
+    found = np.nan_to_num(grain_stresses(forces.contacts, forces.fn, forces.ft, results.grains.radius, length))
+    spatial = np.zeros((len(found), 3, 3))
+    spatial[:, :2, :2] = found
+    return spatial.reshape(-1, 9)
+
+
+def columns(forces: FrameForces, dimension: str, rows: np.ndarray | slice) -> dict[str, np.ndarray]:
     """What the frame has a number of for every contact, or for every grain, on some rows of these."""
     found = {}
     for each in quantities(type(forces)):
@@ -103,7 +151,7 @@ def _bodies(contacts: Contacts, kept: np.ndarray) -> np.ndarray:
     return np.concatenate([contacts.i[kept], contacts.j[kept]])
 
 
-def _polydata(
+def polydata(
     points: Array,
     kind: str,
     cells: np.ndarray,
@@ -111,13 +159,14 @@ def _polydata(
     point_data: Mapping[str, np.ndarray] | None = None,
     cell_data: Mapping[str, np.ndarray] | None = None,
     field_data: Mapping[str, np.ndarray] | None = None,
+    height: float = 0.0,
 ) -> str:
     """One piece: points (p, 2) [m], cells (k, s) of point numbers as Verts or Lines, data by name.
 
-    field_data: single numbers of the whole.
+    field_data: single numbers of the whole; height [m]: z of the points.
     """
     offsets = (np.arange(len(cells)) + 1) * cells.shape[1]
-    spatial = np.column_stack([points, np.zeros(len(points))])
+    places = np.add(spatial(points), [0.0, 0.0, height])
     count = {name: len(cells) if name == kind else 0 for name in ("Verts", "Lines")}
     parts = [
         '<?xml version="1.0"?>',
@@ -126,7 +175,7 @@ def _polydata(
         *_data("FieldData", field_data),
         f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="{count["Verts"]}" NumberOfLines="{count["Lines"]}" '
         'NumberOfStrips="0" NumberOfPolys="0">',
-        "<Points>", _array("points", spatial), "</Points>",
+        "<Points>", _array("points", places), "</Points>",
         f"<{kind}>", _array("connectivity", cells), _array("offsets", offsets), f"</{kind}>",
         *_data("PointData", point_data), *_data("CellData", cell_data),
         "</Piece>", "</PolyData>", "</VTKFile>", "",
@@ -142,10 +191,22 @@ def _array(name: str, values: np.ndarray) -> str:
     """All digits of floats: they read back to the same number."""
     values = np.asarray(values)
     kind = _TYPES[values.dtype.kind]
-    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 and name == "points" else ""
+    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 and name not in TOPOLOGY else ""
     count = f' NumberOfTuples="{len(values)}"' if values.ndim == 1 else ""  # nobody else says it of field data
     text = " ".join(map(repr, values.astype(float if kind == "Float64" else int).ravel().tolist()))
     return f'<DataArray type="{kind}" Name={quoteattr(name)}{width}{count} format="ascii">{text}</DataArray>'
+
+
+def spatial(vectors: Array) -> Array:
+    """Vectors in the plane (k, 2) as vectors in space (k, 3)."""
+    return np.column_stack([vectors, np.zeros(len(vectors))])
+
+
+def blocks(parts: Iterable[str], frame: int) -> str:
+    """A file that shows several others, PART_FRAME.vtp, as one."""
+    rows = [f'<DataSet index="{k}" name="{kind}" file="{kind}_{frame:04d}.vtp"/>' for k, kind in enumerate(parts)]
+    head = '<?xml version="1.0"?>\n<VTKFile type="vtkMultiBlockDataSet" version="1.0" byte_order="LittleEndian">'
+    return "\n".join([head, "<vtkMultiBlockDataSet>", *rows, "</vtkMultiBlockDataSet>", "</VTKFile>", ""])
 
 
 def _collection(names: list[str], time: Array) -> str:

@@ -7,26 +7,39 @@ from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from .. import pipeline
-from ..exchange.tidy_tables import make_tables
+from ..exchange.tidy_tables import TableName, make_table
 from ..experiment.experiment import load_experiment
 from ..progress import Progress, silent
 from ..results.results import Results
 from ..results.store import load_results
 from ..results.summary import summarize
-from ..run_folder import RESULTS, owned
+from ..run_folder import RECORDING, RESULTS, owned
 from ..run_folder import Run as RunFolder
+from .inline import show_recording
 from .settings import as_texts
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class Run:
     """What a run found out. Made by `rodsight.run`, `rodsight.open` and `rodsight.solve`.
 
-    Tables are pandas.DataFrames in SI units, named in `.attrs["units"]`; what is not known is NaN.
+    Tables are pandas.DataFrames in SI units, named in `.attrs["units"]`; what is not known is NaN. Nothing is read
+    before it is asked for.
+
+    Example:
+        >>> import rodsight
+        >>> run = rodsight.open("runs/shear")
+        >>> contacts = run.contacts(frame=3)
+        >>> bearing = contacts[contacts["fn"] > contacts["fn"].mean()]  # the strong network
+        >>> contacts.attrs["units"]["fn"]
+        'N'
     """
 
     def __init__(self, results: Results | Path) -> None:
@@ -52,48 +65,134 @@ class Run:
         """Contacts of one frame, or of all: bodies, point [m], normal, gap [m], forces and their errors [N], state.
 
         i is a grain's id; j is a grain's id or a wall's name, as text. f_n > 0 is compression; forces are those that i
-        exerts on j.
+        exerts on j: f_n along the normal (nx, ny) from i to j, f_t along that normal turned by +90°. Raises IndexError
+        for a frame that is not there.
+
+        Example:
+            >>> run = rodsight.open("runs/shear")
+            >>> list(run.contacts(frame=3).columns[:9])
+            ['frame', 'time', 'i', 'j', 'with_wall', 'x', 'y', 'nx', 'ny']
+            >>> walls = run.contacts(frame=3).query("with_wall")
+            >>> sorted(set(walls["j"]))
+            ['bottom', 'left', 'right', 'top']
         """
         return self._table("contacts", frame)
 
     def grains(self, frame: int | None = None) -> pd.DataFrame:
-        """Grains in one frame, or in all: id, radius [m], pose [m, rad] and how well it is known."""
+        """Grains in one frame, or in all: id, radius [m], pose [m, rad] and how well it is known.
+
+        Example:
+            >>> grains = rodsight.open("runs/shear").grains(frame=3)
+            >>> grains.attrs["units"]["theta"]
+            'rad'
+            >>> bool(grains["radius"].gt(0).all())
+            True
+        """
         return self._table("grains", frame)
 
     def frames(self) -> pd.DataFrame:
-        """One row a frame: status, trust, residuals and the statistics of the packing."""
+        """One row a frame: status, trust, residuals and the statistics of the packing.
+
+        Example:
+            >>> frames = rodsight.open("runs/shear").frames()
+            >>> believed = frames[frames["status"].isin(["settled", "settling"]) & (frames["trust"] > 0.8)]
+            >>> frames["status"].iloc[0]
+            'reset'
+        """
         return self._table("frames", None)
 
     def walls(self, frame: int | None = None) -> pd.DataFrame:
-        """Walls in one frame, or in all: ends [m], pressure [Pa], and the forces [N] on them, inferred and recorded."""
+        """Walls in one frame, or in all: ends [m], pressure [Pa], and the forces [N] on them, inferred and recorded.
+
+        Example:
+            >>> walls = rodsight.open("runs/shear").walls(frame=0).set_index("wall")
+            >>> float(walls.loc["top", "pressure"])
+            50000.0
+        """
         return self._table("walls", frame)
 
     def summary(self) -> dict[str, Any]:
-        """The facts that a person reads at the end of `rodsight run`, as plain values."""
+        """The facts that a person reads at the end of `rodsight run`, as plain values.
+
+        Example:
+            >>> rodsight.open("runs/shear").summary()["resets"]
+            [0]
+        """
         return summarize(self.results, None, {})
+
+    def dataset(self) -> xarray.DataTree:
+        """Everything, as an xarray.DataTree: named dimensions, labels, units; paths as in results.h5.
+
+        `xarray.open_datatree("runs/shear/results.h5")` opens the file itself to the same. Contacts of all frames lie
+        end to end; `frame_of_contact` says whose they are.
+
+        Example:
+            >>> tree = rodsight.open("runs/shear").dataset()
+            >>> tree["tracks/position"].dims
+            ('frame', 'grain', 'xy')
+            >>> tree["statistics/wall_force"].sel(wall="top", xy="y").attrs["units"]
+            'N'
+            >>> mean = tree["forces"].to_dataset()["fn"].groupby("frame_of_contact").mean()
+            >>> mean.sizes == {"frame_of_contact": 5}
+            True
+        """
+        from ..exchange.labelled_dataset import make_dataset
+
+        return make_dataset(self.results)
+
+    def graph(self, frame: int) -> Any:
+        """Contacts of a frame as a networkx.Graph: nodes are ids of grains and names of walls, edges carry forces [N].
+
+        Needs networkx (`pip install 'rodsight[graph]'`), and says so. Raises IndexError for a frame that is not there.
+
+        Example:
+            >>> graph = rodsight.open("runs/shear").graph(frame=3)
+            >>> graph.nodes["top"]["kind"]
+            'wall'
+            >>> graph.graph["units"]["fn"]
+            'N'
+        """
+        from ..exchange.contact_graph import make_graph
+
+        return make_graph(self.results, self._checked(frame))
+
+    def view(self) -> Any:
+        """Open the recording: below the cell of a notebook, else in the viewer.
+
+        Returns what a notebook displays, None where a window was opened, or the sentence that says how to look at it.
+        Raises FileNotFoundError for a run that has no recording, such as one of `rodsight.solve`.
+        """
+        file = None if self.file is None else self.file.with_name(RECORDING)
+        if file is None or not file.is_file():
+            raise FileNotFoundError("there is no recording of this run: rodsight.run and `rodsight record` make one")
+        return show_recording(file)
 
     def __repr__(self) -> str:
         tracks = self.results.tracks
         return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames>"
 
-    @cached_property
-    def _tables(self) -> dict[str, pd.DataFrame]:
-        tables = {}
-        for name, table in make_tables(self.results).items():
-            tables[name] = table.to_pandas()
-            tables[name].attrs["units"] = {
-                each.name: each.metadata[b"unit"].decode() for each in table.schema if each.metadata
-            }
-        return tables
-
-    def _table(self, name: str, frame: int | None) -> pd.DataFrame:
-        table = self._tables[name]
-        if frame is None:
-            return table.copy()
+    def _checked(self, frame: int) -> int:
         count = self.results.tracks.frame_count
         if not 0 <= frame < count:
             raise IndexError(f"there is no frame {frame}: frames go from 0 to {count - 1}")
-        return table.loc[table["frame"] == frame, :].reset_index(drop=True)
+        return frame
+
+    @cached_property
+    def _tables(self) -> dict[str, pd.DataFrame]:
+        """Those that were asked for."""
+        return {}
+
+    def _table(self, name: TableName, frame: int | None) -> pd.DataFrame:
+        if name not in self._tables:
+            made = make_table(self.results, name)
+            self._tables[name] = made.to_pandas()
+            self._tables[name].attrs["units"] = {
+                each.name: each.metadata[b"unit"].decode() for each in made.schema if b"unit" in (each.metadata or {})
+            }
+        table = self._tables[name]
+        if frame is None:
+            return table.copy()
+        return table.loc[table["frame"] == self._checked(frame), :].reset_index(drop=True)
 
 
 def run(
@@ -110,6 +209,11 @@ def run(
     keys of experiment.toml, {"solver.kappa": 0.1}, laid over it; frames: first, and end or None. What is there already
     is not done again.
     Raises InputError for bad input, RunError where another process works in the folder or nothing can be solved.
+
+    Example:
+        >>> run = rodsight.run("my_test", out="runs/shear", settings={"solver.sweeps": 50})
+        >>> run.name
+        'my_test'
     """
     began = time.perf_counter()
     loaded = load_experiment(Path(experiment), as_texts(settings or {}))
@@ -124,7 +228,15 @@ def run(
 
 
 def open_run(path: str | PathLike[str]) -> Run:
-    """Open the results of a run: its folder, or results.h5 itself, of any version. Raises FileNotFoundError."""
+    """Open the results of a run: its folder, or results.h5 itself, of any version. Raises FileNotFoundError.
+
+    Example:
+        >>> rodsight.open("runs/shear")
+        <rodsight.Run 'my_test': 40 grains, 5 frames>
+        >>> rodsight.open("runs/nothing")
+        Traceback (most recent call last):
+        FileNotFoundError: runs/nothing: there are no results
+    """
     file = Path(path) / RESULTS if Path(path).is_dir() else Path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file}: there are no results")

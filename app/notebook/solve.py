@@ -68,6 +68,17 @@ def solve(
     others move as they were measured. precision [m]: standard deviation of a position. settings: by the keys of
     experiment.toml, {"solver.kappa": 0.1}; the defaults are those of `rodsight run`.
     Raises InputError naming column, row and value.
+
+    Example:
+        >>> import pandas as pd
+        >>> tracks = pd.read_csv("my_test/tracks.csv").merge(pd.read_csv("my_test/grains.csv"), on="id")
+        >>> walls = pd.read_csv("my_test/walls.csv")
+        >>> run = rodsight.solve(tracks, walls, {"friction": 0.25}, pressure={"top": 50e3})
+        >>> len(run.frames()) == tracks["frame"].nunique()
+        True
+        >>> rodsight.solve(tracks.drop(columns="radius"), walls)
+        Traceback (most recent call last):
+        rodsight.errors.InputError: tracks: column radius: there is no such column
     """
     texts = as_texts({f"material.{key}": value for key, value in (material or {}).items()} | dict(settings or {}))
     sections = load_sections(texts)

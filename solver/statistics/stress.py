@@ -97,6 +97,19 @@ def love_weber_stress(contacts: Contacts, fn: Array, ft: Array, position: Array,
     return np.einsum("ca,cb->ab", force, branch) / (area * length)
 
 
+def grain_stresses(contacts: Contacts, fn: Array, ft: Array, radius: Array, length: float) -> Array:
+    """σ = Σ f ⊗ R n / V of every grain (n, 2, 2) [Pa] over its own volume, compression positive.
+
+    radius (n,) and length [m] of the rods. Weighted with their volumes they add up to the stress of the packing.
+    """
+    dyad = contact_force_vectors(contacts, fn, ft)[:, :, None] * contacts.normal[:, None, :]
+    total = np.zeros((len(radius), 2, 2))
+    np.add.at(total, contacts.i, radius[contacts.i, None, None] * dyad)
+    pair = ~contacts.with_wall
+    np.add.at(total, contacts.j[pair], radius[contacts.j[pair], None, None] * dyad[pair])  # force and arm both reversed
+    return total / (np.pi * radius**2 * length)[:, None, None]
+
+
 def principal_stresses(stress: Array) -> tuple[float, float, float]:
     """σ₁ ≥ σ₂ [Pa] and the direction of σ₁ [rad] in (−π/2, π/2], of the symmetric part."""
     symmetric = 0.5 * (stress + stress.T)

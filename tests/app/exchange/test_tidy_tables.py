@@ -37,7 +37,7 @@ def test_walls_have_their_names_and_columns_their_units(results):
     table = make_tables(results)["contacts"]
     wall = np.array(table.column("with_wall"))
     assert set(np.array(table.column("j"))[wall]) <= set(results.walls.name)
-    assert table.schema.field("fn").metadata == {b"unit": b"N"}
+    assert table.schema.field("fn").metadata == {b"unit": b"N", b"meaning": b"normal force, compression positive"}
     frames = make_tables(results)["frames"]
     force = np.array(frames.column("wall_force_top_y"))
     top = results.walls.name.index("top")
@@ -66,7 +66,7 @@ def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
         with pytest.raises(SystemExit) as end:
             main(arguments)
         assert not end.value.code
-    names = {"contacts.csv", "grains.csv", "frames.csv", "walls.csv"}
+    names = {"contacts.csv", "grains.csv", "frames.csv", "walls.csv", "columns.csv", "datapackage.json"}
     assert {file.name for file in (out / "tables").iterdir()} == names
     assert (out / "vtk" / "contacts.pvd").is_file()
     with pytest.raises(SystemExit) as end:

@@ -4,6 +4,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
+import pytest
 from rodsight.exchange.vtk_polydata import write_polydata
 
 
@@ -52,3 +53,22 @@ def test_the_collections_carry_the_times_and_name_files_that_are_there(results, 
         rows = ET.parse(collection).getroot().findall("Collection/DataSet")
         assert [float(row.get("timestep", "nan")) for row in rows] == results.tracks.time.tolist()
         assert all((tmp_path / str(row.get("file"))).is_file() for row in rows)
+
+
+def test_one_animation_shows_grains_contacts_and_walls(results, tmp_path):
+    """As ParaView reads it: pyvista is the same reader."""
+    pyvista = pytest.importorskip("pyvista", reason="pyvista, ParaView's reader, is not installed")
+    write_polydata(results, tmp_path)
+    reader = pyvista.get_reader(tmp_path / "packing.pvd")
+    assert reader.time_values == results.tracks.time.tolist()
+    reader.set_active_time_value(reader.time_values[3])
+    (blocks,) = reader.read()
+    forces = results.frames[3]
+    assert blocks.keys() == ["grains", "contacts", "walls"]
+    assert blocks["grains"].n_points == results.grains.count
+    assert blocks["contacts"].n_lines == forces.contacts.count
+    assert np.array_equal(blocks["contacts"]["fn"], forces.fn)
+    vectors = np.einsum("ck,ck->c", blocks["contacts"]["force"][:, :2], forces.contacts.normal)
+    np.testing.assert_allclose(vectors, forces.fn, atol=1e-9)
+    assert blocks["grains"]["stress"].shape == (results.grains.count, 9)
+    assert blocks["walls"].n_lines == results.walls.count

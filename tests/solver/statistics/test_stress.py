@@ -7,6 +7,7 @@ from solver.contacts.contacts import detect_contacts
 from solver.statistics.fabric import contact_fabric, fabric_anisotropy
 from solver.statistics.stress import (
     friction_angle,
+    grain_stresses,
     love_weber_stress,
     packing_area,
     principal_stresses,
@@ -38,6 +39,16 @@ def test_love_weber_stress_is_the_pressure_on_the_walls():
     major, minor, direction = principal_stresses(stress)
     assert (major, minor) == pytest.approx((5e4, 2e4))
     assert abs(direction) == pytest.approx(np.pi / 2)
+
+
+def test_stresses_of_grains_are_their_shares_of_the_stress():
+    contacts, fn, position, _ = square_of_four(2e4, 5e4)
+    radius, share = np.full(4, 0.01), 4.0 / np.pi  # a square over the circle in it
+    alike = grain_stresses(contacts, fn, np.zeros_like(fn), radius, LENGTH)
+    assert alike == pytest.approx(share * np.tile(np.diag([2e4, 5e4]), (4, 1, 1)), rel=EXACT, abs=1e-8)
+    ft = np.where(contacts.with_wall, 0.0, np.linspace(-0.2, 0.2, contacts.count) * fn)
+    whole = love_weber_stress(contacts, fn, ft, position, 0.04**2, LENGTH)
+    assert np.mean(grain_stresses(contacts, fn, ft, radius, LENGTH), axis=0) == pytest.approx(share * whole, abs=1e-8)
 
 
 def test_the_wall_ratio_is_taken_on_the_loaded_plate():
