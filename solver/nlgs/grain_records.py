@@ -32,6 +32,14 @@ def gather_records(body, ids, first, rows, at, stride):  # type: ignore[no-untyp
             rows[at + q * stride + k] = body[RECORD * ids[first + k] + q]
 
 
+def gather_differences(body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
+    """Copy to rows[at + q * stride] what grains ids[second :] have more than ids[first :]: vx, vy; of ω R both."""
+    for k in range(WIDTH):
+        for q in range(RECORD - 1):
+            a, b = body[RECORD * ids[first + k] + q], body[RECORD * ids[second + k] + q]
+            rows[at + q * stride + k] = b + a if q == 2 else b - a
+
+
 def scatter_records(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
     """Copy rows[at + q * stride] to the records of the grains ids[first : first + WIDTH], no two of them the same."""
     for k in range(WIDTH):
@@ -43,6 +51,14 @@ def scatter_records(rows, at, stride, body, ids, first):  # type: ignore[no-unty
 def _compiled_gather(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
     def gather(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
         _gather(body, ids, first, rows, at, stride)  # pyright: ignore[reportCallIssue]
+
+    return gather
+
+
+@overload(gather_differences, inline="always")
+def _compiled_differences(body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
+    def gather(body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
+        _differences(body, ids, first, second, rows, at, stride)  # pyright: ignore[reportCallIssue]
 
     return gather
 
@@ -67,6 +83,26 @@ def _gather(typing, body, ids, first, rows, at, stride):  # type: ignore[no-unty
         return context.get_dummy_value()
 
     return types.void(body, ids, first, rows, at, stride), generate
+
+
+@intrinsic
+def _differences(typing, body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        body, ids, first, second, rows, at, stride = _pointers(context, builder, signature, values)
+        both = zip(_records(builder, body, ids, first), _records(builder, body, ids, second), strict=True)
+        records = []
+        for one, other in both:
+            a, b = _load(builder, one, RECORD), _load(builder, other, RECORD)
+            more, sum_ = builder.fsub(b, a), builder.fadd(b, a)
+            records.append(_shuffle(builder, more, sum_, [0, 1, RECORD + 2, 3]))
+        pairs = [_shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+        for row, place in zip(
+            _transposed(builder, pairs)[: RECORD - 1], _rows(builder, rows, at, stride), strict=False
+        ):
+            _store(builder, row, place)
+        return context.get_dummy_value()
+
+    return types.void(body, ids, first, second, rows, at, stride), generate
 
 
 @intrinsic

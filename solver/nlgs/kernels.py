@@ -16,11 +16,12 @@ import numpy as np
 from numba import njit
 
 from solver.nlgs.contact_law import project_on_cone, relax_contact
-from solver.nlgs.grain_records import WIDTH, gather_records, scatter_records
+from solver.nlgs.grain_records import WIDTH, gather_differences, gather_records, scatter_records
 from solver.nlgs.ordering import GROUP as L
 
 THIRD = 1.0 / 3.0  # W_nn over W_tt between two solid rods
-PAIR, IDS = 5 * L, 2 * L  # numbers in a block
+IDS = 2 * L  # numbers in a block
+ROWS, CELL_ROWS = 4, 5  # of numbers on pairs; the fifth, which every sweep would wait for, is there in a cell alone
 U = np.uint64
 U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 
@@ -73,11 +74,18 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
     flat, flat_force = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
     work = workspace(8 * L)
+    in_cell = problem.pair.shape[1] == CELL_ROWS
     for _ in range(sweeps):
-        for block in range(problem.grouped // L):
-            _relax_group(pair, ids, flat, flat_force, work, block, relaxation, mu)
-        for c in range(problem.grouped, first):
-            _relax_pair(pair, ids, flat, flat_force, c, relaxation, mu)
+        if in_cell:
+            for block in range(problem.grouped // L):
+                _relax_group(pair, ids, flat, flat_force, work, block, CELL_ROWS, relaxation, mu)
+            for c in range(problem.grouped, first):
+                _relax_pair(pair, ids, flat, flat_force, c, CELL_ROWS, relaxation, mu)
+        else:
+            for block in range(problem.grouped // L):
+                _relax_group(pair, ids, flat, flat_force, work, block, ROWS, relaxation, mu)
+            for c in range(problem.grouped, first):
+                _relax_pair(pair, ids, flat, flat_force, c, ROWS, relaxation, mu)
         for c in range(len(problem.wall)):
             _relax_wall(problem.wall, problem.wall_body, flat, plate, flat_force, first + c, c, relaxation, wall_mu)
 
@@ -91,8 +99,8 @@ def workspace(size):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _relax_group(pair, ids, body, force, work, block, relaxation, mu):  # type: ignore[no-untyped-def]
-    p, e, f = block * PAIR, block * IDS, block * IDS
+def _relax_group(pair, ids, body, force, work, block, rows, relaxation, mu):  # type: ignore[no-untyped-def]
+    p, e, f = block * rows * L, block * IDS, block * IDS
     for k in range(0, L, WIDTH):
         gather_records(body, ids, e + k, work, k, L)
         gather_records(body, ids, e + L + k, work, 4 * L + k, L)
@@ -102,7 +110,9 @@ def _relax_group(pair, ids, body, force, work, block, relaxation, mu):  # type: 
         bx, by, bw, cj = work[4 * L + k], work[5 * L + k], work[6 * L + k], work[7 * L + k]
         dx, dy = bx - ax, by - ay
         un = dx * nx + dy * ny + pair[p + 3 * L + k]
-        ut = dy * nx - dx * ny - aw - bw + pair[p + 4 * L + k]
+        ut = dy * nx - dx * ny - aw - bw
+        if rows == CELL_ROWS:
+            ut += pair[p + 4 * L + k]
         fn, ft = force[f + 2 * k], force[f + 2 * k + 1]
         new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
         force[f + 2 * k] = new_n
@@ -121,14 +131,16 @@ def _relax_group(pair, ids, body, force, work, block, relaxation, mu):  # type: 
 
 
 @njit(inline="always")
-def _relax_pair(pair, ids, body, force, c, relaxation, mu):  # type: ignore[no-untyped-def]
+def _relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
     k = c % L
-    p, e = (c // L) * PAIR + k, (c // L) * IDS + k
+    p, e = (c // L) * rows * L + k, (c // L) * IDS + k
     i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
     nx, ny, wn, ci, cj = pair[p], pair[p + L], relaxation * pair[p + 2 * L], body[i + U3], body[j + U3]
     dx, dy = body[j] - body[i], body[j + U1] - body[i + U1]
     un = dx * nx + dy * ny + pair[p + 3 * L]
-    ut = dy * nx - dx * ny - body[i + U2] - body[j + U2] + pair[p + 4 * L]
+    ut = dy * nx - dx * ny - body[i + U2] - body[j + U2]
+    if rows == CELL_ROWS:
+        ut += pair[p + 4 * L]
     fn, ft = force[2 * c], force[2 * c + 1]
     new_n, new_t = relax_contact(fn, ft, un, ut, wn, THIRD * wn, mu)
     force[2 * c] = new_n
@@ -165,21 +177,58 @@ def advance_and_measure(problem, body, plate, force, before, relaxation, done, s
     sweeps 1, 2, 4, … up to a `spacing` and its multiples; the last one alone if it is 0. before: room for the forces.
     """
     residuals[:] = np.nan
+    rest = np.empty_like(body)
+    find_rest(problem, rest)
     row = 0
     while row < len(residuals):
         step = len(residuals) - row
         if spacing > 0:
             number = done + row
             step = min(step, max(number, 1), spacing - number % spacing)
-        advance(problem, body, plate, force, step - 1, relaxation)
+        if step > 1:
+            advance(problem, body, plate, force, step - 1, relaxation)
         before.reshape(before.size)[:] = force.reshape(force.size)  # flat: copied at once
         advance(problem, body, plate, force, 1, relaxation)
         row += step
         change, norm, mean = measure_forces(force, before)
-        worst, _ = measure_unbalance(problem, body)
         residuals[row - 1, 0] = change
         residuals[row - 1, 1] = measure_natural_map(problem, body, plate, force, norm)
-        residuals[row - 1, 2] = worst / mean if mean > 0.0 else 0.0
+        residuals[row - 1, 2] = worst_unbalance(rest, body) / mean if mean > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def find_rest(problem, rest):  # type: ignore[no-untyped-def]
+    """The velocities (n, 4) at which grains are in balance, vx, vy [m/s], and their impedance [N s/m], 0 where nothing moves it."""
+    for k in range(len(rest)):
+        compliance = problem.body[k, 3]
+        rest[k, 0] = problem.body[k, 0] - problem.external[k, 0] * compliance
+        rest[k, 1] = problem.body[k, 1] - problem.external[k, 1] * compliance
+        rest[k, 2] = 0.0
+        rest[k, 3] = 1.0 / compliance if compliance > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def worst_unbalance(rest, body):  # type: ignore[no-untyped-def]
+    """Worst |ΣF| [N] on a grain."""
+    now, still, count = body.reshape(body.size), rest.reshape(rest.size), len(body)
+    work = workspace(L)
+    work[:] = 0.0
+    for block in range(count // L):
+        first = block * (4 * L)
+        for k in range(L):
+            row = first + 4 * k
+            x, y, impedance = now[row] - still[row], now[row + 1] - still[row + 1], still[row + 3]
+            size = (x * x + y * y) * (impedance * impedance)
+            greatest = work[k]
+            work[k] = size if size > greatest else greatest
+    worst = 0.0
+    for k in range(count // L * L, count):
+        row = 4 * k
+        x, y, impedance = now[row] - still[row], now[row + 1] - still[row + 1], still[row + 3]
+        worst = max(worst, (x * x + y * y) * (impedance * impedance))
+    for k in range(L):
+        worst = max(worst, work[k])
+    return np.sqrt(worst)
 
 
 @njit(cache=True, error_model="numpy")
@@ -236,30 +285,21 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
     flat, f = body.reshape(body.size), force.reshape(force.size)
     first = len(force) - len(problem.wall)
-    work = workspace(9 * L)  # the grains' records, and the sum of squares per lane
-    work[8 * L :] = 0.0
-    for block in range(problem.grouped // L):
-        p, e = block * PAIR, block * IDS
-        for k in range(0, L, WIDTH):
-            gather_records(flat, ids, e + k, work, k, L)
-            gather_records(flat, ids, e + L + k, work, 4 * L + k, L)
-        for k in range(L):
-            nx, ny, wn = pair[p + k], pair[p + L + k], pair[p + 2 * L + k]
-            dx, dy = work[4 * L + k] - work[k], work[5 * L + k] - work[L + k]
-            un = dx * nx + dy * ny + pair[p + 3 * L + k]
-            ut = dy * nx - dx * ny - work[2 * L + k] - work[6 * L + k] + pair[p + 4 * L + k]
-            work[8 * L + k] += _miss(f[e + 2 * k], f[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
+    work = workspace(4 * L)  # differences of the grains' records, and the sum of squares per lane
+    work[3 * L :] = 0.0
     total = 0.0
+    if problem.pair.shape[1] == CELL_ROWS:
+        for block in range(problem.grouped // L):
+            _miss_group(pair, ids, flat, f, work, block, CELL_ROWS, mu)
+        for c in range(problem.grouped, first):
+            total += _miss_pair(pair, ids, flat, f, c, CELL_ROWS, mu)
+    else:
+        for block in range(problem.grouped // L):
+            _miss_group(pair, ids, flat, f, work, block, ROWS, mu)
+        for c in range(problem.grouped, first):
+            total += _miss_pair(pair, ids, flat, f, c, ROWS, mu)
     for k in range(L):
-        total += work[8 * L + k]
-    for c in range(problem.grouped, first):
-        p, e = (c // L) * PAIR + c % L, (c // L) * IDS + c % L
-        i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
-        nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
-        dx, dy = flat[j] - flat[i], flat[j + U1] - flat[i + U1]
-        un = dx * nx + dy * ny + pair[p + 3 * L]
-        ut = dy * nx - dx * ny - flat[i + U2] - flat[j + U2] + pair[p + 4 * L]
-        total += _miss(f[2 * c], f[2 * c + 1], un, ut, wn, THIRD * wn, mu)
+        total += work[3 * L + k]
     for c in range(len(problem.wall)):
         i, w, row = U4 * U(problem.wall_body[c, 0]), U(problem.wall_body[c, 1]), 2 * (first + c)
         nx, ny = problem.wall[c, 0], problem.wall[c, 1]
@@ -269,6 +309,34 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     if norm == 0.0:
         return 0.0 if total == 0.0 else np.inf
     return np.sqrt(total) / norm
+
+
+@njit(inline="always")
+def _miss_group(pair, ids, body, force, work, block, rows, mu):  # type: ignore[no-untyped-def]
+    """Add a group's squares to those of its lanes."""
+    p, e = block * rows * L, block * IDS
+    for k in range(0, L, WIDTH):
+        gather_differences(body, ids, e + k, e + L + k, work, k, L)
+    for k in range(L):
+        nx, ny, wn, dx, dy = pair[p + k], pair[p + L + k], pair[p + 2 * L + k], work[k], work[L + k]
+        un = dx * nx + dy * ny + pair[p + 3 * L + k]
+        ut = dy * nx - dx * ny - work[2 * L + k]
+        if rows == CELL_ROWS:
+            ut += pair[p + 4 * L + k]
+        work[3 * L + k] += _miss(force[e + 2 * k], force[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
+
+
+@njit(inline="always")
+def _miss_pair(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-def]
+    p, e = (c // L) * rows * L + c % L, (c // L) * IDS + c % L
+    i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
+    nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
+    dx, dy = body[j] - body[i], body[j + U1] - body[i + U1]
+    un = dx * nx + dy * ny + pair[p + 3 * L]
+    ut = dy * nx - dx * ny - (body[i + U2] + body[j + U2])
+    if rows == CELL_ROWS:
+        ut += pair[p + 4 * L]
+    return _miss(force[2 * c], force[2 * c + 1], un, ut, wn, THIRD * wn, mu)
 
 
 @njit(inline="always")

@@ -36,8 +36,9 @@ class ContactProblem(NamedTuple):
     body: Float[Array, "n 4"]  # free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Float[Array, "w 2"]  # free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
     pair_body: Int32[NDArray[np.int32], "blocks 2 L"]  # grains i, j
-    # nx, ny, 1/W_nn, and what is added to u_n, u_t [m/s]: gap to close, motion of the cell between both
-    pair: Float[Array, "blocks 5 L"]
+    # nx, ny, 1/W_nn, and what is added to u_n [m/s]: gap to close and motion of the cell between both; to u_t: where
+    # there is a cell
+    pair: Float[Array, "blocks rows L"]
     grouped: int  # a multiple of L, at most p
     wall_body: Int32[NDArray[np.int32], "q 2"]  # grain, wall
     # nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
@@ -111,15 +112,11 @@ def assemble(
     closing = np.zeros(contacts.count) if closing is None else closing
 
     pair_w = compliance[i[rows_pair]] + compliance[j[rows_pair]]
-    drift = np.zeros((len(rows_pair), 2))
+    pair = [contacts.normal[rows_pair], _inverse(pair_w), closing[rows_pair]]
     if walls.cell is not None and contacts.shift is not None:
         drift = walls.cell.drift(contacts.shift[rows_pair])
-    pair = np.column_stack([
-        contacts.normal[rows_pair],
-        _inverse(pair_w),
-        closing[rows_pair] + np.einsum("ij,ij->i", drift, contacts.normal[rows_pair]),
-        np.einsum("ij,ij->i", drift, contacts.tangent[rows_pair]),
-    ])  # fmt: skip
+        pair[-1] = pair[-1] + np.einsum("ij,ij->i", drift, contacts.normal[rows_pair])
+        pair.append(np.einsum("ij,ij->i", drift, contacts.tangent[rows_pair]))
 
     wall_body = np.stack([i[rows_wall], j[rows_wall] - n], axis=1)
     wall_w = compliance[wall_body[:, 0]]
@@ -136,7 +133,7 @@ def assemble(
         body,
         plate,
         _blocks(np.stack([i[rows_pair], j[rows_pair]], axis=1)),
-        _blocks(pair),
+        _blocks(np.column_stack(pair)),
         grouped,
         wall_body,
         wall,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from solver.nlgs.grain_records import RECORD, WIDTH, gather_records, scatter_records
+from solver.nlgs.grain_records import RECORD, WIDTH, gather_differences, gather_records, scatter_records
 
 GRAINS, STRIDE = 40, 16
 
@@ -12,6 +12,11 @@ GRAINS, STRIDE = 40, 16
 @njit
 def gather(body, ids, first, rows, at):
     gather_records(body, ids, first, rows, at, STRIDE)
+
+
+@njit
+def subtract(body, ids, first, second, rows, at):
+    gather_differences(body, ids, first, second, rows, at, STRIDE)
 
 
 @njit
@@ -49,3 +54,14 @@ def test_rows_go_back_to_records_and_nowhere_else(body, ids, first, at):
     assert np.array_equal(found, expected)
     changed = np.flatnonzero((found != body).reshape(GRAINS, RECORD).any(axis=1))
     assert np.array_equal(changed, np.sort(ids[first : first + WIDTH]))
+
+
+@pytest.mark.parametrize(("first", "second", "at"), [(0, 8, 0), (5, 20, 8), (GRAINS - WIDTH, 1, 3)])
+def test_differences_of_records_come_in_rows(body, ids, first, second, at):
+    found, expected = np.zeros(RECORD * STRIDE + at), np.zeros(RECORD * STRIDE + at)
+    subtract(body, ids, first, second, found, at)
+    gather_differences(body, ids, first, second, expected, at, STRIDE)
+    assert np.array_equal(found, expected)
+    one, other = (body.reshape(GRAINS, RECORD)[ids[k : k + WIDTH]] for k in (first, second))
+    rows = np.stack([found[at + q * STRIDE :][:WIDTH] for q in range(3)])
+    assert np.array_equal(rows, [other[:, 0] - one[:, 0], other[:, 1] - one[:, 1], other[:, 2] + one[:, 2]])
