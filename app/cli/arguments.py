@@ -9,7 +9,11 @@ import tyro
 
 from ..errors import InputError
 
-ExperimentPath = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT")]
+ExperimentPath = Annotated[
+    Path,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="EXPERIMENT", help="folder of the experiment, or its experiment.toml"),
+]
 Out = Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="folder of the results; default runs/<name>")]
 Settings = Annotated[
     tuple[str, ...],
@@ -35,7 +39,7 @@ Ensemble = Annotated[
     tyro.conf.arg(metavar="K", help="error bars from K sequences solved again with resampled inputs; 8 are enough"),
 ]
 MaxSize = Annotated[
-    float | None, tyro.conf.arg(metavar="MB", help="of the recording: fewer sweeps where it would be larger")
+    float | None, tyro.conf.arg(metavar="MB", help="of the recording [MB]: fewer sweeps where it would be larger")
 ]
 FullFrames = Annotated[
     tuple[int, ...],

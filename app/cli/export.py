@@ -34,19 +34,29 @@ class Drawing:
 
 
 def export(
-    what: Annotated[Literal["pictures", "video", "tables", "vtk", "ovito", "graph", "dic"], tyro.conf.Positional],
+    what: Annotated[
+        Literal["pictures", "video", "tables", "vtk", "ovito", "graph", "dic"],
+        tyro.conf.Positional,
+        tyro.conf.arg(help="to write"),
+    ],
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
     /,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help="default: beside the results")] = None,
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="PATH", help="folder, or file of a video; default: beside the results")
+    ] = None,
     kind: Annotated[Literal["csv", "parquet"], tyro.conf.arg(help="of tables")] = "csv",
     frames: Annotated[str | None, tyro.conf.arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
-    timeline: Annotated[Literal["frame", "sweep"], tyro.conf.arg(help="pictures, video")] = "frame",
+    timeline: Annotated[
+        Literal["frame", "sweep"], tyro.conf.arg(help="pictures, video: what goes on from one to the next")
+    ] = "frame",
     step: Annotated[int, tyro.conf.arg(help="pictures, video: every so many values")] = 1,
     tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show")] = None,
     view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
-    size: Annotated[str, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window")] = "1600x1000",
-    rate: Annotated[float, tyro.conf.arg(help="video: pictures a second")] = 6.0,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="dic: [m]; default: the experiment's")] = None,
+    size: Annotated[str, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window [px]")] = "1600x1000",
+    rate: Annotated[float, tyro.conf.arg(help="video: pictures a second [1/s]")] = 6.0,
+    pixel_size: Annotated[
+        float | None, tyro.conf.arg(help="dic: side of a pixel [m]; default: the experiment's")
+    ] = None,
     quiet: Quiet = False,
 ) -> int:
     """Write pictures, a video, tidy tables, files for ParaView (vtk) and OVITO, graphs (GraphML) or tracker files.
@@ -93,7 +103,11 @@ def export(
 
 
 def share(
-    source: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING_OR_DIR")] = None,
+    source: Annotated[
+        Path | None,
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, or a run's folder"),
+    ] = None,
     /,
     frames: Frames = None,
     scale: Annotated[float, tyro.conf.arg(help="of photographs, 0.5: half as wide and high")] = 1.0,

@@ -33,7 +33,11 @@ COLUMNS = (
 
 
 def view(
-    recording: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING_OR_DIR")],
+    recording: Annotated[
+        Path,
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or a folder of runs"),
+    ],
     /,
     web: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="in a browser")] = False,
     only_list: Annotated[
@@ -57,11 +61,13 @@ def view(
 
 
 def review(
-    experiment: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT_OR_DIR")],
+    experiment: Annotated[
+        Path, tyro.conf.Positional, tyro.conf.arg(metavar="EXPERIMENT_OR_DIR", help="an experiment, or a run's folder")
+    ],
     /,
-    port: Annotated[int, tyro.conf.arg(help="on 127.0.0.1; 0 takes a free one")] = 0,
+    port: Annotated[int, tyro.conf.arg(help="of the page on 127.0.0.1; 0 takes a free one")] = 0,
     browser: Annotated[bool, tyro.conf.arg(help="open the page")] = True,
-    reviewer: Annotated[str | None, tyro.conf.arg(metavar="NAME", help="default: the user's name")] = None,
+    reviewer: Annotated[str | None, tyro.conf.arg(metavar="NAME", help="who judges; default: the user's name")] = None,
     import_csv: Annotated[
         Path | None, tyro.conf.arg(metavar="FILE", help="add verdicts of a table frame,i,j[,verdict], and end")
     ] = None,
@@ -88,7 +94,9 @@ def review(
 
 
 def score(
-    results: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS")],
+    results: Annotated[
+        Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder, or results.h5")
+    ],
     /,
     truth: Annotated[
         Path | None, tyro.conf.arg(metavar="FILE", help="table frame,i,j,fn,ft; default: the experiment's")
@@ -152,14 +160,14 @@ def score(
 
 def compare(
     first: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="A", help="folder of a run, or results.h5")],
-    second: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="B")] = None,
+    second: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="B", help="the other run")] = None,
     /,
     truth: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="compare A with its truth")] = False,
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="the recording; default compare-A-B.rrd")] = None,
 ) -> int:
     """Show two results side by side with their difference.
 
-    Example: rodsight compare runs/shear runs/shear-nlgs --out compare.rrd
+    Example: rodsight compare runs/shear runs/stiffer --out compare.rrd
     """
     from ..recording.comparison_layer import record_comparison
     from ..results.comparison import DifferentPackingError, compare_runs

@@ -8,13 +8,12 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable
 from contextlib import suppress
 
 from ..errors import InputError, RunError
 from ..signals import Stopped, stopping
 
-Command = Callable[..., int]
+SHELLS = ("bash", "zsh", "tcsh")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -51,29 +50,16 @@ def _run(arguments: list[str]) -> int:
     if arguments == ["--version"]:
         print(f"rodsight {__version__}")
         return 0
-    import tyro
+    from .command_list import command_line, overview
 
-    app = tyro.extras.SubcommandApp()
-    for command in _commands():
-        app.command(name=command.__name__.rstrip("_"))(command)
-    return app.cli(prog="rodsight", description=__doc__, args=arguments)
-
-
-def _commands() -> tuple[Command, ...]:
-    """All commands, in the order of the help."""
-    from .export import export, share
-    from .look import compare, review, score, view
-    from .make import synth
-    from .run import check, record, run, solve, track
-    from .settings import settings
-    from .study import sensitivity, study
-    from .take_in import import_
-    from .workbench import init, open_
-
-    return (
-        run, check, track, solve, record, view, review, score, synth, sensitivity, study, share, compare, export,
-        import_, settings, open_, init,
-    )  # fmt: skip
+    if arguments in ([], ["-h"], ["--help"], ["help"]):
+        print(overview())
+        return 0
+    if arguments[0] == "--completion":
+        if len(arguments) != 2 or arguments[1] not in SHELLS:
+            raise InputError("--completion", " ".join(arguments[1:]), f"is not one of {', '.join(SHELLS)}")
+        arguments = ["--tyro-print-completion", arguments[1]]
+    return command_line().cli(prog="rodsight", description="Contact forces from photographs.", args=arguments)
 
 
 def _tell(sentence: str, status: int) -> int:

@@ -27,18 +27,22 @@ def synth(
             "rodsight import pegs; the others are worlds of tracks: --no-photographs"
         ),
     ] = "small",
-    seed: int = 0,
+    seed: Annotated[int, tyro.conf.arg(help="of the packing, its paint and its noise")] = 0,
     photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
     noise: Annotated[
         float | None, tyro.conf.arg(help="of a tracked position [m], with --no-photographs; default 0, or the world's")
     ] = None,
     depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
-    jpeg_quality: Annotated[int | None, tyro.conf.arg(help="of 8-bit photographs; default: the preset's")] = None,
+    jpeg_quality: Annotated[
+        int | None, tyro.conf.arg(help="of 8-bit photographs, 1 to 100; default: the preset's")
+    ] = None,
     png: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write PNG, not JPEG")] = False,
-    grains: Annotated[int | None, tyro.conf.arg(help="number of rods")] = None,
-    frame_count: Annotated[int | None, tyro.conf.arg(name="frames", help="number of photographs")] = None,
-    step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs")] = None,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="[m]")] = None,
+    grains: Annotated[int | None, tyro.conf.arg(help="number of rods; default: the preset's")] = None,
+    frame_count: Annotated[
+        int | None, tyro.conf.arg(name="frames", help="number of photographs; default: the preset's")
+    ] = None,
+    step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs [°]")] = None,
+    pixel_size: Annotated[float | None, tyro.conf.arg(help="side of a pixel [m]")] = None,
     reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="turn back half way")] = False,
     quiet: Quiet = False,
 ) -> int:

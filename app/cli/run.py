@@ -62,7 +62,9 @@ def run(
     experiment: ExperimentPath,
     /,
     out: Out = None,
-    view: Literal["none", "native", "web"] = "none",
+    view: Annotated[
+        Literal["none", "native", "web"], tyro.conf.arg(help="watch while it is solved: in a window, in a browser")
+    ] = "none",
     sweeps: Sweeps = None,
     max_size: MaxSize = None,
     full_frames: FullFrames = (),
@@ -76,7 +78,8 @@ def run(
         tyro.conf.arg(help="wait for further photographs and solve them as they come, then run as ever"),
     ] = False,
     idle: Annotated[
-        float | None, tyro.conf.arg(metavar="SECONDS", help="with --follow: without a photograph for so long it ends")
+        float | None,
+        tyro.conf.arg(metavar="SECONDS", help="end when no photograph has come for so long [s]; with --follow"),
     ] = None,
     quiet: Quiet = False,
 ) -> int:

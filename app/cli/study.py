@@ -97,7 +97,9 @@ def study(
     /,
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(help="of the simulated packings")] = (0, 1, 2),
     grains: Annotated[int | None, tyro.conf.arg(help="rods of a packing; default 1172, of worlds 450")] = None,
-    estimator: Literal["ensemble", "nlgs"] = "ensemble",
+    estimator: Annotated[
+        Literal["ensemble", "nlgs"], tyro.conf.arg(help="mean of seven solutions, or one chain")
+    ] = "ensemble",
     ensemble: Annotated[int, tyro.conf.arg(metavar="K", help="uncertainty: sequences solved again")] = 8,
     worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
@@ -121,7 +123,7 @@ def study(
 
     Photoelastic forces: rodsight import pegs, rodsight run, then rodsight study real runs/my_test --page real.html
 
-    Example: rodsight study paper --seeds 0 1 --grains 400
+    Example: rodsight study worlds --worlds shear --seeds 1 --grains 150
     """
     if subject == "real":
         return _study_real(folder, page, frame, as_json=as_json)

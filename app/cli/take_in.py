@@ -31,8 +31,12 @@ def import_(
             "yade: simulations; pegs: photoelastic discs with their forces; dic: dic_out_N.txt or CONFNNNN"
         ),
     ],
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE", help="or folder, as the form is")],
-    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="to make")],
+    source: Annotated[
+        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE", help="to read, or the folder, as the form is")
+    ],
+    out: Annotated[
+        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the experiment, which is made")
+    ],
     /,
     columns: Annotated[
         str | None,
@@ -41,14 +45,14 @@ def import_(
             help="names of the columns, or their numbers from 1; also diameter=…, time=…; laid over the form's own",
         ),
     ] = None,
-    pixel_size: Annotated[float | None, tyro.conf.arg(help="[m] of the file's unit of length; default: metres")] = None,
+    pixel_size: Annotated[float | None, tyro.conf.arg(help="the file's unit of length [m]; default: metres")] = None,
     y_down: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="y counts down, as in pictures")] = False,
     height: Annotated[
         float | None, tyro.conf.arg(help="of a photograph [px], from whose last row y counts up; default: highest y")
     ] = None,
     degrees: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="theta is in degrees")] = False,
     radius: Annotated[float | None, tyro.conf.arg(help="of all grains that have none, in the file's unit")] = None,
-    interval: Annotated[float, tyro.conf.arg(help="[s] between photographs, or of a step")] = 1.0,
+    interval: Annotated[float, tyro.conf.arg(help="between photographs, or of a step [s]")] = 1.0,
     precision: Annotated[float | None, tyro.conf.arg(help="of a position, in the file's unit")] = None,
     walls: Annotated[
         str | None,
@@ -59,7 +63,7 @@ def import_(
         ),
     ] = None,
     pressure: Annotated[
-        tuple[str, ...], tyro.conf.arg(metavar="WALL=PA", help="what presses on walls, such as top=50e3")
+        tuple[str, ...], tyro.conf.arg(metavar="WALL=PA", help="what presses on walls [Pa], such as top=50e3")
     ] = (),
     quiet: Quiet = False,
 ) -> int:
@@ -70,7 +74,10 @@ def import_(
     A tracker's table in pixels: rodsight import table spots.csv my_test --columns frame=t,id=rod,x=x,y=y,radius=r
     --pixel-size 1.2e-4 --y-down --walls box --pressure top=50e3
 
-    Example: rodsight import pegs solved/ my_test --pixel-size 1e-4
+    Photoelastic discs: rodsight import pegs solved/ my_test --pixel-size 1e-4
+
+    Example: rodsight import table sample_data/shear/truth_tracks.csv my_test --columns frame=frame,id=id,x=x,y=y,theta=theta
+    --radius 0.008 --walls box
     """
     from ..exchange.foreign.columns import parse_columns
     from ..exchange.foreign.experiment_folder import refuse_existing, write_folder

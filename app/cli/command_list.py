@@ -1,0 +1,90 @@
+"""All commands: in groups for a person, and as tyro's command line."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import tyro
+
+from .. import __version__
+from .export import export, share
+from .look import compare, review, score, view
+from .make import synth
+from .run import check, record, run, solve, track
+from .settings import settings
+from .study import sensitivity, study
+from .take_in import import_
+from .workbench import init, open_
+
+Command = Callable[..., int]
+METAVARS: dict[Any, str] = {int: "N", float: "NUMBER", str: "TEXT"}
+
+GROUPS: dict[str, tuple[Command, ...]] = {
+    "Begin": (open_, init, check, run),
+    "Stages of a run": (track, solve, record),
+    "Look": (view, review, compare),
+    "How far to trust it": (score, sensitivity, study),
+    "From and to other programs": (import_, export, share),
+    "More": (synth, settings),
+}
+ENDING = """\
+rodsight COMMAND --help lists the options of a command, with an example.
+Exit status: 0 done, 1 failed, 2 bad input, 130 interrupted (143 terminated, 129 its terminal was closed).
+Completion of commands and options: eval "$(rodsight --completion bash)" (or zsh, tcsh)."""
+
+
+def overview() -> str:
+    """What there is, in groups, a line each."""
+    lines = [f"Rodsight {__version__}: contact forces inside a granular packing, from photographs.", ""]
+    lines += ["Usage: rodsight COMMAND …", "First: rodsight run sample_data/shear"]
+    for group, commands in GROUPS.items():
+        lines += ["", group]
+        lines += [f"  {name_of(command):<12} {purpose(command)}" for command in commands]
+    return "\n".join([*lines, "", ENDING])
+
+
+def command_line() -> tyro.extras.SubcommandApp:
+    """The command line that parses arguments and calls a command."""
+    app = tyro.extras.SubcommandApp()
+    for commands in GROUPS.values():
+        for command in commands:
+            app.command(name=name_of(command))(_with_plain_defaults(command))
+    return app
+
+
+def name_of(command: Command) -> str:
+    """What a user types."""
+    return command.__name__.rstrip("_")
+
+
+def purpose(command: Command) -> str:
+    """The first sentence of its help."""
+    return (inspect.getdoc(command) or "").split("\n\n")[0].replace("\n", " ").removesuffix(".")
+
+
+def _with_plain_defaults(command: Command) -> Command:
+    """The same command; its help says nothing of a default that is none, and names what may be left out by its kind."""
+    hints = get_type_hints(command, include_extras=True)
+    result = hints.pop("return", int)
+    explained = {
+        name: Annotated[_named(hint), tyro.conf.arg(help_behavior_hint=_default)] for name, hint in hints.items()
+    }
+    command.__annotations__ = explained | {"return": result}
+    return command
+
+
+def _named(hint: Any) -> Any:
+    """The hint, with what stands for its value in the help where nobody has said so and it may be left out."""
+    bare = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    kinds = [each for each in get_args(bare) if each is not type(None)]
+    if type(None) not in get_args(bare) or len(kinds) != 1:
+        return hint
+    word = "|".join(get_args(kinds[0])) if get_origin(kinds[0]) is Literal else METAVARS.get(kinds[0])
+    # First of all, so that what was said goes before it.
+    return hint if word is None else Annotated[(bare, tyro.conf.arg(metavar=word), *get_args(hint)[1:])]  # type: ignore[misc]
+
+
+def _default(label: str) -> str:
+    return "" if label in ("None", "False", "") else f"(default: {label})"

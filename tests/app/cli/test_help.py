@@ -1,0 +1,57 @@
+"""The help: grouped, with an example and units, and nothing that is meant for programmers."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+from rodsight.cli.command_list import GROUPS, name_of, overview, purpose
+
+from tests.program import rodsight
+
+COMMANDS = [command for group in GROUPS.values() for command in group]
+QUANTITIES = {  # what an option is called, and the unit that its help must tell
+    "--pixel-size": "m", "--interval": "s", "--idle": "s", "--max-size": "MB", "--density": "kg/m³", "--length": "m",
+    "--step-degrees": "°", "--pressure": "Pa",
+}  # fmt: skip
+
+
+def told(capsys: pytest.CaptureFixture, *arguments: str) -> str:
+    assert rodsight(*arguments) == 0
+    return " ".join(re.sub(r"[│╭╰╮╯─]", " ", capsys.readouterr().out).split())
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=name_of)
+def test_every_command_explains_itself(command, capsys):
+    text = told(capsys, name_of(command), "--help")
+    assert f"Example: rodsight {name_of(command)} " in text
+    assert "None" not in text
+    assert "default: )" not in text
+    for option, unit in QUANTITIES.items():
+        if meaning := re.search(rf"{option} (?!N?\s*\|)[^-]*?(?= --|$)", text.split("options", 1)[1]):
+            assert f"[{unit}" in meaning[0], f"{option}: {meaning[0]}"
+
+
+def test_the_overview_names_every_command_in_a_line(capsys):
+    text = overview()
+    for command in COMMANDS:
+        assert f"  {name_of(command):<12} {purpose(command)}\n" in text
+        assert len(purpose(command)) < 110
+    assert "--completion" in text
+    for arguments in ((), ("--help",), ("-h",)):
+        assert rodsight(*arguments) == 0
+        assert capsys.readouterr().out == text + "\n"
+
+
+def test_completion_of_a_shell_is_printed(capsys):
+    assert "bash completion" in told(capsys, "--completion", "bash").lower()
+    assert rodsight("--completion", "fish") == 2
+    assert "is not one of bash, zsh, tcsh" in capsys.readouterr().err
+
+
+def test_the_overview_loads_no_numerics():
+    code = "import sys; from rodsight.cli.command_list import overview; overview(); print('numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
