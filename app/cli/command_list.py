@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import tyro
 
 from .. import __version__
+from .campaign import campaign
 from .export import export, share
 from .look import compare, review, score, view
 from .make import synth
@@ -27,7 +28,7 @@ GROUPS: dict[str, tuple[Command, ...]] = {
     "Look": (view, review, compare),
     "How far to trust it": (score, sensitivity, study),
     "From and to other programs": (import_, export, share),
-    "More": (synth, settings),
+    "More": (campaign, synth, settings),
 }
 ENDING = """\
 rodsight COMMAND --help lists the options of a command, with an example.

@@ -76,8 +76,8 @@ def import_(
 
     Photoelastic discs: rodsight import pegs solved/ my_test --pixel-size 1e-4
 
-    Example: rodsight import table sample_data/shear/truth_tracks.csv my_test --columns frame=frame,id=id,x=x,y=y,theta=theta
-    --radius 0.008 --walls box
+    Example: rodsight import table sample_data/shear/truth_tracks.csv my_test --radius 0.008 --walls box
+    --columns frame=frame,id=id,x=x,y=y,theta=theta
     """
     from ..exchange.foreign.columns import parse_columns
     from ..exchange.foreign.experiment_folder import refuse_existing, write_folder
