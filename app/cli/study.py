@@ -78,11 +78,12 @@ def sensitivity(
 
 def study(
     subject: Annotated[
-        Literal["paper", "accuracy", "status", "uncertainty", "worlds", "numbers", "real", "perturbation"],
+        Literal["paper", "accuracy", "status", "uncertainty", "worlds", "numbers", "intervals", "real", "perturbation"],
         tyro.conf.Positional,
         tyro.conf.arg(
             help="the paper's claims; r against noise; trust and status refitted; coverage of error bars; what "
-            "laboratories bring, as simulated worlds; every statistic against the truth's; a run "
+            "laboratories bring, as simulated worlds; every statistic against the truth's; what stated "
+            "intervals of forces cover, by groups of contacts, and their constants fitted anew; a run "
             "against forces that were measured; how far forces move when next to nothing is changed"
         ),
     ],
@@ -103,6 +104,9 @@ def study(
     ensemble: Annotated[int, tyro.conf.arg(metavar="K", help="uncertainty: sequences solved again")] = 8,
     worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
+    fit: Annotated[
+        tuple[int, ...], tyro.conf.arg(metavar="SEED", help="intervals: fit the constants on these seeds, too")
+    ] = (),
     settings: Settings = (),
     out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
     as_json: Annotated[
@@ -140,6 +144,8 @@ def study(
         return _study_worlds(worlds, seeds, grains, out, settings, jobs=jobs, as_json=as_json, quiet=quiet)
     if subject == "numbers":
         return _study_numbers(worlds, seeds, grains, out, settings, quiet=quiet)
+    if subject == "intervals":
+        return _study_intervals(worlds, seeds, grains, out, settings, fit=fit, quiet=quiet)
     for option, given in (("--worlds", worlds), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
         if given:
             raise InputError("study", f"{option} with {subject}", "is for worlds only")
@@ -272,16 +278,47 @@ def _study_numbers(
     quiet: bool,
 ) -> int:
     from ..study.numbers import WORLDS, compare_numbers, print_numbers
+    from ..study.solved_world import solve_worlds
     from ..study.world_score import WorldPlan
     from ..study.worlds import WIDTH
     from ..synthetic.worlds.making import GRAINS
 
     plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", settings)
-    cases: list[tuple[WorldName, int]] = [(world, seed) for world in worlds or WORLDS for seed in seeds]
-    found = []
     with progress_of(quiet) as progress:
-        for number, (world, seed) in enumerate(cases):
-            progress("worlds", number, len(cases))
-            found += compare_numbers(plan, world, seed)
+        found = [each for one in solve_worlds(plan, worlds or WORLDS, seeds, progress) for each in compare_numbers(one)]
     print_numbers(table_console(WIDTH), found)
+    return 0
+
+
+def _study_intervals(
+    worlds: tuple[WorldName, ...],
+    seeds: tuple[int, ...],
+    grains: int | None,
+    out: Path,
+    settings: tuple[str, ...],
+    *,
+    fit: tuple[int, ...],
+    quiet: bool,
+) -> int:
+    from ..study import intervals
+    from ..study.contact_errors import ContactErrors, measure_errors
+    from ..study.solved_world import solve_worlds
+    from ..study.world_score import WorldPlan
+    from ..synthetic.worlds.making import GRAINS
+
+    plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", settings)
+    console = table_console()
+    with progress_of(quiet) as progress:
+        if fit:
+            known = ContactErrors.joined([
+                measure_errors(each) for each in solve_worlds(plan, intervals.FIT_WORLDS, fit, progress)
+            ])  # fmt: skip
+            intervals.print_fit(console, intervals.fit_intervals(known))
+            intervals.print_intervals(console, "On the worlds and seeds of the fit, constants in use", known)
+        judged = [
+            measure_errors(each) for each in solve_worlds(plan, worlds or intervals.JUDGE_WORLDS, seeds, progress)
+        ]
+    intervals.print_intervals(
+        console, "Share of contacts within one and two stated deviations, %", ContactErrors.joined(judged)
+    )
     return 0

@@ -2,10 +2,10 @@
 
 A member sees the positions with noise of the stated precision added once more, and another kinematic number,
 friction and surface; S is the spread of the members' forces around the nominal ones, which stay the reported ones:
-a mean of members would count the noise twice. σ² = (a S)² + (b s)², s the standard deviation by the free formula: it
-knows what resampling cannot show, above all the history that photographs do not carry. A constant share of the mean
-force in its place covers less evenly. The constants were fitted on simulated truth (`rodsight study uncertainty`
-prints them anew).
+a mean of members would count the noise twice. σ² = (a S)² + (b s)², s the standard deviation that a run states without
+them: it knows what resampling cannot show, above all the history that photographs do not carry. A constant share of the
+mean force in its place covers less evenly. Where s covers by itself, members may only widen it: b is 1. The constants
+were fitted on simulated truth (`rodsight study uncertainty` prints them anew).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .factors import FACTORS
 from .networks import Networks, VariedInputs, infer
 
 # a and b of f_n, and of f_t
-DEVIATION = {"ensemble": ((0.72, 0.76), (0.83, 0.68)), "nlgs": ((1.4, 1.18), (1.43, 0.92))}
+DEVIATION = {"ensemble": ((0.3, 1.0), (0.3, 1.0)), "nlgs": ((1.4, 1.18), (1.43, 0.92))}
 # What a member varies beside the noise, between which factors of what was given. Friction: grains and walls alike.
 RANGES: dict[str, tuple[float, float]] = {"friction": (0.9, 1.1), "overlap": (0.5, 2.0), "kappa": (0.5, 2.0)}
 SEED = 20  # of the members' draws: the same input gives the same bits

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +20,10 @@ from solver.contacts.contacts import measure_pairs
 from solver.contacts.pairs import Keys
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics
 
-from ..experiment.experiment import load_experiment
 from ..inference.inference import CorrectedSequence, SolvedFrame
-from ..progress import Progress, silent
-from ..synthetic.worlds.making import make_world
 from ..synthetic.worlds.names import WorldName
-from .world_score import SETTLED, WorldPlan, solve_world, true_forces
+from .solved_world import SolvedWorld
+from .world_score import SETTLED
 
 # Worlds whose truth and input have the same rods, so that every statistic can be compared.
 WORLDS: tuple[WorldName, ...] = (
@@ -61,13 +57,9 @@ class Compared:
         return np.degrees(difference) if self.name in DEGREES else difference
 
 
-def compare_numbers(plan: WorldPlan, world: WorldName, seed: int, progress: Progress = silent) -> list[Compared]:
-    """Make a world, solve it and compare every statistic. Raises UnbalancedError where it cannot be simulated."""
-    with TemporaryDirectory() as folder:
-        made = make_world(Path(folder), world, seed, grains=plan.grains, kept=plan.folder / "kept", progress=progress)
-        experiment = load_experiment(made.folder, plan.settings)
-        sequence, frames = solve_world(experiment, progress)
-        true = true_forces(experiment, sequence)
+def compare_numbers(solved: SolvedWorld) -> list[Compared]:
+    """Compare every statistic of a solved world."""
+    world, seed, sequence, frames, true = solved.world, solved.seed, solved.sequence, solved.frames, solved.true
     pairs = [(each.statistics, _statistics_of_truth(sequence, each, *true[k])) for k, each in enumerate(frames)]
     late = pairs[SETTLED:]
     return [

@@ -22,6 +22,7 @@ from solver.contacts.pairs import Keys, recall
 from solver.dem.simulation import DemTruth
 from solver.sequence import judgement
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.intervals import FLOOR, formula_deviations
 from solver.sequence.judgement import Evidence, trust
 from solver.statistics.agreement import compare_forces
 
@@ -249,15 +250,16 @@ def _contact_errors(frame: FrameForces, key: Keys, force: Array) -> tuple[Array,
     bearing = np.maximum(frame.fn, true[:, 0]) > WEAK * mean
     error = (np.column_stack([frame.fn, frame.ft]) - true) / mean
     relative = frame.fn / mean
+    formula = formula_deviations(frame)
     spread = np.column_stack([
-        _spread_behind(frame.fn_sd / mean, relative, judgement.NORMAL_DEVIATION),
-        _spread_behind(frame.ft_sd / mean, relative, judgement.TANGENT_DEVIATION),
+        _spread_behind(formula[:, c], relative, (np.hypot(constants[0], FLOOR[c]), *constants[1:]))
+        for c, constants in enumerate((judgement.NORMAL_DEVIATION, judgement.TANGENT_DEVIATION))
     ])  # fmt: skip
     return error[bearing], relative[bearing], spread[bearing]
 
 
 def _spread_behind(deviation: Array, force: Array, constants: tuple[float, float, float]) -> Array:
-    """The members' spread from which a standard deviation was made: a frame keeps only the latter."""
+    """The members' spread from which the formula's deviation was made: a frame keeps only what that became."""
     a, b, c = constants
     return np.sqrt(np.maximum(deviation**2 - a**2 - b**2 * force, 0.0)) / c
 

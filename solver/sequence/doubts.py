@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from solver.convex.friction_check import FrictionCheck
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.intervals import widen_for_friction
 from solver.sequence.judgement import (
     HOLE_DOUBT,
     INFERRED_DOUBT,
@@ -170,4 +171,5 @@ def doubt_friction(frame: FrameForces, check: FrictionCheck | None) -> FrameForc
         f"the motion contradicts the friction: {check.measured:.2f} ({check.low:.2f} to {check.high:.2f}) for "
         f'{check.given:g}; measure it, or set friction = "measured"'
     )
-    return replace(frame, trust=frame.trust * (1.0 - share), doubt="; ".join(filter(None, (words, frame.doubt))))
+    told = replace(frame, trust=frame.trust * (1.0 - share), doubt="; ".join(filter(None, (words, frame.doubt))))
+    return widen_for_friction(told, check.given, check.measured)

@@ -20,6 +20,7 @@ from solver.sequence.doubts import lower_bound, tell_doubts
 from solver.sequence.estimate import Estimate
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frame_problem import FrameProblem
+from solver.sequence.intervals import calibrate_deviations
 from solver.sequence.judgement import (
     Evidence,
     Standing,
@@ -50,6 +51,8 @@ def report_frame(
         frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen & problem.packing.grains.free
     )
     told = replace(frame, trust=lower_bound(evidence), doubt=tell_doubts(evidence), grain_unbalance=unbalance)
+    if estimate.spread_fn is not None and problem.motion.spans:  # of other fields no truth has told enough
+        told = calibrate_deviations(told)
     return told, evidence
 
 

@@ -1,0 +1,39 @@
+"""Intervals are fitted so that they cover, whatever the formula said."""
+
+import numpy as np
+import pytest
+from rodsight.study.contact_errors import ContactErrors
+from rodsight.study.intervals import covered, fit_intervals
+
+from solver.sequence.intervals import Group
+
+COUNT = 12_000
+
+
+def _errors(rng: np.random.Generator) -> ContactErrors:
+    """Errors that are twice the formula's deviation in one group and half of it in the others, more in doubt."""
+    group = rng.integers(0, len(Group), COUNT).astype(np.uint8)
+    doubt = rng.uniform(0.0, 0.4, COUNT)
+    formula = rng.uniform(0.05, 0.5, (COUNT, 2))
+    size = np.where(group == Group.WEAK, 2.0, 0.5) * np.exp(doubt)
+    no = np.zeros(COUNT, np.bool_)
+    return ContactErrors(
+        world=np.where(np.arange(COUNT) % 2 == 0, "shear", "biaxial"), seed=np.zeros(COUNT, np.int64),
+        frame=np.ones(COUNT, np.int64), group=group, wall=no, sliding=no, doubtful=no,
+        witness=np.zeros(COUNT, np.uint8), doubt=doubt, force=np.ones((COUNT, 2)),
+        error=size[:, None] * formula * rng.standard_normal((COUNT, 2)), deviation=formula, formula=formula,
+    )  # fmt: skip
+
+
+def test_fitted_intervals_cover_in_every_group_on_errors_that_were_not_fitted():
+    from dataclasses import replace
+
+    fit = fit_intervals(_errors(np.random.default_rng(1)))
+    others = _errors(np.random.default_rng(2))
+    told = replace(others, deviation=fit.deviations(others))
+    for group in (Group.WEAK, Group.MEAN):
+        part = told.select(told.group == group)
+        for one, two in (covered(part)[:2], covered(part)[2:]):
+            assert one == pytest.approx(0.683, abs=0.04)
+            assert two == pytest.approx(0.954, abs=0.02)
+    assert covered(others.select(others.group == Group.WEAK))[0] < 0.4

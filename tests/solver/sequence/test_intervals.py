@@ -1,0 +1,73 @@
+"""Deviations that cover: which group a contact is in, what trust and a wrong friction make of its interval."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.sequence.intervals import (
+    FLOOR,
+    Group,
+    Witness,
+    calibrate_deviations,
+    formula_deviations,
+    groups_of,
+    widen_for_friction,
+    witness_of,
+)
+from tests.app.recording.fake_results import make_results
+
+
+@pytest.fixture(scope="module")
+def frame():
+    one = make_results(1, 8, 7, sweeps=2).frames[0]
+    c = one.contacts.count
+    fn = np.linspace(0.0, 2.0, c) * 30.0
+    return replace(
+        one, fn=fn, fn_sd=0.1 * fn, ft_sd=0.03 * fn, trust=0.9, positions_share=0.0,
+        bearing_probability=np.where(np.arange(c) % 7 == 0, 0.5, 1.0), sliding_probability=np.zeros(c),
+    )  # fmt: skip
+
+
+def test_groups_name_what_matters_most_of_a_contact(frame):
+    group = groups_of(frame)
+    wall, doubtful = frame.contacts.with_wall, frame.bearing_probability < 0.9
+    mean = frame.fn[frame.fn > 0].mean()
+    assert (group[doubtful] == Group.DOUBTFUL).all()
+    assert (group[wall & ~doubtful] == Group.WALL).all()
+    plain = ~wall & ~doubtful
+    assert (group[plain & (frame.fn < 0.49 * mean)] == Group.WEAK).all()
+    assert (group[plain & (frame.fn > 1.51 * mean)] == Group.STRONG).all()
+    assert {Group.WEAK, Group.MEAN, Group.STRONG, Group.WALL, Group.DOUBTFUL} == set(group.tolist())
+    slides = replace(frame, sliding_probability=np.ones(len(frame.fn)))
+    assert (groups_of(slides)[plain] == Group.SLIDING).all()
+
+
+def test_witness_follows_the_share_of_positions():
+    assert [witness_of(share) for share in (0.0, 0.5, 1.0)] == [Witness.MOTION, Witness.BOTH, Witness.POSITIONS]
+
+
+def test_calibrated_deviations_tell_what_they_were_made_of(frame):
+    told = calibrate_deviations(frame)
+    made_of = formula_deviations(told)
+    mean = frame.fn[frame.fn > 0].mean()
+    known = frame.fn_sd > 0
+    expected = np.hypot(np.column_stack([frame.fn_sd, frame.ft_sd]) / mean, FLOOR)
+    assert made_of[known] == pytest.approx(expected[known])
+    assert (told.fn_sd[~known] == 0).all()
+
+
+def test_doubt_widens_where_motion_speaks_and_narrows_the_mean_of_both_witnesses(frame):
+    for share, grows in ((0.0, True), (0.5, False)):
+        sure, doubted = (
+            calibrate_deviations(replace(frame, positions_share=share, trust=trust)).fn_sd[-1] for trust in (0.95, 0.7)
+        )
+        assert (doubted > sure) == grows
+
+
+def test_a_wrong_friction_widens_strong_contacts_most(frame):
+    told = widen_for_friction(frame, 0.2, 0.26)
+    added = told.fn_sd**2 - frame.fn_sd**2
+    assert added[-1] == pytest.approx((0.9 * np.log(1.3) * frame.fn[-1]) ** 2)
+    assert added[0] == pytest.approx(0.0)
+    assert (widen_for_friction(frame, 0.25, 0.25).ft_sd == frame.ft_sd).all()
