@@ -26,7 +26,7 @@ from .experiment.boundary import bound_tracks, free_surfaces
 from .experiment.config.experiment_file import as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
-from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
+from .experiment.experiment import POSE_COLUMNS, load_experiment, read_grain_guess, read_times, read_tracks
 from .experiment.plausibility import check_inside, check_radii, doubtful_loads, open_sides, rods_beyond_ends
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
@@ -40,10 +40,10 @@ from .inference.inference import (
 from .inference.settings import material_of, settings_of
 from .results.checkpoint import Checkpoint
 from .results.results import Results, TruthContacts
-from .results.store import Provenance, load_results, load_tracks, save_results, save_tracks
+from .results.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
-from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run
+from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
 from .sensitivity.execution import available_cores
 from .sensitivity.spread import calibrated_inputs, solve_members, with_spread
 from .sensitivity.study import Nominal
@@ -319,6 +319,16 @@ def conclude(run: Run, results: Results, truth: TruthContacts | None, since: flo
     summary = summarize(results, agreement, {**run.timings.seconds, "total": time.perf_counter() - since})
     save_summary(run.file(SUMMARY), summary)
     return summary
+
+
+def truth_of(file: Path) -> TruthContacts | None:
+    """The truth that the experiment of finished results names; None without one, or where the experiment is gone."""
+    origin = origin_of(file)
+    try:
+        experiment = find_experiment(file, origin)
+    except InputError:
+        return None
+    return load_truth(Run(load_experiment(experiment), file.parent, origin.frames), load_results(file))
 
 
 def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthContacts | None:

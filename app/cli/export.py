@@ -15,6 +15,8 @@ from .terminal import progress_of, tell
 
 if TYPE_CHECKING:
     from ..experiment.units import Scale
+    from ..figures.gallery import FileKind
+    from ..figures.page import Width
     from ..progress import Progress
     from ..results.results import Results
 
@@ -35,7 +37,7 @@ class Drawing:
 
 def export(
     what: Annotated[
-        Literal["pictures", "video", "tables", "vtk", "ovito", "graph", "dic"],
+        Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"],
         tyro.conf.Positional,
         tyro.conf.arg(help="to write"),
     ],
@@ -57,9 +59,16 @@ def export(
     pixel_size: Annotated[
         float | None, tyro.conf.arg(help="dic: side of a pixel [m]; default: the experiment's")
     ] = None,
+    frame: Annotated[int | None, tyro.conf.arg(help="figures: of this frame; default: the last settled one")] = None,
+    formats: Annotated[tuple[Literal["pdf", "svg", "png"], ...], tyro.conf.arg(help="figures: kinds of files")] = (
+        "pdf",
+        "svg",
+    ),
+    width: Annotated[Literal["single", "double"], tyro.conf.arg(help="figures: columns of a page")] = "single",
     quiet: Quiet = False,
 ) -> int:
-    """Write pictures, a video, tidy tables, files for ParaView (vtk) and OVITO, graphs (GraphML) or tracker files.
+    """Write pictures, a video, figures for a paper (PDF, SVG), tidy tables, files for ParaView (vtk) and OVITO, graphs
+    (GraphML) or tracker files.
 
     Tables come with columns.csv, the dictionary of their columns, and datapackage.json for a data repository. ParaView
     opens vtk/packing.pvd, OVITO ovito/frame_0000.vtm, and finds the others.
@@ -83,6 +92,10 @@ def export(
         drawing = Drawing(recording, timeline, frames, step, tab, view, size, rate)
         with progress_of(quiet) as progress:
             told = _draw(drawing, out, progress, film=what == "video")
+        tell(console, told)
+        return 0
+    if what == "figures":
+        told = _write_figures(folder / RESULTS if source.is_dir() else source, out, formats, frame, width)
         tell(console, told)
         return 0
     results = load_results(folder / RESULTS if source.is_dir() else source)
@@ -169,6 +182,27 @@ def _draw(drawing: Drawing, out: Path | None, progress: Progress, *, film: bool)
     except NoPictureError as error:
         raise InputError("export", "", str(error)) from None
     return text
+
+
+def _write_figures(
+    file: Path,
+    out: Path | None,
+    formats: tuple[FileKind, ...],
+    frame: int | None,
+    width: Width,
+) -> str:
+    """Write the figures of a run, that against the truth where its experiment names one; returns what to tell."""
+    from .. import pipeline
+    from ..figures.gallery import write_figures
+    from ..results.store import load_results
+
+    folder = file.parent / "figures" if out is None else out
+    results, truth = load_results(file), pipeline.truth_of(file)
+    try:
+        files = write_figures(results, folder, formats, frame=frame, width=width, truth=truth)
+    except (IndexError, ValueError) as error:
+        raise InputError("--frame", str(frame), str(error)) from None
+    return f"{folder}/: {', '.join(each.name for each in files)}."
 
 
 def _window(text: str) -> tuple[int, int]:

@@ -24,6 +24,11 @@ from .inline import show_recording
 from .settings import as_texts
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..figures.page import Width
+
+if TYPE_CHECKING:
     import xarray
 
 
@@ -166,6 +171,18 @@ class Run:
         if file is None or not file.is_file():
             raise FileNotFoundError("there is no recording of this run: rodsight.run and `rodsight record` make one")
         return show_recording(file)
+
+    def figure(self, name: str = "forces", frame: int | None = None, *, width: Width = "single") -> Figure:
+        """A figure for a paper, to be saved with `.savefig("x.pdf")`: light, at column width, with units.
+
+        name: forces (the network), density (P(f)), rose, stress, time, or truth (inferred over true forces, where the
+        experiment names a truth); frame: default the last settled one; width: single (85 mm) or double (175 mm).
+        Raises ValueError for a figure that is not known or has no data, IndexError for a frame that is not there.
+        """
+        from ..figures.gallery import draw_figure
+
+        truth = pipeline.truth_of(self._source) if name == "truth" and isinstance(self._source, Path) else None
+        return draw_figure(self.results, name, frame, width=width, truth=truth)
 
     def __repr__(self) -> str:
         tracks = self.results.tracks

@@ -48,7 +48,7 @@ def solve_worlds(
     plan: WorldPlan, worlds: Sequence[WorldName], seeds: Sequence[int], progress: Progress = silent
 ) -> Iterator[SolvedWorld]:
     """Every world of every seed, one after the other."""
-    cases = [(world, seed) for world in worlds for seed in seeds]
+    cases: list[tuple[WorldName, int]] = [(world, seed) for world in worlds for seed in seeds]
     for done, (world, seed) in enumerate(cases):
         progress("worlds", done, len(cases))
         yield solve_one(plan, world, seed)
