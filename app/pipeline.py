@@ -8,7 +8,7 @@ frame where it stopped.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.sequence.doubts import doubt_friction
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics
@@ -39,13 +40,14 @@ from .inference.inference import (
 )
 from .inference.settings import material_of, settings_of
 from .results.checkpoint import Checkpoint
+from .results.lazy import Lazily
 from .results.results import Results, TruthContacts
 from .results.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
 from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
 from .sensitivity.execution import available_cores
-from .sensitivity.spread import calibrated_inputs, solve_members, with_spread
+from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
 from .sensitivity.study import Nominal
 from .tracking.report.page import tracking_report
 from .tracking.stage import DETECTIONS, gather_report, track_photographs, write_found_tables
@@ -220,35 +222,34 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     )  # fmt: skip
     if run.watch is not None:
         run.watch.start(unsolved)
-    solved = list(_solve_frames(run, sequence, checkpoint))
-    frames = [each.forces for each in solved]
-    statistics = [each.statistics for each in solved]
+    _solve_frames(run, sequence, checkpoint)
+    frames, statistics = checkpoint.lazily(len(sequence.snapshots), FrameForces, FrameStatistics)
     _refuse_nothing(run, frames)
-    frames, check = sequence.check_friction(frames)
-    results = replace(unsolved, frames=frames, statistics=statistics, friction_check=check)
+    check = sequence.find_friction(frames)
+    judged = Lazily(len(frames), lambda k: doubt_friction(frames[k], check))
+    results = replace(unsolved, frames=judged, statistics=statistics, friction_check=check)
     save_results(run.file(RESULTS), results, origin)
     run.manifest.add(RESULTS, origin.fingerprint)
+    results = load_results(run.file(RESULTS))
     checkpoint.clear()
     run.timings.add("solving", since)
     return results
 
 
-def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint) -> Iterator[SolvedFrame]:
-    """Every frame: those in the checkpoint as they are, then the others, kept as they come."""
+def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint) -> None:
+    """Have every frame in the checkpoint: those that are there stay as they are, the others are kept as they come."""
     total, last = len(sequence.snapshots), None
     done = min(checkpoint.finished(), total)
-    kept = (SolvedFrame(*checkpoint.load(k, FrameForces, FrameStatistics, SequenceState)) for k in range(done))
-    for last in kept:
-        if run.watch is not None:
-            run.watch.frame(last.forces, last.statistics)
-        yield last
+    for k in range(done if run.watch is not None else 0):
+        run.watch.frame(*checkpoint.load(k, FrameForces, FrameStatistics))
+    if done:
+        last = SolvedFrame(*checkpoint.load(done - 1, FrameForces, FrameStatistics, SequenceState))
     run.progress("solving", done, total)
     for frame in solve_frames(sequence, after=last, observer=run.note_failure):
         checkpoint.save(frame.forces.frame, frame.forces, frame.statistics, frame.state)
         if run.watch is not None:
             run.watch.frame(frame.forces, frame.statistics)
         run.progress("solving", frame.forces.frame + 1, total)
-        yield frame
 
 
 def _refuse_nothing(run: Run, frames: Sequence[FrameForces]) -> None:
@@ -265,10 +266,14 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
     inputs = _inputs(run, log, results.tracks, results.walls).with_friction(results.friction, results.friction_check)
     inputs = calibrated_inputs(inputs)
     members = solve_members(inputs, size, checkpoint, workers=available_cores(), progress=run.progress)
-    frames = with_spread(results.frames, members, inputs.settings.sequence.estimator)
+    former, estimator = results.frames, inputs.settings.sequence.estimator
+    frames = Lazily(
+        len(former), lambda k: frame_with_spread(former[k], [each.at(k) for each in members], estimator)
+    )  # fmt: skip
     results = replace(results, frames=frames, ensemble_size=size, configuration=as_toml(run.experiment.config))
     save_results(run.file(RESULTS), results, origin)
     run.manifest.add(RESULTS, origin.fingerprint)
+    results = load_results(run.file(RESULTS))
     checkpoint.clear()
     run.timings.add("ensemble", since)
     run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")

@@ -20,6 +20,7 @@ from solver.bodies.grains import Array
 
 from ..atomic import write_atomically
 from ..errors import InputError
+from ..experiment.input_files import ordinary
 from ..experiment.units import Scale
 from ..tracks import Tracks
 
@@ -128,7 +129,7 @@ def _read_conf(file: Path) -> Array:
 def _numbers(file: Path, columns: int) -> tuple[Array, list[str]]:
     """The rows that the first line counts (n, columns), and the lines after them."""
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
+        lines = ordinary(file).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(file, "", f"cannot be read ({error})") from None
     try:

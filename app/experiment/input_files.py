@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import RunError
+from ..errors import InputError, RunError
+
+
+def ordinary(file: Path) -> Path:
+    """The file, if it is none that never ends or answers, such as a device or a pipe. Raises InputError, OSError."""
+    kind = file.stat().st_mode
+    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):  # a folder is refused by whoever opens it
+        raise InputError(file, "", "is a device or a pipe, not a file")
+    return file
 
 
 class InputFiles:
@@ -22,7 +31,7 @@ class InputFiles:
 
     def read(self, file: Path) -> bytes:
         """The bytes of a file. Raises OSError, and RunError where it has changed since it was first read."""
-        content = file.read_bytes()
+        content = ordinary(file).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
         if self._sums.setdefault(file, digest) != digest:
             raise RunError(

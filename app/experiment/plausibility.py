@@ -16,6 +16,7 @@ from .experiment import Experiment
 NEIGHBOURS = 8  # of a grain, among which is the one it is closest to in radii
 SPACING = (0.93, 1.15)  # of neighbours over their radii, median: packed rods touch, whatever the noise
 GREATEST_RADIUS = 0.5  # [m] of a rod
+GREATEST_SHARE = 2.0  # of the packing's diagonal: no radius is larger
 NEAR = 0.05  # radii from a wall's line: a rod as near as that may bear on it
 BEYOND = 0.5  # radii past a wall's end
 LIKE = 0.15  # relative difference up to which a spacing looks like a certain mistake
@@ -41,6 +42,13 @@ def check_radii(experiment: Experiment, tracks: Tracks) -> None:
     if middle > GREATEST_RADIUS:
         guess = "; they look like millimetres" if middle < 1e3 * GREATEST_RADIUS else ""
         raise InputError(file, key, f"makes the median radius {middle:g} m: lengths are in metres{guess}")
+    here, largest = tracks.position[0][tracks.present[0]], int(np.argmax(tracks.radius))
+    across = float(np.hypot(*np.ptp(here, axis=0))) if len(here) > 2 else np.inf
+    if tracks.radius[largest] > max(GREATEST_SHARE * across, middle):
+        raise InputError(
+            file, key, f"makes grain {tracks.id[largest]} larger than the packing: its radius is "
+            f"{tracks.radius[largest]:g} m, and all centres lie within {across:.3g} m",
+        )  # fmt: skip
     spacing = neighbour_spacing(tracks.position[0][tracks.present[0]], tracks.radius[tracks.present[0]])
     if len(spacing) and not SPACING[0] <= (found := float(np.median(spacing))) <= SPACING[1]:
         state = "overlap" if found < 1.0 else "stand apart"

@@ -42,9 +42,10 @@ def friction_of(
     """
     if len(snapshots) < 4 or packing.material.friction <= 0 or packing.material.wall_friction <= 0:
         return None
-    calm = np.array([frame.status in (FrameStatus.SETTLED, FrameStatus.SETTLING) for frame in frames])
+    found = [(frame.status, frame.contacts.count) for frame in frames]
+    calm = np.array([status in (FrameStatus.SETTLED, FrameStatus.SETTLING) for status, _ in found])
     lost = np.array([1.0 - snapshot.present.mean() for snapshot in snapshots])
-    contacts = max(int(np.median([frame.contacts.count for frame in frames])), 1)
+    contacts = max(int(np.median([count for _, count in found])), 1)
     wanted = int(np.clip(-(-ENOUGH_CONTACTS // contacts), FEWEST_FRAMES, FRAMES))
     count = min(wanted, len(snapshots) - 2)
     starts = np.arange(1, len(snapshots) - count)

@@ -84,12 +84,17 @@ class CorrectedSequence:
 
     def check_friction(self, frames: Sequence[FrameForces]) -> tuple[list[FrameForces], FrictionCheck | None]:
         """What the motion of all solved frames says of the friction that was given, and how far they hold after it."""
+        check = self.find_friction(frames)
+        return [doubt_friction(frame, check) for frame in frames], check
+
+    def find_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
+        """What the motion of all solved frames says of the friction that was given; they are looked at once."""
         probability = self.settings.for_radii(self.packing.grains.radius).ensemble.probability
         check = friction_of(self.packing, self.snapshots, frames, probability)
         found = self.wall_friction
         if check is not None and found is not None:
             check = replace(check, wall_measured=found.measured, wall_low=found.low, wall_high=found.high)
-        return [doubt_friction(frame, check) for frame in frames], check
+        return check
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from enum import IntEnum
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -22,18 +22,25 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 import numpy as np
 
 from ..atomic import write_atomically
+from ..errors import RunError
+from .lazy import Lazily
 
 T = TypeVar("T")
 CHECKSUM = 32  # bytes at the beginning of a file
+MOST_KEPT = 2  # frames that were read last
 
 
 class Checkpoint:
     """Frames of one stage of one run."""
 
-    def __init__(self, folder: Path, fingerprint: str, notes: list[str] | None = None) -> None:
-        """notes: where a sentence goes about what is damaged."""
+    def __init__(
+        self, folder: Path, fingerprint: str, notes: list[str] | None = None, *, looks_on: bool = False
+    ) -> None:
+        """notes: where a sentence goes about what is damaged; looks_on: another process fills it, none is changed."""
         self.folder, self._fingerprint = folder, fingerprint
         self._notes = notes if notes is not None else []
+        if looks_on:
+            return
         mark = folder / "fingerprint"
         if folder.exists() and (not mark.exists() or mark.read_bytes() != fingerprint.encode()):
             shutil.rmtree(folder)
@@ -41,9 +48,9 @@ class Checkpoint:
         if not mark.exists():
             write_atomically(mark, fingerprint.encode())
 
-    def finished(self) -> int:
-        """How many frames from the first on are there, whole."""
-        count = 0
+    def finished(self, seen: int = 0) -> int:
+        """How many frames from the first on are there, whole; seen: so many are known to be."""
+        count = seen
         while self._file(count).exists():
             if self._content(count) is None:
                 self._notes.append(f"Frame {count} of the unfinished {self.folder.name} is damaged: it is done again.")
@@ -62,9 +69,14 @@ class Checkpoint:
     def load(self, frame: int, *kinds: type) -> list[Any]:
         content = self._content(frame)
         if content is None:
-            raise ValueError(f"{self._file(frame)} is damaged")
+            raise RunError(f"{self._file(frame)}: was damaged meanwhile; the same command does it again")
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
+
+    def lazily(self, count: int, *kinds: type) -> tuple[Lazily[Any], ...]:
+        """The first frames, read whenever they are asked for: a sequence for each kind."""
+        load = lru_cache(MOST_KEPT)(lambda frame: self.load(frame, *kinds))
+        return tuple(Lazily(count, lambda frame, at=at: load(frame)[at]) for at in range(len(kinds)))
 
     def clear(self) -> None:
         """Remove the frames, and the folder above once no stage is left in it."""

@@ -6,7 +6,6 @@ than the rest, is an InputError that names the dataset.
 
 from __future__ import annotations
 
-import operator
 import threading
 import weakref
 from collections import OrderedDict
@@ -14,13 +13,14 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import h5py
 import numpy as np
 
 from ..errors import InputError
 from .checkpoint import restore
+from .lazy import Lazily
 from .schema import (
     CONTACT_OFFSET,
     DIMENSIONS,
@@ -36,6 +36,7 @@ from .schema import (
 
 MOST_KEPT = 4  # frames that were read last
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps whose forces are kept
+CACHE = 1 << 16  # [bytes] of decompressed values that are kept of each dataset
 
 
 class Stored:
@@ -81,17 +82,15 @@ class Stored:
                 raise InputError(self.file, f"dataset contacts/{name}", f"names a body beyond {known} in frame {k}")
         return restore(PARTS["frames"], own | bodies | {"frame": k}, "")
 
-    def statistics(self) -> list[Any]:
-        """The statistics of every frame."""
+    def statistics(self) -> Sequence[Any]:
+        """The statistics of every frame, each made when it is asked for of columns that are read now."""
         columns = {each.attribute: self.read(each) for each in entries("statistics")}
-        return [
-            restore(
-                PARTS["statistics"],
-                {name: None if values is None else values[k] for name, values in columns.items()},
-                "",
-            )
-            for k in range(self._sizes["frame"])
-        ]
+
+        def statistics_of(k: int) -> Any:
+            own = {name: None if values is None else values[k] for name, values in columns.items()}
+            return restore(PARTS["statistics"], own, "")
+
+        return Lazily(self._sizes["frame"], statistics_of)
 
     def read(self, entry: Entry) -> Any:
         """All values of a dataset; where there is none, what stands for absent ones."""
@@ -138,7 +137,7 @@ class Stored:
         """The same by a handle of its own, which is closed once nobody holds it; a file put in its place is another."""
         again = copy(self)
         stream = self.file.open("rb")
-        again._store = store = h5py.File(stream, "r")
+        again._store = store = h5py.File(stream, "r", rdcc_nbytes=CACHE)
         again._found = {}
 
         def close() -> None:
@@ -280,28 +279,16 @@ class _Rows:
         return values if entry.dims[0] in ("contact", "kept_sweep") else values[0]
 
 
-class StoredFrames(Sequence[Any]):
+class StoredFrames(Lazily[Any]):
     """The forces of every frame of a file; a few that were read last are kept."""
 
     def __init__(self, stored: Stored, rows: _Rows, bodies: dict[str, int], count: int) -> None:
-        self._stored, self._rows, self._bodies, self._count = stored, rows, bodies, count
+        super().__init__(count, self._find)
+        self._stored, self._rows, self._bodies = stored, rows, bodies
         self._kept: OrderedDict[int, Any] = OrderedDict()
         self._lock = threading.Lock()
 
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, index: int) -> Any: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Any]: ...
-    def __getitem__(self, index: int | slice) -> Any:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(self._count))]
-        k = operator.index(index)
-        k += self._count if k < 0 else 0
-        if not 0 <= k < self._count:
-            raise IndexError(f"there is no frame {index} of {self._count}")
+    def _find(self, k: int) -> Any:
         with self._lock:
             if k not in self._kept:
                 self._kept[k] = self._read(k)
@@ -309,9 +296,6 @@ class StoredFrames(Sequence[Any]):
             while len(self._kept) > MOST_KEPT:
                 self._kept.popitem(last=False)
             return self._kept[k]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return list, (list(self),)  # another process has no handle of the file
 
     def _read(self, k: int) -> Any:
         try:

@@ -18,16 +18,15 @@ import numpy as np
 from solver.sequence.ensemble import MEMBERS
 
 from .. import __version__
-from ..atomic import write_atomically
+from ..atomic import replacing
 from ..errors import InputError
 from ..tracks import Tracks, WallTracks
 from .manifest import MANIFEST, Manifest
 from .reader import Stored
+from .refusable import created
 from .results import Results
 from .schema import DEVIATIONS, SCHEMA, SCHEMA_VERSION
-from .writer import columns_of, columns_of_results, write_columns
-
-BLOCK = 1 << 20  # [bytes] by which a file grows in memory
+from .writer import columns_of, write_columns, write_results
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +53,12 @@ def load_tracks(file: Path) -> tuple[Tracks, WallTracks | None]:
 
 
 def save_results(file: Path, results: Results, origin: Provenance) -> None:
-    """Write everything; float64 where it was computed so, recorded sweeps in float32."""
+    """Write everything, frame after frame; float64 where it was computed so, recorded sweeps in float32."""
     with _creating(file) as store:
         _write_origin(store, results.name, origin)
         store.attrs["configuration"] = results.configuration
         store.attrs["friction"] = results.friction
-        write_columns(store, columns_of_results(results))
+        write_results(store, results)
         for path in DEVIATIONS:
             store[path].attrs["source"] = _source_of_deviation(results.ensemble_size)
             store[path].attrs["ensemble_size"] = results.ensemble_size
@@ -117,12 +116,8 @@ def origin_of(file: Path) -> Provenance:
 
 @contextmanager
 def _creating(file: Path) -> Iterator[h5py.File]:
-    """Make a file in memory and then write it: the library breaks down where a disk refuses what it closes."""
-    with h5py.File(file.name, "w", driver="core", backing_store=False, block_size=BLOCK) as store:
+    with replacing(file) as part, created(part) as store:
         yield store
-        store.flush()
-        content = store.id.get_file_image()
-    write_atomically(file, content)
 
 
 @contextmanager
@@ -139,6 +134,8 @@ def _open(file: Path) -> Iterator[h5py.File]:
 
 
 def _opened(file: Path) -> h5py.File:
+    if file.exists() and not file.is_file():
+        raise InputError(file, "", "is not a file")
     if not Manifest(file.parent).is_whole(file.name):
         raise InputError(file, "", f"is not what {MANIFEST} lists: it was damaged or changed; run the experiment again")
     try:

@@ -6,11 +6,11 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.sequence.frame_forces import FrameStatus
+from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.statistics.agreement import Agreement
 
 from ..atomic import write_atomically
@@ -20,9 +20,32 @@ from .results import Results
 from .truth import accuracy
 
 
+class _Frame(NamedTuple):
+    """What is told of a frame: frames are read one after the other, and only once."""
+
+    frame: int
+    status: FrameStatus
+    reason: str
+    failed_reason: str
+    contact_count: int
+    trust: float
+    doubt: str
+    unbalance: float
+    natural_map: float
+    correction: float
+
+    @classmethod
+    def of(cls, forces: FrameForces) -> _Frame:
+        return cls(
+            forces.frame, forces.status, forces.reason, forces.failed_reason, forces.contacts.count, forces.trust,
+            forces.doubt, forces.unbalance, forces.natural_map, forces.correction,
+        )  # fmt: skip
+
+
 def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: dict[str, float]) -> dict[str, Any]:
     """Gather the summary; JSON values only."""
-    frames, tracks = results.frames, results.tracks
+    frames, tracks = [_Frame.of(each) for each in results.frames], results.tracks
+    statistics = [(each.friction_angle, each.coordination_number, each.mean_fn) for each in results.statistics]
     status = Counter(frame.status.name.lower() for frame in frames)
     settled = [frame.frame for frame in frames if frame.status is FrameStatus.SETTLED]
     lost, cut = tracks.lost, tracks.out_of_frame
@@ -35,7 +58,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "grain_count": results.grains.count,
         "loaded_walls": [name for name, loaded in zip(results.walls.name, results.walls.loaded, strict=True) if loaded],
         "wall_count": results.walls.count,
-        "contact_count": [frame.contacts.count for frame in frames],
+        "contact_count": [frame.contact_count for frame in frames],
         "status": [frame.status.name.lower() for frame in frames],
         "status_count": dict(status),
         "settled_after": settled[0] if settled else None,
@@ -58,11 +81,11 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "correction": _plain([frame.correction for frame in frames]),
         "trust": _plain(trust.tolist()),
         "doubts": [frame.doubt for frame in frames],
-        "friction_angle_degrees": _plain([float(np.rad2deg(s.friction_angle)) for s in results.statistics]),
-        "coordination_number": _plain([s.coordination_number for s in results.statistics]),
-        "mean_fn": _plain([s.mean_fn for s in results.statistics]),
+        "friction_angle_degrees": _plain([float(np.rad2deg(angle)) for angle, _, _ in statistics]),
+        "coordination_number": _plain([number for _, number, _ in statistics]),
+        "mean_fn": _plain([mean for _, _, mean in statistics]),
         "friction": _friction(results),
-        "wall_force_error": _wall_force_error(results),
+        "wall_force_error": _wall_force_error(results, settled),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
         "boundary": results.boundary.describe(results.walls.name) if results.boundary is not None else [],
         "corrections": calibration_facts(results.calibration, results.walls.name) if results.calibration else None,
@@ -87,10 +110,9 @@ def _radius_curve(results: Results) -> dict[str, list[float]] | None:
     return {"change": tuning.change.tolist(), "coordination_number": tuning.coordination_number.tolist()}
 
 
-def _wall_force_error(results: Results) -> dict[str, float]:
+def _wall_force_error(results: Results, settled: list[int]) -> dict[str, float]:
     """rms |F inferred − F recorded| / rms |F recorded| of every wall with a sensor, over settled frames."""
     recorded = results.walls.force
-    settled = [frame.frame for frame in results.frames if frame.status is FrameStatus.SETTLED]
     if recorded is None or not settled:
         return {}
     inferred = np.stack([results.statistics[k].wall_force for k in settled])

@@ -50,16 +50,17 @@ def read_truth(
         pair[row, 0] = body.get(int(i[row]), -1)
         if text in wall:
             pair[row, 1] = wall[text]
-        elif text.lstrip("+-").isdigit():
-            pair[row, 1] = body.get(int(text), -1)
         else:
-            raise table.error(row, "j", "is neither a grain's id nor the name of a wall")
+            try:
+                pair[row, 1] = body.get(int(text), -1)
+            except ValueError:
+                raise table.error(row, "j", "is neither a grain's id nor the name of a wall") from None
     if not np.any(ids < 0):  # every grain has a name, so that an unknown one is a mistake
         for column, values in (("i", pair[:, 0]), ("j", pair[:, 1])):
             unknown = np.flatnonzero(values < 0)
             if unseen is not None:
-                told = np.array([int(table.text(column)[row]) for row in unknown], np.int64)
-                unknown = unknown[~np.isin(told, unseen)]
+                known_unseen = set(unseen.tolist())
+                unknown = unknown[[int(table.text(column)[row]) not in known_unseen for row in unknown]]
             if len(unknown):
                 raise table.error(int(unknown[0]), column, "is not the id of a grain")
     # A pair may be listed from either side: f_n and f_t are the same seen from both.

@@ -1,38 +1,25 @@
 """Results laid out as the columns of the schema, and written as HDF5 with labelled dimensions.
 
 Every dimension is an HDF5 dimension scale at the root of the file, as netCDF has them: xarray opens the file with the
-names and labels of its dimensions.
+names and labels of its dimensions. What frames have is written frame after frame, in blocks of one size.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import h5py
 import numpy as np
 
-from solver.bodies.quantity import columns
-from solver.nlgs.sweep_record import SweepHistory
-from solver.sequence.frame_forces import FrameForces
-
 from .checkpoint import flatten
+from .frame_pieces import Columns, Shapes, find_extents, piece_of
 from .results import Results
-from .schema import (
-    CONTACT_OFFSET,
-    DIMENSIONS,
-    KEPT_OFFSET,
-    PER_FRAME,
-    SWEEP_COUNT,
-    SWEEP_NUMBER,
-    SWEEP_OFFSET,
-    Entry,
-    entries,
-)
-
-Columns = dict[str, np.ndarray]  # by path
+from .schema import DIMENSIONS, PARTS, PER_FRAME, Entry, entries
 
 COMPRESSED = 1024  # [bytes] and more: an index of compressed blocks takes twice as much
+BLOCK = 1 << 15  # [bytes] that are compressed together, and wait in memory until they are
+TEXTS = 256  # that wait likewise
 NO_LABELS = "This is a netCDF dimension but not a netCDF variable. {:10d}"  # what netCDF calls such a dimension
 
 
@@ -45,77 +32,110 @@ def columns_of(part: str, whole: Any) -> Columns:
 
 
 def columns_of_results(results: Results) -> Columns:
-    """Everything that results hold."""
-    columns = {}
-    for part in ("tracks", "walls", "grains", "calibration", "boundary", "friction_check", "radius_tuning"):
-        columns |= columns_of(part, getattr(results, part))
-    for part in PER_FRAME:
-        columns |= _over_frames(part, getattr(results, part))
-    return columns | _rows(results.frames)
-
-
-def _over_frames(part: str, frames: Sequence[Any]) -> Columns:
-    """What every frame has (where one lacks it, none has it), laid end to end or stacked."""
-    named = [dict(flatten(frame)) for frame in frames]
-    laid: Columns = {}
-    for each in entries(part):
-        if not all(each.attribute in frame for frame in named):
-            continue
-        values = [frame[each.attribute] for frame in named]
-        if each.dims == ("sweep",):
-            values = [value[_measured(frame.history)] for value, frame in zip(values, frames, strict=True)]
-        if each.dims == ("kept_force",):
-            values = [value.ravel() for value in values]
-        column = np.stack(values) if each.dims[0] == "frame" else np.concatenate(values)
-        if column.dtype.kind != "f" or each.dtype.kind == "f":
-            laid[each.path] = column
-        elif np.isfinite(column).all():  # NaN in place of whole numbers: an earlier version did not store them
-            laid[each.path] = column.astype(each.dtype)
-    return laid
-
-
-def _rows(frames: Sequence[FrameForces]) -> Columns:
-    """Which rows belong to which frame, and which sweeps were measured."""
-    histories = [frame.history for frame in frames]
-    measured = [_measured(history) for history in histories]
-    return {
-        CONTACT_OFFSET.path: _offset(frame.contacts.count for frame in frames),
-        SWEEP_COUNT.path: np.array([history.count for history in histories], np.int64),
-        SWEEP_OFFSET.path: _offset(map(len, measured)),
-        SWEEP_NUMBER.path: np.concatenate(measured).astype(np.int64),
-        KEPT_OFFSET.path: _offset(len(history.recorded) for history in histories),
+    """Everything that results hold, in memory: for tables, which are made of all frames at once."""
+    every = list(_pieces(results))
+    extents = find_extents(every)
+    of_frames = {
+        each.path: np.concatenate([_as_stored(each, piece[each.path]) for piece in every])
+        for each in entries()
+        if each.path in extents.shape
     }
+    return _of_the_whole(results) | extents.rows | of_frames
 
 
-def _measured(history: SweepHistory) -> np.ndarray:
-    """Sweeps of a frame, from 0, whose residuals were measured."""
-    rows = np.stack([getattr(history, name) for name in columns(SweepHistory, "sweep")])
-    return np.flatnonzero(~np.isnan(rows).all(axis=0))
+def write_results(store: h5py.File, results: Results) -> None:
+    """Write everything. Frames are gone through twice, one after the other, and are never all in memory.
 
-
-def _offset(counts: Iterable[int]) -> np.ndarray:
-    return np.concatenate([[0], np.cumsum(list(counts))]).astype(np.int64)
+    Raises ValueError where sizes disagree.
+    """
+    extents = find_extents(_pieces(results))
+    whole = _of_the_whole(results) | extents.rows
+    _write_scales(store, _shapes(whole) | extents.shape, whole)
+    _write_whole(store, whole)
+    shape = extents.shape
+    growing = [_GrowingColumn(store, each, shape[each.path]) for each in entries() if each.path in shape]
+    for piece in _pieces(results):
+        for column in growing:
+            column.add(piece)
+    for column in growing:
+        column.end()
 
 
 def write_columns(store: h5py.File, columns: Columns) -> None:
     """Write the columns with their dimensions, units and meaning; raises ValueError where their sizes disagree."""
-    written = [each for each in entries() if each.path in columns]
+    _write_scales(store, _shapes(columns), columns)
+    _write_whole(store, columns)
+
+
+class _GrowingColumn:
+    """A dataset that is filled from its first row on, in whole blocks."""
+
+    def __init__(self, store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> None:
+        self._entry, self._dataset = entry, _make_dataset(store, entry, shape)
+        self._block = self._dataset.chunks[0] if self._dataset.chunks else TEXTS
+        self._waiting: list[np.ndarray] = []
+        self._count = self._written = 0  # rows that wait, and that are there
+
+    def add(self, piece: Columns) -> None:
+        rows = _as_stored(self._entry, piece[self._entry.path])
+        self._waiting.append(rows)
+        self._count += len(rows)
+        if self._count >= self._block:
+            self._write(self._count - self._count % self._block)
+
+    def end(self) -> None:
+        if self._count:
+            self._write(self._count)
+
+    def _write(self, count: int) -> None:
+        rows = np.concatenate(self._waiting)
+        self._dataset[self._written : self._written + count] = rows[:count]
+        self._waiting, self._count = [rows[count:].copy()], len(rows) - count
+        self._written += count
+
+
+def _of_the_whole(results: Results) -> Columns:
+    """What a run has once."""
+    columns: Columns = {}
+    for part in PARTS:
+        if part not in PER_FRAME:
+            columns |= columns_of(part, getattr(results, part))
+    return columns
+
+
+def _pieces(results: Results) -> Iterator[Columns]:
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        yield piece_of(forces, statistics)
+
+
+def _as_stored(entry: Entry, values: np.ndarray) -> np.ndarray:
+    return values.astype(entry.dtype, copy=False)  # an integer where an enumeration was given
+
+
+def _shapes(columns: Columns) -> Shapes:
+    return {path: values.shape for path, values in columns.items()}
+
+
+def _write_scales(store: h5py.File, shapes: Shapes, columns: Columns) -> None:
+    """Write the dimensions of all columns, once their sizes are found to agree."""
     sizes: dict[str, int] = {}
-    for each in written:
-        shape = columns[each.path].shape
-        agreed = tuple(sizes.setdefault(name, size) for name, size in zip(each.dims, shape, strict=False))
-        if len(shape) != len(each.dims) or shape != agreed:
-            raise ValueError(f"{each.path} has shape {shape}; its dimensions are {each.dims} {agreed}")
+    for each in entries():
+        if each.path in shapes:
+            shape = shapes[each.path]
+            agreed = tuple(sizes.setdefault(name, size) for name, size in zip(each.dims, shape, strict=False))
+            if len(shape) != len(each.dims) or shape != agreed:
+                raise ValueError(f"{each.path} has shape {shape}; its dimensions are {each.dims} {agreed}")
     for name, size in sizes.items():
         _write_scale(store, name, size, columns)
-    for each in written:
-        dataset = _write_dataset(store, each, columns[each.path])
-        for axis, name in enumerate(each.dims):
-            dataset.dims[axis].label = name
-            dataset.dims[axis].attach_scale(store[name])
 
 
-def _write_scale(store: h5py.File, name: str, size: int, columns: Columns) -> None:
+def _write_whole(store: h5py.File, columns: Columns) -> None:
+    for each in entries():
+        if each.path in columns:
+            _make_dataset(store, each, columns[each.path].shape)[...] = _as_stored(each, columns[each.path])
+
+
+def _write_scale(store: h5py.File, name: str, size: int, columns: Mapping[str, np.ndarray]) -> None:
     dimension = DIMENSIONS[name]
     labels = columns.get(dimension.labelled_by, dimension.labels)
     if name == "frame":
@@ -132,17 +152,23 @@ def _write_scale(store: h5py.File, name: str, size: int, columns: Columns) -> No
     scale.attrs["long_name"] = dimension.meaning
 
 
-def _write_dataset(store: h5py.File, entry: Entry, values: np.ndarray) -> h5py.Dataset:
+def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5py.Dataset:
+    """A dataset that is still to be filled, with what it is said to hold."""
     quantity = entry.quantity
     kind: Any = entry.dtype
     if quantity.names is not None:
         kind = h5py.enum_dtype({member.name.lower(): member.value for member in quantity.names}, basetype=np.uint8)
     elif entry.dtype.kind == "O":
         kind = h5py.string_dtype()
-    data = values.astype(entry.dtype)  # an integer where an enumeration was given
-    small = values.nbytes < COMPRESSED or entry.dtype.kind == "O"
-    options: dict[str, Any] = {} if small else {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-    dataset = store.create_dataset(entry.path, data=data, dtype=kind, **options)
+    options: dict[str, Any] = {}
+    size = int(np.prod(shape)) * entry.dtype.itemsize
+    if size >= COMPRESSED and entry.dtype.kind != "O":
+        rows = max(min(BLOCK * shape[0] // size, shape[0]), 1)
+        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": 4, "shuffle": True}
+    dataset = store.create_dataset(entry.path, shape, kind, **options)
+    for axis, name in enumerate(entry.dims):
+        dataset.dims[axis].label = name
+        dataset.dims[axis].attach_scale(store[name])
     dataset.attrs["long_name"] = quantity.meaning  # as netCDF's conventions and xarray call it
     if quantity.unit:
         dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit

@@ -121,12 +121,13 @@ def deviation(spread: Array, free: Array, constants: tuple[float, float]) -> Arr
 
 def with_spread(frames: Sequence[FrameForces], members: Sequence[Networks], estimator: str) -> list[FrameForces]:
     """The same forces with the standard deviations that the members give, in place of the free formula's."""
-    told = []
-    for k, frame in enumerate(frames):
-        force = np.column_stack([frame.fn, frame.ft])
-        spread = spread_around(frame.contacts.key, force, [each.at(k) for each in members])
-        normal, tangent = DEVIATION[estimator]
-        fn_sd = deviation(spread.fn, frame.fn_sd, normal)
-        ft_sd = deviation(spread.ft, frame.ft_sd, tangent)
-        told.append(replace(frame, fn_sd=fn_sd, ft_sd=ft_sd))
-    return told
+    return [frame_with_spread(frame, [each.at(k) for each in members], estimator) for k, frame in enumerate(frames)]
+
+
+def frame_with_spread(frame: FrameForces, members: Sequence[tuple[Keys, Array]], estimator: str) -> FrameForces:
+    """Likewise of one frame; members: keys (m,) and forces (m, 2) [N] of each."""
+    spread = spread_around(frame.contacts.key, np.column_stack([frame.fn, frame.ft]), members)
+    normal, tangent = DEVIATION[estimator]
+    fn_sd = deviation(spread.fn, frame.fn_sd, normal)
+    ft_sd = deviation(spread.ft, frame.ft_sd, tangent)
+    return replace(frame, fn_sd=fn_sd, ft_sd=ft_sd)

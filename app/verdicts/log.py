@@ -263,10 +263,16 @@ def _entry(file: Path, where: str, values: dict[str, Any]) -> Entry:
 
     def member(key: str, kind: type[StrEnum], default: str | None = None) -> Any:
         found = values.get(key, default)
-        if found not in {each.value for each in kind}:
+        if not isinstance(found, str) or found not in {each.value for each in kind}:
             allowed = ", ".join(each.value for each in kind)
             raise InputError(file, f"{where}, {key} = {found!r}", f"is none of {allowed}")
         return kind(found)
+
+    def seconds() -> float:
+        found = values.get("seconds", 0.0)
+        if isinstance(found, bool) or not isinstance(found, int | float) or not 0.0 <= found < 1e12:
+            raise InputError(file, f"{where}, seconds = {str(found)[:50]}", "is no number of seconds")
+        return float(found)
 
     frame, reviewer = value("frame", int), value("reviewer", str)
     if "flag" in values:
@@ -276,6 +282,6 @@ def _entry(file: Path, where: str, values: dict[str, Any]) -> Entry:
         )  # fmt: skip
     return Entry(
         frame, reviewer, value("a", int), value("b", (int, str)), member("verdict", Verdict),
-        seconds=float(values.get("seconds", 0.0)), origin=member("origin", Origin, Origin.QUEUE),
+        seconds=seconds(), origin=member("origin", Origin, Origin.QUEUE),
         blind=bool(values.get("blind", False)), time=str(values.get("time", "")), line=str(values.get("line", where)),
     )  # fmt: skip

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
+from ..experiment.input_files import ordinary
 from ..experiment.tables import Table, read_table, write_table
 from .decisions import Bodies
 from .log import Entry, Origin, Pair, Verdict, VerdictLog, canonical
@@ -89,7 +90,7 @@ def import_verdicts(
 
 def _header(file: Path) -> list[str]:
     try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
+        with ordinary(file).open(newline="", encoding="utf-8-sig") as stream:
             return [name.strip() for name in next(csv.reader(stream), [])]
     except (OSError, UnicodeDecodeError, csv.Error):
         return []  # read_table says what is wrong

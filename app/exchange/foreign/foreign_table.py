@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ...errors import InputError
+from ...experiment.input_files import ordinary
 from ...experiment.tables import Table
 
 PARQUET = b"PAR1"
@@ -56,7 +57,7 @@ def column_names(file: Path) -> list[str]:
 def read_text(file: Path) -> str:
     """A text file, whatever wrote it: UTF-8 or UTF-16 with their marks, or Latin-1. Raises InputError."""
     try:
-        content = file.read_bytes()
+        content = ordinary(file).read_bytes()
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except OSError as error:
@@ -78,7 +79,7 @@ def read_text(file: Path) -> str:
 def _open(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     """The header, and the rows with their lines."""
     try:
-        with file.open("rb") as stream:
+        with ordinary(file).open("rb") as stream:
             start = stream.read(4)
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None

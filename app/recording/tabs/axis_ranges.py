@@ -21,7 +21,7 @@ MARGIN = 0.06  # of the span, where there is no legend
 
 def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
     """Least and greatest value of every curve whose values are known before the recording is written."""
-    found: dict[str, list[float]] = {}
+    found: dict[str, tuple[float, float]] = {}
     for frame, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
         values = [*statistic_values(statistics), (entities.CORRECTION, forces.correction)]
         values += [(entities.OLD_UNBALANCE, forces.old_unbalance), (entities.START_DIFFERENCE, forces.start_difference)]
@@ -36,8 +36,9 @@ def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
             values += [(path, float(value)) for value in several]
         for path, value in values:
             if np.isfinite(value):
-                found.setdefault(path, []).append(value)
-    return {path: (min(values), max(values)) for path, values in found.items()}
+                low, high = found.get(path, (value, value))
+                found[path] = min(low, value), max(high, value)
+    return found
 
 
 def range_with_room(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,37 +16,72 @@ from solver.sequence.frame_forces import FrameForces
 from solver.statistics.frame_statistics import FrameStatistics
 
 from ...experiment.units import Scale
-from ...results.checkpoint import Checkpoint
+from ...results.checkpoint import Checkpoint, flatten
+from ...results.lazy import Lazily, Remembered
 from ...results.results import Results
 from ...results.store import load_results, load_tracks
 from ...run_folder import RESULTS, TRACKS, UNFINISHED
 from ...tracks import Tracks, TrackStatus, WallTracks
 
+ROOM = 256 << 20  # [bytes] of frames that are kept: those of a usual test are answered from at once
+NUMBERS = ("trust", "residual", "correction", "friction_angle", "coordination", "mean_fn")
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Tracks, and the frames that have been solved."""
+    """Tracks, and the frames that have been solved, read when they are asked for."""
 
     tracks: Tracks
     walls: WallTracks | None
-    frames: tuple[FrameForces, ...]
-    statistics: tuple[FrameStatistics, ...]
+    frames: Sequence[FrameForces]
+    statistics: Sequence[FrameStatistics]
     results: Results | None  # None: of a run that goes on
+    going_on: GoingOn | None = None
+    told: dict[int, Facts] = field(default_factory=dict)  # of frames that were looked at
 
     @property
     def provisional(self) -> bool:
         return self.results is None
 
 
-def find_run(folder: Path) -> Found | None:
-    """What lies in a run's folder; a run that goes on counts before what it will replace. None: nothing yet."""
-    going_on = _unfinished(folder)
+@dataclass(slots=True)
+class GoingOn:
+    """Frames of a run that goes on, or was stopped: what has been read of them stays, however many come."""
+
+    checkpoint: Checkpoint
+    fingerprint: str
+    solved: Remembered[list[Any]]
+    told: dict[int, Facts] = field(default_factory=dict)
+
+
+class Facts(NamedTuple):
+    """What the time line tells of a frame."""
+
+    status: str
+    reason: str
+    trust: float
+    contacts: int
+    residual: float
+    correction: float
+    friction_angle: float  # [degrees]
+    coordination: float
+    mean_fn: float
+
+
+def find_run(folder: Path, former: Found | None = None) -> Found | None:
+    """What lies in a run's folder; a run that goes on counts before what it will replace. None: nothing yet.
+
+    former: what was found there before, of which it goes on.
+    """
+    going_on = _unfinished(folder, None if former is None else former.going_on)
     if going_on is not None:
         return going_on
     if not (folder / RESULTS).is_file():
         return None
     results = load_results(folder / RESULTS)
-    return Found(results.tracks, results.walls, tuple(results.frames), tuple(results.statistics), results)
+    stored = results.frames
+    frames: Remembered[FrameForces] = Remembered(len(stored), lambda k: stored[k], _bytes_of, ROOM)
+    return Found(results.tracks, results.walls, frames, results.statistics, replace(results, frames=frames))
 
 
 def run_stamp(folder: Path) -> tuple[Any, ...]:
@@ -55,7 +91,7 @@ def run_stamp(folder: Path) -> tuple[Any, ...]:
     return len(kept), *(file.stat().st_mtime_ns if file.is_file() else 0 for file in told)
 
 
-def _unfinished(folder: Path) -> Found | None:
+def _unfinished(folder: Path, going_on: GoingOn | None) -> Found | None:
     """Finished frames of a run that goes on, or was stopped."""
     place, tracks = folder / UNFINISHED / "solving", folder / TRACKS
     try:
@@ -64,36 +100,54 @@ def _unfinished(folder: Path) -> Found | None:
         return None
     if not tracks.is_file():
         return None
-    checkpoint = Checkpoint(place, fingerprint)
+    if going_on is None or going_on.fingerprint != fingerprint:
+        checkpoint = Checkpoint(place, fingerprint, looks_on=True)
+        solved: Remembered[list[Any]] = Remembered(
+            0, lambda k: checkpoint.load(k, FrameForces, FrameStatistics), lambda both: _bytes_of(both[0]), ROOM
+        )
+        going_on = GoingOn(checkpoint, fingerprint, solved)
+    solved = going_on.solved
     try:
-        solved = [checkpoint.load(k, FrameForces, FrameStatistics) for k in range(checkpoint.finished())]
+        count = going_on.checkpoint.finished(len(solved))
     except FileNotFoundError:  # it finished just now, and took its pieces away
         return None
-    if not solved:
+    if not count:
         return None
+    solved.grow(count)
     seen, walls = load_tracks(tracks)
-    return Found(seen, walls, tuple(each[0] for each in solved), tuple(each[1] for each in solved), None)
+    frames, statistics = (Lazily(count, lambda k, at=at: solved[k][at]) for at in range(2))
+    return Found(seen, walls, frames, statistics, None, going_on, going_on.told)
+
+
+def _bytes_of(forces: FrameForces) -> int:
+    return sum(array.nbytes for _, array in flatten(forces))
 
 
 def frame_facts(found: Found) -> dict[str, Any]:
     """What is told of every frame, for the time line."""
-    frames, statistics, tracks = found.frames, found.statistics, found.tracks
+    tracks, count = found.tracks, len(found.frames)
     lost = np.isin(tracks.status, (TrackStatus.LOST, TrackStatus.OUT_OF_FRAME)).sum(axis=1)
     suspect = (tracks.status == TrackStatus.SUSPECT).sum(axis=1)
+    for k in range(count):
+        if k not in found.told:
+            found.told[k] = _facts_of(found.frames[k], found.statistics[k])
+    facts = [found.told[k] for k in range(count)]
     return {
-        "count": len(frames), "provisional": found.provisional, "rods": tracks.grain_count,
-        "status": [frame.status.name.lower() for frame in frames],
-        "reason": [frame.failed_reason or frame.reason for frame in frames],
-        "trust": plain([frame.trust for frame in frames]),
-        "contacts": [frame.contacts.count for frame in frames],
-        "residual": plain([frame.natural_map for frame in frames]),
-        "correction": plain([frame.correction for frame in frames]),
-        "friction_angle": plain([np.rad2deg(each.friction_angle) for each in statistics]),
-        "coordination": plain([each.coordination_number for each in statistics]),
-        "mean_fn": plain([each.mean_fn for each in statistics]),
+        "count": count, "provisional": found.provisional, "rods": tracks.grain_count,
+        "status": [each.status for each in facts], "reason": [each.reason for each in facts],
+        "contacts": [each.contacts for each in facts],
+        **{name: plain([getattr(each, name) for each in facts]) for name in NUMBERS},
         "lost": lost.tolist(), "suspect_poses": suspect.tolist(),
-        "time": tracks.time[: len(frames)].tolist(),
+        "time": tracks.time[:count].tolist(),
     }  # fmt: skip
+
+
+def _facts_of(forces: FrameForces, statistics: FrameStatistics) -> Facts:
+    return Facts(
+        forces.status.name.lower(), forces.failed_reason or forces.reason, forces.trust, forces.contacts.count,
+        forces.natural_map, forces.correction, float(np.rad2deg(statistics.friction_angle)),
+        statistics.coordination_number, statistics.mean_fn,
+    )  # fmt: skip
 
 
 def network(found: Found, frame: int, scale: Scale) -> dict[str, Any]:

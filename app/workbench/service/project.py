@@ -119,7 +119,8 @@ class Project:
         with self.lock:
             stamp = self.results, run_stamp(self.results)
             if self._found[0] != stamp:
-                self._found = stamp, find_run(self.results)
+                former = self._found[1] if self._found[0] and self._found[0][0] == self.results else None
+                self._found = stamp, find_run(self.results, former)
             return self._found[1]
 
     def mender(self, make: Callable[[], Mender]) -> Mender:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -15,7 +16,7 @@ def differences(one: Results, other: Results) -> list[str]:
     found: list[str] = []
     for each in fields(Results):
         a, b = getattr(one, each.name), getattr(other, each.name)
-        if isinstance(a, list | tuple):
+        if isinstance(a, Sequence) and not isinstance(a, str):
             found += [] if len(a) == len(b) else [f"number of {each.name}"]
             for k, (x, y) in enumerate(zip(a, b, strict=False)):
                 found += _parts(f"{each.name}[{k}]", x, y)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from rodsight.errors import RunError
 from rodsight.results.checkpoint import Checkpoint, flatten
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
@@ -59,7 +60,7 @@ def test_a_damaged_frame_is_done_again_with_those_after_it_and_said(tmp_path, at
     file.write_bytes(content)
     assert checkpoint.finished() == 1
     assert notes == ["Frame 1 of the unfinished solving is damaged: it is done again."]
-    with pytest.raises(ValueError, match=r"000001\.piece is damaged"):
+    with pytest.raises(RunError, match=r"000001\.piece: was damaged"):
         checkpoint.load(1, FrameForces)
 
 

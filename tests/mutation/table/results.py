@@ -11,16 +11,18 @@ COMPARISON = "tests/app/results/test_comparison.py"
 
 MUTANTS = [
     *mutants_of(
+        "app/results/frame_pieces.py",
+        STORE,
+        ("ends[path].append(ends[path][-1] + len(piece[counted]))", "ends[path].append(ends[path][-1] + 1)"),
+        ("return value[measured]", "return value[: len(measured)]"),
+        ("if seen[path] == count}", "if seen[path]}"),
+        ("np.flatnonzero(~np.isnan(rows).all(axis=0))", "np.flatnonzero(~np.isnan(rows).any(axis=0))"),
+    ),
+    *mutants_of(
         "app/results/writer.py",
         STORE,
-        (
-            "CONTACT_OFFSET.path: _offset(frame.contacts.count for",
-            "CONTACT_OFFSET.path: _offset(frame.contacts.count - 1 for",
-        ),
-        ("value[_measured(frame.history)] for", "value[: len(_measured(frame.history))] for"),
-        ("np.concatenate([[0], np.cumsum(list(counts))])", "np.concatenate([np.cumsum(list(counts)), [0]])"),
-        ("KEPT_OFFSET.path: _offset(len(history.recorded)", "KEPT_OFFSET.path: _offset(history.count"),
-        ("np.flatnonzero(~np.isnan(rows).all(axis=0))", "np.flatnonzero(~np.isnan(rows).any(axis=0))"),
+        ("self._waiting, self._count = [rows[count:].copy()], len(rows) - count", "self._waiting, self._count = [], 0"),
+        ("self._written += count", "self._written = count"),
         ('dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit', 'dataset.attrs["unit"] = ""'),
         (
             "member.name.lower(): member.value for member in quantity.names}",

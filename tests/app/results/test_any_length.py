@@ -1,0 +1,134 @@
+"""A run of any length is written and gone through in the memory of a few frames, and a disk may refuse any of it."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import tracemalloc
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+from rodsight.results import writer
+from rodsight.results.checkpoint import Checkpoint, flatten
+from rodsight.results.lazy import Lazily, Remembered
+from rodsight.results.refusable import created
+from rodsight.results.store import Provenance, load_results, save_results
+from rodsight.results.summary import summarize
+
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.frame_statistics import FrameStatistics
+from tests.app.results.full_results import make_full_results
+from tests.app.results.same import differences
+
+ORIGIN = Provenance("print", "experiment.toml", (0, None), {})
+
+
+def test_frames_of_a_checkpoint_are_stored_as_those_in_memory(tmp_path):
+    full = make_full_results()
+    checkpoint = Checkpoint(tmp_path / "solving", "fingerprint")
+    for k, (forces, statistics) in enumerate(zip(full.frames, full.statistics, strict=True)):
+        checkpoint.save(k, forces, statistics)
+    frames, statistics = checkpoint.lazily(len(full.frames), FrameForces, FrameStatistics)
+    save_results(tmp_path / "results.h5", replace(full, frames=frames, statistics=statistics), ORIGIN)
+    assert differences(full, load_results(tmp_path / "results.h5")) == []
+
+
+def peak_of(work) -> int:
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_twice_as_many_frames_take_no_more_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "BLOCK", 1 << 11)  # else it takes hundreds of frames until blocks are full
+    monkeypatch.setattr(writer, "TEXTS", 8)
+    few = make_full_results()
+
+    def of(count: int):
+        def frame(k: int) -> FrameForces:
+            forces = few.frames[k % 3]
+            fn = np.random.default_rng(k).random(forces.history.fn.shape).astype(np.float32)
+            return replace(forces, frame=k, history=replace(forces.history, fn=fn))
+
+        plain = {"boundary": None, "calibration": None, "friction_check": None, "radius_tuning": None}
+        tracks = few.tracks.frames(0, 3)
+        over = np.arange(count) % 3
+        tracks = replace(
+            tracks, failed_reason=None, time=np.arange(count, dtype=float),
+            **{name: getattr(tracks, name)[over] for name in ("position", "rotation", "sigma", "zncc", "status")},
+            second_zncc=None, reference_frame=None,
+        )  # fmt: skip
+        unknown = dict.fromkeys(("force", "sigma", "told", "load", "cell"))
+        walls = replace(few.walls, endpoints=few.walls.endpoints[over], **unknown)
+        return replace(
+            few, tracks=tracks, walls=walls, frames=Lazily(count, frame),
+            statistics=Lazily(count, lambda k: few.statistics[k % 3]), **plain,
+        )  # fmt: skip
+
+    def all_of_it(count: int) -> None:
+        save_results(tmp_path / "results.h5", of(count), ORIGIN)
+        summarize(load_results(tmp_path / "results.h5"), None, {})
+
+    all_of_it(3)  # what is made once
+    some, many = peak_of(lambda: all_of_it(60)), peak_of(lambda: all_of_it(120))
+    frames = sum(array.nbytes for each in few.frames for _, array in flatten(each)) / len(few.frames) * 60
+    assert many - some < 0.2 * frames, (some, many, frames)
+
+
+@pytest.mark.parametrize("size", [0, 300, 5000, 100_000])
+def test_a_disk_that_refuses_is_heard_with_the_name_of_the_file(tmp_path, monkeypatch, size):
+    file = tmp_path / "store.h5"
+    written, real = [0], io.FileIO.write
+
+    class Full:
+        def __init__(self, target):
+            self._target = target
+
+        def __getattr__(self, name):
+            return getattr(self._target, name)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            self._target.close()
+
+        def write(self, content):
+            written[0] += len(content)
+            if written[0] > size:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return real(self._target, content)
+
+    opened = type(file).open
+    monkeypatch.setattr(type(file), "open", lambda self, *given, **named: Full(opened(self, *given, **named)))
+    with pytest.raises(OSError, match="No space left") as refused, created(file) as store:
+        fill(store)
+    assert refused.value.filename == str(file)
+
+
+def fill(store: h5py.File) -> None:
+    for k in range(30):
+        values = np.random.default_rng(k).random(2000)
+        store.create_dataset(f"group/{k}", data=values, chunks=(500,), compression="gzip")
+
+
+def test_as_many_are_remembered_as_find_room():
+    made: list[int] = []
+
+    def make(k: int) -> int:
+        made.append(k)
+        return k
+
+    some = Remembered(5, make, lambda _: 10, 25)
+    assert [some[k] for k in (0, 1, 0, 1, 2, 1, 0)] == [0, 1, 0, 1, 2, 1, 0]
+    assert made == [0, 1, 2, 0]
+    some.grow(7)
+    assert some[-1] == 6
+    with pytest.raises(IndexError):
+        some[7]

@@ -1,0 +1,66 @@
+"""What campaigns and strangers have found once: each ends in one line that names it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+
+import pytest
+
+from .attempt import attempt, complaint
+
+
+def first_lines(file, **replaced: str) -> None:
+    lines = file.read_text().splitlines()
+    head = lines[0].split(",")
+    cells = lines[1].split(",")
+    for name, value in replaced.items():
+        cells[head.index(name)] = value
+    file.write_text("\n".join([lines[0], ",".join(cells), *lines[2:]]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("file", "cell", "told"),
+    [
+        ("grains.csv", {"radius": "7000.0"}, "larger than the packing"),
+        ("truth_contacts.csv", {"j": "9" * 30}, "is not the id of a grain"),
+        ("truth_contacts.csv", {"j": "²"}, "neither a grain's id nor the name of a wall"),
+        ("truth_contacts.csv", {"j": "9" * 5000}, "neither a grain's id nor the name of a wall"),
+    ],
+)
+def test_a_cell_is_refused(originals, tmp_path, file, cell, told):
+    copy = shutil.copytree(originals.tracked, tmp_path / "copy")
+    first_lines(copy / file, **cell)
+    ended = attempt(["check", str(copy), "--quiet"])
+    assert complaint(ended, None, (2,)) == ""
+    assert told in ended.said
+
+
+@pytest.mark.parametrize(
+    "spoiled", [{"seconds": []}, {"seconds": 10**400}, {"seconds": True}, {"verdict": []}, {"origin": {}}]
+)
+def test_a_verdict_of_another_kind_is_refused(originals, tmp_path, spoiled):
+    copy = shutil.copytree(originals.solved, tmp_path / "solved")
+    log = copy / "verdicts.jsonl"
+    line = json.loads(log.read_text().splitlines()[0])
+    log.write_text(json.dumps(line | spoiled) + "\n")
+    ended = attempt(["review", str(copy), "--export-csv", str(copy / "verdicts.csv")])
+    assert complaint(ended, None, (2,)) == ""
+    assert next(iter(spoiled)) in ended.said
+
+
+def test_what_never_ends_or_answers_is_no_file(originals, tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    commands = (
+        ["check", str(originals.tracked), "--set", "tracks.positions=/dev/zero", "--quiet"],
+        ["check", str(pipe), "--quiet"],
+        ["score", str(pipe), "--json"],
+        ["import", "trackmate", str(pipe), str(tmp_path / "out"), "--quiet"],
+        ["review", str(originals.solved), "--import-csv", str(pipe)],
+    )
+    for arguments in commands:
+        ended = attempt(arguments)
+        assert complaint(ended, None, (2,)) == "", arguments
+        assert "not a file" in ended.said, arguments
