@@ -14,7 +14,7 @@ from solver.contacts.contacts import Contacts
 from solver.detection.networks import Network
 from solver.nlgs.problem import ContactProblem, assemble, inertial_impedance, kinematic_impedance
 from solver.nlgs.solve import NlgsSettings, Solution, solve, unbalance_of
-from solver.nlgs.sweep_record import MEASURED_EVERY, Keep, SweepHistory, SweepRecorder
+from solver.nlgs.sweep_record import Keep, SweepHistory, SweepRecorder
 from solver.nlgs.warm_start import ForceMemory
 
 
@@ -84,7 +84,7 @@ def advance_chain(
         recorder.begin(problem, contacts)
         # Where a stopping level is looked at, every sweep is measured.
         every = recorder.strides() if nlgs.force_change is None else 1
-        return solve(problem, nlgs, guess=guess, observer=recorder.hear, every=every, between=MEASURED_EVERY)
+        return solve(problem, nlgs, guess=guess, observer=recorder.hear, every=every, measured=recorder.measured)
 
     carried, done = memory, 0
     for step in range(1, steps):

@@ -40,6 +40,13 @@ def gather_differences(body, ids, first, second, rows, at, stride):  # type: ign
             rows[at + q * stride + k] = b + a if q == 2 else b - a
 
 
+def transpose_records(body, first, rows, at, stride):  # type: ignore[no-untyped-def]
+    """Copy WIDTH records that lie together from body[first] on to rows[at + q * stride]."""
+    for k in range(WIDTH):
+        for q in range(RECORD):
+            rows[at + q * stride + k] = body[first + RECORD * k + q]
+
+
 def scatter_records(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
     """Copy rows[at + q * stride] to the records of the grains ids[first : first + WIDTH], no two of them the same."""
     for k in range(WIDTH):
@@ -61,6 +68,14 @@ def _compiled_differences(body, ids, first, second, rows, at, stride):  # type: 
         _differences(body, ids, first, second, rows, at, stride)  # pyright: ignore[reportCallIssue]
 
     return gather
+
+
+@overload(transpose_records, inline="always")
+def _compiled_transpose(body, first, rows, at, stride):  # type: ignore[no-untyped-def]
+    def transpose(body, first, rows, at, stride):  # type: ignore[no-untyped-def]
+        _transpose(body, first, rows, at, stride)  # pyright: ignore[reportCallIssue]
+
+    return transpose
 
 
 @overload(scatter_records, inline="always")
@@ -103,6 +118,20 @@ def _differences(typing, body, ids, first, second, rows, at, stride):  # type: i
         return context.get_dummy_value()
 
     return types.void(body, ids, first, second, rows, at, stride), generate
+
+
+@intrinsic
+def _transpose(typing, body, first, rows, at, stride):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        body, first, rows, at, stride = _pointers(context, builder, signature, values)
+        places = [builder.gep(body, [builder.add(first, _INDEX(RECORD * k))]) for k in range(WIDTH)]
+        records = [_load(builder, place, RECORD) for place in places]
+        pairs = [_shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+        for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
+            _store(builder, row, place)
+        return context.get_dummy_value()
+
+    return types.void(body, first, rows, at, stride), generate
 
 
 @intrinsic

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.nlgs.contact_law import project_on_cone, relax_contact
+from solver.nlgs.contact_law import relax_contact
 from solver.nlgs.grain_records import WIDTH, gather_differences, gather_records, scatter_records
 from solver.nlgs.ordering import GROUP as L
 
@@ -80,14 +80,14 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
             for block in range(problem.grouped // L):
                 _relax_group(pair, ids, flat, flat_force, work, block, CELL_ROWS, relaxation, mu)
             for c in range(problem.grouped, first):
-                _relax_pair(pair, ids, flat, flat_force, c, CELL_ROWS, relaxation, mu)
+                relax_pair(pair, ids, flat, flat_force, c, CELL_ROWS, relaxation, mu)
         else:
             for block in range(problem.grouped // L):
                 _relax_group(pair, ids, flat, flat_force, work, block, ROWS, relaxation, mu)
             for c in range(problem.grouped, first):
-                _relax_pair(pair, ids, flat, flat_force, c, ROWS, relaxation, mu)
+                relax_pair(pair, ids, flat, flat_force, c, ROWS, relaxation, mu)
         for c in range(len(problem.wall)):
-            _relax_wall(problem.wall, problem.wall_body, flat, plate, flat_force, first + c, c, relaxation, wall_mu)
+            relax_wall(problem.wall, problem.wall_body, flat, plate, flat_force, first + c, c, relaxation, wall_mu)
 
 
 @njit(inline="always")
@@ -131,7 +131,7 @@ def _relax_group(pair, ids, body, force, work, block, rows, relaxation, mu):  # 
 
 
 @njit(inline="always")
-def _relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
+def relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignore[no-untyped-def]
     k = c % L
     p, e = (c // L) * rows * L + k, (c // L) * IDS + k
     i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
@@ -156,7 +156,7 @@ def _relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignor
 
 
 @njit(inline="always")
-def _relax_wall(wall, wall_body, body, plate, force, row, c, relaxation, mu):  # type: ignore[no-untyped-def]
+def relax_wall(wall, wall_body, body, plate, force, row, c, relaxation, mu):  # type: ignore[no-untyped-def]
     i, w = U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
     nx, ny = wall[c, 0], wall[c, 1]
     un = plate[w, 0] - body[i] * nx - body[i + U1] * ny + wall[c, 4]
@@ -168,67 +168,20 @@ def _relax_wall(wall, wall_body, body, plate, force, row, c, relaxation, mu):  #
     _push_from_wall(body, plate, i, w, nx, ny, new_n - fn, new_t - ft)
 
 
-@njit(cache=True, error_model="numpy")
-def advance_and_measure(problem, body, plate, force, before, relaxation, done, spacing, residuals):  # type: ignore[no-untyped-def]
-    """Advance by as many sweeps as residuals has rows (s, 3), and measure some of them.
-
-    A row holds the greatest force change, the natural-map residual and the worst unbalance over the mean f_n after
-    that sweep, or NaN where they are not measured. Measured are the last sweep and, counted on from `done`, the
-    sweeps 1, 2, 4, … up to a `spacing` and its multiples; the last one alone if it is 0. before: room for the forces.
-    """
-    residuals[:] = np.nan
-    rest = np.empty_like(body)
-    find_rest(problem, rest)
-    row = 0
-    while row < len(residuals):
-        step = len(residuals) - row
-        if spacing > 0:
-            number = done + row
-            step = min(step, max(number, 1), spacing - number % spacing)
-        if step > 1:
-            advance(problem, body, plate, force, step - 1, relaxation)
-        before.reshape(before.size)[:] = force.reshape(force.size)  # flat: copied at once
-        advance(problem, body, plate, force, 1, relaxation)
-        row += step
-        change, norm, mean = measure_forces(force, before)
-        residuals[row - 1, 0] = change
-        residuals[row - 1, 1] = measure_natural_map(problem, body, plate, force, norm)
-        residuals[row - 1, 2] = worst_unbalance(rest, body) / mean if mean > 0.0 else 0.0
+@njit(inline="always")
+def relative_size(squares, norm):  # type: ignore[no-untyped-def]
+    if norm == 0.0:
+        return 0.0 if squares == 0.0 else np.inf
+    return np.sqrt(squares) / norm
 
 
-@njit(cache=True, error_model="numpy")
-def find_rest(problem, rest):  # type: ignore[no-untyped-def]
-    """The velocities (n, 4) at which grains are in balance, vx, vy [m/s], and their impedance [N s/m], 0 where nothing moves it."""
-    for k in range(len(rest)):
-        compliance = problem.body[k, 3]
-        rest[k, 0] = problem.body[k, 0] - problem.external[k, 0] * compliance
-        rest[k, 1] = problem.body[k, 1] - problem.external[k, 1] * compliance
-        rest[k, 2] = 0.0
-        rest[k, 3] = 1.0 / compliance if compliance > 0.0 else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def worst_unbalance(rest, body):  # type: ignore[no-untyped-def]
-    """Worst |ΣF| [N] on a grain."""
-    now, still, count = body.reshape(body.size), rest.reshape(rest.size), len(body)
-    work = workspace(L)
-    work[:] = 0.0
-    for block in range(count // L):
-        first = block * (4 * L)
-        for k in range(L):
-            row = first + 4 * k
-            x, y, impedance = now[row] - still[row], now[row + 1] - still[row + 1], still[row + 3]
-            size = (x * x + y * y) * (impedance * impedance)
-            greatest = work[k]
-            work[k] = size if size > greatest else greatest
-    worst = 0.0
-    for k in range(count // L * L, count):
-        row = 4 * k
-        x, y, impedance = now[row] - still[row], now[row + 1] - still[row + 1], still[row + 3]
-        worst = max(worst, (x * x + y * y) * (impedance * impedance))
-    for k in range(L):
-        worst = max(worst, work[k])
-    return np.sqrt(worst)
+@njit(inline="always")
+def miss_of_wall(wall, wall_body, body, plate, force, row, c, mu):  # type: ignore[no-untyped-def]
+    i, w = U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
+    nx, ny = wall[c, 0], wall[c, 1]
+    un = plate[w, 0] - (body[i] * nx + body[i + U1] * ny) + wall[c, 4]
+    ut = (body[i] * ny - body[i + U1] * nx) - body[i + U2] + wall[c, 5]
+    return miss_of(force[2 * row], force[2 * row + 1], un, ut, wall[c, 2], wall[c, 3], mu)
 
 
 @njit(cache=True, error_model="numpy")
@@ -292,23 +245,18 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
         for block in range(problem.grouped // L):
             _miss_group(pair, ids, flat, f, work, block, CELL_ROWS, mu)
         for c in range(problem.grouped, first):
-            total += _miss_pair(pair, ids, flat, f, c, CELL_ROWS, mu)
+            total += miss_of_pair(pair, ids, flat, f, c, CELL_ROWS, mu)
     else:
         for block in range(problem.grouped // L):
             _miss_group(pair, ids, flat, f, work, block, ROWS, mu)
         for c in range(problem.grouped, first):
-            total += _miss_pair(pair, ids, flat, f, c, ROWS, mu)
+            total += miss_of_pair(pair, ids, flat, f, c, ROWS, mu)
     for k in range(L):
         total += work[3 * L + k]
+    wall_total = 0.0
     for c in range(len(problem.wall)):
-        i, w, row = U4 * U(problem.wall_body[c, 0]), U(problem.wall_body[c, 1]), 2 * (first + c)
-        nx, ny = problem.wall[c, 0], problem.wall[c, 1]
-        un = plate[w, 0] - flat[i] * nx - flat[i + U1] * ny + problem.wall[c, 4]
-        ut = flat[i] * ny - flat[i + U1] * nx - flat[i + U2] + problem.wall[c, 5]
-        total += _miss(f[row], f[row + 1], un, ut, problem.wall[c, 2], problem.wall[c, 3], wall_mu)
-    if norm == 0.0:
-        return 0.0 if total == 0.0 else np.inf
-    return np.sqrt(total) / norm
+        wall_total += miss_of_wall(problem.wall, problem.wall_body, flat, plate, f, first + c, c, wall_mu)
+    return relative_size(total + wall_total, norm)
 
 
 @njit(inline="always")
@@ -323,11 +271,11 @@ def _miss_group(pair, ids, body, force, work, block, rows, mu):  # type: ignore[
         ut = dy * nx - dx * ny - work[2 * L + k]
         if rows == CELL_ROWS:
             ut += pair[p + 4 * L + k]
-        work[3 * L + k] += _miss(force[e + 2 * k], force[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
+        work[3 * L + k] += miss_of(force[e + 2 * k], force[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
 
 
 @njit(inline="always")
-def _miss_pair(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-def]
+def miss_of_pair(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-def]
     p, e = (c // L) * rows * L + c % L, (c // L) * IDS + c % L
     i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
     nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
@@ -336,14 +284,16 @@ def _miss_pair(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-
     ut = dy * nx - dx * ny - (body[i + U2] + body[j + U2])
     if rows == CELL_ROWS:
         ut += pair[p + 4 * L]
-    return _miss(force[2 * c], force[2 * c + 1], un, ut, wn, THIRD * wn, mu)
+    return miss_of(force[2 * c], force[2 * c + 1], un, ut, wn, THIRD * wn, mu)
 
 
 @njit(inline="always")
-def _miss(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
-    """|f − P(f − D⁻¹ u)|² of one contact."""
-    pn, pt = project_on_cone(fn - wn * un, ft - wt * ut, mu)
-    return (fn - pn) * (fn - pn) + (ft - pt) * (ft - pt)
+def miss_of(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
+    """|f − P(f − D⁻¹ u)|² of one contact, without taking a force from itself: that would cost digits."""
+    normal = min(wn * un, fn)
+    limit = mu * (fn - normal)
+    tangential = min(max(wt * ut, ft - limit), ft + limit)
+    return normal * normal + tangential * tangential
 
 
 @njit(cache=True, error_model="numpy")

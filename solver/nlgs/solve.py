@@ -20,13 +20,13 @@ from solver.bodies.grains import Array
 from solver.nlgs.acceleration import PERIOD, Acceleration
 from solver.nlgs.kernels import (
     advance,
-    advance_and_measure,
     apply_forces,
     measure_forces,
     measure_natural_map,
     measure_state,
     measure_unbalance,
 )
+from solver.nlgs.measured_sweeps import advance_and_measure, find_rest, rest_shape
 from solver.nlgs.problem import ContactProblem, aligned_zeros
 
 
@@ -100,28 +100,37 @@ def sweeps(
     *,
     guess: Array | None = None,
     every: int | Iterable[int] = 1,
-    between: int = 0,
+    measured: bool = False,
 ) -> Iterator[Sweep]:
     """Advance `every` sweeps at a time from a guess: without end, or by strides that come to one.
 
-    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent. Of the sweeps that are not heard
-    every so many-th is measured, too, as `between` says; 0: none. With acceleration the forces take a step every
+    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent. measured: the sweeps
+    that are not heard are measured, too. With acceleration the forces take a step every
     PERIOD sweeps, heard or not.
     """
     force, body, plate = _start(problem, guess)
-    before, number, relaxation = np.empty_like(force), 0, settings.relaxation
+    rest, number = np.empty(rest_shape(len(body))), 0
+    find_rest(problem, rest)
+
+    def advance_by(rows: Array) -> None:
+        if not measured:
+            rows[:-1] = np.nan
+            advance(problem, body, plate, force, len(rows) - 1, settings.relaxation)
+            rows = rows[-1:]
+        advance_and_measure(problem, body, plate, force, rest, settings.relaxation, rows)
+
     acceleration = Acceleration(problem, force, settings.acceleration) if settings.acceleration else None
     for stride in repeat(every) if isinstance(every, int) else every:
         residuals = np.empty((stride, 3))
-        if acceleration is None:
-            advance_and_measure(problem, body, plate, force, before, relaxation, number, between, residuals)
+        if acceleration is None and stride > 0:
+            advance_by(residuals)
             number += stride
         row = 0 if acceleration else stride
         while acceleration and row < stride:
             if number % PERIOD == 0 and number > 0:
                 acceleration.step(body, plate, force)
             part = residuals[row : row + PERIOD - number % PERIOD]
-            advance_and_measure(problem, body, plate, force, before, relaxation, number, between, part)
+            advance_by(part)
             row, number = row + len(part), number + len(part)
             if number % PERIOD == 0 and acceleration.settle(body, plate, force):
                 part[-1, 1:] = measure_state(problem, body, plate, force)
@@ -135,12 +144,12 @@ def solve(
     guess: Array | None = None,
     observer: Callable[[Sweep], None] | None = None,
     every: int | Iterable[int] = 1,
-    between: int = 0,
+    measured: bool = False,
 ) -> Solution:
     """Sweep until a stopping level or the number of sweeps is reached.
 
     The observer hears a sweep every `every` sweeps, or after each of the given strides, and the last one; at these
-    sweeps the stopping levels are looked at. `between`: as for `sweeps`.
+    sweeps the stopping levels are looked at. measured: as for `sweeps`.
     """
     if len(problem.rows) == 0:
         return Solution(np.empty(0), np.empty(0), Stop.EMPTY, 0, 0.0, 0.0, 0.0)
@@ -153,7 +162,7 @@ def solve(
         every = max(1, settings.sweeps)
     strides = _strides(every, settings.sweeps)
     stop, number, force = Stop.SWEEPS, 0, _start(problem, guess)[0]
-    for sweep in sweeps(problem, settings, guess=guess, every=strides, between=between):
+    for sweep in sweeps(problem, settings, guess=guess, every=strides, measured=measured):
         force, number = sweep.force, sweep.number
         if observer is not None:
             observer(sweep)

@@ -1,7 +1,7 @@
-"""A listener that keeps what a frame's sweeps did: the residuals of many, the forces of some.
+"""A listener that keeps what a frame's sweeps did: the exact residuals of all, the forces of some.
 
-To measure a sweep takes about as long as to do one. Residuals are therefore those of every MEASURED_EVERY-th
-sweep, of every sweep that keeps its forces and of the last one of a sub-step; exact ones all. Other rows hold NaN.
+To measure a sweep takes about as long as to do one. Where no forces are kept but the last ones, the residuals of a
+sub-step's last sweep are measured alone; other rows hold NaN.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from solver.nlgs.solve import Sweep
 Keep = Literal["log", "all", "none"]
 FIRST = 8  # sweeps kept one by one before the spacing becomes logarithmic
 LOG_SPACED = 40  # sweeps kept of a frame
-MEASURED_EVERY = 32  # sweeps
 
 
 def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
@@ -55,6 +54,7 @@ class SweepRecorder:
     """Hears the sweeps of a frame's successive sub-steps."""
 
     def __init__(self, expected: int, keep: Keep) -> None:
+        self.measured = keep != "none"  # every sweep, not those alone that are heard
         self._wanted = recorded_sweeps(expected, keep)
         self._recorded: list[int] = []
         self._count = 0

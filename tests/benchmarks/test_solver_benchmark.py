@@ -24,7 +24,7 @@ from solver.bodies.grains import Array
 from solver.nlgs.kernels import advance, apply_forces
 from solver.nlgs.problem import ContactProblem, aligned_zeros
 from solver.nlgs.solve import NlgsSettings, Solution, Stop, solve
-from solver.nlgs.sweep_record import MEASURED_EVERY, SweepHistory, SweepRecorder
+from solver.nlgs.sweep_record import SweepHistory, SweepRecorder
 from tests.benchmarks.plain_kernel import plain_problem, plain_state, plain_sweeps
 from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, StaticPacking, jammed_packing, static_problem
 
@@ -134,13 +134,13 @@ def test_a_recorded_solve_takes_little_longer_than_a_silent_one(
     def record() -> SweepHistory:
         recorder = SweepRecorder(HEARD_SWEEPS, "log")
         recorder.begin(problem, case.contacts)
-        solve(problem, settings, observer=recorder.hear, every=recorder.strides(), between=MEASURED_EVERY)
+        solve(problem, settings, observer=recorder.hear, every=recorder.strides(), measured=True)
         return recorder.history(case.contacts)
 
     ways: dict[str, Callable[[], object]] = {
         "silent": lambda: solve(problem, settings),
         "recorded": record,
-        "measured": lambda: solve(problem, settings, observer=lambda _: None, every=HEARD_SWEEPS, between=1),
+        "measured": lambda: solve(problem, settings, observer=lambda _: None, every=HEARD_SWEEPS, measured=True),
         "called": lambda: solve(problem, settings, observer=lambda _: None, every=1),
     }
     best = dict.fromkeys(ways, np.inf)

@@ -7,17 +7,17 @@ from solver.nlgs.acceleration import extrapolate, inner_products
 from solver.nlgs.contact_law import project_on_cone
 from solver.nlgs.kernels import (
     advance,
-    advance_and_measure,
     apply_forces,
     measure_forces,
     measure_natural_map,
     measure_state,
     measure_unbalance,
 )
+from solver.nlgs.measured_sweeps import advance_and_measure, find_rest, rest_shape
 from solver.nlgs.ordering import GROUP, visiting_order
 from tests.reference.twins.ordering import plain_order
 from tests.reference.twins.packing import make_case, make_guess
-from tests.reference.twins.sweeps import PlainSolver, greatest_change, mean_normal, measured_sweeps
+from tests.reference.twins.sweeps import PlainSolver, greatest_change, mean_normal
 
 pytestmark = pytest.mark.unit
 
@@ -81,48 +81,62 @@ def test_no_force_at_all_is_infinitely_far_from_a_load(case):
     assert measure_state(problem, body, plate, force)[1] == 0.0
 
 
-@pytest.mark.parametrize(("count", "spacing"), [(1, 0), (11, 0), (11, 4), (21, 6), (16, 16)])
-def test_sweeps_are_measured_where_they_should_be(case, plain, count, spacing):
-    problem = case.assemble()
-    force = make_guess(case)[problem.rows].copy()
+@pytest.fixture(scope="module", params=["walls", "boundary grains and a cell"])
+def swept(request):
+    return make_case(with_boundary=request.param != "walls")
+
+
+def rest_of(problem):
+    rest = np.empty(rest_shape(len(problem.body)))
+    find_rest(problem, rest)
+    return rest
+
+
+@pytest.mark.parametrize("relaxation", [1.0, 1.4])
+def test_measured_sweeps_are_the_silent_ones(swept, relaxation):
+    problem = swept.assemble()
+    force = make_guess(swept)[problem.rows].copy()
     body, plate = state_of(problem, force)
     silent = [each.copy() for each in (body, plate, force)]
-    residuals = np.empty((count, 3))
-    advance_and_measure(problem, body, plate, force, np.empty_like(force), 1.0, 0, spacing, residuals)
-    known = np.flatnonzero(np.isfinite(residuals).all(axis=1)) + 1
-    assert known.tolist() == measured_sweeps(count, spacing)
-    assert np.isfinite(residuals).any(axis=1).sum() == len(known)
-    advance(problem, *silent, count, 1.0)
-    assert np.array_equal(silent[2], force)
+    advance_and_measure(problem, body, plate, force, rest_of(problem), relaxation, np.empty((6, 3)))
+    advance(problem, *silent, 6, relaxation)
+    assert all(np.array_equal(one, other) for one, other in zip(silent, (body, plate, force), strict=True))
 
 
-def test_measured_sweeps_hold_their_own_residuals(case, plain):
-    problem, spacing, count = case.assemble(), 4, 6
-    expected = make_guess(case)
+def test_every_sweep_holds_its_own_residuals(swept):
+    plain = PlainSolver(
+        swept.grains, swept.motion, swept.walls, swept.contacts, swept.material, swept.impedance, swept.closing
+    )
+    problem, count = swept.assemble(), 6
+    expected = make_guess(swept)
     force = expected[problem.rows].copy()
     body, plate = state_of(problem, force)
     residuals = np.empty((count, 3))
-    advance_and_measure(problem, body, plate, force, np.empty_like(force), 1.0, 0, spacing, residuals)
+    advance_and_measure(problem, body, plate, force, rest_of(problem), 1.0, residuals)
     world = plain.world(expected)
-    for number in range(1, count + 1):
+    for row in range(count):
         before = expected.copy()
         plain.sweep(world, expected, problem.rows)
-        if number in measured_sweeps(count, spacing):
-            row = (
+        assert residuals[row] == pytest.approx(
+            (
                 greatest_change(expected, before),
                 plain.natural_map(expected),
                 plain.unbalance(expected)[0] / mean_normal(expected),
-            )
-            assert residuals[number - 1] == pytest.approx(row, rel=ROUNDING)
+            ),
+            rel=ROUNDING,
+        )
 
 
-def test_later_chunks_are_measured_at_the_same_sweeps(case):
+def test_sweeps_have_the_same_residuals_however_many_are_done_at_once(case):
     problem = case.assemble()
     force = make_guess(case)[problem.rows].copy()
     body, plate = state_of(problem, force)
-    residuals = np.empty((10, 3))
-    advance_and_measure(problem, body, plate, force, np.empty_like(force), 1.0, 8, 4, residuals)
-    assert (np.flatnonzero(np.isfinite(residuals[:, 1])) + 9).tolist() == [12, 16, 18]
+    again = [each.copy() for each in (body, plate, force)]
+    together, alone = np.empty((7, 3)), np.empty((7, 3))
+    advance_and_measure(problem, body, plate, force, rest_of(problem), 1.0, together)
+    for row in range(len(alone)):
+        advance_and_measure(problem, *again, rest_of(problem), 1.0, alone[row : row + 1])
+    assert np.array_equal(together, alone)
 
 
 @pytest.mark.parametrize("size", [4, GROUP])

@@ -177,12 +177,6 @@ def mean_normal(force: Array) -> float:
     return sum(bearing) / len(bearing)
 
 
-def measured_sweeps(count: int, spacing: int) -> list[int]:
-    """Which of the sweeps 1 … count are measured: powers of two up to a spacing, its multiples, and the last."""
-    early = [2**k for k in range(64) if 2**k < spacing]
-    return sorted({k for k in range(1, count + 1) if k in early or (spacing and k % spacing == 0)} | {count})
-
-
 def plain_sweeps(grains, state, walls, contacts, material, impedance, order, count):
     """Forces (c, 2) after `count` sweeps from zero, visiting contacts in `order`."""
     solver = PlainSolver(grains, state, walls, contacts, material, impedance)
