@@ -11,8 +11,8 @@ from solver.bodies.holes import find_holes
 from solver.bodies.motion import shear_over
 from solver.contacts.contacts import Contacts, detect_contacts
 from solver.contacts.pairs import align, are_among
-from solver.convex.program import polish
 from solver.detection.networks import NearPairs
+from solver.mixture.balancing import bring_into_balance
 from solver.mixture.mixing import Field, Mixture, mix_on
 from solver.nlgs.chain import ChainStep, advance_chain
 from solver.nlgs.warm_start import ForceMemory
@@ -107,7 +107,8 @@ def _mix(problem: FrameProblem, estimate: Estimate, positions: FramePosterior, m
     known, soft = problem.packing.scale_is_known, problem.settings.soft_trust if problem.settings.soft else None
     mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft)
     balance = assemble_frame_balance(problem, contacts, estimate.step)
-    polished = polish(balance, mixture.fn, mixture.ft, problem.settings.ensemble.convex)
+    convex = problem.settings.ensemble.convex
+    polished = bring_into_balance(balance, mixture.fn, mixture.ft, mixture.spread_fn, convex)
     fn, ft = (polished.fn, polished.ft) if polished.converged else (mixture.fn, mixture.ft)
     members = estimate.members
     if not problem.motion.spans:  # no member has a history of its own yet

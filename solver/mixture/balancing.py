@@ -1,0 +1,31 @@
+"""A mixed field brought into balance, as strictly as its own deviations bear.
+
+Pairs that are missing from the list, be it that fringes were too faint to show them, leave grains that no forces hold.
+A strict balance then empties everything around them; what the field says of itself tells how much it may be changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.bodies.grains import Array
+from solver.convex.program import Balance, ConvexForces, ConvexSettings, polish
+
+LARGEST_CHANGE = 0.6  # rms change of f_n over its rms deviation
+LOOSER = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003)  # of the price of an unbalance, tried one after the other
+
+
+def bring_into_balance(balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings) -> ConvexForces:
+    """The field nearest to the given one (c,) [N] under the highest price of an unbalance that leaves it its own.
+
+    fn_sd (c,) [N]: deviations of f_n. The last attempt stands where none does.
+    """
+    doubt = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
+    for share in LOOSER:
+        found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))
+        change = float(np.sqrt(np.mean((found.fn - fn) ** 2))) if len(fn) else 0.0
+        if found.converged and change <= LARGEST_CHANGE * doubt:
+            break
+    return found

@@ -1,0 +1,70 @@
+"""A mixed field is brought into balance as strictly as its own deviations bear."""
+
+import numpy as np
+
+from solver.bodies.grains import Grains
+from solver.bodies.walls import Walls
+from solver.contacts.contacts import detect_contacts
+from solver.convex.program import ConvexSettings, assemble_balance, polish, solve_member
+from solver.mixture.balancing import LARGEST_CHANGE, bring_into_balance
+
+UNIT = 20.0  # N
+RADIUS = 0.01  # m
+
+
+def lattice(left_out=0):
+    """A triangular packing under a plate, some of its contacts not listed; true f_n, f_t (c,) and the balance."""
+    position = np.array(
+        [
+            [RADIUS * (2 * q + 1 + row % 2), RADIUS * (1 + np.sqrt(3) * row)]
+            for row in range(7)
+            for q in range(6 - row % 2)
+        ]
+    )
+    grains = Grains.of_rods(np.full(len(position), RADIUS), density=2700.0, length=0.06)
+    width, height = 12 * RADIUS, RADIUS * (2 + np.sqrt(3) * 6)
+    corner = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=float)
+    endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    walls = Walls(endpoints, np.zeros((4, 2, 2)), np.array([np.nan, np.nan, 60.0, np.nan]))
+    contacts = detect_contacts(grains, position, np.ones(len(position), bool), walls, 1e-9)
+
+    def balance_of(listed):
+        return assemble_balance(
+            listed, grains, walls, present=np.ones(grains.count, bool), friction=np.full(listed.count, 0.25),
+            force_unit=UNIT,
+        )  # fmt: skip
+
+    none = np.zeros(contacts.count)
+    true = solve_member(balance_of(contacts), none, none + 1.0, none, none)
+    strong = np.argsort(true.fn * ~contacts.with_wall)[::-1][:left_out]
+    kept = np.setdiff1d(np.arange(contacts.count), strong)
+    return true.fn[kept], true.ft[kept], balance_of(contacts.select(kept))
+
+
+def change(found, fn, fn_sd):
+    return np.sqrt(np.mean((found.fn - fn) ** 2) / np.mean(fn_sd**2))
+
+
+def test_a_field_that_can_be_balanced_is_balanced_strictly():
+    fn, ft, balance = lattice()
+    noisy = fn * (1 + 0.1 * np.random.default_rng(5).normal(size=len(fn)))
+    found = bring_into_balance(balance, noisy, ft, 0.2 * fn, ConvexSettings())
+    np.testing.assert_array_equal(found.fn, polish(balance, noisy, ft).fn)
+
+
+def test_pairs_that_are_missing_do_not_empty_what_is_around_them():
+    fn, ft, balance = lattice(left_out=4)
+    fn_sd = np.full(len(fn), 0.4 * fn.mean())
+    strict = polish(balance, fn, ft)
+    assert change(strict, fn, fn_sd) > LARGEST_CHANGE
+    found = bring_into_balance(balance, fn, ft, fn_sd, ConvexSettings())
+    assert change(found, fn, fn_sd) <= LARGEST_CHANGE
+    assert np.corrcoef(found.fn, fn)[0, 1] > np.corrcoef(strict.fn, fn)[0, 1] + 0.005
+    assert np.all(np.abs(found.ft) <= 0.25 * found.fn)
+
+
+def test_without_contacts_there_is_nothing_to_balance():
+    _, _, balance = lattice()
+    empty = np.empty(0)
+    nothing = balance.__class__(balance.matrix[:, :0], balance.load, empty, UNIT, balance.grains)
+    assert len(bring_into_balance(nothing, empty, empty, empty, ConvexSettings()).fn) == 0
