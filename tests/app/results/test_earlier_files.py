@@ -119,7 +119,7 @@ def test_a_file_of_schema_2_reads_as_the_numbers_it_was_made_of(file):
         frames=frames,
         calibration=calibration,
     )  # fmt: skip
-    assert differences(then, load_results(file)) == []
+    assert differences(then, load_results(file), rounding=1e-12) == []
 
 
 @pytest.fixture(scope="module")
