@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.bodies.grains import Array, Grains
+from solver.bodies.grains import Grains
 from solver.bodies.motion import Snapshot
+from solver.bodies.rods import RodMaterial
 from solver.bodies.strain import displacement_gradient, shear_of
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, measure_pairs
@@ -21,6 +22,7 @@ from solver.detection.displacement import displacement_scale
 from solver.detection.precision import contradiction, measure_precision
 from solver.detection.refinement import refine
 from solver.detection.touch_probability import ContactProbabilitySettings
+from solver.posterior.sequence_evidence import gather_evidence
 from solver.sequence.settings import typical_overlap
 
 from ..tracks import Tracks, WallTracks
@@ -31,6 +33,11 @@ LOOKED_AT = 3  # photographs
 # on simulated worlds, seeds 0, 1 and 3, with 10 to 100 µm of noise.
 EXPECTED = (-3.29, 0.235, 0.424)
 EXPECTED_SD = 0.45
+# Where the gaps of touching grains scatter by too much nobody can tell who touches, whatever the motion: scatter over
+# the mean diameter, and 1 − r as it was with simulated discs, with photoelastic discs, and with a ring of these.
+GAP_SCATTER = (0.009, 0.0125, 0.05)
+GAP_ERROR = (0.05, 0.26, 0.85)
+APART = 0.015  # mean diameters that touching grains stand apart from which on it is said
 NOISE_SHARES = (0.05, 1.0)  # between which noise over motion counts
 REFERENCE_STEP = math.radians(0.25)
 HIDDEN = 0.5  # noise over motion from which on the motion tells next to nothing
@@ -42,7 +49,6 @@ AMBIGUOUS = (0.05, 0.95)  # P(touch) between which nobody can say
 TOUCHES = 0.5
 SLIDES = 3.0  # standard deviations of a sliding from which on it is seen
 SLIDING_SIGMAS = 2.8  # of a position: two grains that move and turn, two photographs
-ROBUST = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +62,8 @@ class DataBudget:
     shear: float  # [rad] of a step
     sliding: float  # share of touching pairs that slide by more than noise
     ambiguous: float  # share of the pairs that may touch of which nobody can say whether they do
-    scatter: float  # [m] of the gaps of pairs that touch, noise taken off: errors of radii and centres, or overlap
+    apart: float  # [m] at which touching grains stand, by their radii
+    scatter: float  # [m] of these gaps: noise, errors of radii and centres, overlap
     diameter: float  # [m] mean
 
     @property
@@ -70,13 +77,26 @@ class DataBudget:
         a, b, c = EXPECTED
         steps = math.log(max(self.shear / REFERENCE_STEP, 1.0))
         error = a + b * math.log(float(np.clip(self.noise_share, *NOISE_SHARES))) + c * steps
-        r, low, high = (1.0 - math.exp(error + k * EXPECTED_SD) for k in (0.0, 1.0, -1.0))
-        return r, max(low, 0.0), high
+        if self.coarse:
+            error = max(error, self._error_of_gaps)
+        r, low, high = (max(1.0 - math.exp(error + k * EXPECTED_SD), 0.0) for k in (0.0, 1.0, -1.0))
+        return r, low, high
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the gaps of touching grains scatter by so much that nobody can tell who touches."""
+        return self.scatter > GAP_SCATTER[0] * self.diameter
 
     @property
     def suffices(self) -> bool:
         """Whether the motion can carry forces."""
-        return self.noise_share < HIDDEN and not self.sliding < STILL
+        return self.noise_share < HIDDEN and not self.sliding < STILL and not self.coarse
+
+    @property
+    def _error_of_gaps(self) -> float:
+        """ln(1 − r) that the scatter of gaps leads to."""
+        scatter = math.log(self.scatter / self.diameter)
+        return float(np.interp(scatter, np.log(GAP_SCATTER), np.log(GAP_ERROR)))
 
     def describe(self) -> list[str]:
         """What was found and what it means, in two or three sentences."""
@@ -88,8 +108,20 @@ class DataBudget:
             f"{_share(self.sliding)} of the contacts slide by more than noise; of {_share(self.ambiguous)} of the near "
             "pairs nobody can say yet whether they touch."
         ]
+        if self.apart > APART * self.diameter:
+            lines.append(
+                f"Touching grains stand {1e6 * self.apart:.3g} µm apart, {_share(self.apart / self.diameter)} of a "
+                f"diameter: all radii look {0.5e6 * self.apart:.3g} µm too small, or the pixel size too large."
+            )
         r, low, high = self.expected
         expected = f"expected r(f_n) {r:.2f} ({low:.2f} to {high:.2f})"
+        if self.coarse:
+            scatter = f"{100.0 * self.scatter / self.diameter:.1f} % of a diameter"
+            return [
+                *lines,
+                f"These data hardly tell who touches, because the gaps of touching grains scatter by {scatter}, "
+                f"which noise, centres and radii must not: {expected}.",
+            ]
         if self.suffices:
             return [*lines, f"These data can carry forces from motion: {expected}{self._advice()}."]
         if self.noise_share >= HIDDEN:
@@ -131,13 +163,15 @@ def measure_budget(tracks: Tracks, walls: WallTracks | None) -> DataBudget | Non
     moved = np.where(both[:, None], snapshots[1].position - snapshots[0].position, np.nan)
     gradient = displacement_gradient(snapshots[0].position, moved, both)
     seen = [np.where(both[:, None], each.position, np.nan) for each in snapshots[:2]]
+    apart, scatter = _touching(first, ends, snapshots, noise)
     return DataBudget(
         count, noise, told,
         displacement_scale(seen[0], seen[1], np.full(grains.count, noise)),
         shear_of(0.5 * (gradient + gradient.T)),
         _sliding(contacts, grains, snapshots, noise),
         float((possible & (touch < AMBIGUOUS[1])).sum() / max(possible.sum(), 1)),
-        _scatter(contacts, noise),
+        apart,
+        scatter,
         2.0 * float(first.radius.mean()),
     )  # fmt: skip
 
@@ -165,10 +199,11 @@ def _sliding(contacts: Contacts, grains: Grains, snapshots: list[Snapshot], nois
     return float((np.abs(slid[known]) > SLIDES * SLIDING_SIGMAS * noise).mean()) if known.any() else math.nan
 
 
-def _scatter(contacts: Contacts, noise: float) -> float:
-    """Robust scatter of the gaps of contacts [m], noise taken off."""
-    gap: Array = contacts.gap[~contacts.with_wall]
-    if len(gap) < 10:
-        return math.nan
-    spread = ROBUST * float(np.median(np.abs(gap - np.median(gap))))
-    return math.sqrt(max(spread**2 - 2.0 * noise**2, 0.0))
+def _touching(tracks: Tracks, walls: WallTracks, snapshots: list[Snapshot], noise: float) -> tuple[float, float]:
+    """Where touching grains stand apart by their radii [m], and how their gaps scatter [m]; NaN without near pairs."""
+    packing = RodMaterial().pack(tracks.radius, walls.usual_pressure(RodMaterial().length), boundary=tracks.boundary)
+    try:
+        found = gather_evidence(packing, [_with_sigma(each, noise) for each in snapshots]).touching
+    except ValueError:
+        return math.nan, math.nan
+    return found.offset, found.deviation

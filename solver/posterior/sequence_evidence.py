@@ -27,7 +27,7 @@ from solver.posterior.touching import TouchingGaps, fit_touching
 
 NEAR = 0.01  # [mean diameter] of gaps of pairs that do not touch but may soon
 REACH = 6.0  # standard deviations of a gap, beyond
-FARTHEST = 0.12  # mean diameters: pairs beyond it are no near pairs
+FARTHEST = 0.3  # mean diameters: pairs beyond it are no near pairs
 SCATTER = 0.8  # standard deviation of contact forces over their mean
 APART = 1.0  # standard deviations that touching pairs stand apart from which on the gaps must share an error
 SCATTER_FRAMES = 8  # photographs that tell errors of radii from errors of centres
