@@ -20,6 +20,7 @@ from solver.sequence.doubts import doubt_friction
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics
+from solver.together import available_cores
 
 from .atomic import write_atomically
 from .errors import InputError, RunError, UndeterminedError
@@ -46,7 +47,6 @@ from .results.store import Provenance, load_results, load_tracks, origin_of, sav
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
 from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
-from .sensitivity.execution import available_cores
 from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
 from .sensitivity.study import Nominal
 from .tracking.report.page import tracking_report

@@ -37,7 +37,7 @@ SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with t
 FAILURES = "failures.log"  # tracebacks of what failed a frame
 OWN = (TRACKS, RESULTS, RECORDING, SUMMARY, REPORT, SIDE, MANIFEST, "detections.csv", "tracked_walls.csv")
 UNFINISHED = ".unfinished"  # folder of checkpoints
-ERROR_BARS = {"solver": {"ensemble_size"}}  # settings that leave the forces as they are
+ERROR_BARS = {"solver": {"ensemble_size", "workers"}}  # settings that leave the forces as they are
 
 
 @dataclass(slots=True)

@@ -47,11 +47,13 @@ def campaign(
 
     Example: rodsight campaign sample_data/campaign.csv --workers 2
     """
+    from solver.together import available_cores
+
     from ..campaign.collect import collect
     from ..campaign.plan import read_plan
     from ..campaign.report import write_report
     from ..campaign.workers import run_cases
-    from ..sensitivity.execution import available_cores, reach_scheduler
+    from ..sensitivity.execution import reach_scheduler
 
     if workers is not None and workers < 1:
         raise InputError("--workers", str(workers), "must be at least one")

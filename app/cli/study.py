@@ -46,11 +46,13 @@ def sensitivity(
 
     Example: rodsight sensitivity sample_data/shear --factors friction=0.7:1.3 kappa
     """
+    from solver.together import available_cores
+
     from .. import pipeline
     from ..sensitivity import design as designs
     from ..sensitivity import report
     from ..sensitivity import study as runs
-    from ..sensitivity.execution import available_cores, reach_scheduler
+    from ..sensitivity.execution import reach_scheduler
 
     if workers is not None and workers < 1:
         raise InputError("--workers", str(workers), "must be at least one")

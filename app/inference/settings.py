@@ -97,6 +97,7 @@ def sequence_settings(config: InferenceSections) -> SequenceSettings:
     return SequenceSettings(
         estimator="nlgs" if paper else solver.estimator,
         chain=chain,
+        workers=solver.workers,
         keep_members=solver.keep_members,
         positions=solver.positions,
         measure_precision=solver.precision == "measured" and not paper,

@@ -27,11 +27,6 @@ ANSWER = 5.0  # [s] that a scheduler has to answer
 _work: Callable[[Any], Any] | None = None  # of a worker process, what it does with an item
 
 
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def run_all(
     work: Callable[[Common, Item], Result],
     common: Common,

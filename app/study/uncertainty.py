@@ -19,10 +19,10 @@ from scipy.optimize import minimize
 from solver.bodies.grains import Array
 from solver.contacts.pairs import recall
 from solver.dem.simulation import DemTruth
+from solver.together import available_cores
 
 from ..inference.inference import infer_frames
 from ..progress import Progress, silent
-from ..sensitivity.execution import available_cores
 from ..sensitivity.spread import (
     DEVIATION,
     calibrated_inputs,

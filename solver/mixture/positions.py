@@ -22,7 +22,11 @@ SEED = 0  # of the draws, with the number of the frame: the same bits, whatever 
 class Positions:
     """The positions of a sequence as a witness of its forces."""
 
-    def __init__(self, packing: Packing, snapshots: Sequence[Snapshot], settings: PosteriorSettings) -> None:
+    def __init__(
+        self, packing: Packing, snapshots: Sequence[Snapshot], settings: PosteriorSettings, workers: int | None = None
+    ) -> None:
+        """workers: threads; None: one for every core."""
+        self._workers = workers
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._gathered: SequenceEvidence | None = None
         self._known: dict[int, FramePosterior | None] = {}
@@ -44,4 +48,4 @@ class Positions:
         if evidence.contacts.count == 0:
             return None
         settings = self._gathered.settings.alone() if k == 0 else self._gathered.settings  # no motion leads to frame 0
-        return infer_frame(evidence, settings, np.random.default_rng([SEED, k]))
+        return infer_frame(evidence, settings, np.random.default_rng([SEED, k]), self._workers)

@@ -95,7 +95,7 @@ class Acceleration:
         return np.asarray(np.linalg.lstsq(gram, right, rcond=1e-14)[0], np.float64)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def inner_products(rows, vector):  # type: ignore[no-untyped-def]
     """Products of rows (k, m) with a vector (m,), in an order of summation that no number of threads can change."""
     result = np.zeros(len(rows))
@@ -113,7 +113,7 @@ def inner_products(rows, vector):  # type: ignore[no-untyped-def]
     return result
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def extrapolate(force, change, weights, friction, pairs):  # type: ignore[no-untyped-def]
     """Take weights (k,) times the changes (k, 2 c) off the forces (c, 2), and project on the cones."""
     flat = force.reshape(force.size)

@@ -26,7 +26,7 @@ U = np.uint64
 U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def apply_forces(problem, body, plate, force):  # type: ignore[no-untyped-def]
     """Set body and plate to the velocities under the given forces."""
     body[:] = problem.body
@@ -62,7 +62,7 @@ def _push_from_wall(body, plate, i, w, nx, ny, fn, ft):  # type: ignore[no-untyp
     plate[w, 0] += plate[w, 1] * fn
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no-untyped-def]
     """Advance by a number of Gauss-Seidel sweeps, in place.
 
@@ -184,7 +184,7 @@ def miss_of_wall(wall, wall_body, body, plate, force, row, c, mu):  # type: igno
     return miss_of(force[2 * row], force[2 * row + 1], un, ut, wall[c, 2], wall[c, 3], mu)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def measure_state(problem, body, plate, force):  # type: ignore[no-untyped-def]
     """Natural-map residual, and the worst unbalance over the mean f_n."""
     _, norm, mean = measure_forces(force, force)
@@ -192,7 +192,7 @@ def measure_state(problem, body, plate, force):  # type: ignore[no-untyped-def]
     return measure_natural_map(problem, body, plate, force, norm), worst / mean if mean > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def measure_forces(force, before):  # type: ignore[no-untyped-def]
     """Greatest relative change, Euclidean norm [N], and mean f_n of bearing contacts [N].
 
@@ -228,7 +228,7 @@ def measure_forces(force, before):  # type: ignore[no-untyped-def]
     return np.sqrt(greatest), np.sqrt(squares), total / max(bearing, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-untyped-def]
     """‖f − P(f − D⁻¹ u)‖ / ‖f‖ under the present velocities u, zero exactly at a solution; norm: ‖f‖ [N].
 
@@ -296,7 +296,7 @@ def miss_of(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
     return normal * normal + tangential * tangential
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def measure_unbalance(problem, body):  # type: ignore[no-untyped-def]
     """Worst and mean |ΣF| [N] on a grain, from what the forces have added to its velocity."""
     now, free, external = (

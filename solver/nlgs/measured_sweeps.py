@@ -47,7 +47,7 @@ DIFFERENCES, MISS, SQUARES, NORMAL, BEARING, CHANGE, SIZE, WORKSPACE = (
 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def advance_and_measure(problem, body, plate, force, rest, relaxation, residuals):  # type: ignore[no-untyped-def]
     """Advance by as many sweeps as residuals has rows (s, 3), and measure every one; rest: of find_rest.
 
@@ -169,7 +169,7 @@ def rest_shape(count: int) -> tuple[int, int, int]:
     return count // L + 1, 3, L
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def find_rest(problem, rest):  # type: ignore[no-untyped-def]
     """Blocks of L grains (blocks, 3, L): the velocity at which each is in balance, vx, vy [m/s], and its impedance.
 
@@ -183,7 +183,7 @@ def find_rest(problem, rest):  # type: ignore[no-untyped-def]
         rest[g // L, 2, g % L] = 1.0 / compliance if compliance > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def worst_unbalance(rest, body):  # type: ignore[no-untyped-def]
     """Worst |ΣF| [N] on a grain, from what the forces have added to its velocity."""
     now, still, full = body.reshape(body.size), rest.reshape(rest.size), len(body) // L

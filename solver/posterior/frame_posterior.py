@@ -7,6 +7,7 @@ of choosing. It is sampled by chains that start alike and draw other numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +19,7 @@ from solver.posterior.chain import Chain, centres_of, laws_of, pairs_of, run_cha
 from solver.posterior.frame_evidence import FrameEvidence
 from solver.posterior.settings import PosteriorSettings
 from solver.statistics.agreement import pearson
+from solver.together import work_together
 
 # Over the draws' standard deviation: covers 68/95 % of f_n, its scale apart, on simulated packings (median of 14).
 HONEST = 2.2
@@ -46,12 +48,17 @@ class FramePosterior:
     agreement: float  # correlation of two chains; NaN of one
 
 
-def infer_frame(evidence: FrameEvidence, settings: PosteriorSettings, rng: np.random.Generator) -> FramePosterior:
-    """Sample the posterior of one frame. The same generator gives the same bits, whatever runs beside it."""
+def infer_frame(
+    evidence: FrameEvidence, settings: PosteriorSettings, rng: np.random.Generator, workers: int | None = None
+) -> FramePosterior:
+    """Sample the posterior of one frame. The same generator gives the same bits, whatever runs beside it.
+
+    workers: threads that the chains share; None: one for every core.
+    """
     pairs, centres = pairs_of(evidence), centres_of(evidence)
     laws = laws_of(settings, float(evidence.prior.sum()), scale_known=evidence.known.fix_the_scale)
-    fields = [run_chain(pairs, centres, laws, settings, each) for each in rng.spawn(settings.chains)]
-    return _summarise(evidence, fields)
+    tasks = [partial(run_chain, pairs, centres, laws, settings, each) for each in rng.spawn(settings.chains)]
+    return _summarise(evidence, work_together(tasks, workers))
 
 
 def _summarise(evidence: FrameEvidence, chains: list[Chain]) -> FramePosterior:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from solver.sequence.frame_problem import FrameProblem
 from solver.sequence.judgement import SETTLED_DIFFERENCE
 from solver.statistics.agreement import relative_change
 from solver.statistics.bearing import cone_share
+from solver.together import work_together
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,17 +262,24 @@ def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touc
     packing, motion, contacts = problem.packing, problem.motion, touching.contacts
     chain = problem.settings.chain
     network = ProbablePairs(state.pairs if motion.spans else touching.pairs, touching.pairs)
-    soft = advance_chain(packing, motion, state.soft, chain, network)
     assert chain.kappa is not None
-    stiff_chain = replace(chain, kappa=chain.kappa * problem.settings.ensemble.stiffer, keep="none")
-    stiff = advance_chain(packing, motion, state.stiff, stiff_chain, network)
-    if not motion.spans or state.start_forgotten:
+    silent = replace(chain, keep="none")
+    starts = [
+        (state.soft, chain),
+        (state.stiff, replace(silent, kappa=chain.kappa * problem.settings.ensemble.stiffer)),
+    ]
+    started_again = motion.spans and not state.start_forgotten
+    if started_again:
+        other = state.other
+        if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
+            uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
+            other = other.renew(contacts, uniform, problem.snapshot.present)
+        starts.append((other, silent))
+    tasks = [partial(advance_chain, packing, motion, memory, told, network) for memory, told in starts]
+    soft, stiff, *rest = work_together(tasks, problem.settings.workers)
+    if not rest:
         return _Chains(soft, stiff, state.other, np.nan, state.agreeing)
-    other = state.other
-    if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
-        uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
-        other = other.renew(contacts, uniform, problem.snapshot.present)
-    again = advance_chain(packing, motion, other, replace(chain, keep="none"), network)
+    (again,) = rest
     difference = relative_change(contacts.key, soft.solution.force, contacts.key, again.solution.force)
     agreeing = state.agreeing + 1 if difference <= SETTLED_DIFFERENCE else 0
     return _Chains(soft, stiff, again.memory, difference, agreeing)
@@ -296,14 +305,27 @@ def _advance_members(
     worth, place = [1.0, 1.0], [0, 1]
     memories: list[ForceMemory | None] = []
     remarks: list[str] = []
-    for number, (slip, memory) in enumerate(zip(_slips(problem, touching.contacts), former, strict=True), start=2):
+    slips = _slips(problem, touching.contacts)
+    tasks = [
+        partial(
+            advance_member,
+            balance,
+            touching.contacts,
+            problem.snapshot,
+            slip,
+            touching.probability,
+            memory,
+            problem.settings.ensemble.convex,
+        )
+        for slip, memory in zip(slips, former, strict=True)
+        if slip is not None
+    ]
+    found = iter(work_together(tasks, problem.settings.workers))
+    for number, slip in enumerate(slips, start=CHAINS):
         if slip is None:
             memories.append(None)
             continue
-        forces, renewed = advance_member(
-            balance, touching.contacts, problem.snapshot, slip, touching.probability, memory,
-            problem.settings.ensemble.convex,
-        )  # fmt: skip
+        forces, renewed = next(found)
         if forces.converged:
             fields.append(np.column_stack([forces.fn, forces.ft]))
             worth.append(slip.worth)

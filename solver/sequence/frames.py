@@ -59,7 +59,7 @@ def solve_sequence(
         snapshots = bridge_frames(snapshots, unbelieved)
         snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
     asked = settings.asks_positions and len(snapshots) > 1
-    positions = Positions(packing, snapshots, settings.posterior) if asked else None
+    positions = Positions(packing, snapshots, settings.posterior, settings.workers) if asked else None
     sequence = SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known)
     blocks = _Blocks(sequence)
     for k in range(first, len(snapshots)):

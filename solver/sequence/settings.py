@@ -37,6 +37,7 @@ class SequenceSettings:
     overlap: float | None = None  # [m] typical overlap or roughness of touching surfaces; None: `typical_overlap`
     threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
+    workers: int | None = None  # threads that members of a frame share; None: one for every core. No bit depends on it
     reset_to_zero: bool = False  # the paper's reset at a rearrangement
     reset_frames: frozenset[int] = frozenset()  # frames that start from zero forces whatever is found
     kept_frames: frozenset[int] = frozenset()  # frames that never do

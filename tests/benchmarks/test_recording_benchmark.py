@@ -34,8 +34,9 @@ from rodsight.recording.packing_layers.network import SweepChoice
 from rodsight.recording.tabs.blueprint import Layout, make_blueprint
 from rodsight.recording.tabs.layout_property import send_layout
 from rodsight.recording.viewing.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
-from rodsight.sensitivity.execution import available_cores
 from rodsight.synthetic.synthesis import synthesize
+
+from solver.together import available_cores
 
 pytestmark = pytest.mark.slow
 

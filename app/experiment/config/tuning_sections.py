@@ -166,6 +166,11 @@ class SolverSection(Section):
         "Stop a sub-step when the forces change by less than this share, the paper's ε_f; absent: never early.",
         default=CHAIN.force_change,
     )
+    workers: Annotated[int, whole(1, 1024)] | None = key(
+        "Threads that solve members of a frame side by side; absent: as many as there are cores. Their number changes "
+        "no bit of the results.",
+        default=SEQUENCE.workers,
+    )
     keep_members: Switch = key("Store the forces of every member of the ensemble, too.", default=SEQUENCE.keep_members)
     positions: Literal["needed", "always", "never"] = key(
         "When positions alone are asked, by a posterior over contacts and forces, and mixed with what the motion says. "
