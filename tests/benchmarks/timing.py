@@ -1,0 +1,78 @@
+"""Times of the processor and of the clock, and the table that benchmarks print."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+TURNS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A line of the table."""
+
+    what: str
+    found: str
+    aim: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Took:
+    """Seconds."""
+
+    processor: float
+    clock: float
+
+    def __truediv__(self, count: int) -> Took:
+        return Took(self.processor / count, self.clock / count)
+
+    def __str__(self) -> str:
+        return f"{_told(self.processor)} of processor, {_told(self.clock)} of the clock"
+
+
+def fastest(way: Callable[[], object], turns: int = TURNS) -> Took:
+    """The least of several turns after a first one, processor and clock each by themselves."""
+    way()
+    took = [once(way) for _ in range(turns)]
+    return Took(min(each.processor for each in took), min(each.clock for each in took))
+
+
+def once(way: Callable[[], object]) -> Took:
+    processor, clock = time.process_time(), time.perf_counter()
+    way()
+    return Took(time.process_time() - processor, time.perf_counter() - clock)
+
+
+def by_turns(ways: dict[str, Callable[[], object]], turns: int = TURNS) -> dict[str, float]:
+    """Processor seconds of the fastest turn of each; they take turns, so that what else runs weighs on all alike."""
+    best = dict.fromkeys(ways, float("inf"))
+    for way in ways.values():
+        way()
+    for _ in range(turns):
+        for name, way in ways.items():
+            best[name] = min(best[name], once(way).processor)
+    return best
+
+
+def format_table(title: str, rows: list[Row]) -> str:
+    lines = [f"### {title}", "", "| what | measured | aim |", "|---|---|---|"]
+    return "\n".join([*lines, *(f"| {row.what} | {row.found} | {row.aim} |" for row in rows), ""])
+
+
+def processor_name() -> str:
+    """What the machine calls its processor."""
+    try:
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        told = ""
+    names = [line.partition(":")[2].strip() for line in told.splitlines() if line.startswith("model name")]
+    flags = next((line for line in told.splitlines() if line.startswith("flags")), "").split()
+    vectors = next((each for each in ("avx512f", "avx2") if each in flags), "no AVX2")
+    return f"{names[0]} ({vectors}), {len(names)} cores" if names else "unknown processor"
+
+
+def _told(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
