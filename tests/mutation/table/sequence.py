@@ -58,7 +58,7 @@ MUTANTS = [
         "solver/sequence",
         FRAMES,
         ("stiffer: float = 2.0", "stiffer: float = 4.0"),
-        ("if not motion.spans or state.start_forgotten:", "if not motion.spans:"),
+        ("motion.spans and not state.start_forgotten", "motion.spans"),
         ("np.average(members.force, axis=0, weights=members.worth)", "np.average(members.force, axis=0)"),
         (
             "are_among(contacts.key, verdicts.forced), 1.0, told)",
