@@ -107,7 +107,7 @@ def study(
     worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
     fit: Annotated[
-        tuple[int, ...], tyro.conf.arg(metavar="SEED", help="intervals: fit the constants on these seeds, too")
+        tuple[int, ...], tyro.conf.arg(metavar="SEED", help="intervals, numbers: fit the constants on these seeds, too")
     ] = (),
     settings: Settings = (),
     out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
@@ -145,7 +145,7 @@ def study(
             settings = (*settings, "solver.estimator=nlgs")
         return _study_worlds(worlds, seeds, grains, out, settings, jobs=jobs, as_json=as_json, quiet=quiet)
     if subject == "numbers":
-        return _study_numbers(worlds, seeds, grains, out, settings, quiet=quiet)
+        return _study_numbers(worlds, seeds, grains, out, settings, fit=fit, quiet=quiet)
     if subject == "intervals":
         return _study_intervals(worlds, seeds, grains, out, settings, fit=fit, quiet=quiet)
     for option, given in (("--worlds", worlds), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
@@ -277,18 +277,27 @@ def _study_numbers(
     out: Path,
     settings: tuple[str, ...],
     *,
+    fit: tuple[int, ...],
     quiet: bool,
 ) -> int:
-    from ..study.numbers import WORLDS, compare_numbers, print_numbers
+    from ..study.intervals import FIT_WORLDS
+    from ..study.numbers import WORLDS, compare_numbers, fit_deviations, print_numbers
     from ..study.solved_world import solve_worlds
     from ..study.world_score import WorldPlan
     from ..study.worlds import WIDTH
     from ..synthetic.worlds.making import GRAINS
 
     plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", settings)
+    console = table_console(WIDTH)
     with progress_of(quiet) as progress:
+        if fit:
+            known = [
+                each for one in solve_worlds(plan, FIT_WORLDS, fit, progress) for each in compare_numbers(one)
+            ]  # fmt: skip
+            for name, told in fit_deviations(known).items():
+                console.print(f"{name}: {', '.join(f'{each:.2g}' for each in told)}", highlight=False)
         found = [each for one in solve_worlds(plan, worlds or WORLDS, seeds, progress) for each in compare_numbers(one)]
-    print_numbers(table_console(WIDTH), found)
+    print_numbers(console, found)
     return 0
 
 

@@ -61,7 +61,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
             f"Trust (a lower bound of the correlation with the true forces): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
         )
-    lines += _doubt_line(summary)
+    lines += _deviation_line(summary) + _doubt_line(summary)
     if not summary["loaded_walls"]:
         lines.append(
             "[bold]No wall carries a given pressure:[/] forces are known up to a scale, which differs between frames."
@@ -99,6 +99,28 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
                 f"r(f_t) {np.mean(late_t):.3f}.[/]"
             )
     return lines
+
+
+# Of the statistics whose deviation is told: their name, a factor, what stands behind the number, and its form.
+TOLD_DEVIATIONS = (
+    ("friction_angle", "friction angle", 180.0 / np.pi, "°", ".1f"),
+    ("principal_direction", "direction of σ₁", 180.0 / np.pi, "°", ".1f"),
+    ("coordination_number", "z", 1.0, "", ".2f"),
+    ("sliding_fraction", "share of sliding contacts", 1.0, "", ".2f"),
+)
+
+
+def _deviation_line(summary: dict[str, Any]) -> list[str]:
+    """How far what is stated errs: one standard deviation, median of the frames that have one."""
+    told = []
+    for name, label, factor, unit, form in TOLD_DEVIATIONS:
+        known = [value for value in summary.get("deviations", {}).get(name, []) if value is not None]
+        if known:
+            told.append(f"{label} ± {factor * np.median(known):{form}}{unit}")
+    forces = [value for value in summary.get("fn_deviation", []) if value is not None]
+    if forces:
+        told.append(f"one f_n ± {np.median(forces):.2f} of the mean f_n")
+    return [f"One standard deviation, median of the frames: {', '.join(told)}."] if told else []
 
 
 def _doubt_line(summary: dict[str, Any]) -> list[str]:

@@ -27,6 +27,7 @@ from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_sequence
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
+from solver.sequence.statistic_intervals import with_deviations
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics, no_statistics
 
 from ..errors import UndeterminedError
@@ -209,8 +210,9 @@ def _summarize(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatist
         return no_statistics(len(packing.pressure))
     assert forces.bearing_probability is not None
     assert forces.sliding_probability is not None
-    return frame_statistics(
+    statistics = frame_statistics(
         forces.contacts, forces.fn, forces.ft, Likely(forces.bearing_probability, forces.sliding_probability),
         snapshot.position, snapshot.present, packing.walls_of(snapshot), packing.length,
         grains=packing.grains, material=packing.material,
     )  # fmt: skip
+    return with_deviations(statistics, forces, scale_is_known=packing.scale_is_known, moved=forces.frame > 0)

@@ -11,7 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.statistic_intervals import DEVIATION
 from solver.statistics.agreement import Agreement
+from solver.statistics.frame_statistics import FrameStatistics
 
 from ..atomic import write_atomically
 from ..tracks import TrackStatus
@@ -33,19 +35,34 @@ class _Frame(NamedTuple):
     unbalance: float
     natural_map: float
     correction: float
+    fn_deviation: float
 
     @classmethod
     def of(cls, forces: FrameForces) -> _Frame:
         return cls(
             forces.frame, forces.status, forces.reason, forces.failed_reason, forces.contacts.count, forces.trust,
-            forces.doubt, forces.unbalance, forces.natural_map, forces.correction,
+            forces.doubt, forces.unbalance, forces.natural_map, forces.correction, _median_deviation(forces),
         )  # fmt: skip
+
+
+class _Statistics(NamedTuple):
+    """What is told of a frame's statistics."""
+
+    friction_angle: float
+    coordination_number: float
+    mean_fn: float
+    deviations: dict[str, float]
+
+    @classmethod
+    def of(cls, told: FrameStatistics) -> _Statistics:
+        deviations = {name: float(getattr(told, f"{name}_sd")) for name in DEVIATION}
+        return cls(told.friction_angle, told.coordination_number, told.mean_fn, deviations)
 
 
 def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: dict[str, float]) -> dict[str, Any]:
     """Gather the summary; JSON values only."""
     frames, tracks = [_Frame.of(each) for each in results.frames], results.tracks
-    statistics = [(each.friction_angle, each.coordination_number, each.mean_fn) for each in results.statistics]
+    statistics = [_Statistics.of(each) for each in results.statistics]
     status = Counter(frame.status.name.lower() for frame in frames)
     settled = [frame.frame for frame in frames if frame.status is FrameStatus.SETTLED]
     lost, cut = tracks.lost, tracks.out_of_frame
@@ -81,9 +98,11 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "correction": _plain([frame.correction for frame in frames]),
         "trust": _plain(trust.tolist()),
         "doubts": [frame.doubt for frame in frames],
-        "friction_angle_degrees": _plain([float(np.rad2deg(angle)) for angle, _, _ in statistics]),
-        "coordination_number": _plain([number for _, number, _ in statistics]),
-        "mean_fn": _plain([mean for _, _, mean in statistics]),
+        "friction_angle_degrees": _plain([float(np.rad2deg(each.friction_angle)) for each in statistics]),
+        "coordination_number": _plain([each.coordination_number for each in statistics]),
+        "mean_fn": _plain([each.mean_fn for each in statistics]),
+        "deviations": {name: _plain([each.deviations[name] for each in statistics]) for name in DEVIATION},
+        "fn_deviation": _plain([frame.fn_deviation for frame in frames]),
         "friction": _friction(results),
         "wall_force_error": _wall_force_error(results, settled),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
@@ -95,6 +114,12 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
     if agreement is not None:
         summary["accuracy"] = accuracy(agreement)
     return summary
+
+
+def _median_deviation(frame: FrameForces) -> float:
+    """The median standard deviation of f_n over the mean f_n, of contacts that bear force; NaN without any."""
+    bearing = frame.fn > 0
+    return float(np.median(frame.fn_sd[bearing]) / frame.fn[bearing].mean()) if bearing.any() else float("nan")
 
 
 def save_summary(file: Path, summary: dict[str, Any]) -> None:

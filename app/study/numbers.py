@@ -18,10 +18,14 @@ from solver.bodies.grains import Array
 from solver.bodies.quantity import quantities
 from solver.contacts.contacts import measure_pairs
 from solver.contacts.pairs import Keys
+from solver.sequence.intervals import Witness, doubt_of, witness_of
+from solver.sequence.statistic_intervals import DEVIATION, LEAST_DOUBT, SIZED, size_of
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics
 
 from ..inference.inference import CorrectedSequence, SolvedFrame
 from ..synthetic.worlds.names import WorldName
+from ..synthetic.worlds.table import WORLDS as WORLDS_OF
+from .intervals import COVERED
 from .solved_world import SolvedWorld
 from .world_score import SETTLED
 
@@ -47,6 +51,8 @@ class Compared:
     stated: Array  # (f,)
     true: Array  # (f,)
     deviation: Array  # (f,) stated standard deviation, NaN without one
+    doubt: Array  # (f,) 1 − T
+    witness: NDArray[np.uint8]  # (f,) of Witness
 
     @property
     def error(self) -> Array:
@@ -62,8 +68,10 @@ def compare_numbers(solved: SolvedWorld) -> list[Compared]:
     world, seed, sequence, frames, true = solved.world, solved.seed, solved.sequence, solved.frames, solved.true
     pairs = [(each.statistics, _statistics_of_truth(sequence, each, *true[k])) for k, each in enumerate(frames)]
     late = pairs[SETTLED:]
+    doubt = np.array([float(doubt_of(each.forces.trust)) for each in frames[SETTLED:]])
+    witness = np.array([witness_of(each.forces.positions_share) for each in frames[SETTLED:]], np.uint8)
     return [
-        Compared(world, seed, name, *(np.array(column) for column in zip(*values, strict=True)))
+        Compared(world, seed, name, *(np.array(column) for column in zip(*values, strict=True)), doubt, witness)
         for name in compared_names()
         if (values := [_values(name, stated, exact) for stated, exact in late])
     ]
@@ -91,6 +99,26 @@ def print_numbers(console: Console, found: Sequence[Compared]) -> None:
     )  # fmt: skip
 
 
+def fit_deviations(found: Sequence[Compared]) -> dict[str, tuple[float, ...]]:
+    """Constants of `solver.sequence.statistic_intervals`: by what they were read from, NaN where no frame was."""
+    fitted = {}
+    for name in DEVIATION:
+        rows = [
+            each for each in found if each.name == name and (name not in SIZED or WORLDS_OF[each.world].scale_known)
+        ]
+        error, doubt = np.abs(_raw(rows)), np.concatenate([each.doubt for each in rows])
+        size = np.array([size_of(name, float(value)) for each in rows for value in each.stated])
+        ratio = error / (size * np.sqrt(np.maximum(doubt, LEAST_DOUBT)))
+        witness = np.concatenate([each.witness for each in rows])
+        fitted[name] = tuple(_scale(ratio[(witness == each) & np.isfinite(ratio)]) for each in Witness)
+    return fitted
+
+
+def _scale(ratio: Array) -> float:
+    """What one and two of it cover 68 and 95 % of these (k,) with, as nearly as one number can."""
+    return float(np.sqrt(np.prod(np.quantile(ratio, COVERED) / (1.0, 2.0)))) if len(ratio) else float("nan")
+
+
 def relative_bias(rows: Sequence[Compared]) -> float:
     """Mean error over the mean true value; of angles in degrees, of shapes as it is; NaN without any."""
     error = np.concatenate([each.error for each in rows])
@@ -111,8 +139,9 @@ def _cells(rows: Sequence[Compared]) -> list[str]:
     worst = max(by_world, key=lambda world: -1.0 if np.isnan(by_world[world]) else abs(by_world[world]))
     error = np.concatenate([each.error for each in rows]) / _unit(rows)
     sigma = np.concatenate([each.deviation for each in rows])
+    known = np.isfinite(sigma) & np.isfinite(_raw(rows))
     covered = [
-        f"{100.0 * np.mean(np.abs(_raw(rows)) <= t * sigma):.0f}" if np.isfinite(sigma).all() else "–" for t in (1, 2)
+        f"{100.0 * np.mean(np.abs(_raw(rows)[known]) <= t * sigma[known]):.0f}" if known.any() else "–" for t in (1, 2)
     ]
     mean = np.degrees(np.nanmean(true)) if name in DEGREES else np.nanmean(true)
     flag = "biased" if name not in DEGREES and name not in SHAPES and abs(bias) > BIASED else ""

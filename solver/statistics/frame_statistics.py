@@ -40,6 +40,7 @@ from solver.statistics.stress import (
 from solver.statistics.weighted import weighted_mean
 
 KNOWN_SLIDING = 0.99  # |f_t| / (μ f_n) of exact forces from which on a contact slides
+NAN = float("nan")
 EVEN = 0.5  # P(bears force) above which a contact counts where all or nothing is asked: rattlers
 
 
@@ -56,6 +57,10 @@ class Likely:
         bearing = fn > 0
         slides = bearing & (mobilisation(fn, ft, friction) >= KNOWN_SLIDING)
         return cls(bearing.astype(np.float64), slides.astype(np.float64))
+
+
+def _deviation_of(name: str, unit: str = "") -> Quantity:
+    return Quantity(f"standard deviation of {name}, calibrated", unit, since=2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +120,35 @@ class FrameStatistics:
     wall_tangential_force: Annotated[
         Array | None, Quantity("sum of the tangential forces on each wall, towards end 1", "N", "wall", since=2)
     ] = None
+
+    # Standard deviations that truths showed, NaN where none is known; `solver.sequence.statistic_intervals` sets them.
+    friction_angle_sd: Annotated[float, _deviation_of("friction_angle", "rad")] = NAN
+    wall_ratio_angle_sd: Annotated[float, _deviation_of("wall_ratio_angle", "rad")] = NAN
+    principal_direction_sd: Annotated[float, _deviation_of("principal_direction", "rad")] = NAN
+    pressure_sd: Annotated[float, _deviation_of("pressure", "Pa")] = NAN
+    sigma_1_sd: Annotated[float, _deviation_of("sigma_1", "Pa")] = NAN
+    sigma_2_sd: Annotated[float, _deviation_of("sigma_2", "Pa")] = NAN
+    coordination_number_sd: Annotated[float, _deviation_of("coordination_number")] = NAN
+    coordination_number_without_rattlers_sd: Annotated[float, _deviation_of("coordination_number_without_rattlers")] = (
+        NAN
+    )
+    rattler_count_sd: Annotated[float, _deviation_of("rattler_count")] = NAN
+    contact_count_sd: Annotated[float, _deviation_of("contact_count")] = NAN
+    sliding_fraction_sd: Annotated[float, _deviation_of("sliding_fraction")] = NAN
+    mobilisation_sd: Annotated[float, _deviation_of("mobilisation")] = NAN
+    mean_fn_sd: Annotated[float, _deviation_of("mean_fn", "N")] = NAN
+    max_fn_sd: Annotated[float, _deviation_of("max_fn", "N")] = NAN
+    fabric_anisotropy_sd: Annotated[float, _deviation_of("fabric_anisotropy")] = NAN
+    contact_anisotropy_sd: Annotated[float, _deviation_of("contact_anisotropy")] = NAN
+    branch_anisotropy_sd: Annotated[float, _deviation_of("branch_anisotropy")] = NAN
+    normal_force_anisotropy_sd: Annotated[float, _deviation_of("normal_force_anisotropy")] = NAN
+    tangential_force_anisotropy_sd: Annotated[float, _deviation_of("tangential_force_anisotropy")] = NAN
+    friction_angle_of_anisotropies_sd: Annotated[float, _deviation_of("friction_angle_of_anisotropies", "rad")] = NAN
+    strong_share_sd: Annotated[float, _deviation_of("strong_share")] = NAN
+    strong_pressure_share_sd: Annotated[float, _deviation_of("strong_pressure_share")] = NAN
+    strong_deviator_share_sd: Annotated[float, _deviation_of("strong_deviator_share")] = NAN
+    chain_count_sd: Annotated[float, _deviation_of("chain_count")] = NAN
+    chain_grain_share_sd: Annotated[float, _deviation_of("chain_grain_share")] = NAN
 
 
 def frame_statistics(

@@ -29,6 +29,7 @@ from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frames import solve_sequence
 from solver.sequence.settings import EnsembleSettings, SequenceSettings
+from solver.sequence.statistic_intervals import DEVIATION
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics
 
 STORED = Path(__file__).with_name("forces.npz")
@@ -158,5 +159,7 @@ def _columns(frames: list[FrameForces], statistics: list[FrameStatistics]) -> di
     for name in SCALARS:
         columns[name] = np.array([float(getattr(frame, name)) for frame in frames])
     for each in fields(FrameStatistics):
+        if each.name in {f"{name}_sd" for name in DEVIATION}:  # set once a frame's trust is known
+            continue
         columns[f"statistics/{each.name}"] = np.stack([np.asarray(getattr(s, each.name), float) for s in statistics])
     return columns

@@ -18,6 +18,7 @@ from solver.convex.friction_check import FrictionCheck
 from solver.nlgs.starts import COLD_SWEEPS
 from solver.sequence.ensemble import MEMBERS
 from solver.sequence.frame_forces import FrameForces
+from solver.sequence.statistic_intervals import DEVIATION
 from tests.app.recording.fake_results import make_results, make_tuning
 
 CELL = np.array([[0.3, 0.01], [0.02, 0.4]])  # [m]
@@ -114,7 +115,9 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
     )
 
 
-SINCE = ("wall_normal_force", "wall_tangential_force")  # the stored file was made of draws without these
+DEVIATIONS = tuple(f"{name}_sd" for name in DEVIATION)
+# The stored file was made of draws without these.
+SINCE = ("wall_normal_force", "wall_tangential_force", *DEVIATIONS)
 
 
 def _varied(statistics, rng: np.random.Generator):
@@ -126,6 +129,7 @@ def _varied(statistics, rng: np.random.Generator):
             name: int(rng.integers(100)) if value.dtype.kind == "i" else _like(value, rng)
             for name, value in named.items()
         },
+        **{name: 0.01 * (1 + row) for row, name in enumerate(DEVIATIONS)},
     )
 
 

@@ -21,7 +21,7 @@ from rodsight.results.schema import entries
 from rodsight.results.store import Provenance, load_results, read_origin, save_results
 from rodsight.results.summary import save_summary, summarize
 
-from tests.app.results.full_results import make_full_results
+from tests.app.results.full_results import DEVIATIONS, make_full_results
 from tests.app.results.same import differences
 from tests.golden.stored import SCHEMAS, unpack
 
@@ -102,7 +102,7 @@ def test_a_file_of_schema_2_reads_as_the_numbers_it_was_made_of(file):
         "force_change": np.nan, "strain": None, "shear": np.nan, "shear_step": np.nan, "doubt": "",
     }  # fmt: skip
     frames = [replace(each, contacts=replace(each.contacts, shift=None), **new) for each in full.frames]
-    unsummed = {"wall_normal_force": None, "wall_tangential_force": None}
+    unsummed = {"wall_normal_force": None, "wall_tangential_force": None} | dict.fromkeys(DEVIATIONS, np.nan)
     statistics = [replace(each, **unsummed) for each in full.statistics]
     assert full.calibration is not None
     assert full.friction_check is not None
