@@ -10,6 +10,7 @@ import tyro
 
 from .. import __version__
 from .campaign import campaign
+from .docs import docs
 from .export import export, share
 from .look import compare, review, score, view
 from .make import synth
@@ -28,7 +29,7 @@ GROUPS: dict[str, tuple[Command, ...]] = {
     "Look": (view, review, compare),
     "How far to trust it": (score, sensitivity, study),
     "From and to other programs": (import_, export, share),
-    "More": (campaign, synth, settings),
+    "More": (campaign, synth, settings, docs),
 }
 ENDING = """\
 rodsight COMMAND --help lists the options of a command, with an example.

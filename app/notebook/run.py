@@ -38,7 +38,7 @@ class Run:
     Tables are pandas.DataFrames in SI units, named in `.attrs["units"]`; what is not known is NaN. Nothing is read
     before it is asked for.
 
-    Example:
+    Examples:
         >>> import rodsight
         >>> run = rodsight.open("runs/shear")
         >>> contacts = run.contacts(frame=3)
@@ -73,7 +73,7 @@ class Run:
         exerts on j: f_n along the normal (nx, ny) from i to j, f_t along that normal turned by +90°. Raises IndexError
         for a frame that is not there.
 
-        Example:
+        Examples:
             >>> run = rodsight.open("runs/shear")
             >>> list(run.contacts(frame=3).columns[:9])
             ['frame', 'time', 'i', 'j', 'with_wall', 'x', 'y', 'nx', 'ny']
@@ -86,7 +86,7 @@ class Run:
     def grains(self, frame: int | None = None) -> pd.DataFrame:
         """Grains in one frame, or in all: id, radius [m], pose [m, rad] and how well it is known.
 
-        Example:
+        Examples:
             >>> grains = rodsight.open("runs/shear").grains(frame=3)
             >>> grains.attrs["units"]["theta"]
             'rad'
@@ -98,7 +98,7 @@ class Run:
     def frames(self) -> pd.DataFrame:
         """One row a frame: status, trust, residuals and the statistics of the packing.
 
-        Example:
+        Examples:
             >>> frames = rodsight.open("runs/shear").frames()
             >>> believed = frames[frames["status"].isin(["settled", "settling"]) & (frames["trust"] > 0.8)]
             >>> frames["status"].iloc[0]
@@ -109,7 +109,7 @@ class Run:
     def walls(self, frame: int | None = None) -> pd.DataFrame:
         """Walls in one frame, or in all: ends [m], pressure [Pa], and the forces [N] on them, inferred and recorded.
 
-        Example:
+        Examples:
             >>> walls = rodsight.open("runs/shear").walls(frame=0).set_index("wall")
             >>> float(walls.loc["top", "pressure"])
             50000.0
@@ -119,7 +119,7 @@ class Run:
     def summary(self) -> dict[str, Any]:
         """The facts that a person reads at the end of `rodsight run`, as plain values.
 
-        Example:
+        Examples:
             >>> rodsight.open("runs/shear").summary()["resets"]
             [0]
         """
@@ -131,7 +131,7 @@ class Run:
         `xarray.open_datatree("runs/shear/results.h5")` opens the file itself to the same. Contacts of all frames lie
         end to end; `frame_of_contact` says whose they are.
 
-        Example:
+        Examples:
             >>> tree = rodsight.open("runs/shear").dataset()
             >>> tree["tracks/position"].dims
             ('frame', 'grain', 'xy')
@@ -150,7 +150,7 @@ class Run:
 
         Needs networkx (`pip install 'rodsight[graph]'`), and says so. Raises IndexError for a frame that is not there.
 
-        Example:
+        Examples:
             >>> graph = rodsight.open("runs/shear").graph(frame=3)
             >>> graph.nodes["top"]["kind"]
             'wall'
@@ -222,12 +222,12 @@ def run(
 ) -> Run:
     """Photographs or tracks to forces and a recording: what `rodsight run` does, with its defaults.
 
-    experiment: its folder or its experiment.toml; out: folder of the results, default runs/<name>; settings: by the
+    experiment: its folder or its experiment.toml; out: folder of the results, default runs/NAME; settings: by the
     keys of experiment.toml, {"solver.kappa": 0.1}, laid over it; frames: first, and end or None. What is there already
     is not done again.
     Raises InputError for bad input, RunError where another process works in the folder or nothing can be solved.
 
-    Example:
+    Examples:
         >>> run = rodsight.run("my_test", out="runs/shear", settings={"solver.sweeps": 50})
         >>> run.name
         'my_test'
@@ -247,7 +247,7 @@ def run(
 def open_run(path: str | PathLike[str]) -> Run:
     """Open the results of a run: its folder, or results.h5 itself, of any version. Raises FileNotFoundError.
 
-    Example:
+    Examples:
         >>> rodsight.open("runs/shear")
         <rodsight.Run 'my_test': 40 grains, 5 frames>
         >>> rodsight.open("runs/nothing")

@@ -69,7 +69,7 @@ def solve(
     experiment.toml, {"solver.kappa": 0.1}; the defaults are those of `rodsight run`.
     Raises InputError naming column, row and value.
 
-    Example:
+    Examples:
         >>> import pandas as pd
         >>> tracks = pd.read_csv("my_test/tracks.csv").merge(pd.read_csv("my_test/grains.csv"), on="id")
         >>> walls = pd.read_csv("my_test/walls.csv")

@@ -1,0 +1,61 @@
+"""app/docs/commands.md: the help of all commands; `python -m rodsight.cli.commands_page` writes it."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import re
+from contextlib import redirect_stdout, suppress
+
+from ..atomic import write_atomically
+from ..manual.contents import FOLDER
+from .command_list import GROUPS, Command, command_line, name_of, overview
+
+PAGE = FOLDER / "commands.md"
+FIRST_LINE = "<!-- Generated: run `python -m rodsight.cli.commands_page` to write it anew. -->"
+ROW = re.compile(r"^(?:│ |  )(.*?) *│?$")  # of the tables of options, with their frames on a terminal
+
+
+def commands_page() -> str:
+    """The whole page, Markdown."""
+    parts = [FIRST_LINE, "# Commands", f"```text\n{overview()}\n```"]
+    for group, commands in GROUPS.items():
+        parts.append(f"## {group}")
+        parts += [part for command in commands for part in _section(command)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _section(command: Command) -> list[str]:
+    text, _, example = inspect.cleandoc(command.__doc__ or "").rpartition("Example: ")
+    options = "\n".join(f"{name:<30} {meaning}".rstrip() for name, meaning in _options(command))
+    return [
+        f"### {name_of(command)}",
+        " ".join(text.split()),
+        f"```sh\n{' '.join(example.split())}\n```",
+        f"```text\n{options}\n```",
+    ]
+
+
+def _options(command: Command) -> list[tuple[str, str]]:
+    """Arguments and options, and what the help says of each."""
+    said = io.StringIO()
+    with redirect_stdout(said), suppress(SystemExit):
+        command_line().cli(prog="rodsight", args=[name_of(command), "--help"])
+    found: list[tuple[str, str]] = []
+    for line in said.getvalue().splitlines():
+        row = ROW.match(line)
+        if row is None or not row[1].strip():
+            continue
+        if not row[1].startswith(" "):
+            name, _, meaning = row[1].partition("  ")
+            found.append((name.strip(), meaning.strip()))
+        elif found:
+            # A list of choices goes on with its name, everything else with its meaning.
+            name, meaning = found[-1]
+            whole = name.count("{") == name.count("}") and name.count("[") == name.count("]")
+            found[-1] = (name, f"{meaning} {row[1].strip()}".strip()) if whole else (name + row[1].strip(), meaning)
+    return [each for each in found if each[0] != "-h, --help"]
+
+
+if __name__ == "__main__":
+    write_atomically(PAGE, commands_page().encode())

@@ -1,0 +1,45 @@
+"""The pages of the documentation, in their order, under the headings they are found by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+FOLDER = Path(__file__).parent.parent / "docs"
+
+CONTENTS: dict[str, dict[str, str]] = {
+    "Begin": {
+        "index.md": "Start",
+        "photographs.md": "Your own photographs",
+        "views.md": "What the views show",
+        "trust.md": "How far to trust it",
+        "troubleshooting.md": "Troubleshooting",
+    },
+    "Understand": {
+        "how_it_works.md": "How it works",
+        "accuracy.md": "How exact, how fast",
+        "gallery.md": "Gallery",
+    },
+    "Work with results": {
+        "python.md": "Python and notebooks",
+        "exchange.md": "From and to other programs",
+        "campaigns.md": "Many experiments",
+    },
+    "Look up": {
+        "commands.md": "Commands",
+        "settings.md": "Settings",
+        "schema.md": "results.h5",
+        "api.md": "Python, name by name",
+    },
+    "Take part": {
+        "contributing.md": "Contributing",
+        "architecture.md": "Architecture",
+        "conventions.md": "Conventions",
+        "robustness.md": "Robustness, counted",
+        "threats.md": "Strangers",
+    },
+}
+
+
+def pages() -> dict[str, str]:
+    """Titles of all pages, by file name."""
+    return {file: title for group in CONTENTS.values() for file, title in group.items()}

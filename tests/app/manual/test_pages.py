@@ -1,0 +1,169 @@
+"""The pages: complete, linked, current; every command and every piece of Python in them works."""
+
+from __future__ import annotations
+
+import functools
+import html.parser
+import inspect
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+import rodsight
+from rodsight.cli import command_list, commands_page
+from rodsight.manual.contents import CONTENTS, FOLDER, pages
+from rodsight.manual.messages import find_messages
+from rodsight.manual.reading import write_pages
+from rodsight.manual.troubleshooting import topic_of, troubleshooting_page
+
+from tests.program import ROOT
+from tests.program import rodsight as command
+
+TEXTS = {file: (FOLDER / file).read_text(encoding="utf-8") for file in pages()}
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(text: str, kind: str) -> list[str]:
+    return [found[2] for found in BLOCK.finditer(text) if found[1] == kind]
+
+
+def commands(text: str) -> list[list[str]]:
+    """What is typed after `rodsight` in the shell blocks of a page."""
+    found = []
+    for block in blocks(text, "sh"):
+        for line in block.replace("\\\n", " ").splitlines():
+            for part in re.split(r"&&|;", line.split("  #")[0]):
+                words = shlex.split(part, comments=True)
+                if words and words[0].endswith("rodsight"):
+                    found.append(words[1:])
+    return found
+
+
+class Page(html.parser.HTMLParser):
+    """Where a page can be entered, and where it leads to."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.targets: list[str] = []
+        self.feed(file.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.anchors |= {given["id"] or ""} if "id" in given else set()
+        self.targets += [given[name] or "" for name in ("href", "src") if name in given]
+
+
+def test_the_site_has_the_same_pages_and_none_is_forgotten():
+    told = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("nav:\n")[-1]
+    lines = []
+    for group, listed in CONTENTS.items():
+        lines += [f"  - {group}:", *(f'      - "{title}": {file}' for file, title in listed.items())]
+    assert told.splitlines() == lines
+    assert {file.name for file in FOLDER.glob("*.md")} == set(pages())
+
+
+def test_every_link_leads_somewhere_and_nothing_is_loaded_from_elsewhere(tmp_path):
+    write_pages(tmp_path)
+    found = {file.name: Page(file) for file in tmp_path.glob("*.html")}
+    assert len(found) == len(pages())
+    for name, page in found.items():
+        for target in page.targets:
+            if "://" in target:
+                continue
+            file, _, mark = target.partition("#")
+            assert not file or (tmp_path / file).is_file(), f"{name}: {target}"
+            if mark:
+                assert mark in found[file or name].anchors, f"{name}: {target}"
+        assert not re.search(r'src="https?:|@import|<script', (tmp_path / name).read_text(encoding="utf-8"))
+    assert "rodsight.solve(tracks" in (tmp_path / "api.html").read_text(encoding="utf-8")
+
+
+def test_every_message_has_its_cure():
+    messages = find_messages()
+    assert len(messages) > 300
+    for message in messages:
+        topic = topic_of(message)
+        assert topic is not None, f"no topic in cures.toml for {message.source}"
+        assert topic.cure(message), f"no cure for {message}"
+
+
+@pytest.mark.parametrize(
+    ("source", "text"),
+    [
+        ("app/lock.py", "…: process … is at work in it; wait for it, or take another --out"),
+        ("app/experiment/tables.py", "stands twice in its frame"),
+        ("app/experiment/config/input_sections.py", "give either interval or times"),
+        ("solver/sequence/judgement.py", "the mean stress jumped by … % (> … %)"),
+        ("solver/sequence/doubts.py", "photographs are …° of shear apart: take them every .25°"),
+        ("app/run_folder.py", "… is damaged or was changed: it is made again."),
+    ],
+)
+def test_messages_are_found_wherever_they_are_made(source, text):
+    assert (source, text) in {(each.source, each.text) for each in find_messages()}
+
+
+def test_generated_pages_are_current():
+    assert TEXTS["troubleshooting.md"] == troubleshooting_page(), "python -m rodsight.manual.troubleshooting"
+    assert TEXTS["commands.md"] == commands_page.commands_page(), "python -m rodsight.cli.commands_page"
+
+
+@pytest.fixture
+def understood(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of commands that would have been called: their arguments are parsed, and nothing is done."""
+    called: list[str] = []
+
+    def standing_in(original: command_list.Command) -> command_list.Command:
+        @functools.wraps(original)
+        def stand_in(*given: object, **named: object) -> int:
+            inspect.signature(original).bind(*given, **named)
+            called.append(command_list.name_of(original))
+            return 0
+
+        return stand_in
+
+    groups = {group: tuple(map(standing_in, members)) for group, members in command_list.GROUPS.items()}
+    monkeypatch.setattr(command_list, "GROUPS", groups)
+    return called
+
+
+@pytest.mark.parametrize("page", [*TEXTS, "README.md"])
+def test_every_command_that_a_page_tells_is_understood(page, understood):
+    typed = [words for words in commands(TEXTS.get(page, README)) if words and not words[0].startswith("-")]
+    for words in typed:
+        assert command(*words) == 0, words
+    assert understood == [words[0] for words in typed]
+
+
+@pytest.fixture(scope="module")
+def folder(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the Python of the pages works: an experiment my_test, runs/shear, and a campaign of one run."""
+    folder = tmp_path_factory.mktemp("snippets")
+    shutil.copytree(made_tracks, folder / "my_test")
+    run = rodsight.run(folder / "my_test", out=folder / "runs/shear", settings={"solver.sweeps": 50})
+    (folder / "runs/campaign").mkdir()
+    run.frames().assign(run="shear").to_parquet(folder / "runs/campaign/frames.parquet")
+    return folder
+
+
+@pytest.mark.parametrize("page", [page for page, text in TEXTS.items() if blocks(text, "python")])
+def test_the_python_of_a_page_runs(page, folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    mpl.use("agg")
+    for number, block in enumerate(blocks(TEXTS[page], "python")):
+        exec(compile(block, f"{page}, block {number}", "exec"), {})
+    capsys.readouterr()
+
+
+def test_the_command_writes_or_prints_the_pages(tmp_path, capsys):
+    assert command("docs", "troubleshooting", "--out", tmp_path) == 0
+    assert (tmp_path / "troubleshooting.html").is_file()
+    assert f"{tmp_path}/troubleshooting.html" in capsys.readouterr().out
+    assert command("docs", "trust", "--text") == 0
+    assert "Status of the frame" in capsys.readouterr().out
+    assert command("docs", "trubleshooting") == 2
+    assert "did you mean troubleshooting?" in capsys.readouterr().err
