@@ -67,8 +67,7 @@ def export(
     width: Annotated[Literal["single", "double"], tyro.conf.arg(help="figures: columns of a page")] = "single",
     quiet: Quiet = False,
 ) -> int:
-    """Write pictures, a video, figures for a paper (PDF, SVG), tidy tables, files for ParaView (vtk) and OVITO, graphs
-    (GraphML) or tracker files.
+    """Write pictures, a video, figures for a paper, tables, files for ParaView, OVITO and networkx, tracker files.
 
     Tables come with columns.csv, the dictionary of their columns, and datapackage.json for a data repository. ParaView
     opens vtk/packing.pvd, OVITO ovito/frame_0000.vtm, and finds the others.

@@ -178,6 +178,9 @@ class Run:
         name: forces (the network), density (P(f)), rose, stress, time, or truth (inferred over true forces, where the
         experiment names a truth); frame: default the last settled one; width: single (85 mm) or double (175 mm).
         Raises ValueError for a figure that is not known or has no data, IndexError for a frame that is not there.
+
+        Examples:
+            >>> rodsight.open("runs/shear").figure("forces", frame=3).savefig("forces.pdf")
         """
         from ..figures.gallery import draw_figure
 
