@@ -240,8 +240,9 @@ def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint)
     """Have every frame in the checkpoint: those that are there stay as they are, the others are kept as they come."""
     total, last = len(sequence.snapshots), None
     done = min(checkpoint.finished(), total)
-    for k in range(done if run.watch is not None else 0):
-        run.watch.frame(*checkpoint.load(k, FrameForces, FrameStatistics))
+    if run.watch is not None:
+        for k in range(done):
+            run.watch.frame(*checkpoint.load(k, FrameForces, FrameStatistics))
     if done:
         last = SolvedFrame(*checkpoint.load(done - 1, FrameForces, FrameStatistics, SequenceState))
     run.progress("solving", done, total)

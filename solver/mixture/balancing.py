@@ -14,7 +14,7 @@ from solver.bodies.grains import Array
 from solver.convex.program import Balance, ConvexForces, ConvexSettings, polish
 
 LARGEST_CHANGE = 0.6  # rms change of f_n over its rms deviation
-LOOSER = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003)  # of the price of an unbalance, tried one after the other
+LOOSER = (0.3, 0.1, 0.03, 0.01, 0.003)  # of the price of an unbalance, tried one after the other
 
 
 def bring_into_balance(balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings) -> ConvexForces:
@@ -23,9 +23,13 @@ def bring_into_balance(balance: Balance, fn: Array, ft: Array, fn_sd: Array, set
     fn_sd (c,) [N]: deviations of f_n. The last attempt stands where none does.
     """
     doubt = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
+    found = polish(balance, fn, ft, settings)
     for share in LOOSER:
-        found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))
-        change = float(np.sqrt(np.mean((found.fn - fn) ** 2))) if len(fn) else 0.0
-        if found.converged and change <= LARGEST_CHANGE * doubt:
+        if found.converged and _change(found.fn, fn) <= LARGEST_CHANGE * doubt:
             break
+        found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))
     return found
+
+
+def _change(found: Array, given: Array) -> float:
+    return float(np.sqrt(np.mean((found - given) ** 2))) if len(given) else 0.0
