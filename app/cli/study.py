@@ -80,12 +80,24 @@ def sensitivity(
 
 def study(
     subject: Annotated[
-        Literal["paper", "accuracy", "status", "uncertainty", "worlds", "numbers", "intervals", "real", "perturbation"],
+        Literal[
+            "paper",
+            "accuracy",
+            "status",
+            "uncertainty",
+            "worlds",
+            "numbers",
+            "intervals",
+            "report",
+            "real",
+            "perturbation",
+        ],
         tyro.conf.Positional,
         tyro.conf.arg(
             help="the paper's claims; r against noise; trust and status refitted; coverage of error bars; what "
             "laboratories bring, as simulated worlds; every statistic against the truth's; what stated "
-            "intervals of forces cover, by groups of contacts, and their constants fitted anew; a run "
+            "intervals of forces cover, by groups of contacts, and their constants fitted anew; all of that as one "
+            "page, and what does not hold; a run "
             "against forces that were measured; how far forces move when next to nothing is changed"
         ),
     ],
@@ -115,7 +127,11 @@ def study(
         bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="worlds, real: print JSON")
     ] = False,
     page: Annotated[
-        Path | None, tyro.conf.arg(metavar="OUT.html", help="real: pictures side by side, true, inferred and baseline")
+        Path | None,
+        tyro.conf.arg(
+            metavar="OUT.html",
+            help="real: pictures side by side, true, inferred and baseline; report: the page, default report.html",
+        ),
     ] = None,
     frame: Annotated[int | None, tyro.conf.arg(help="real: the frame of the pictures; default: the middle one")] = None,
     quiet: Quiet = False,
@@ -133,6 +149,8 @@ def study(
     """
     if subject == "real":
         return _study_real(folder, page, frame, as_json=as_json)
+    if subject == "report" and frame is None:
+        return _study_report(worlds, seeds, grains, out, settings, page, as_json=as_json, quiet=quiet)
     for option, value in (("--page", page), ("--frame", frame)):
         if value is not None:
             raise InputError("study", f"{option} with {subject}", "is for real only")
@@ -280,8 +298,7 @@ def _study_numbers(
     fit: tuple[int, ...],
     quiet: bool,
 ) -> int:
-    from ..study.intervals import FIT_WORLDS
-    from ..study.numbers import WORLDS, compare_numbers, fit_deviations, print_numbers
+    from ..study.numbers import FIT_WORLDS, WORLDS, compare_numbers, fit_deviations, print_numbers
     from ..study.solved_world import solve_worlds
     from ..study.world_score import WorldPlan
     from ..study.worlds import WIDTH
@@ -333,3 +350,36 @@ def _study_intervals(
         console, "Share of contacts within one and two stated deviations, %", ContactErrors.joined(judged)
     )
     return 0
+
+
+def _study_report(
+    worlds: tuple[WorldName, ...],
+    seeds: tuple[int, ...],
+    grains: int | None,
+    out: Path,
+    settings: tuple[str, ...],
+    page: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Write the calibration report. Exit status 1 where something that is stated does not hold."""
+    from ..study.calibration_report import study_calibration
+    from ..study.numbers import WORLDS
+    from ..study.report_page import report_page
+    from ..study.world_score import WorldPlan
+    from ..synthetic.worlds.making import GRAINS
+
+    plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", settings)
+    with progress_of(quiet) as progress:
+        found = study_calibration(plan, worlds or WORLDS, seeds, progress)
+    facts = found.facts()
+    file = out / "report.html" if page is None else page
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(report_page(found), encoding="utf-8")
+    if as_json:
+        print(json.dumps(facts, indent=1))
+    else:
+        told = facts["broken"] or ["all that is stated holds within its limits"]
+        table_console().print(f"{file}: {'; '.join(told)}.", highlight=False, soft_wrap=True)
+    return 1 if facts["broken"] else 0

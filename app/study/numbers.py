@@ -25,7 +25,8 @@ from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_st
 from ..inference.inference import CorrectedSequence, SolvedFrame
 from ..synthetic.worlds.names import WorldName
 from ..synthetic.worlds.table import WORLDS as WORLDS_OF
-from .intervals import COVERED
+from .intervals import COVERED, JUDGE_WORLDS
+from .intervals import FIT_WORLDS as INTERVAL_WORLDS
 from .solved_world import SolvedWorld
 from .world_score import SETTLED
 
@@ -33,12 +34,19 @@ from .world_score import SETTLED
 WORLDS: tuple[WorldName, ...] = (
     "shear", "sheared", "biaxial", "isotropic", "gravity", "soft", "corners", "radii_03", "mu_low", "step_05", "step_1",
 )  # fmt: skip
+# Deviations are fitted on all worlds but those that are told a wrong friction, and judged on other seeds.
+FIT_WORLDS: tuple[WorldName, ...] = (
+    *INTERVAL_WORLDS,
+    *(world for world in JUDGE_WORLDS if not world.startswith("mu_")),
+)
 BIASED = 0.05  # of the true value: more is a bias to be told
 CONE = 0.999  # quantile of |f_t| / f_n of true contacts that is their friction, for a fifth of them are on the cone
 IN_PI = ("principal_direction",)  # directions: the same after half a turn
 SHAPES = ("fn_density", "ft_density", "mobilisation_density")  # compared as a whole: the share that is elsewhere
 NOT_COMPARED = ("area",)  # no estimate
 DEGREES = ("friction_angle", "wall_ratio_angle", "principal_direction", "friction_angle_of_anisotropies")
+
+HEADINGS = ("statistic", "true mean", "bias", "worst world", "bias there", "scatter", "68 %", "95 %", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +79,22 @@ def compare_numbers(solved: SolvedWorld) -> list[Compared]:
     doubt = np.array([float(doubt_of(each.forces.trust)) for each in frames[SETTLED:]])
     witness = np.array([witness_of(each.forces.positions_share) for each in frames[SETTLED:]], np.uint8)
     return [
-        Compared(world, seed, name, *(np.array(column) for column in zip(*values, strict=True)), doubt, witness)
+        _compared(world, seed, name, values, doubt, witness)
         for name in compared_names()
         if (values := [_values(name, stated, exact) for stated, exact in late])
     ]
+
+
+def _compared(
+    world: WorldName,
+    seed: int,
+    name: str,
+    values: Sequence[tuple[float, float, float]],
+    doubt: Array,
+    witness: NDArray[np.uint8],
+) -> Compared:
+    stated, true, deviation = (np.array(column) for column in zip(*values, strict=True))
+    return Compared(world, seed, name, stated, true, deviation, doubt, witness)
 
 
 def compared_names() -> list[str]:
@@ -86,10 +106,10 @@ def compared_names() -> list[str]:
 def print_numbers(console: Console, found: Sequence[Compared]) -> None:
     """Print one row for every statistic: its mean, its bias over all worlds and at worst in one, and its scatter."""
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-    for heading in ("statistic", "true mean", "bias", "worst world", "bias there", "scatter", "68 %", "95 %", ""):
+    for heading in HEADINGS:
         table.add_column(heading, justify="left" if heading in ("statistic", "worst world", "") else "right")
-    for name in compared_names():
-        table.add_row(name, *_cells([each for each in found if each.name == name]))
+    for row in number_rows(found):
+        table.add_row(*row)
     console.print(table)
     console.print(
         "Bias: mean of stated less true over the mean true value; of angles in degrees; of densities the share that "
@@ -97,6 +117,11 @@ def print_numbers(console: Console, found: Sequence[Compared]) -> None:
         f"frames within one and two stated standard deviations. Frames from {SETTLED} on.",
         highlight=False, soft_wrap=True,
     )  # fmt: skip
+
+
+def number_rows(found: Sequence[Compared]) -> list[list[str]]:
+    """A row of cells under HEADINGS for every statistic."""
+    return [[name, *_cells([each for each in found if each.name == name])] for name in compared_names()]
 
 
 def fit_deviations(found: Sequence[Compared]) -> dict[str, tuple[float, ...]]:
