@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numba import njit
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
@@ -90,19 +91,39 @@ def _resultants(grains: Grains, contacts: Contacts, rows: NDArray[np.intp], plac
 def _nearest(matrix: Array, wanted: Array, found: Array, limit: Array, close: float) -> Array:
     """The point (m, 2) nearest to `found` with matrix · f = wanted and every force within its friction cone."""
     inverse = np.linalg.pinv(matrix)
-    force, correction = found.copy(), np.zeros_like(found)
-    for step in range(STEPS):
-        balanced = (force.ravel() - inverse @ (matrix @ force.ravel() - wanted)).reshape(-1, 2)
-        before, force = force, _into_cones(balanced + correction, limit)
-        correction = balanced + correction - force
-        if step % CHECKED == 0 and np.abs(force - before).max(initial=0.0) < 0.01 * close:
-            break
+    # What leaves the resultants as they are, and what makes them those that are wanted: one product for a projection.
+    apart = np.ascontiguousarray(np.eye(matrix.shape[1]) - inverse @ matrix)
+    force = np.ascontiguousarray(found, np.float64).copy()
+    _project_by_turns(apart, inverse @ wanted, force, limit, 0.01 * close)
     return force
 
 
-def _into_cones(force: Array, limit: Array) -> Array:
-    """The nearest forces (m, 2) with f_n ≥ 0 and |f_t| ≤ μ f_n; limit (m,): μ."""
-    fn, ft = force[:, 0], force[:, 1]
-    along = np.maximum((fn + limit * np.abs(ft)) / (1.0 + limit**2), 0.0)
-    beyond = np.abs(ft) > limit * fn
-    return np.stack([np.where(beyond, along, fn), np.where(beyond, np.copysign(limit * along, ft), ft)], axis=1)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project_by_turns(apart, shift, force, limit, close):  # type: ignore[no-untyped-def]
+    """Project (m, 2) forces on the balance and on the cones by turns, in place, until they hardly change."""
+    flat = force.reshape(force.size)
+    correction, balanced = np.zeros(len(flat)), np.empty(len(flat))
+    for step in range(STEPS):
+        balanced[:] = shift
+        for k in range(len(flat)):  # apart is symmetric: its rows are its columns
+            row, part = apart[k], flat[k]
+            for other in range(len(flat)):
+                balanced[other] += row[other] * part
+        change = 0.0
+        for m in range(len(force)):
+            tried_n, tried_t = balanced[2 * m] + correction[2 * m], balanced[2 * m + 1] + correction[2 * m + 1]
+            fn, ft = _into_cone(tried_n, tried_t, limit[m])
+            correction[2 * m], correction[2 * m + 1] = tried_n - fn, tried_t - ft
+            change = max(change, abs(fn - flat[2 * m]), abs(ft - flat[2 * m + 1]))
+            flat[2 * m], flat[2 * m + 1] = fn, ft
+        if step % CHECKED == 0 and change < close:
+            break
+
+
+@njit(inline="always")
+def _into_cone(fn, ft, friction):  # type: ignore[no-untyped-def]
+    """The nearest force with f_n ≥ 0 and |f_t| ≤ μ f_n."""
+    along = max((fn + friction * abs(ft)) / (1.0 + friction * friction), 0.0)
+    if abs(ft) > friction * fn:
+        return along, friction * along if ft >= 0.0 else -friction * along
+    return fn, ft

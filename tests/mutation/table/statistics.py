@@ -22,9 +22,9 @@ MUTANTS = [
         "solver/statistics/removal.py",
         STATISTICS,
         ("matrix[at[body], 2, m, 1] = -grains.radius[body]", "matrix[at[body], 2, m, 1] = grains.radius[body] * sign"),
-        ("correction = balanced + correction - force", "correction = 0.0 * force"),
+        ("= tried_n - fn, tried_t - ft", "= 0.0, 0.0"),
         ("wanted = matrix @ found.ravel() + lost", "wanted = matrix @ found.ravel()"),
-        ("np.copysign(limit * along, ft)", "limit * along"),
+        ("friction * along if ft >= 0.0 else -friction * along", "friction * along"),
         ("free[row] = False", "free[row] = True"),
     ),
     *mutants_of(
