@@ -20,6 +20,7 @@ from rich.progress import (
 from rich.progress import Progress as Bars
 
 from ..progress import Progress, silent
+from .compiling import SENTENCE, hearing_of_compilation
 
 Form = Literal["bars", "lines"]
 WIDE = 120  # columns of a table that goes to a file
@@ -27,7 +28,7 @@ WIDE = 120  # columns of a table that goes to a file
 
 @contextmanager
 def progress_bars() -> Iterator[Progress]:
-    """Give a callable that draws one bar per stage on standard error."""
+    """Give a callable that draws one bar per stage on standard error, and one while kernels are compiled."""
     bars = Bars(
         TextColumn("{task.description:<10}"),
         BarColumn(bar_width=36),
@@ -44,7 +45,12 @@ def progress_bars() -> Iterator[Progress]:
             tasks[stage] = bars.add_task(stage, total=total)
         bars.update(tasks[stage], completed=done, total=total)
 
-    with bars:
+    def compiling(count: int) -> None:
+        if count == 1:
+            bars.console.print(SENTENCE)
+        show("compiling", count, count)
+
+    with bars, hearing_of_compilation(compiling):
         yield show
 
 
