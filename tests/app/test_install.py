@@ -64,7 +64,11 @@ def test_the_wheel_holds_the_package_its_data_and_no_tests(wheel):
         "rodsight",
         "solver",
     ]
-    for name in ("py.typed", "review/page/index.html", "recording/viewing/single_page.html"):
+    for name in (
+        "py.typed", "review/page/index.html", "recording/viewing/single_page.html", "docs/troubleshooting.md",
+        "docs/pictures/experiment.png", "docs/notebooks/is_it_to_be_trusted.ipynb", "manual/page.html",
+        "manual/cures.toml", "campaign/report.html",
+    ):  # fmt: skip
         assert (wheel / "rodsight" / name).is_file(), name
     assert (wheel / "solver" / "py.typed").is_file()
 

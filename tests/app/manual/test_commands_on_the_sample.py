@@ -1,0 +1,42 @@
+"""Every command that the pages tell is done, one after the other, by somebody who starts in an empty folder."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.app.manual.test_pages import TEXTS, commands
+from tests.program import ROOT, rodsight
+
+pytestmark = [pytest.mark.slow, pytest.mark.screen]  # minutes long; pictures are drawn
+
+SERVING = ("view", "open", "review")  # wait for a person
+MAKING = ("init", "import", "synth")  # a folder that must not be there
+
+
+def waits(words: list[str]) -> bool:
+    """Whether a command needs a person, a running test or photographs that are not ours."""
+    return words[0] in SERVING or "--follow" in words or "--view" in words or "photos/*.png" in words
+
+
+def test_they_all_end_well(tmp_path, monkeypatch, capsys):
+    (tmp_path / "sample_data").symlink_to(ROOT / "sample_data", target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    assert rodsight("run", "sample_data/shear") == 0
+    assert rodsight("run", "sample_data/shear", "--set", "solver.kappa=0.1", "--out", "runs/stiffer") == 0
+    told = [words for text in TEXTS.values() for words in commands(text) if words and not words[0].startswith("-")]
+    done: list[list[str]] = []
+    for words in told:
+        if words in done or waits(words):
+            continue
+        done.append(words)
+        if words[0] in MAKING:
+            target = Path(next(word for word in words if word in ("my_test", "my_import", "try", "big", "OUT")))
+            shutil.rmtree(target, ignore_errors=True)
+            if words[0] == "init":
+                target.mkdir()
+        status = rodsight(*words)
+        assert status == 0, (words, capsys.readouterr().err)
+    assert len(done) > 25
