@@ -46,14 +46,14 @@ def _options(command: Command) -> list[tuple[str, str]]:
         row = ROW.match(line)
         if row is None or not row[1].strip():
             continue
-        if not row[1].startswith(" "):
+        text = row[1].strip()
+        if found and found[-1][0].count("{") > found[-1][0].count("}"):  # a list of choices that goes on
+            found[-1] = (found[-1][0] + text, "")
+        elif not row[1].startswith(" "):
             name, _, meaning = row[1].partition("  ")
             found.append((name.strip(), meaning.strip()))
         elif found:
-            # A list of choices goes on with its name, everything else with its meaning.
-            name, meaning = found[-1]
-            whole = name.count("{") == name.count("}") and name.count("[") == name.count("]")
-            found[-1] = (name, f"{meaning} {row[1].strip()}".strip()) if whole else (name + row[1].strip(), meaning)
+            found[-1] = (found[-1][0], f"{found[-1][1]} {text}".strip())
     return [each for each in found if each[0] != "-h, --help"]
 
 
