@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import inspect
 import io
+import os
 import re
 from contextlib import redirect_stdout, suppress
+from unittest.mock import patch
 
 from ..atomic import write_atomically
 from ..manual.contents import FOLDER
@@ -39,7 +41,8 @@ def _section(command: Command) -> list[str]:
 def _options(command: Command) -> list[tuple[str, str]]:
     """Arguments and options, and what the help says of each."""
     said = io.StringIO()
-    with redirect_stdout(said), suppress(SystemExit):
+    # So wide that nothing is broken: a word in pieces could not be put together again.
+    with patch.dict(os.environ, COLUMNS="4000"), redirect_stdout(said), suppress(SystemExit):
         command_line().cli(prog="rodsight", args=[name_of(command), "--help"])
     found: list[tuple[str, str]] = []
     for line in said.getvalue().splitlines():
