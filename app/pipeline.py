@@ -47,6 +47,7 @@ from .results.store import Provenance, load_results, load_tracks, origin_of, sav
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
 from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
+from .sensitivity.error_budget import budget_cases, measure_budget
 from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
 from .sensitivity.study import Nominal
 from .tracking.report.page import tracking_report
@@ -278,6 +279,29 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
     checkpoint.clear()
     run.timings.add("ensemble", since)
     run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")
+    return results
+
+
+def add_error_budget(run: Run, workers: int) -> Results:
+    """Divide the error of every frame of a run among its causes, and store that with its results and its summary."""
+    since = time.perf_counter()
+    log = VerdictLog(run.file(VERDICTS)).as_of_now()
+    results, origin = _solve(run, log), run.origin(FORCES_FROM, log)
+    given = _inputs(run, log, results.tracks, results.walls).with_friction(results.friction, results.friction_check)
+    inputs = calibrated_inputs(given)
+    calibration = results.calibration
+    scatter = 0.0
+    if calibration is not None and calibration.applied:
+        scatter = float(np.nanmedian(calibration.radius_sd / results.tracks.radius))
+    cases = budget_cases(inputs, scatter=scatter)
+    budget = measure_budget(inputs, results.frames, cases, workers=workers, progress=run.progress)
+    former = results.frames
+    results = replace(results, frames=Lazily(len(former), lambda k: budget.told(former[k])))
+    save_results(run.file(RESULTS), results, origin)
+    run.manifest.add(RESULTS, origin.fingerprint)
+    results = load_results(run.file(RESULTS))
+    run.timings.add("error budget", since)
+    conclude(run, results, load_truth(run, results), since)
     return results
 
 

@@ -34,6 +34,11 @@ def sensitivity(
     scheduler: Annotated[
         str | None, tyro.conf.arg(metavar="ADDRESS", help="run on the machines of this dask scheduler instead")
     ] = None,
+    budget: Annotated[
+        bool,
+        tyro.conf.FlagCreatePairsOff,
+        tyro.conf.arg(help="instead divide each frame's error among its causes, and store that with the results"),
+    ] = False,
     as_json: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="print JSON")] = False,
     quiet: Quiet = False,
 ) -> int:
@@ -58,6 +63,8 @@ def sensitivity(
         raise InputError("--workers", str(workers), "must be at least one")
     console = table_console(report.WIDTH, quiet=quiet)
     request = Request(experiment, settings, quiet, out, frames)
+    if budget:
+        return _divide_error(request, workers or available_cores(), as_json=as_json)
     with open_run(request) as run:
         varied, cases = designs.plan(run.experiment, design, factors, samples, seed)
         if scheduler is not None:
@@ -75,6 +82,27 @@ def sensitivity(
         return 0
     report.print_findings(console, findings)
     console.print(f"Tables in {run.folder}/: {', '.join(report.FILES)}.", highlight=False)
+    return 0
+
+
+def _divide_error(request: Request, workers: int, *, as_json: bool) -> int:
+    from .. import pipeline
+    from ..results.summary import summarize
+    from .summary_table import budget_lines
+
+    with open_run(request) as run:
+        summary = summarize(pipeline.add_error_budget(run, workers), None, {})
+    if as_json:
+        print(json.dumps(summary["error_budget"], indent=1))
+        return 0
+    console = table_console(quiet=request.quiet)
+    for line in budget_lines(summary):
+        console.print(line, highlight=False, soft_wrap=True)
+    console.print(
+        f"Shares by frame: frames/error_budget in {run.folder}/results.h5; rodsight record draws them.",
+        highlight=False,
+        soft_wrap=True,
+    )
     return 0
 
 

@@ -61,7 +61,7 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
             f"Trust (a lower bound of the correlation with the true forces): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
         )
-    lines += _deviation_line(summary) + _doubt_line(summary)
+    lines += _deviation_line(summary) + budget_lines(summary) + _doubt_line(summary)
     if not summary["loaded_walls"]:
         lines.append(
             "[bold]No wall carries a given pressure:[/] forces are known up to a scale, which differs between frames."
@@ -121,6 +121,31 @@ def _deviation_line(summary: dict[str, Any]) -> list[str]:
     if forces:
         told.append(f"one f_n ± {np.median(forces):.2f} of the mean f_n")
     return [f"One standard deviation, median of the frames: {', '.join(told)}."] if told else []
+
+
+HALVED = {
+    "positions": "positions and rotations", "radii": "radii and centres", "friction": "the coefficient of friction",
+    "contacts": "the surfaces' roughness, which decides of doubtful contacts", "steps": "the step between photographs",
+}  # fmt: skip
+
+
+def budget_lines(summary: dict[str, Any]) -> list[str]:
+    """What the forces err by, from where, and what halving the greatest cause would do; means over the frames."""
+    budget = summary.get("error_budget")
+    known = [each for each in budget["relative_error"] if each is not None] if budget else []
+    if not known:
+        return []
+    share = {
+        name: float(np.mean([each for each in values if each is not None])) for name, values in budget["share"].items()
+    }
+    error = 100.0 * float(np.mean(known))
+    told = ", ".join(f"{name} {100.0 * part:.0f} %" for name, part in share.items())
+    worst = max(HALVED, key=lambda name: share.get(name, 0.0))
+    after = error * float(np.sqrt(1.0 - 0.75 * share[worst]))
+    return [
+        f"Error budget: the forces err by {error:.0f} % (relative L2); of the variance {told}.",
+        f"Halving the error of {HALVED[worst]} would make it {after:.1f} % instead of {error:.1f} %.",
+    ]
 
 
 def _doubt_line(summary: dict[str, Any]) -> list[str]:

@@ -43,7 +43,7 @@ IDENTITY = {
     "pressure": ("Pa", "pressure that loads the wall"),
 }
 SAID = ("time", "i", "j", "point", "normal", "position", "rotation")  # among these, or by other names
-SPREAD = ("xy", "axis", "wall", "anisotropy", "member", "component")  # dimensions that become columns
+SPREAD = ("xy", "axis", "wall", "anisotropy", "member", "component", "error_part")  # dimensions that become columns
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from solver.contacts.radius_tuning import RadiusTuning
 from solver.convex.friction_check import FrictionCheck
 from solver.nlgs.starts import COLD_SWEEPS
 from solver.sequence.ensemble import MEMBERS
-from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frame_forces import ERROR_PARTS, FrameForces
 from solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
 from solver.statistics.frame_statistics import FrameStatistics
 
@@ -93,6 +93,7 @@ DIMENSIONS = {
     "member": Dimension("members of the ensemble", MEMBERS),
     "component": Dimension("components of a contact's force", ("fn", "ft")),
     "anisotropy": Dimension("kinds of anisotropy", ("contact", "branch", "normal", "tangential")),
+    "error_part": Dimension("causes of the forces' error", ERROR_PARTS),
     "force_bin": Dimension("bins of f / ⟨f⟩, labelled by their middles", _middles(FORCE_EDGES)),
     "mobilisation_bin": Dimension("bins of |f_t| / (μ f_n), labelled by their middles", _middles(MOBILISATION_EDGES)),
     "radius_change": Dimension("changes of radius that were tried"),

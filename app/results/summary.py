@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from solver.sequence.statistic_intervals import DEVIATION
 from solver.statistics.agreement import Agreement
 from solver.statistics.frame_statistics import FrameStatistics
@@ -36,12 +36,15 @@ class _Frame(NamedTuple):
     natural_map: float
     correction: float
     fn_deviation: float
+    relative_error: float
+    error_budget: list[float] | None
 
     @classmethod
     def of(cls, forces: FrameForces) -> _Frame:
         return cls(
             forces.frame, forces.status, forces.reason, forces.failed_reason, forces.contacts.count, forces.trust,
             forces.doubt, forces.unbalance, forces.natural_map, forces.correction, _median_deviation(forces),
+            forces.relative_error, None if forces.error_budget is None else forces.error_budget.tolist(),
         )  # fmt: skip
 
 
@@ -102,6 +105,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "coordination_number": _plain([each.coordination_number for each in statistics]),
         "mean_fn": _plain([each.mean_fn for each in statistics]),
         "deviations": {name: _plain([each.deviations[name] for each in statistics]) for name in DEVIATION},
+        "error_budget": _error_budget(frames),
         "fn_deviation": _plain([frame.fn_deviation for frame in frames]),
         "friction": _friction(results),
         "wall_force_error": _wall_force_error(results, settled),
@@ -114,6 +118,19 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
     if agreement is not None:
         summary["accuracy"] = accuracy(agreement)
     return summary
+
+
+def _error_budget(frames: Sequence[_Frame]) -> dict[str, Any] | None:
+    """Shares of the causes by frame, and the relative errors that they divide; None where nobody asked for them."""
+    shares = [frame.error_budget for frame in frames]
+    if not any(shares):
+        return None
+    nothing = [float("nan")] * len(ERROR_PARTS)
+    columns = zip(*(each or nothing for each in shares), strict=True)
+    return {
+        "share": {name: _plain(list(column)) for name, column in zip(ERROR_PARTS, columns, strict=True)},
+        "relative_error": _plain([frame.relative_error for frame in frames]),
+    }
 
 
 def _median_deviation(frame: FrameForces) -> float:

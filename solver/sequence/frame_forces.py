@@ -15,6 +15,7 @@ from solver.contacts.contacts import Contacts, ContactSource, ContactState
 from solver.nlgs.sweep_record import SweepHistory
 
 NAN = float("nan")
+ERROR_PARTS = ("positions", "radii", "friction", "contacts", "steps", "method")  # of an error budget
 
 
 class FrameStatus(IntEnum):
@@ -114,4 +115,9 @@ class FrameForces:
     ] = NAN
     positions_share: Annotated[float, Quantity("what positions alone count in the reported field", since=2)] = 0.0
     doubt: Annotated[str, Quantity("what lowers the trust and what to do about it, the worst first", since=2)] = ""
+    error_budget: Annotated[
+        Array | None,
+        Quantity("share of each cause in the variance of the forces' error", dims="error_part", since=2),
+    ] = None  # not asked for
+    relative_error: Annotated[float, Quantity("error of the forces that the budget divides, ‖σ‖ / ‖f‖", since=2)] = NAN
     failed_reason: Annotated[str, Quantity("why it could not be solved; empty where it was", since=2)] = ""

@@ -17,7 +17,7 @@ from solver.calibration.statistics import GapStatistics
 from solver.convex.friction_check import FrictionCheck
 from solver.nlgs.starts import COLD_SWEEPS
 from solver.sequence.ensemble import MEMBERS
-from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frame_forces import ERROR_PARTS, FrameForces
 from solver.sequence.statistic_intervals import DEVIATION
 from tests.app.recording.fake_results import make_results, make_tuning
 
@@ -112,6 +112,8 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         sliding_probability=np.linspace(0.9, 0.1, c),
         overlap=0.25 + frame.frame,
         positions_share=0.5 + 0.01 * frame.frame,
+        error_budget=np.linspace(0.0, 1.0, len(ERROR_PARTS)) / (1 + frame.frame),
+        relative_error=0.15 + 0.01 * frame.frame,
     )
 
 

@@ -100,6 +100,7 @@ def test_a_file_of_schema_2_reads_as_the_numbers_it_was_made_of(file):
     new = {
         "bearing_probability": None, "sliding_probability": None, "overlap": np.nan, "positions_share": 0.0,
         "force_change": np.nan, "strain": None, "shear": np.nan, "shear_step": np.nan, "doubt": "",
+        "error_budget": None, "relative_error": np.nan,
     }  # fmt: skip
     frames = [replace(each, contacts=replace(each.contacts, shift=None), **new) for each in full.frames]
     unsummed = {"wall_normal_force": None, "wall_tangential_force": None} | dict.fromkeys(DEVIATIONS, np.nan)
