@@ -6,6 +6,7 @@ import inspect
 import io
 import os
 import re
+import textwrap
 from contextlib import redirect_stdout, suppress
 from unittest.mock import patch
 
@@ -15,6 +16,7 @@ from .command_list import GROUPS, Command, command_line, name_of, overview
 
 PAGE = FOLDER / "commands.md"
 FIRST_LINE = "<!-- Generated: run `python -m rodsight.cli.commands_page` to write it anew. -->"
+NAMES, WIDTH = 26, 100  # [columns] of names, and of a line
 ROW = re.compile(r"^(?:│ |  )(.*?) *│?$")  # of the tables of options, with their frames on a terminal
 
 
@@ -29,13 +31,24 @@ def commands_page() -> str:
 
 def _section(command: Command) -> list[str]:
     text, _, example = inspect.cleandoc(command.__doc__ or "").rpartition("Example: ")
-    options = "\n".join(f"{name:<30} {meaning}".rstrip() for name, meaning in _options(command))
+    options = "\n".join(_row(name, meaning) for name, meaning in _options(command))
     return [
         f"### {name_of(command)}",
         " ".join(text.split()),
         f"```sh\n{' '.join(example.split())}\n```",
         f"```text\n{options}\n```",
     ]
+
+
+def _row(name: str, meaning: str) -> str:
+    """A line for a short name, its meaning below a long one."""
+    name = name.replace(",", ", ") if len(name) > NAMES else name
+    head = textwrap.fill(name, WIDTH, subsequent_indent=" ", break_long_words=False, break_on_hyphens=False)
+    below = textwrap.fill(
+        meaning, WIDTH, initial_indent=" " * NAMES, subsequent_indent=" " * NAMES, break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
+    return f"{head}\n{below}" if len(head) >= NAMES else f"{head:<{NAMES}}{below[NAMES:]}".rstrip()
 
 
 def _options(command: Command) -> list[tuple[str, str]]:

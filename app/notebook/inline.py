@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import html
 import sys
 from pathlib import Path
 from typing import Any
 
-WIDTH, HEIGHT = "100%", 720  # [px] of a recording below a cell
+HEIGHT = 720  # [px] of a recording below a cell
+# The viewer's script takes its own address for a part of one, and a page within a cell has none.
+NO_ADDRESS = ("document.currentScript !== null", "false")
 
 
 def in_notebook() -> bool:
@@ -16,16 +19,19 @@ def in_notebook() -> bool:
 
 
 def show_recording(recording: Path) -> Any:
-    """Show a recording: a frame of the page to be displayed in a notebook; elsewhere None, and the viewer opens.
+    """Show a recording: what a notebook displays below the cell; elsewhere None, and the viewer opens.
 
-    Where neither is possible, the sentence that says how to look at it.
+    Where neither is possible, the sentence that says how to look at it. Viewer and recording become part of the
+    notebook: no server is asked, and other pages may not frame those that Rodsight serves.
     """
     if in_notebook():
-        from IPython.display import IFrame  # pyright: ignore[reportMissingImports]
+        from IPython.display import HTML  # pyright: ignore[reportMissingImports]
 
-        from ..recording.viewing.recording_server import serve_apart
+        from ..recording.viewing.single_page import single_page
 
-        return IFrame(serve_apart([recording]), WIDTH, HEIGHT)
+        page = single_page(recording, title=recording.parent.name).replace(*NO_ADDRESS)
+        style = f"width: 100%; height: {HEIGHT}px; border: 0"
+        return HTML(f'<iframe srcdoc="{html.escape(page, quote=True)}" style="{style}"></iframe>')
     from ..recording.viewing.viewer import open_viewer
 
     return open_viewer(recording)

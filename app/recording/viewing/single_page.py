@@ -24,6 +24,12 @@ def write_single_page(recording: Path | str, target: Path | str, *, title: str) 
     The page needs a browser with WebAssembly and WebGL 2 or WebGPU; `?renderer=webgl` after its address forbids the
     latter. Raises FileNotFoundError where there is no recording, RuntimeError where the viewer has no web part.
     """
+    write_atomically(Path(target), single_page(recording, title=title).encode("utf-8"))
+    return Path(target).stat().st_size
+
+
+def single_page(recording: Path | str, *, title: str) -> str:
+    """The text of such a page."""
     data = Path(recording).read_bytes()
     viewer = read_web_viewer()
     script = viewer.script.decode("utf-8").replace("</script", "<\\/script")
@@ -36,8 +42,7 @@ def write_single_page(recording: Path | str, target: Path | str, *, title: str) 
     }
     for mark, content in parts.items():
         page = page.replace(mark, content)
-    write_atomically(Path(target), page.encode("utf-8"))
-    return Path(target).stat().st_size
+    return page
 
 
 def _packed(data: bytes) -> str:

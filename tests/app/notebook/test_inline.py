@@ -1,0 +1,51 @@
+"""A recording below the cell of a notebook."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+import rodsight
+from rodsight.experiment.units import Scale
+from rodsight.notebook import inline
+from rodsight.recording.files.finished_run import write_recording
+
+from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
+from tests.app.recording.fake_results import make_results
+
+
+@pytest.fixture
+def notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if a Jupyter kernel ran this process, whose HTML is its text."""
+    shell = SimpleNamespace(kernel=object())
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(HTML=str))
+
+
+def test_only_a_kernel_is_a_notebook(notebook, monkeypatch):
+    assert inline.in_notebook()
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
+    assert not inline.in_notebook()
+
+
+def test_a_run_without_a_recording_says_so():
+    with pytest.raises(FileNotFoundError, match="no recording of this run"):
+        rodsight.Run(make_results(2)).view()
+
+
+@pytest.mark.screen
+def test_the_recording_appears_in_a_frame_of_the_notebooks_page(notebook, page, tmp_path):
+    results = make_results(frame_count=4)
+    path = write_recording(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
+    shown = inline.show_recording(path)
+    file = tmp_path / "notebook.html"
+    shown = shown.replace("?? undefined", "?? &quot;webgl&quot;")  # the only renderer of a browser without a screen
+    file.write_text(f"<!doctype html><title>notebook</title><body>{shown}</body>")
+    page.goto(file.as_uri())
+    frame = page.frame_locator("iframe")
+    frame.locator("canvas").wait_for()
+    inner = page.frames[1]
+    inner.wait_for_function("window.rodsight !== undefined")
+    assert inner.title() != "failed"
+    assert frame.locator("#note").count() == 0
