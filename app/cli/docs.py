@@ -29,8 +29,8 @@ def docs(
     from rich.console import Console
 
     from .. import __version__
-    from ..manual.contents import FOLDER, pages
-    from ..manual.reading import reading_folder, write_pages
+    from ..manual.contents import pages
+    from ..manual.reading import page_text, reading_folder, write_pages
     from ..recording.viewing.viewer import has_display
     from .terminal import tell
 
@@ -44,7 +44,7 @@ def docs(
     if text:
         from rich.markdown import Markdown
 
-        console.print(Markdown((FOLDER / names[name]).read_text(encoding="utf-8")))
+        console.print(Markdown(page_text(names[name])))
         return 0
     first = write_pages(reading_folder(__version__) if out is None else out)
     shown = first.with_name(f"{name}.html")

@@ -29,13 +29,19 @@ def write_pages(folder: Path) -> Path:
     template = Environment(autoescape=True, trim_blocks=True).from_string(source)
     folder.mkdir(parents=True, exist_ok=True)
     for name, title in pages().items():
-        body = _html((FOLDER / name).read_text(encoding="utf-8"))
+        body = _html(page_text(name))
         page = template.render(title=title, here=name, contents=CONTENTS, body=body)
         write_atomically((folder / name).with_suffix(".html"), page.encode())
     for part in ("pictures", "notebooks"):
         if (FOLDER / part).is_dir():
             shutil.copytree(FOLDER / part, folder / part, dirs_exist_ok=True)
     return folder / "index.html"
+
+
+def page_text(name: str) -> str:
+    """The Markdown of a page, with what the code says of itself in its place."""
+    text = (FOLDER / name).read_text(encoding="utf-8")
+    return MEMBER.sub(lambda found: _describe(found[1], found[2]), text)
 
 
 def reading_folder(version: str) -> Path:
@@ -52,7 +58,6 @@ def reading_folder(version: str) -> Path:
 def _html(text: str) -> str:
     from markdown_it import MarkdownIt
 
-    text = MEMBER.sub(lambda found: _describe(found[1], found[2]), text)
     parser = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"])
     tokens = parser.parse(text)
     for token, following in pairwise(tokens):
@@ -89,7 +94,7 @@ def _entry(name: str, thing: Any) -> str:
     shown = "" if isinstance(thing, property) or inspect.isclass(thing) else _signature(thing)
     text, _, example = (inspect.getdoc(thing) or "").partition("\nExamples:\n")
     code = f"\n\n```pycon\n{inspect.cleandoc(example)}\n```" if example else ""
-    return f'<p class="name"><code>{html.escape(name + shown)}</code></p>\n\n{html.escape(text, quote=False)}{code}'
+    return f"### `{name}{shown}`\n\n{html.escape(text, quote=False)}{code}"
 
 
 def _signature(thing: Any) -> str:

@@ -165,5 +165,7 @@ def test_the_command_writes_or_prints_the_pages(tmp_path, capsys):
     assert f"{tmp_path}/troubleshooting.html" in capsys.readouterr().out
     assert command("docs", "trust", "--text") == 0
     assert "Status of the frame" in capsys.readouterr().out
+    assert command("docs", "api", "--text") == 0
+    assert "run(experiment, *, out=None" in capsys.readouterr().out
     assert command("docs", "trubleshooting") == 2
     assert "did you mean troubleshooting?" in capsys.readouterr().err
