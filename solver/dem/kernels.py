@@ -128,6 +128,27 @@ def base_forces(bodies: Bodies, law: Law) -> None:
 
 
 @njit(cache=True)
+def press_apart(force: Array, radius: Array, i: int, j: int, nx: float, ny: float, fn: float, ft: float) -> None:
+    """Add the forces f_n, f_t [N] of a contact with normal n from grain i to j to those on both (n, 3)."""
+    fx = fn * nx - ft * ny
+    fy = fn * ny + ft * nx
+    force[j, 0] += fx
+    force[j, 1] += fy
+    force[j, 2] -= radius[j] * ft
+    force[i, 0] -= fx
+    force[i, 1] -= fy
+    force[i, 2] -= radius[i] * ft
+
+
+@njit(cache=True)
+def press_on_wall(force: Array, radius: Array, i: int, nx: float, ny: float, fn: float, ft: float) -> None:
+    """Add the forces f_n, f_t [N] of a contact with normal n from grain i to a wall to those on the grain (n, 3)."""
+    force[i, 0] -= fn * nx - ft * ny
+    force[i, 1] -= fn * ny + ft * nx
+    force[i, 2] -= radius[i] * ft
+
+
+@njit(cache=True)
 def grain_forces(bodies: Bodies, pairs: Pairs, law: Law) -> None:
     """Add the forces between grains to `bodies.force`."""
     state, force, radius = bodies.state, bodies.force, bodies.radius
@@ -154,14 +175,7 @@ def grain_forces(bodies: Bodies, pairs: Pairs, law: Law) -> None:
         )
         pairs.fn[p] = fn
         pairs.ft[p] = ft
-        fx = fn * nx - ft * ny
-        fy = fn * ny + ft * nx
-        force[j, 0] += fx
-        force[j, 1] += fy
-        force[j, 2] -= radius[j] * ft
-        force[i, 0] -= fx
-        force[i, 1] -= fy
-        force[i, 2] -= radius[i] * ft
+        press_apart(force, radius, i, j, nx, ny, fn, ft)
         if law.rolling_friction > 0.0:
             arm = radius[i] * radius[j] / touch
             turning = arm * (state[j, OMEGA] - state[i, OMEGA])
@@ -220,9 +234,7 @@ def wall_forces(bodies: Bodies, pairs: Pairs, law: Law, shear_rate: float) -> tu
         )
         pairs.fn[p] = fn
         pairs.ft[p] = ft
-        force[i, 0] -= fn * nx - ft * ny
-        force[i, 1] -= fn * ny + ft * nx
-        force[i, 2] -= radius[i] * ft
+        press_on_wall(force, radius, i, nx, ny, fn, ft)
         if law.rolling_friction > 0.0:
             turning = radius[i] * (spin - state[i, OMEGA])
             moment, pairs.roll[p] = rolling_force(fn, turning, pairs.damping[p], pairs.roll[p], law)

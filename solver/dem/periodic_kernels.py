@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.dem.kernels import OMEGA, THETA, VX, VY, Law, X, Y, contact_force
+from solver.dem.kernels import OMEGA, THETA, VX, VY, Law, X, Y, contact_force, press_apart
 
 
 class PeriodicBodies(NamedTuple):
@@ -76,14 +76,7 @@ def pair_forces(bodies: PeriodicBodies, pairs: PeriodicPairs, law: Law, shear: f
         )
         pairs.fn[p] = fn
         pairs.ft[p] = ft
-        fx = fn * nx - ft * ny
-        fy = fn * ny + ft * nx
-        force[j, 0] += fx
-        force[j, 1] += fy
-        force[j, 2] -= radius[j] * ft
-        force[i, 0] -= fx
-        force[i, 1] -= fy
-        force[i, 2] -= radius[i] * ft
+        press_apart(force, radius, i, j, nx, ny, fn, ft)
         work += fn * distance
     return work
 

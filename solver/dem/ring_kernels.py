@@ -22,6 +22,7 @@ from solver.dem.kernels import (
     contact_force,
     grain_forces,
     move_grains,
+    press_on_wall,
 )
 
 # entries of the circles' state: the ring is about the origin, and does not turn
@@ -70,9 +71,7 @@ def circle_forces(bodies: Bodies, pairs: Pairs, law: Law, circles: Array, drive:
         )
         pairs.fn[p] = fn
         pairs.ft[p] = ft
-        force[i, 0] -= fn * nx - ft * ny
-        force[i, 1] -= fn * ny + ft * nx
-        force[i, 2] -= radius[i] * ft
+        press_on_wall(force, radius, i, nx, ny, fn, ft)
         if wall == RING:
             total += fn
     return total
