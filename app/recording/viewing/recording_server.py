@@ -15,19 +15,17 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from pathlib import Path
-from typing import IO, Any
-from urllib.parse import parse_qs, urlsplit
+from typing import IO
 
-from .gate import SAFE_HEADERS, Gate, QuietServer
+from .gate import Gate, QuietServer
+from .gated_handler import GatedHandler
 from .web_viewer import WebViewer, read_web_viewer
 
 IDLE = 3600.0  # [s] without a question after which a server of its own ends
 LOOK = 0.1  # [s] between two looks at a recording that grows
 LAST = 5.0  # [s] that those who watch have to take the end of it
-PATIENCE = 60.0  # [s] for a client that says nothing
 PIECE = 1 << 20  # [bytes]
 RENDERERS = ("webgl", "webgpu")
 COMMAND = f"from {__name__} import serve_alone; serve_alone()"
@@ -56,7 +54,7 @@ class RecordingServer:
             recordings = server
 
         self._http = QuietServer(("127.0.0.1", port), Handler)
-        self.gate = Gate(self._http.server_address[1], "view")
+        self.gate = Handler.gate = Gate(self._http.server_address[1], "view")
         room = files(__name__.rpartition(".")[0])
         self.assets = {path: (room.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
         page, kind = self.assets["/"]
@@ -142,76 +140,42 @@ def serve_alone() -> None:
     server.close()
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(GatedHandler):
     """One connection. Subclassed with the server it belongs to."""
 
     recordings: RecordingServer
-    protocol_version = "HTTP/1.1"
-    server_version = "rodsight"
-    sys_version = ""
-    timeout = PATIENCE
-    disable_nagle_algorithm = True
 
-    def do_GET(self) -> None:
-        parts = urlsplit(self.path)
-        query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
-        entering = parts.path == "/" and "token" in query
-        named = self.recordings.named.get(parts.path)
-        refusal = self.recordings.gate.refusal(self.headers, changes=False, entering=entering or named is not None)
-        if refusal is not None:
-            self.close_connection = True
-            self._say(*refusal)
-        elif entering and self.recordings.gate.opens(query["token"]):
-            place = f"/?renderer={query['renderer']}" if query.get("renderer") in RENDERERS else "/"
-            self._send(
-                b"", "text/plain", HTTPStatus.SEE_OTHER, Location=place, Set_Cookie=self.recordings.gate.set_cookie
-            )
-        elif entering:
-            self._say(HTTPStatus.FORBIDDEN, "this token is not the one that was printed")
-        else:
-            self.recordings.asked = time.monotonic()
-            self._give(parts.path, named)
+    def is_open(self, path: str) -> bool:
+        return path in self.recordings.named
 
-    def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: the terminal belongs to the person."""
+    def entrance(self, query: dict[str, str]) -> str:
+        return f"/?renderer={query['renderer']}" if query.get("renderer") in RENDERERS else "/"
+
+    def give(self, path: str, query: dict[str, str]) -> None:
+        self.recordings.asked = time.monotonic()
+        self._give(path, self.recordings.named.get(path))
 
     def _give(self, path: str, recording: Path | None) -> None:
         server = self.recordings
         if path in server.assets:
-            self._send(*server.assets[path])
+            self.send(*server.assets[path])
         elif path == "/re_viewer.js":
-            self._send(server.viewer().script, "text/javascript; charset=utf-8")
+            self.send(server.viewer().script, "text/javascript; charset=utf-8")
         elif path == "/re_viewer_bg.wasm":
-            self._send(server.viewer().module, "application/wasm")
+            self.send(server.viewer().module, "application/wasm")
         elif recording is not None:
             self._stream(recording)
         else:
-            self._say(HTTPStatus.NOT_FOUND, "there is nothing here")
+            self.say(HTTPStatus.NOT_FOUND, "there is nothing here")
 
     def _stream(self, recording: Path) -> None:
         if not recording.is_file():
-            self._say(HTTPStatus.NOT_FOUND, "the recording is not there any more")
+            self.say(HTTPStatus.NOT_FOUND, "the recording is not there any more")
             return
-        self._head("application/octet-stream", HTTPStatus.OK, {"Transfer-Encoding": "chunked"})
+        self.head("application/octet-stream", HTTPStatus.OK, {"Transfer-Encoding": "chunked"})
         try:
             for piece in self.recordings.pieces(recording):
                 self.wfile.write(b"%x\r\n%s\r\n" % (len(piece), piece))
             self.wfile.write(b"0\r\n\r\n")
         except OSError:  # the page went away, or the file: the answer is cut
             self.close_connection = True
-
-    def _say(self, status: HTTPStatus, sentence: str) -> None:
-        self._send(sentence.encode(), "text/plain; charset=utf-8", status)
-
-    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
-        named = {key.replace("_", "-"): value for key, value in headers.items()}
-        self._head(kind, status, {"Content-Length": str(len(content)), **named})
-        self.wfile.write(content)
-
-    def _head(self, kind: str, status: HTTPStatus, headers: dict[str, str]) -> None:
-        self.send_response(status)
-        for name, value in {"Content-Type": kind, "Cache-Control": "no-store", **SAFE_HEADERS, **headers}.items():
-            self.send_header(name, value)
-        if self.close_connection:
-            self.send_header("Connection", "close")
-        self.end_headers()

@@ -10,20 +10,19 @@ import json
 import threading
 from collections.abc import Callable
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from ...errors import InputError
-from ...recording.viewing.gate import SAFE_HEADERS, Gate, QuietServer
+from ...recording.viewing.gate import Gate, QuietServer
+from ...recording.viewing.gated_handler import GatedHandler
 from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
 from ...verdicts.log import Flag, Origin, Verdict
 from .session import BadRequest, ReviewSession, Viewpoint
 
 LARGEST_BODY = 64 * 1024  # bytes of a question
 LONGEST_NAME = 60  # characters of a reviewer
-PATIENCE = 60.0  # [s] for a client that says nothing
 
 _PAGE = {
     "/": ("index.html", "text/html; charset=utf-8"),
@@ -48,7 +47,7 @@ class ReviewServer:
             review = server
 
         self._http = QuietServer(("127.0.0.1", port), Handler)
-        self.gate = Gate(self._http.server_address[1])
+        self.gate = Handler.gate = Gate(self._http.server_address[1])
         page = files(__name__.rsplit(".", 2)[0]) / "page"
         self.assets = {path: (page.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
         self._viewer: WebViewer | None = None
@@ -181,59 +180,38 @@ _QUESTIONS: dict[str, Callable[[ReviewServer, _Values], dict[str, Any]]] = {
 }  # fmt: skip
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(GatedHandler):
     """One connection. Subclassed with the server it belongs to."""
 
     review: ReviewServer
-    protocol_version = "HTTP/1.1"
-    server_version = "rodsight"
-    sys_version = ""
-    timeout = PATIENCE
-    disable_nagle_algorithm = True
 
-    def do_GET(self) -> None:
-        parts = urlsplit(self.path)
-        query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
-        entering = parts.path == "/" and "token" in query
-        if self._refused(changes=False, entering=entering):
-            return
-        if entering:
-            if self.review.gate.opens(query["token"]):
-                self._send(
-                    b"", "text/plain", HTTPStatus.SEE_OTHER, Location="/", Set_Cookie=self.review.gate.set_cookie
-                )
-            else:
-                self._say(HTTPStatus.FORBIDDEN, "this token is not the one that `rodsight review` printed")
-            return
-        self._guarded(lambda: self._get(parts.path, query))
+    def give(self, path: str, query: dict[str, str]) -> None:
+        self._guarded(lambda: self._get(path, query))
 
     def do_POST(self) -> None:
-        if self._refused(changes=True):
+        if self.refused(changes=True):
             return
         length = self.headers.get("Content-Length") or ""
         if not length.isdecimal() or int(length) > LARGEST_BODY:
-            self._say(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "a question must be short")
+            self.say(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "a question must be short")
             return
         body = self.rfile.read(int(length))
         self._guarded(lambda: self._post(urlsplit(self.path).path, body))
 
-    def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: the terminal belongs to the person."""
-
     def _get(self, path: str, query: dict[str, str]) -> None:
         if path in self.review.assets:
-            self._send(*self.review.assets[path])
+            self.send(*self.review.assets[path])
         elif path == _SCRIPT:
-            self._send(self.review.viewer().script, "text/javascript; charset=utf-8")
+            self.send(self.review.viewer().script, "text/javascript; charset=utf-8")
         elif path == _MODULE:
             packs = "gzip" in (self.headers.get("Accept-Encoding") or "")
             content = self.review.packed_module() if packs else self.review.viewer().module
             encoding = "gzip" if packs else "identity"
-            self._send(content, "application/wasm", Vary="Accept-Encoding", Content_Encoding=encoding)
+            self.send(content, "application/wasm", Vary="Accept-Encoding", Content_Encoding=encoding)
         elif path in ("/backdrop", "/marks", "/look", "/crop"):
             self._send_picture(path, query)
         else:
-            self._say(HTTPStatus.NOT_FOUND, "there is nothing here")
+            self.say(HTTPStatus.NOT_FOUND, "there is nothing here")
 
     def _send_picture(self, path: str, query: dict[str, str]) -> None:
         session = self.review.session
@@ -242,14 +220,14 @@ class _Handler(BaseHTTPRequestHandler):
         if not 0 <= frame < len(session.results.frames):
             raise BadRequest(f"there is no frame {frame}")
         if path == "/backdrop":
-            self._send(session.picture.backdrop(frame), _RRD)
+            self.send(session.picture.backdrop(frame), _RRD)
         elif path == "/marks":
             asked = {"reviewer": query.get("reviewer", ""), "frame": frame, "blind": query.get("blind") == "1"}
-            self._send(session.marks(_Values(asked).view(), key), _RRD)
+            self.send(session.marks(_Values(asked).view(), key), _RRD)
         elif path == "/look":
             aspect = _whole(query, "aspect") / 1000.0
             point = session.point_of(frame, key) if key is not None else None
-            self._send(session.picture.look(point, aspect), _RRD)
+            self.send(session.picture.look(point, aspect), _RRD)
         else:
             if key is None:
                 raise BadRequest("a crop is of a pair")
@@ -257,7 +235,7 @@ class _Handler(BaseHTTPRequestHandler):
             zoom = _whole(query, "zoom")
             if zoom >= len(windows):
                 raise BadRequest(f"there is no zoom {zoom}")
-            self._send(session.picture.crop(frame, windows[zoom]), "image/jpeg")
+            self.send(session.picture.crop(frame, windows[zoom]), "image/jpeg")
 
     def _post(self, path: str, body: bytes) -> None:
         try:
@@ -267,40 +245,18 @@ class _Handler(BaseHTTPRequestHandler):
         if not path.startswith("/ask/") or not isinstance(values, dict):
             raise BadRequest("there is no such question")
         answer = self.review.answer(path.removeprefix("/ask/"), values)
-        self._send(json.dumps(answer, allow_nan=False).encode(), "application/json")
+        self.send(json.dumps(answer, allow_nan=False).encode(), "application/json")
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
             work()
         except BadRequest as error:
-            self._say(HTTPStatus.BAD_REQUEST, str(error))
+            self.say(HTTPStatus.BAD_REQUEST, str(error))
         except (InputError, OSError) as error:
             if isinstance(error, ConnectionError):
                 self.close_connection = True  # the page went away
             else:
-                self._say(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
-
-    def _refused(self, *, changes: bool, entering: bool = False) -> bool:
-        refusal = self.review.gate.refusal(self.headers, changes=changes, entering=entering)
-        if refusal is not None:
-            self.close_connection = True  # the body, if any, was not read
-            self._say(*refusal)
-        return refusal is not None
-
-    def _say(self, status: HTTPStatus, sentence: str) -> None:
-        self._send(sentence.encode(), "text/plain; charset=utf-8", status)
-
-    def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(content)))
-        self.send_header("Cache-Control", "no-store")
-        for name, value in (SAFE_HEADERS | {key.replace("_", "-"): value for key, value in headers.items()}).items():
-            self.send_header(name, value)
-        if self.close_connection:
-            self.send_header("Connection", "close")
-        self.end_headers()
-        self.wfile.write(content)
+                self.say(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
 
 
 def _whole(query: dict[str, str], name: str) -> int:
