@@ -15,8 +15,8 @@ Width = Literal["single", "double"]
 WIDTHS: dict[Width, float] = {"single": 85.0, "double": 175.0}  # [mm] of one column, and of a page of two
 MILLIMETRE = 1.0 / 25.4  # in inches
 
-# Dark enough on white, apart under deuteranopia and protanopia (Okabe and Ito 2008), and in grey by their dashes.
-BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#AA4499"
+# Dark enough on white, apart by a CIE76 of 25 under deuteranopia and protanopia, and in grey by their dashes.
+BLUE, VERMILION, GREEN, PURPLE = "#006CD3", "#D55D00", "#009E74", "#AB4695"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 INK, GRID, OUTLINE = "#1a1a1a", "#d8d8d8", "#b4b8c0"

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.bodies.grains import Array
+from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 
 from ...tracks import Tracks, TrackStatus
 from ..look import entities
-from ..look.colours import INFERRED, SERIES, Rgba
+from ..look.colours import BOUNDARY, GAINED, INFERRED, INK, LOST, SERIES, Rgba
 from ..look.scene import Clock, Scene
 from ..look.texts import printable
-from ..look.values import log_scalar
+from ..look.values import log_scalar, log_scalars
 from .convergence import power_of_ten
 
 STATUS_COLOURS: dict[FrameStatus, Rgba] = {
@@ -73,8 +74,8 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         (entities.SWEEP_COUNT, "sweeps", SERIES[1]),
         (entities.FINAL_NATURAL_MAP, "natural map reached", SERIES[2]),
         (entities.FINAL_UNBALANCE, "worst unbalance of the reported field", SERIES[3]),
-        (entities.GAINED_COUNT, "gained", (112, 214, 134, 255)),
-        (entities.PARTED_COUNT, "lost", (255, 82, 122, 255)),
+        (entities.GAINED_COUNT, "gained", GAINED),
+        (entities.PARTED_COUNT, "lost", LOST),
     ):
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
 
@@ -100,6 +101,16 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         (entities.PARTED_COUNT, forces.parted_count),
     ):
         log_scalar(clock, path, float(value))
+    if forces.error_budget is not None:
+        _log_error_budget(clock, forces.error_budget)
+
+
+def _log_error_budget(clock: Clock, share: Array) -> None:
+    """Log the shares (p,) of the causes, and how they look: a recording without any has no such curves."""
+    log_scalars(clock, entities.ERROR_BUDGET, share)
+    colours = [(*SERIES, BOUNDARY, INK)[part] for part in range(len(ERROR_PARTS))]
+    style = rr.SeriesLines(colors=colours, names=list(ERROR_PARTS), widths=[2.0] * len(ERROR_PARTS))
+    clock.stream.log(entities.ERROR_BUDGET, style, static=True)
 
 
 def tracking_state(tracks: Tracks, frame: int) -> str:

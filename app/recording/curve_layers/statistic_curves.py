@@ -18,6 +18,10 @@ from ..look.scene import Clock, Scene
 from ..look.texts import printable
 from ..look.values import log_scalar, log_scalars
 
+BAND_NAME = "95 %"
+# Of entities.BANDED, the colours of their curves.
+BAND_COLOURS = (SERIES[0], SERIES[2], SERIES[0], SERIES[1], SERIES[0], SERIES[0], SERIES[1])
+
 
 def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log names and colours of the curves."""
@@ -51,10 +55,19 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
         (entities.FABRIC_ANISOTROPY, "fabric anisotropy", SERIES[2]),
     ):
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
+    for path, colour in zip(entities.BANDED, BAND_COLOURS, strict=True):
+        faint = (*colour[:3], 130)
+        stream.log(path + entities.BAND, rr.SeriesLines(colors=[faint] * 2, names=[BAND_NAME] * 2, widths=[0.8] * 2),
+                   static=True)  # fmt: skip
     walls = [printable(name) for name in scene.walls.name]
     hues = [SERIES[row % len(SERIES)] for row in range(len(walls))]
     for path in (entities.WALL_NORMAL_FORCE, entities.WALL_TANGENTIAL_FORCE):
         stream.log(path, rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls)), static=True)
+    if scene.walls.force is not None:
+        pale = [(*hue[:3], 150) for hue in hues]
+        told = [f"{name}, recorded" for name in walls]
+        for path in (entities.WALL_NORMAL_RECORDED, entities.WALL_TANGENTIAL_RECORDED):
+            stream.log(path, rr.SeriesLines(colors=pale, names=told, widths=[5.0] * len(walls)), static=True)
 
 
 def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> None:
@@ -62,8 +75,14 @@ def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> N
     clock.end()
     for path, value in statistic_values(statistics):
         log_scalar(clock, path, float(value))
-    for path, values in wall_values(scene.walls_at(clock.frame), statistics):
+    for path, ends in band_values(statistics):
+        log_scalars(clock, path, ends)
+    walls = scene.walls_at(clock.frame)
+    for path, values in wall_values(walls, statistics):
         log_scalars(clock, path, values)
+    if scene.walls.force is not None:
+        for path, values in recorded_values(walls, scene.walls.force[clock.frame]):
+            clock.stream.log(path, rr.Scalars(np.where(np.isfinite(values), values, 0.0)))
 
 
 def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ...]:
@@ -96,6 +115,29 @@ def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ..
         (entities.STRONG_DEVIATOR_SHARE, statistics.strong_deviator_share),
         (entities.CHAIN_COUNT, statistics.chain_count),
         (entities.CHAIN_GRAIN_SHARE, statistics.chain_grain_share),
+    )
+
+
+def band_values(statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
+    """Entity of every band, and its ends (2,): two standard deviations to either side, NaN where none is known."""
+    value, two = dict(statistic_values(statistics)), 2.0 * np.array([-1.0, 1.0])
+    told = (
+        (entities.FRICTION_ANGLE, math.degrees(statistics.friction_angle_sd)),
+        (entities.PRINCIPAL_DIRECTION, math.degrees(statistics.principal_direction_sd)),
+        (entities.COORDINATION_NUMBER, statistics.coordination_number_sd),
+        (entities.SLIDING_FRACTION, statistics.sliding_fraction_sd),
+        (entities.MOBILISATION, statistics.mobilisation_sd),
+        (entities.SIGMA_1, 1e-3 * statistics.sigma_1_sd),
+        (entities.SIGMA_2, 1e-3 * statistics.sigma_2_sd),
+    )
+    return tuple((path + entities.BAND, value[path] + deviation * two) for path, deviation in told)
+
+
+def recorded_values(walls: Walls, force: Array) -> tuple[tuple[str, Array], ...]:
+    """Entity and values (w,) [N] of what sensors recorded of straight walls: force (w, 2) [N], NaN: none."""
+    return (
+        (entities.WALL_NORMAL_RECORDED, np.einsum("wk,wk->w", force, walls.outward)),
+        (entities.WALL_TANGENTIAL_RECORDED, np.einsum("wk,wk->w", force, walls.direction)),
     )
 
 

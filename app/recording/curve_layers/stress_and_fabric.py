@@ -26,7 +26,10 @@ def log_polar_axes(stream: rr.RecordingStream) -> None:
     log_texts(
         stream,
         entities.ROSE_TICKS,
-        [(_corner(ROSE_REACH, 0), "contacts", SERIES[1]), (_corner(ROSE_REACH, 1), "forces", SERIES[0])],
+        [
+            (_corner(ROSE_REACH, 0), "contacts between grains", SERIES[1]),
+            (_corner(ROSE_REACH, 1), "their forces", SERIES[0]),
+        ],
     )
 
 
@@ -68,13 +71,17 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
 
 
 def log_rose(clock: Clock, forces: FrameForces) -> None:
-    """Log how many contacts with force, and how much force, point in every direction, over the isotropic value."""
+    """Log how many contacts between grains, and how much force, point in every direction, over the isotropic value.
+
+    Contacts count as they are likely to bear force; those with walls point where the walls face, and are left out.
+    """
     clock.end()
-    loaded = np.isfinite(forces.fn) & (forces.fn > 0.0)
+    loaded = np.isfinite(forces.fn) & (forces.fn > 0.0) & ~forces.contacts.with_wall
     normal, fn = forces.contacts.normal[loaded], forces.fn[loaded]
+    bears = np.ones(len(fn)) if forces.bearing_probability is None else forces.bearing_probability[loaded]
     for path, weight, colour, order in (
-        (entities.ROSE, np.ones(len(fn)), SERIES[1], 10.0),
-        (entities.ROSE_OF_FORCES, fn, SERIES[0], 20.0),
+        (entities.ROSE, bears, SERIES[1], 10.0),
+        (entities.ROSE_OF_FORCES, bears * fn, SERIES[0], 20.0),
     ):
         strips = [rose_outline(direction_shares(normal, weight))] if len(fn) else []
         clock.stream.log(
@@ -97,7 +104,7 @@ def rose_outline(shares: Array) -> np.ndarray:
     """A closed outline of sectors (2 BINS + 1, 2) in view units."""
     edges = np.arange(BINS + 1) * 2.0 * np.pi / BINS
     angle = np.stack([edges[:-1], edges[1:]], axis=1).ravel()
-    outline = polar(angle, np.repeat(shares, 2))
+    outline = polar(angle, np.minimum(np.repeat(shares, 2), ROSE_REACH))  # what is greater ends at the view's edge
     return np.concatenate([outline, outline[:1]])
 
 

@@ -110,7 +110,8 @@ def layout_of(results: Results, scene: Scene, *, photographs: bool) -> Layout:
     """What the blueprint must know of a finished run."""
     return Layout(
         scene.canvas, scene.rod_length, len(results.frames), photographs, scene.truth is not None, scene.walls.count,
-        scene.radius_tuning is not None, find_extremes(results),
+        scene.radius_tuning is not None, scene.walls.force is not None,
+        any(each.error_budget is not None for each in results.frames), find_extremes(results),
     )  # fmt: skip
 
 

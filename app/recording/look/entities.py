@@ -43,6 +43,8 @@ PARTED = "/contacts/parted"
 PROBABILITY = "/contacts/probability"
 VERDICTS = "/contacts/verdict"
 FORCE_LEGEND = "/legend/force"
+SCALE_BAR = "/legend/scale"
+SCALE_BAR_LENGTH = "/legend/scale/length"
 FORCE_LEGEND_TICKS = "/legend/force/ticks"
 GAP_LEGEND = "/legend/gap"
 GAP_LEGEND_TICKS = "/legend/gap/ticks"
@@ -65,6 +67,7 @@ CHANGE_MAP = "/solve/map/change"
 STATUS_LANE = "/frames/status"
 TRACKING_LANE = "/frames/tracking"
 TRUST = "/frames/trust"
+ERROR_BUDGET = "/frames/error_budget"
 SIMILARITY = "/frames/similarity"
 CORRECTION = "/frames/correction"
 OLD_UNBALANCE = "/frames/old_unbalance"
@@ -111,6 +114,9 @@ CHAIN_COUNT = "/statistics/chain_count"
 CHAIN_GRAIN_SHARE = "/statistics/chain_grain_share"
 WALL_NORMAL_FORCE = "/statistics/wall_normal_force"
 WALL_TANGENTIAL_FORCE = "/statistics/wall_tangential_force"
+WALL_NORMAL_RECORDED = "/statistics/wall_normal_force/recorded"
+WALL_TANGENTIAL_RECORDED = "/statistics/wall_tangential_force/recorded"
+BAND = "/band"  # below a curve: two standard deviations to either side
 FORCE_DENSITY = "/statistics/force_density/frame"
 FORCE_DENSITY_TAIL = "/statistics/force_density/tail"
 FORCE_DENSITY_TAIL_VALUE = "/statistics/force_density/tail/value"
@@ -147,6 +153,12 @@ TRUTH_ERROR = "/truth/relative_l2"
 SUMMARY = "/summary"
 
 
+# Curves whose deviation is known.
+BANDED = (
+    FRICTION_ANGLE, PRINCIPAL_DIRECTION, COORDINATION_NUMBER, SLIDING_FRACTION, MOBILISATION, SIGMA_1, SIGMA_2,
+)  # fmt: skip
+
+
 class When(Enum):
     """On which rows an entity has data."""
 
@@ -175,6 +187,8 @@ class Condition(Enum):
     TRUTH = "with a truth"
     RADII = "where radii were tuned by the coordination number"
     FLAGS = "where something was flagged"
+    WALL_FORCES = "where wall forces were recorded"
+    BUDGET = "where an error budget was asked for"
     CELL = "of a periodic cell"
 
 
@@ -243,6 +257,8 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(
         VERDICTS, "contacts that a reviewer added or forbade", _STRIPS | {"source", "grain_a", "body_b"}, When.START,
     ),
+    Entity(SCALE_BAR, "a bar of a round length", _STRIPS, When.STATIC),
+    Entity(SCALE_BAR_LENGTH, "its length", _TICKS, When.STATIC),
     Entity(FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
     Entity(FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
     Entity(GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
@@ -273,6 +289,7 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(STATUS_LANE, "status of the frame", _LANE, When.START),
     Entity(TRACKING_LANE, "whether every grain has a pose", _LANE, When.START),
     _scalar(TRUST, "estimated correlation with the true forces, given these inputs"),
+    _scalar(ERROR_BUDGET, "share of each cause in the variance of the forces' error", When.END, Condition.BUDGET),
     _scalar(SIMILARITY, "correlation of f_n with the frame before, common contacts"),
     _scalar(CORRECTION, "ε, how much the forces must correct the measured motion"),
     _scalar(OLD_UNBALANCE, "ū, unbalance of the former forces on this network"),
@@ -320,6 +337,9 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(CHAIN_GRAIN_SHARE, "share of the grains that belong to one"),
     _scalar(WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
     _scalar(WALL_TANGENTIAL_FORCE, "… along the wall [N]"),
+    _scalar(WALL_NORMAL_RECORDED, "what sensors recorded of it [N]", When.END, Condition.WALL_FORCES),
+    _scalar(WALL_TANGENTIAL_RECORDED, "… along the wall [N]", When.END, Condition.WALL_FORCES),
+    *(_scalar(path + BAND, "the same, two standard deviations less and more") for path in BANDED),
     Entity(FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
     Entity(FORCE_DENSITY_TAIL, "exponential tail above the mean, this frame", _STRIPS, When.END),
     Entity(FORCE_DENSITY_TAIL_VALUE, "its exponent", _TICKS, When.END),

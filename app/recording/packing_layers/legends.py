@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 
 from ..look import entities
-from ..look.axes import log_texts
+from ..look.axes import log_texts, round_step
 from ..look.canvas import Canvas
-from ..look.colours import ADDED, BOUNDARY, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba
+from ..look.colours import ADDED, BOUNDARY, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba, packed_one
 from ..look.scene import Scene
 from .changes import gap_colours, gap_range
 from .touching import probability_colours
@@ -27,6 +27,7 @@ _POWERS = ("10⁻⁴", "0.001", "0.01", "0.1")  # texts of the decades of the ma
 def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log all legends, static."""
     log_force_legend(stream, scene)
+    _log_scale_bar(stream, scene.canvas)
     _log_gap_legend(stream, scene)
     power = np.linspace(DECADES[0], DECADES[1], PIECES)
     decades = int(DECADES[1] - DECADES[0])
@@ -60,6 +61,24 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
         notes.append((0.9, "rim: boundary", BOUNDARY))
     places = [(value / top, text) for value, text in values]
     _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places, notes)
+
+
+def _log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
+    """A bar of a round length in the corner above the grains."""
+    pixel = canvas.scale.pixel_size * canvas.shrink
+    length = round_step(0.25 * canvas.width * pixel)
+    start = np.array([canvas.left + 0.6 * canvas.grain_radius, canvas.top + 0.5 * canvas.grain_radius])
+    end = start + np.array([length / pixel, 0.0])
+    stream.log(
+        entities.SCALE_BAR,
+        rr.LineStrips2D(
+            [np.stack([start, end]).astype(np.float32)], radii=np.float32(0.1 * canvas.grain_radius),
+            colors=packed_one(INK), draw_order=50.0,
+        ),
+        static=True,
+    )  # fmt: skip
+    told = f"{1e3 * length:g} mm" if length < 1.0 else f"{length:g} m"
+    log_texts(stream, entities.SCALE_BAR_LENGTH, [(0.5 * (start + end), told, INK)])
 
 
 def _log_gap_legend(stream: rr.RecordingStream, scene: Scene) -> None:

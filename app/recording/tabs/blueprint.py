@@ -52,6 +52,8 @@ class Layout:
     truth: bool
     wall_count: int = 4
     radius_curve: bool = False
+    wall_forces: bool = False  # were recorded
+    budget: bool = False  # of errors
     extremes: Extremes = field(default_factory=dict)  # of curves whose values are known beforehand
 
 
@@ -105,7 +107,7 @@ def _experiment(layout: Layout) -> rrb.Container:
         packing_view("Force network", layout.canvas, [*photograph, *_PACKING, *_FORCES]),
         rrb.Vertical(
             lanes_view(),
-            curve_view("Friction angle [°]", angles, layout.extremes, height=200.0, corner=_HIGH),
+            curve_view("Friction angle [°]", _banded(angles), layout.extremes, height=200.0, corner=_HIGH),
             curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
             flags_view(),
             row_shares=[1.15, 2.0, 2.0, 1.5],
@@ -138,6 +140,14 @@ def _convergence(layout: Layout) -> rrb.Container:
 def _settling(layout: Layout) -> rrb.Container:
     starts = [entities.COLD_RESIDUAL, entities.WARM_RESIDUAL, entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]
     doubts = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
+    below = [
+        curve_view("Doubts: ε, ū and H", doubts, layout.extremes, height=190.0),
+        curve_view("Sweeps saved", [entities.SAVED_SWEEPS]),
+        curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes),
+    ]
+    if layout.budget:
+        below[1:] = [curve_view("Error budget: shares of the variance", [entities.ERROR_BUDGET], y_range=_SHARE,
+                                entries=6)]  # fmt: skip
     return rrb.Vertical(
         lanes_view(),
         rrb.Horizontal(
@@ -145,11 +155,9 @@ def _settling(layout: Layout) -> rrb.Container:
             curve_view("log₁₀ residuals: cold start, warm start, reached", starts, y_range=_RESIDUALS),
         ),
         rrb.Horizontal(
-            curve_view("Doubts: ε, ū and H", doubts, layout.extremes, height=190.0),
-            curve_view("Sweeps saved", [entities.SAVED_SWEEPS]),
-            curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes),
+            *below,
             flags_view(),
-            column_shares=[1.0, 0.8, 0.8, 1.4],
+            column_shares=[1.0, *([1.6] if layout.budget else [0.8, 0.8]), 1.4],
         ),
         row_shares=[1.0, 2.0, 1.8],
         name=Tab.SETTLING,
@@ -161,9 +169,9 @@ def _statistics(layout: Layout) -> rrb.Container:
     coordination = [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS]
     strong = [entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE]
     plots: list[tuple[str, list[str]]] = [
-        ("Coordination number", coordination),
+        ("Coordination number", _banded(coordination)),
         ("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
-        ("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
+        ("Sliding and mobilisation", _banded([entities.SLIDING_FRACTION, entities.MOBILISATION])),
         ("Strong network, force chains", [*strong, entities.CHAIN_GRAIN_SHARE]),
     ]
     below: list[rrb.View] = [curve_view(name, paths, layout.extremes, height=330.0) for name, paths in plots]
@@ -173,7 +181,7 @@ def _statistics(layout: Layout) -> rrb.Container:
         rrb.Horizontal(
             density,
             polar_view("Stress / pressure", "/statistics/stress", STRESS_REACH),
-            polar_view("Fabric: contacts, forces", "/statistics/rose", ROSE_REACH),
+            polar_view("Fabric: contacts between grains", "/statistics/rose", ROSE_REACH),
             column_shares=[1.45, 1.0, 1.0],
         ),
         rrb.Horizontal(*below),
@@ -194,16 +202,21 @@ def _loads(layout: Layout) -> rrb.Container:
         return curve_view(name, paths, layout.extremes, height=340.0, entries=entries)
 
     unit = unit_of("statistics/wall_force")
+    normal, tangential = [entities.WALL_NORMAL_FORCE], [entities.WALL_TANGENTIAL_FORCE]
+    entries = layout.wall_count
+    if layout.wall_forces:
+        normal, tangential = [*normal, entities.WALL_NORMAL_RECORDED], [*tangential, entities.WALL_TANGENTIAL_RECORDED]
+        entries *= 2
     return rrb.Vertical(
         rrb.Horizontal(
-            plot("Friction angle [°]", angles),
-            plot("Principal stresses [kPa]", stresses),
-            plot("Direction of σ₁ [°]", [entities.PRINCIPAL_DIRECTION]),
+            plot("Friction angle [°]", _banded(angles)),
+            plot("Principal stresses [kPa]", _banded(stresses)),
+            plot("Direction of σ₁ [°]", _banded([entities.PRINCIPAL_DIRECTION])),
         ),
         rrb.Horizontal(
             plot("Anisotropies", anisotropies),
-            plot(f"Forces on the walls, normal [{unit}]", [entities.WALL_NORMAL_FORCE], layout.wall_count),
-            plot(f"Forces on the walls, tangential [{unit}]", [entities.WALL_TANGENTIAL_FORCE], layout.wall_count),
+            plot(f"Forces on the walls, normal [{unit}]", normal, entries),
+            plot(f"Forces on the walls, tangential [{unit}]", tangential, entries),
         ),
         name=Tab.LOADS,
     )
@@ -271,3 +284,8 @@ def _truth(layout: Layout) -> rrb.Container:
         row_shares=[1.7, 1.0],
         name=Tab.TRUTH,
     )
+
+
+def _banded(paths: list[str]) -> list[str]:
+    """Curves with the bands of those that have one."""
+    return [*paths, *(path + entities.BAND for path in paths if path in entities.BANDED)]

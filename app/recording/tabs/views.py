@@ -14,10 +14,10 @@ _TOP = (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop)
 
 
 def packing_view(name: str, canvas: Canvas, contents: list[str]) -> rrb.View:
-    """A view of the packing, with room for a legend below it."""
+    """A view of the packing with a scale bar, and room for a legend below it."""
     return rrb.Spatial2DView(
         origin="/",
-        contents=contents,
+        contents=[*contents, f"{entities.SCALE_BAR}/**"],
         name=name,
         background=BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(

@@ -38,5 +38,10 @@ def recording(results, truth, tmp_path_factory) -> RecordingFile:
     """Everything that a recording can hold."""
     path: Path = tmp_path_factory.mktemp("recording") / "run.rrd"
     scale = Scale(PIXEL, SHAPE[0])
-    tuned = replace(results, radius_tuning=make_tuning())
+    share = np.array([0.3, 0.2, 0.1, 0.1, 0.1, 0.2])
+    force = np.random.default_rng(5).random((len(results.frames), results.walls.count, 2))
+    tuned = replace(
+        results, radius_tuning=make_tuning(), walls=replace(results.walls, force=force),
+        frames=[replace(each, error_budget=share) for each in results.frames],
+    )  # fmt: skip
     return write_recording(tuned, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rerun as rr
 from rodsight.recording.curve_layers.convergence import SMALLEST, power_of_ten
 from rodsight.recording.curve_layers.force_density import BINS as DENSITY_BINS
 from rodsight.recording.curve_layers.force_density import EDGES, density_points, merged
-from rodsight.recording.curve_layers.stress_and_fabric import BINS, direction_shares, rose_outline
+from rodsight.recording.curve_layers.stress_and_fabric import BINS, ROSE_REACH, direction_shares, rose_outline
+from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
@@ -21,6 +24,7 @@ from rodsight.results.truth import score
 
 from solver.contacts.contacts import Contacts
 from solver.statistics.balance import grain_unbalance
+from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest
 
 ROUNDING = 1e-12
@@ -87,7 +91,7 @@ def test_a_rose_points_the_way_of_its_contacts_and_the_opposite():
     shares = direction_shares(np.array([[0.0, 1.0]]), np.array([2.0]))
     assert np.flatnonzero(shares).tolist() == [BINS // 4, 3 * BINS // 4]
     outline = rose_outline(shares)
-    assert outline[:, 1].min() < -1000.0  # up, y down
+    assert outline[:, 1].min() == pytest.approx(-100.0 * ROSE_REACH)  # up, y down; what is greater ends at the edge
 
 
 def test_capsules_turn_onto_their_branches():
@@ -151,3 +155,27 @@ def scene_of(results) -> Scene:
         results.name, results.tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, ForceRange.of(results.frames)),
     )  # fmt: skip
+
+
+def test_a_rose_leaves_out_contacts_with_walls(tmp_path):
+    results = make_results(1, sweeps=2)
+    path = write_recording(results, tmp_path / "run.rrd").path
+    forces = results.frames[0]
+    between = (forces.fn > 0) & ~forces.contacts.with_wall
+    expected = rose_outline(direction_shares(forces.contacts.normal[between], np.ones(int(between.sum()))))
+    shown = latest(path, entities.ROSE, entities.FRAME, 0)["LineStrips2D:strips"]
+    assert forces.contacts.with_wall.any()
+    assert np.allclose(np.array(shown[0]), expected, atol=1e-3)
+
+
+def test_bands_reach_two_deviations_to_either_side_and_recorded_forces_stand_beside_the_inferred(tmp_path):
+    results = make_results(2, sweeps=2)
+    told = [replace(each, friction_angle_sd=np.radians(1.5)) for each in results.statistics]
+    force = np.zeros((2, 4, 2))
+    force[:, 0] = (3.0, -40.0)  # on the bottom, whose outward normal points down
+    walls = replace(results.walls, force=force)
+    path = write_recording(replace(results, statistics=told, walls=walls), tmp_path / "run.rrd").path
+    angle = np.degrees(results.statistics[1].friction_angle)
+    band = latest(path, entities.FRICTION_ANGLE + entities.BAND, entities.FRAME, 1)["Scalars:scalars"]
+    assert band == pytest.approx([angle - 3.0, angle + 3.0])
+    assert latest(path, entities.WALL_NORMAL_RECORDED, entities.FRAME, 1)["Scalars:scalars"][0] == pytest.approx(40.0)

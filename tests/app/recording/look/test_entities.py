@@ -45,6 +45,7 @@ def test_a_bare_recording_holds_the_unconditional_part_of_the_schema(tmp_path):
     report = write_recording(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
     # The only frame is a reset, so that something is flagged.
     absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
+    absent += (Condition.WALL_FORCES, Condition.BUDGET)
     assert written(report.path) == expected(*absent, Condition.CELL)
 
 

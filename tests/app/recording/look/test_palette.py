@@ -1,0 +1,33 @@
+"""Colours that must be told apart are, also without red or green cones, and where two lie side by side in grey."""
+
+from itertools import combinations
+
+import pytest
+from rodsight.figures.page import COLOURS
+from rodsight.recording.look.colours import ADDED, FORBIDDEN, GAINED, LOST, SERIES
+
+from tests.app.recording.look.colour_vision import VISIONS, cie76
+
+APART = 25.0
+GROUPS = {
+    "curves": SERIES,
+    "changes and verdicts": (GAINED, LOST, ADDED, FORBIDDEN),
+    "figures": tuple(tuple(int(text[k : k + 2], 16) for k in (1, 3, 5)) for text in COLOURS),
+}
+
+
+@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("vision", [name for name in VISIONS if name != "grey"])
+def test_colours_of_a_group_are_apart(group, vision):
+    for one, other in combinations(GROUPS[group], 2):
+        assert cie76(one, other, vision) >= APART, (one, other)
+
+
+@pytest.mark.parametrize("pair", [(SERIES[0], SERIES[1]), (SERIES[2], SERIES[3]), (GAINED, LOST)])
+def test_the_commonest_pairs_are_apart_in_grey(pair):
+    assert cie76(*pair, "grey") >= APART
+
+
+def test_the_measure_knows_black_from_white_and_what_deuteranopes_confuse():
+    assert cie76((0, 0, 0), (255, 255, 255)) == pytest.approx(100.0, abs=0.1)
+    assert cie76((176, 60, 60), (110, 110, 40), "deuteranopia") < 0.5 * cie76((176, 60, 60), (110, 110, 40))
