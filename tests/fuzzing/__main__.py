@@ -1,7 +1,33 @@
-"""Print what the last full run counted, and write the page."""
+"""Print what the last full run counted, and write the page; or try a share of the spoiled inputs.
 
-from .table import PAGE, render
+python -m tests.fuzzing                         the table
+python -m tests.fuzzing --pieces FILE 0 2       the first of two shares of the campaign, kept in FILE; it goes on there
+python -m tests.fuzzing --gather FILE FILE      count the pieces of all shares
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from .campaign import gather, try_pieces
+from .cases import make_originals
+from .table import PAGE, note, render
 
 if __name__ == "__main__":
-    PAGE.write_text(render(), encoding="utf-8")
-    print(render())
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzzing", description=__doc__)
+    parser.add_argument("--pieces", nargs=3, metavar=("FILE", "PART", "PARTS"))
+    parser.add_argument("--gather", nargs="+", type=Path, metavar="FILE")
+    asked = parser.parse_args()
+    if asked.pieces:
+        file, part, parts = asked.pieces
+        with tempfile.TemporaryDirectory() as folder:
+            try_pieces(make_originals(Path(folder)), Path(file), int(part), int(parts))
+    else:
+        if asked.gather:
+            tried, wrong = gather(asked.gather)
+            note("mutations", tried=tried, wrong=len(wrong))
+            print(*wrong, sep="\n")
+        PAGE.write_text(render(), encoding="utf-8")
+        print(render())

@@ -12,6 +12,7 @@ from pathlib import Path
 from rodsight.synthetic.synthesis import synthesize
 
 from .attempt import Case, attempt
+from .foreign_files import FORMS, make_bounded, write_forms
 from .spoiling import BYTES, NUMBERS, TABLE, TEXT, WORDS, Spoil, spoil_store
 
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20", "--sweeps", "none", "--quiet")
@@ -25,6 +26,9 @@ class Originals:
     photographed: Path
     dic: Path
     solved: Path  # a run's folder, beside `tracked`
+    foreign: Path  # FORMS, each in a folder by its number
+    bounded: Path  # experiments with other boundaries
+    tables: dict[str, tuple[str, ...]]  # of these, by their names
     work: Path  # where spoiled copies go
 
 
@@ -54,7 +58,17 @@ def make_originals(folder: Path) -> Originals:
     verdict = '{{"frame": 1, "reviewer": "anna", "a": {}, "b": {}, "verdict": "contact", "seconds": 1.5}}\n'
     (solved / "verdicts.jsonl").write_text(verdict.format(ids[0], ids[1]) + verdict.format(ids[1], ids[2]))
     assert attempt(["check", str(photographed), "--quiet"]).status == 0
-    return Originals(tracked, photographed, dic, solved, folder / "work")
+    foreign, bounded = folder / "foreign", folder / "bounded"
+    write_forms(foreign)
+    for number, (form, files, options) in enumerate(FORMS):
+        source = foreign / str(number) / next(iter(files)) if len(files) == 1 else foreign / str(number)
+        ended = attempt(["import", form, str(source), str(folder / "imported" / str(number)), *options, "--quiet"])
+        assert ended.status == 0, ended.said
+    tables = make_bounded(tracked, bounded)
+    for name in tables:
+        ended = attempt(["check", str(bounded / name), "--quiet"])
+        assert ended.status == 0, ended.said
+    return Originals(tracked, photographed, dic, solved, foreign, bounded, tables, folder / "work")
 
 
 def make_cases(originals: Originals, count: int, seed: int = 0) -> Iterator[Case]:
@@ -139,6 +153,25 @@ def _import(originals: Originals, chance: random.Random) -> tuple[list[str], Pat
     return ["import", "dic", str(copy), str(out), "--pixel-size", "1e-4", "--quiet"], out
 
 
+def _foreign(originals: Originals, chance: random.Random) -> tuple[list[str], Path | None]:
+    number = chance.randrange(len(FORMS))
+    form, files, options = FORMS[number]
+    copy = _spoiled(originals.foreign / str(number), originals.work, chance.choice(sorted(files)), TABLE, chance)
+    out = originals.work / "imported"
+    source = copy / next(iter(files)) if len(files) == 1 else copy
+    return ["import", form, str(source), str(out), *options, "--quiet"], out
+
+
+def _bounded(originals: Originals, chance: random.Random) -> tuple[list[str], Path | None]:
+    name = chance.choice(sorted(originals.tables))
+    file = chance.choice((*originals.tables[name], "experiment.toml"))
+    copy = _spoiled(originals.bounded / name, originals.work, file, TABLE if file.endswith("csv") else TEXT, chance)
+    out = originals.work / "out"
+    if chance.random() < 0.7:
+        return ["check", str(copy), "--quiet"], None
+    return ["solve", str(copy), "--out", str(out), *FEW], out
+
+
 def _setting(originals: Originals, chance: random.Random) -> tuple[list[str], Path | None]:
     key = chance.choice(SETTINGS)
     value = chance.choice((*NUMBERS, *WORDS)).replace("\x00", "")
@@ -163,7 +196,7 @@ Make = Callable[[Originals, random.Random], tuple[list[str], "Path | None"]]
 KINDS: tuple[tuple[str, Make], ...] = (
     ("toml", _config), ("table", _table), ("toml", _config), ("table", _table), ("pixels", _pixel_table),
     ("image", _image), ("store", _store), ("table", _table), ("store bytes", _store_bytes), ("verdicts", _verdicts),
-    ("import", _import),
+    ("import", _import), ("foreign", _foreign), ("bounded", _bounded), ("foreign", _foreign), ("bounded", _bounded),
     ("setting", _setting), ("frames", _frames), ("toml", _config), ("solve", _solve), ("setting", _setting),
     ("image", _image),
 )  # fmt: skip
