@@ -1,8 +1,12 @@
-"""Strangers at the doors of the pages: other sites, other names, guessed secrets, broken requests. Nobody gets in."""
+"""Strangers at the doors of the pages: other sites, other names, guessed secrets, broken requests. Nobody gets in.
+
+The doors are those of a recording, of a live run's growing recording, of the review and of the workbench.
+"""
 
 from __future__ import annotations
 
 import random
+import shutil
 import socket
 import threading
 
@@ -11,10 +15,12 @@ from rodsight.recording.viewing.recording_server import RecordingServer
 from rodsight.review.command import open_session
 from rodsight.review.reviewed_run import open_reviewed
 from rodsight.review.service.server import ReviewServer
+from rodsight.workbench.service.bench import Bench
+from rodsight.workbench.service.server import WorkbenchServer
 
 from .table import REQUESTS, note
 
-QUICK, SEED = 120, 6
+QUICK, SEED = 160, 6
 SECRET = b"bytes of a recording that no stranger sees"
 HOSTS = (
     "evil.example",
@@ -43,6 +49,16 @@ PATHS = (
     "/look",
     "/crop?frame=0&key=1&zoom=0",
     "/backdrop?frame=0",
+    "/ask/home",
+    "/ask/run_start",
+    "/ask/set_scale",
+    "/events?at=experiment",
+    "/photograph?at=experiment&frame=0",
+    "/crop?at=../..&frame=0&x=0&y=0&width=9",
+    "/page/app.js",
+    "/page/..%2fserver.py",
+    "/growing.rrd",
+    "/{key}/growing.rrd",
     "/../results.h5",
     "/%2e%2e/verdicts.jsonl",
     "//etc/passwd",
@@ -105,17 +121,25 @@ BODIES = ("", "{}", "[" * 5000, '{"a": ' * 3000, "9" * 5000, "\x00" * 100, "x" *
 @pytest.fixture(scope="module")
 def servers(originals, tmp_path_factory):
     folder = tmp_path_factory.mktemp("served")
-    file = folder / "recording.rrd"
-    file.write_bytes(SECRET)
-    recordings = RecordingServer([file])
+    file, growing = folder / "recording.rrd", folder / "growing.rrd"
+    for each in (file, growing):
+        each.write_bytes(SECRET)
+    shutil.copytree(originals.photographed, folder / "bench" / "experiment")
+    recordings, live = RecordingServer([file]), RecordingServer([growing], grows=True)
     review = ReviewServer(open_session(open_reviewed(originals.solved)), reviewer="anna")
-    thread = threading.Thread(target=review.serve, daemon=True)
-    thread.start()
-    yield recordings, review
-    recordings.close()
-    review.shutdown()
+    workbench = WorkbenchServer(Bench(folder / "bench"))
+    threads = [threading.Thread(target=each.serve, daemon=True) for each in (review, workbench)]
+    for thread in threads:
+        thread.start()
+    yield recordings, review, workbench, live
+    for each in (recordings, live):
+        each.close()
+    for each in (review, workbench):
+        each.shutdown()
+    for thread in threads:
+        thread.join()
     review.close()
-    thread.join()
+    workbench.close()
 
 
 def request_of(chance: random.Random, port: int) -> bytes:
@@ -174,13 +198,15 @@ def test_some_strangers_are_kept_out(servers, capsys):
 
 @pytest.mark.slow
 def test_many_strangers_are_kept_out(servers, capsys):
-    wrong = knock(servers, 2 * REQUESTS, SEED + 1, capsys)
-    note("requests", tried=2 * REQUESTS, wrong=len(wrong))
+    wrong = knock(servers, 4 * REQUESTS, SEED + 1, capsys)
+    note("requests", tried=4 * REQUESTS, wrong=len(wrong))
     assert wrong == []
 
 
 def test_who_knows_the_secrets_is_let_in(servers):
-    recordings, _ = servers
+    recordings, _, workbench, _ = servers
+    named = f"GET /?token={workbench.gate.token} HTTP/1.1\r\nHost: 127.0.0.1:{workbench.gate.port}"
+    assert b" 303 " in answer_to(workbench.gate.port, f"{named}\r\nConnection: close\r\n\r\n".encode())
     port, gate = recordings.port, recordings.gate
     entry = f"GET /?token={gate.token}&renderer=webgl HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n"
     answer = answer_to(port, entry.encode())

@@ -21,7 +21,7 @@ from rerun.chunk import RrdReader
 from ..look import entities
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import read_layout
-from ..viewing.viewer import viewer_binary
+from ..viewing.viewer import viewer_binary, viewer_environment
 from .properties import EXPERIMENT, OUTCOME
 
 RECORDING = "recording.rrd"  # of a run, in a folder of its own
@@ -103,5 +103,5 @@ def show_together(address: str | Sequence[Path]) -> subprocess.Popen[bytes]:
     shown = [address] if isinstance(address, str) else [str(file) for file in address]
     return subprocess.Popen(
         [str(viewer_binary()), "--hide-welcome-screen", *shown],
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        env=viewer_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip

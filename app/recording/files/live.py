@@ -39,7 +39,7 @@ from ..tabs.blueprint import Layout, make_blueprint
 from ..tabs.layout_property import send_layout
 from ..viewing.headless import free_port
 from ..viewing.recording_server import RecordingServer, grown
-from ..viewing.viewer import ViewerKind, has_display, viewer_binary
+from ..viewing.viewer import ViewerKind, has_display, viewer_binary, viewer_environment
 from .recorder import BATCHES, Recorder
 from .writing import WrittenFile, writing
 
@@ -146,7 +146,8 @@ class LiveRecording:
         elif self._kind is ViewerKind.NATIVE and has_display():
             self._viewer = subprocess.Popen(
                 [str(viewer_binary()), "--hide-welcome-screen", "-"],
-                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+                env=viewer_environment(), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                start_new_session=True,
             )  # fmt: skip
             threading.Thread(target=self._feed, args=(self._viewer,), daemon=True).start()
             self.hint = "Watch it in the viewer's window."

@@ -17,7 +17,7 @@ from ...atomic import replacing
 from ..look import entities
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import PROPERTY, read_layout, send_layout
-from ..viewing.viewer import viewer_binary
+from ..viewing.viewer import viewer_binary, viewer_environment
 from .writing import writing
 
 JPEG_QUALITY = 70  # of photographs made smaller
@@ -72,7 +72,7 @@ def run_tool(command: str, *arguments: Path | str) -> None:
     """Run `rerun rrd COMMAND` of the installed SDK; raises OSError with what it says where it fails."""
     done = subprocess.run(
         [viewer_binary(), "rrd", command, *map(str, arguments)],
-        stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+        env=viewer_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
     )  # fmt: skip
     if done.returncode:
         raise OSError(f"rerun rrd {command} failed: {' '.join(done.stderr.split())[-300:]}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import glob
 import hashlib
-import os
 import socket
 import subprocess
 import tempfile
@@ -19,7 +18,7 @@ from types import TracebackType
 
 from rerun.experimental import ViewerClient
 
-from .viewer import viewer_binary
+from .viewer import viewer_binary, viewer_environment
 
 START_SECONDS = 60.0
 ANSWER_SECONDS = 60.0
@@ -154,7 +153,7 @@ class HeadlessViewer:
             raise NoPictureError(
                 "no Vulkan driver found: pictures without a screen need one (apt-get install mesa-vulkan-drivers)"
             )
-        environment = dict(os.environ)
+        environment = viewer_environment()
         environment.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
         software = [file for file in vulkan_drivers() if "lvp_icd" in file]
         if software and not Path("/dev/dri").exists():

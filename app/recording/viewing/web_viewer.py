@@ -8,7 +8,7 @@ import time
 import urllib.request
 from dataclasses import dataclass
 
-from .viewer import viewer_binary
+from .viewer import viewer_binary, viewer_environment
 
 START_SECONDS = 30.0
 
@@ -30,8 +30,9 @@ def read_web_viewer() -> WebViewer:
         str(data_port),
     ]  # fmt: skip
     viewer = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+        command, env=viewer_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
     try:
         give_up = time.monotonic() + START_SECONDS
         while True:

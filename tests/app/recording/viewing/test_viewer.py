@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +28,30 @@ def test_the_viewer_knows_the_options_that_are_used():
     known = subprocess.run([viewer.viewer_binary(), "--help"], capture_output=True, text=True, timeout=60).stdout
     assert "--bind" in known
     assert "--hide-welcome-screen" in known
+
+
+def test_a_viewer_tells_nobody_of_its_use(recording, tmp_path, monkeypatch):
+    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "CI"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("FORCE_RERUN_ANALYTICS", "1")
+
+    def kept_of(home, environment) -> list[str]:
+        home.mkdir()
+        command = [viewer.viewer_binary(), "rrd", "stats", str(recording.path)]
+        subprocess.run(command, env={**environment, "HOME": str(home)}, capture_output=True, timeout=60, check=True)
+        return [file.name for file in home.rglob("*analytics*")]
+
+    assert kept_of(tmp_path / "ours", viewer.viewer_environment()) == []
+    if sys.platform == "linux":
+        assert kept_of(tmp_path / "as it comes", dict(os.environ)) != []
+
+
+def test_every_viewer_is_started_with_the_environment_that_is_ours():
+    for file in Path(viewer.__file__).parents[1].rglob("*.py"):
+        text = file.read_text(encoding="utf-8")
+        starts = text.count("viewer_binary()") - text.count("def viewer_binary()")
+        if "subprocess." in text and starts:
+            assert "viewer_environment()" in text, file
 
 
 def test_without_a_display_one_line_says_how_to_look(recording, monkeypatch):
