@@ -66,7 +66,7 @@ def complaint(ended: Ended, out: Path | None, statuses: tuple[int, ...] = (0, 2)
     return ""
 
 
-def try_all(cases: Iterable[Case], statuses: tuple[int, ...] = (0, 2), *, batch: int = 100) -> tuple[int, list[str]]:
+def try_all(cases: Iterable[Case], statuses: tuple[int, ...] = (0, 2), *, batch: int = 250) -> tuple[int, list[str]]:
     """Try cases in forked processes; gives how many there were, and what was wrong with which."""
     count, wrong, waiting = 0, [], list(cases)
     while waiting:

@@ -58,6 +58,8 @@ def make_originals(folder: Path) -> Originals:
     verdict = '{{"frame": 1, "reviewer": "anna", "a": {}, "b": {}, "verdict": "contact", "seconds": 1.5}}\n'
     (solved / "verdicts.jsonl").write_text(verdict.format(ids[0], ids[1]) + verdict.format(ids[1], ids[2]))
     assert attempt(["check", str(photographed), "--quiet"]).status == 0
+    for arguments in (_reading(solved, random.Random(seed)) for seed in range(8)):  # forks find it imported
+        assert attempt(arguments).status == 0, arguments
     foreign, bounded = folder / "foreign", folder / "bounded"
     write_forms(foreign)
     for number, (form, files, options) in enumerate(FORMS):

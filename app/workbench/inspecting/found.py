@@ -23,7 +23,7 @@ from ...results.store import load_results, load_tracks
 from ...run_folder import RESULTS, TRACKS, UNFINISHED
 from ...tracks import Tracks, TrackStatus, WallTracks
 
-ROOM = 256 << 20  # [bytes] of frames that are kept: those of a usual test are answered from at once
+ROOM = 32 << 20  # [bytes] of frames that are kept: a test of fifty photographs is answered from at once
 NUMBERS = ("trust", "residual", "correction", "friction_angle", "coordination", "mean_fn")
 
 
