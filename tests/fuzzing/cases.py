@@ -60,6 +60,8 @@ def make_originals(folder: Path) -> Originals:
     assert attempt(["check", str(photographed), "--quiet"]).status == 0
     for arguments in (_reading(solved, random.Random(seed)) for seed in range(8)):  # forks find it imported
         assert attempt(arguments).status == 0, arguments
+    shutil.rmtree(solved / "exported", ignore_errors=True)
+    (solved / "verdicts.csv").unlink(missing_ok=True)
     foreign, bounded = folder / "foreign", folder / "bounded"
     write_forms(foreign)
     for number, (form, files, options) in enumerate(FORMS):
