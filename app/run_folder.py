@@ -35,7 +35,10 @@ TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd"
 REPORT = "tracking_report.html"
 SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
 FAILURES = "failures.log"  # tracebacks of what failed a frame
-OWN = (TRACKS, RESULTS, RECORDING, SUMMARY, REPORT, SIDE, MANIFEST, "detections.csv", "tracked_walls.csv")
+OWN = (
+    TRACKS, RESULTS, RECORDING, f"{RECORDING}.whole", SUMMARY, REPORT, SIDE, MANIFEST, "detections.csv",
+    "tracked_walls.csv",
+)  # fmt: skip
 UNFINISHED = ".unfinished"  # folder of checkpoints
 ERROR_BARS = {"solver": {"ensemble_size", "workers"}}  # settings that leave the forces as they are
 

@@ -9,7 +9,6 @@ import json
 import os
 import random
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -120,5 +119,3 @@ def _by_frame(table: Path) -> list[list[list[str]]]:
 def _write(file: Path, header: str, frames) -> None:
     lines = (",".join((str(frame), *row)) for frame, rows in frames for row in rows)
     file.write_text("\n".join((header, *lines)) + "\n")
-
-

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 MUTATIONS, KILLS, FAULTS, REQUESTS = 10_000, 100, 40, 800  # of a full run, at least
+FRAMES, GROWTH = 1000, 0.05  # of the long run, and by how much its memory may grow from frame 50 on
 FILE = Path(__file__).with_name("last_run.json")
 PAGE = Path(__file__).parents[2] / "app" / "docs" / "robustness.md"
 
@@ -18,6 +19,8 @@ _ROWS = {
     "mutations": ("spoiled inputs", "tracebacks, hangs, half-written files, second lines", "test_fuzzing"),
     "kills": ("kills (SIGKILL)", "runs that lost frames, or whose results differ in a bit", "test_kills"),
     "faults": ("refused reads and writes", "ends without their one line", "test_faults"),
+    "frames": ("photographs of one long run", "stages whose memory grows by more than 5 % from frame 50 on",
+               "test_long_runs"),
     "requests": ("hostile requests", "let in, or answered with a traceback", "test_hostile_requests"),
 }  # fmt: skip
 
@@ -48,7 +51,7 @@ def render() -> str:
         if told is None:
             rows.append(f"| {what} | not counted yet | | {meaning} | | `{test}` | |")
             continue
-        more = ", ".join(
+        more = "; ".join(
             f"{key} {value}" for key, value in told.items() if key not in ("tried", "wrong", "day", "python")
         )
         rows.append(f"| {what} | {told['tried']} | {told['wrong']} | {meaning} | {more} | `{test}` | {told['day']} |")

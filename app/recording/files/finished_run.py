@@ -24,11 +24,14 @@ from ..packing_layers.network import SweepChoice
 from ..tabs.axis_ranges import find_extremes
 from ..tabs.blueprint import Layout, Tab, make_blueprint
 from ..tabs.layout_property import send_layout
+from ..viewing.viewer import run_tool
 from .recorder import BATCHES, SWEEPS_KEPT, PhotographSource, Recorder
 from .writing import writing
 
 FrameProgress = Callable[[int, int], None]  # frames done, frames in all
 
+LONG = 200  # frames from which on the index of a recording, .2 MB a frame in memory, is made by a process of its own
+WHOLE = ".whole.part"  # a recording that has been given its index
 LEAST_ROWS = 4  # sweeps of a frame that even a short solve keeps
 BYTES_PER_CONTACT = 8  # and row, at least: a width and a colour
 
@@ -150,7 +153,8 @@ def _write(run: _Run, part: Path, plan: _Plan, notes: tuple[str, ...], max_size:
     results, photograph = run.results, run.photograph
     stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
     layout = layout_of(results, run.scene, photographs=photograph is not None)
-    with writing(stream, part, make_blueprint(layout, active=run.active)) as written:
+    indexed = len(results.frames) < LONG
+    with writing(stream, part, make_blueprint(layout, active=run.active), indexed=indexed) as written:
         recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept, flush=written.flush)
         recorder.start(run.scene)
         send_layout(stream, layout)
@@ -162,8 +166,20 @@ def _write(run: _Run, part: Path, plan: _Plan, notes: tuple[str, ...], max_size:
             if max_size is not None and written.size > max_size:
                 return None
         recorder.finish(notes)
+    if not indexed:
+        _give_index(part)
     _check_whole(part)
     return recorder
+
+
+def _give_index(part: Path) -> None:
+    """Copy a recording message by message, its index at the end; raises OSError where that fails."""
+    whole = part.with_name(part.name.removesuffix(".part") + WHOLE)
+    try:
+        run_tool("filter", part, "-o", whole)
+        os.replace(whole, part)
+    finally:
+        whole.unlink(missing_ok=True)
 
 
 def _ask_for_room(folder: Path, results: Results, choice: SweepChoice, max_size: int | None) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from ...atomic import replacing
+from ..viewing.viewer import run_tool
 from .readback import read_forces
-from .share import run_tool
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from ...atomic import replacing
 from ..look import entities
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import PROPERTY, read_layout, send_layout
-from ..viewing.viewer import viewer_binary, viewer_environment
+from ..viewing.viewer import run_tool
 from .writing import writing
 
 JPEG_QUALITY = 70  # of photographs made smaller
@@ -66,16 +65,6 @@ def share_recording(
         finally:
             loose.unlink(missing_ok=True)
     return SharedRecording(target, target.stat().st_size, source.stat().st_size, stop - first)
-
-
-def run_tool(command: str, *arguments: Path | str) -> None:
-    """Run `rerun rrd COMMAND` of the installed SDK; raises OSError with what it says where it fails."""
-    done = subprocess.run(
-        [viewer_binary(), "rrd", command, *map(str, arguments)],
-        env=viewer_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
-    )  # fmt: skip
-    if done.returncode:
-        raise OSError(f"rerun rrd {command} failed: {' '.join(done.stderr.split())[-300:]}")
 
 
 def _sweeps_of(chunks: list[Chunk], first: int, stop: int) -> tuple[int, int]:

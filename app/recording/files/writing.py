@@ -25,9 +25,12 @@ PIECE = 1 << 20  # [bytes] that are read at once
 
 
 @contextmanager
-def writing(stream: rr.RecordingStream, file: Path, blueprint: rrb.Blueprint | None = None) -> Iterator[WrittenFile]:
+def writing(
+    stream: rr.RecordingStream, file: Path, blueprint: rrb.Blueprint | None = None, *, indexed: bool = True
+) -> Iterator[WrittenFile]:
     """Have a stream written to a file, which is whole when the block has ended; the stream is ended with it.
 
+    indexed: with an index at its end, by which viewers read parts of it, and which grows in memory until then.
     Raises OSError where the disk refuses, or does nothing for DEADLINE seconds.
     """
     file.open("wb").close()  # refused here, if at all
@@ -41,11 +44,11 @@ def writing(stream: rr.RecordingStream, file: Path, blueprint: rrb.Blueprint | N
             held = os.open(pipe, os.O_WRONLY)  # until the stream has it: it writes before it is there
             try:
                 written.fill_from(end)
-                stream.save(pipe, default_blueprint=blueprint)
+                stream.save(pipe, default_blueprint=blueprint, write_footer=indexed)
             finally:
                 os.close(held)
     else:  # pragma: no cover - Windows
-        stream.save(file, default_blueprint=blueprint)
+        stream.save(file, default_blueprint=blueprint, write_footer=indexed)
     try:
         yield written
     finally:

@@ -37,6 +37,16 @@ def viewer_environment() -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name != forced} | {"CI": "1"}
 
 
+def run_tool(command: str, *arguments: Path | str) -> None:
+    """Run `rerun rrd COMMAND` of the installed SDK; raises OSError with what it says where it fails."""
+    done = subprocess.run(
+        [viewer_binary(), "rrd", command, *map(str, arguments)],
+        env=viewer_environment(), stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+    )  # fmt: skip
+    if done.returncode:
+        raise OSError(f"rerun rrd {command} failed: {' '.join(done.stderr.split())[-300:]}")
+
+
 def view_command(path: Path | str, *also: Path | str) -> list[str]:
     """The command that shows a recording, with its side files, in a window."""
     return [str(viewer_binary()), *map(str, (path, *also))]
