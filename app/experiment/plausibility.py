@@ -42,6 +42,11 @@ def check_radii(experiment: Experiment, tracks: Tracks) -> None:
     if middle > GREATEST_RADIUS:
         guess = "; they look like millimetres" if middle < 1e3 * GREATEST_RADIUS else ""
         raise InputError(file, key, f"makes the median radius {middle:g} m: lengths are in metres{guess}")
+    if section is not None and section.precision > middle:
+        raise InputError(
+            experiment.file, f"key tracks.precision = {section.precision:g}",
+            f"is more than the rods' radius, {middle:g} m: it is the standard deviation of a position, in metres",
+        )  # fmt: skip
     here, largest = tracks.position[0][tracks.present[0]], int(np.argmax(tracks.radius))
     across = float(np.hypot(*np.ptp(here, axis=0))) if len(here) > 2 else np.inf
     if tracks.radius[largest] > max(GREATEST_SHARE * across, middle):
@@ -170,7 +175,7 @@ def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> N
             raise InputError(
                 experiment.folder / (table or ""),
                 f"frame {k}, wall {name!r}",
-                f"grain {tracks.id[row]} lies {beyond[k, row] * 1e3:.4g} mm beyond it; "
+                f"grain {tracks.id[row]} lies {float(beyond[k, row]) * 1e3:.4g} mm beyond it; "
                 f"the packing must lie {PLACE_OF_PACKING[int(walls.sides[w])]}, all in metres"
                 f"{_cause_of_walls(experiment, tracks, walls)}",
             )

@@ -18,6 +18,7 @@ from solver.bodies.wall_shapes import Sides
 from solver.inferred.surroundings import Surroundings
 
 MISFIT = 5.0  # standard deviations of a gap within which a body touches the rod …
+COARSE = 0.3  # of a radius: beyond it nothing tells a rod that touches from one that does not
 SURFACE = 1e-3  # … and the share of its radius
 TOUCHES_FREE = 2  # bodies that any rod can be made to touch
 LEAST_HELD = 0.45  # mean number of touches beyond those, over photographs, that is no chance …
@@ -74,8 +75,8 @@ def infer_unseen(
     rods: list[_Rod] = []
     if sizes is None:
         sizes = np.quantile(radius, np.linspace(0.0, 1.0, TRIED))
-    if frames >= FEWEST_FRAMES and endpoints.shape[1]:
-        tolerance = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
+    tolerance = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
+    if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance < COARSE * float(np.min(sizes)):
         near: Array | None = None
         for _ in range(PASSES):
             around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side)

@@ -9,6 +9,8 @@ import shutil
 import pytest
 
 from .attempt import attempt, complaint
+from .cases import FEW
+from .foreign_files import FORMS
 
 
 def first_lines(file, **replaced: str) -> None:
@@ -48,6 +50,25 @@ def test_a_verdict_of_another_kind_is_refused(originals, tmp_path, spoiled):
     ended = attempt(["review", str(copy), "--export-csv", str(copy / "verdicts.csv")])
     assert complaint(ended, None, (2,)) == ""
     assert next(iter(spoiled)) in ended.said
+
+
+@pytest.mark.parametrize("precision", ["0.01", "0.002"])
+def test_positions_that_tell_nothing_are_refused_or_soon_done_with(originals, tmp_path, precision):
+    out = tmp_path / "out"
+    arguments = ["solve", str(originals.tracked), "--out", str(out), *FEW, "--set", f"tracks.precision={precision}"]
+    ended = attempt(arguments)
+    assert complaint(ended, out) == ""
+    assert ended.status == (2 if float(precision) > 0.009 else 0)
+
+
+@pytest.mark.parametrize("file", ["one_ParticleData.dlm", "one_NormWeightedAdjacencyMatrix.dlm"])
+def test_an_empty_table_of_another_program_is_named(originals, tmp_path, file):
+    number = [form for form, _, _ in FORMS].index("pegs")
+    copy = shutil.copytree(originals.foreign / str(number), tmp_path / "discs")
+    (copy / file).write_text("\n")
+    ended = attempt(["import", "pegs", str(copy), str(tmp_path / "out"), "--pixel-size", "1e-4", "--quiet"])
+    assert complaint(ended, tmp_path / "out", (2,)) == ""
+    assert file in ended.said
 
 
 def test_what_never_ends_or_answers_is_no_file(originals, tmp_path):

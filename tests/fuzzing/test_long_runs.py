@@ -12,7 +12,7 @@ from .table import FRAMES, GROWTH, note
 def test_a_long_run_takes_no_more_memory_than_a_short_one(originals, tmp_path):
     found = measure(originals.tracked, tmp_path, FRAMES)
     grown = {stage: growth(taken) for stage, taken in found.items() if max(taken) > EARLY}
-    note("frames", tried=FRAMES, wrong=sum(share > GROWTH for _, _, share in grown.values()),
-         **{stage: f"{1e-6 * a:.0f} to {1e-6 * b:.0f} MB ({c:+.1%})" for stage, (a, b, c) in grown.items()})  # fmt: skip
+    told = {stage: f"{1e-6 * a:.0f} to {1e-6 * b:.0f} MB ({c:+.1%})" for stage, (a, b, c) in grown.items()}
+    note("frames", tried=FRAMES, wrong=sum(share > GROWTH for _, _, share in grown.values()), **told)
     assert {"solving", "recording", "review"} <= grown.keys()
     assert [stage for stage, (_, _, share) in grown.items() if share > GROWTH] == []

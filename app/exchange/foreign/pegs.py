@@ -205,7 +205,7 @@ def _numbers(file: Path, least: int) -> Array:
             raise InputError(file, f"row {number}", f"{text.strip()[:60]!r} is not numbers") from None
         if len(cells) < least or len(cells) != len(rows[0]):
             raise InputError(file, f"row {number}", f"has {len(cells)} numbers, not {max(least, len(rows[0]))}")
-    table = np.array(rows, np.float64).reshape(len(rows), -1)
+    table = np.array(rows, np.float64).reshape(len(rows), -1 if rows else least)
     bad = np.argwhere(~np.isfinite(table))
     if len(bad):
         raise InputError(file, f"row {bad[0][0] + 1}", "has a number that is not finite")
