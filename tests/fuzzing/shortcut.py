@@ -13,7 +13,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from rodsight.cli import export, look, make, run, take_in
 
-NAMED = {"set": "settings", "sweeps": "sweeps"}  # options whose argument has another name
+NAMED = {"set": "settings", "json": "as_json"}  # options whose argument has another name
 COMMANDS: dict[str, Callable[..., int]] = {
     "check": run.check, "solve": run.solve, "track": run.track, "score": look.score, "review": look.review,
     "export": export.export, "import": take_in.import_, "synth": make.synth,
