@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import rodsight
 from hypothesis import HealthCheck, Phase, settings
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from rodsight.synthetic.synthesis import synthesize
@@ -31,6 +32,17 @@ def made_tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small tracked experiment with truth; not to be written to."""
     folder = tmp_path_factory.mktemp("synthetic") / "tracked"
     synthesize(folder, grains=40, frames=5, photographs=False, noise=1e-5, seed=1)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def examples(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the examples of docstrings and pages work: an experiment my_test and its run, runs/shear."""
+    folder = tmp_path_factory.mktemp("examples")
+    shutil.copytree(made_tracks, folder / "my_test")
+    config = folder / "my_test/experiment.toml"
+    config.write_text(config.read_text().replace('"tracked"', '"my_test"'))
+    rodsight.run(folder / "my_test", out=folder / "runs/shear", settings={"solver.sweeps": 50})
     return folder
 
 

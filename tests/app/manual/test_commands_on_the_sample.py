@@ -24,6 +24,7 @@ def waits(words: list[str]) -> bool:
 def test_they_all_end_well(tmp_path, monkeypatch, capsys):
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data", target_is_directory=True)
     monkeypatch.chdir(tmp_path)
+    assert rodsight("synth", "my_test", "--grains", 60, "--frames", 6, "--seed", 3) == 0
     assert rodsight("run", "sample_data/shear") == 0
     assert rodsight("run", "sample_data/shear", "--set", "solver.kappa=0.1", "--out", "runs/stiffer") == 0
     told = [words for text in TEXTS.values() for words in commands(text) if words and not words[0].startswith("-")]

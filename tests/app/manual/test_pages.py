@@ -7,7 +7,6 @@ import html.parser
 import inspect
 import re
 import shlex
-import shutil
 from pathlib import Path
 
 import matplotlib as mpl
@@ -140,14 +139,12 @@ def test_every_command_that_a_page_tells_is_understood(page, understood):
 
 
 @pytest.fixture(scope="module")
-def folder(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the Python of the pages works: an experiment my_test, runs/shear, and a campaign of one run."""
-    folder = tmp_path_factory.mktemp("snippets")
-    shutil.copytree(made_tracks, folder / "my_test")
-    run = rodsight.run(folder / "my_test", out=folder / "runs/shear", settings={"solver.sweeps": 50})
-    (folder / "runs/campaign").mkdir()
-    run.frames().assign(run="shear").to_parquet(folder / "runs/campaign/frames.parquet")
-    return folder
+def folder(examples: Path) -> Path:
+    """The examples, and what a campaign of one run leaves."""
+    (examples / "runs/campaign").mkdir(exist_ok=True)
+    frames = rodsight.open(examples / "runs/shear").frames()
+    frames.assign(run="shear").to_parquet(examples / "runs/campaign/frames.parquet")
+    return examples
 
 
 @pytest.mark.parametrize("page", [page for page, text in TEXTS.items() if blocks(text, "python")])
