@@ -17,6 +17,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Understand": {
         "how_it_works.md": "How it works",
         "accuracy.md": "How exact, how fast",
+        "speed.md": "Speed, stage by stage",
         "gallery.md": "Gallery",
     },
     "Work with results": {
