@@ -1,8 +1,8 @@
 """A live recording in a process of its own: the solve does not wait for its pictures.
 
 What is solved goes there through a pipe. The process ends when the pipe does, be it that the run is over, interrupted
-or killed: it closes the recording and ends its servers. Frames that wait for their turn are those of the results,
-which the run keeps anyway, so that waiting takes no memory; over there is one frame at a time.
+or killed: it closes the recording and ends its servers. Frames that wait for their turn do so in a file without a name,
+so that waiting takes no memory; over there is one frame at a time.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import queue
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -56,7 +57,7 @@ class LiveProcess:
         self.path = path
         self.started = False
         self._tell, self._options = tell, options
-        self._waiting: queue.SimpleQueue[tuple[str, Any] | None] = queue.SimpleQueue()
+        self._waiting = _Waiting()
         # It takes a second to get ready, which is over when there is something to solve.
         self._process = subprocess.Popen(
             [sys.executable, "-c", COMMAND],
@@ -76,8 +77,12 @@ class LiveProcess:
         self._waiting.put(("start", (self.path, self._options, run)))
 
     def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
-        """Have one finished frame recorded, and do not wait for it."""
-        self._waiting.put(("frame", (forces, statistics)))
+        """Have one finished frame recorded, and do not wait for it; where there is no room for it, the view ends."""
+        try:
+            self._waiting.put(("frame", (forces, statistics)))
+        except OSError as error:
+            self._tell(f"The live view ends here, without harm to the run: {error.strerror}.")
+            self._waiting.end()
 
     def close(self, *, whole: bool) -> None:
         """Wait for what is still to be recorded, and for the end of file, servers and page.
@@ -85,14 +90,16 @@ class LiveProcess:
         whole: whether the run came to its end, which the summary says.
         """
         if not self.started:  # it has opened nothing yet
+            self._waiting.close()
             self._process.kill()
             self._process.communicate()
             return
         if whole:
             self._waiting.put(("finish", ()))
-        self._waiting.put(None)
+        self._waiting.end()
         for thread in self._threads:
             thread.join()
+        self._waiting.close()
         if self._process.wait():
             self._tell("The live view broke off, without harm to the run.")
 
@@ -100,7 +107,7 @@ class LiveProcess:
         assert self._process.stdin is not None
         with suppress(BrokenPipeError), self._process.stdin as pipe:  # who hears no more says so by how it ended
             while (message := self._waiting.get()) is not None:
-                pickle.dump(message, pipe, pickle.HIGHEST_PROTOCOL)
+                pipe.write(message)
                 pipe.flush()
 
     def _listen(self) -> None:
@@ -108,6 +115,47 @@ class LiveProcess:
         with self._process.stdout as lines:
             for line in lines:
                 self._tell(line.decode().rstrip())
+
+
+class _Waiting:
+    """Messages on their way, in order; those that wait are in a file."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - until close
+        self._places: queue.SimpleQueue[tuple[int, int] | None] = queue.SimpleQueue()
+        self._lock, self._end = threading.Lock(), 0
+        self._ended = False
+
+    def put(self, message: tuple[str, Any]) -> None:
+        """Raises OSError where the disk has no room."""
+        if self._ended:
+            return
+        content = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
+        with self._lock:
+            self._file.seek(self._end)
+            self._file.write(content)
+            self._file.flush()
+            self._places.put((self._end, len(content)))
+            self._end += len(content)
+
+    def end(self) -> None:
+        """Nothing comes any more."""
+        if not self._ended:
+            self._ended = True
+            self._places.put(None)
+
+    def close(self) -> None:
+        self._file.close()
+
+    def get(self) -> bytes | None:
+        """The next message, which is waited for; None: there is none any more."""
+        place = self._places.get()
+        if place is None:
+            return None
+        start, size = place
+        with self._lock:
+            self._file.seek(start)
+            return self._file.read(size)
 
 
 def serve() -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.recording.files.live import LiveRecording
-from rodsight.recording.files.live_process import LiveProcess
+from rodsight.recording.files.live_process import LiveProcess, _Waiting
 from rodsight.recording.files.readback import read_forces
 from rodsight.recording.files.repair import repair_recording
 
@@ -118,6 +119,20 @@ def test_a_process_that_breaks_off_does_no_harm_to_the_run(results, tmp_path):
         live.frame(forces, statistics)
     live.close(whole=True)
     assert told == ["The live view broke off, without harm to the run."]
+
+
+def test_without_room_for_frames_that_wait_the_view_ends_and_the_run_goes_on(results, tmp_path, monkeypatch):
+    told: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", told.append)
+    live.start(replace(results, frames=(), statistics=()))
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(_Waiting, "put", full)
+    live.frame(results.frames[0], results.statistics[0])
+    live.close(whole=False)
+    assert told[0] == "The live view ends here, without harm to the run: No space left on device."
 
 
 def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
