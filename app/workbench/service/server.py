@@ -182,7 +182,7 @@ async def _news(bench: Bench, opened: Project, request: Request) -> AsyncIterato
 def _ask(bench: Bench, name: str, body: bytes) -> Response:
     try:
         values = json.loads(body)
-    except ValueError:
+    except (ValueError, RecursionError):  # not JSON, or deeper than anybody means
         raise BadRequest("this is not JSON") from None
     if not isinstance(values, dict):
         raise BadRequest("a question has named values")

@@ -61,6 +61,13 @@ def test_a_malformed_question_is_refused(visitor, question, values):
     assert visitor.post(question, values).status_code == 400
 
 
+@pytest.mark.parametrize("body", ["[" * 90_000, '{"at": ' * 9000, "9" * 5000, '{"at": ' + "9" * 5000 + "}", "\x00", ""])
+def test_what_is_no_question_is_refused(tmp_path, body):
+    visitor = Visitor(Bench(tmp_path)).enter()
+    headers = {"Origin": HOST, "Content-Type": "application/json"}
+    assert visitor.client.post("/ask/home", content=body.encode(), headers=headers).status_code == 400
+
+
 def test_a_long_question_is_refused(visitor):
     body = b'{"at": "' + b"x" * 300_000 + b'"}'
     answer = visitor.client.post(
