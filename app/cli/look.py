@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import threading
 import webbrowser
 from contextlib import ExitStack
@@ -39,7 +40,11 @@ def view(
         tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or a folder of runs"),
     ],
     /,
-    web: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="in a browser")] = False,
+    web: Annotated[
+        bool,
+        tyro.conf.FlagCreatePairsOff,
+        tyro.conf.arg(help="in a browser: tells the address, and serves it until Ctrl+C"),
+    ] = False,
     only_list: Annotated[
         bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="list", help="of a folder: tell what is in it, no more")
     ] = False,
@@ -57,7 +62,9 @@ def view(
         raise InputError(file, "", "there is no such recording")
     side = file.with_name(SIDE)
     also = (side,) if recording.is_dir() and side.is_file() else ()
-    return show(file, "web" if web else "native", Console(), *also)
+    if web:
+        return _serve([file, *also], Console())
+    return show(file, "native", Console(), *also)
 
 
 def review(
@@ -202,13 +209,29 @@ def show(recording: Path, how: str, console: Console, *also: Path) -> int:
     return 0
 
 
+def _serve(files: list[Path], console: Console) -> int:
+    """Serve recordings to a browser of this machine, on a port of their own, until interrupted. Exit status 0."""
+    from ..recording.viewing.recording_server import RecordingServer
+    from ..recording.viewing.viewer import has_display
+
+    server = RecordingServer(files)
+    tell(console, f"At {server.address} until interrupted (Ctrl+C).")
+    sys.stdout.flush()  # whoever reads it through a pipe waits for it
+    if has_display():
+        webbrowser.open(server.address)
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:  # how it is meant to end
+        return 0
+    return 0
+
+
 def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) -> int:
     """Tell the recordings of a folder by their properties and open them together. Exit status 0.
 
     The viewer is waited for: the catalogue is served by this process.
     """
     from ..recording.files.catalogue import can_serve, find_recordings, read_entries, serve, show_together
-    from ..recording.viewing.recording_server import RecordingServer
     from ..recording.viewing.viewer import has_display
 
     files = find_recordings(folder)
@@ -223,11 +246,7 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
         console.print(f"No display here. In a browser: rodsight view --web {folder}", highlight=False, soft_wrap=True)
         return 0
     if web:
-        server = RecordingServer(files)
-        tell(console, f"At {server.address} until interrupted (Ctrl+C).")
-        if has_display():
-            webbrowser.open(server.address)
-        threading.Event().wait()
+        return _serve(files, console)
     with ExitStack() as stack:
         if can_serve():
             shown = stack.enter_context(serve(files))

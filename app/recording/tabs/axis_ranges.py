@@ -9,7 +9,7 @@ import numpy as np
 from solver.bodies.walls import Walls
 
 from ...results.results import Results
-from ..curve_layers.statistic_curves import statistic_values, wall_values
+from ..curve_layers.statistic_curves import band_values, recorded_values, statistic_values, wall_values
 from ..look import entities
 
 Extremes = Mapping[str, tuple[float, float]]  # of the curves at a path
@@ -32,8 +32,11 @@ def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
         if frame:
             values.append((entities.SIMILARITY, forces.similarity))
         walls = Walls.at_rest(results.walls.endpoints[frame], side=results.walls.side)
-        for path, several in wall_values(walls, statistics):
+        for path, several in (*wall_values(walls, statistics), *band_values(statistics)):
             values += [(path, float(value)) for value in several]
+        if results.walls.force is not None:
+            for path, several in recorded_values(walls, results.walls.force[frame]):
+                values += [(path, float(value)) for value in several]
         for path, value in values:
             if np.isfinite(value):
                 low, high = found.get(path, (value, value))

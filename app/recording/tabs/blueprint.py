@@ -120,18 +120,20 @@ def _experiment(layout: Layout) -> rrb.Container:
 def _convergence(layout: Layout) -> rrb.Container:
     maps = [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"]
     residuals = [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE]
+    low, high = layout.extremes.get(entities.SWEEP_COUNT, (0.0, 1.0))
+    plots: list[rrb.View] = [
+        drawn_view("Residuals of this frame over its sweeps", "/solve/plot", *PLOT_BOUNDS),
+        curve_view(
+            "log₁₀ residuals: every sweep, or the last of a frame", [*residuals, entities.TOLERANCE],
+            y_range=(-6.4, 4.4),
+        ),
+    ]  # fmt: skip
+    if high > low:  # the same number in every frame is no curve
+        plots.append(curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes))
     return rrb.Horizontal(
         packing_view("Network as it forms", layout.canvas, [*_PACKING, *_FORCES]),
         packing_view("Unbalance of grains, change since the last row", layout.canvas, maps),
-        rrb.Vertical(
-            drawn_view("Residuals of this frame over its sweeps", "/solve/plot", *PLOT_BOUNDS),
-            curve_view(
-                "log₁₀ residuals: every sweep, or the last of a frame", [*residuals, entities.TOLERANCE],
-                y_range=(-6.4, 2.6), entries=0,
-            ),
-            curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes),
-            row_shares=[2.0, 1.5, 0.8],
-        ),
+        rrb.Vertical(*plots, row_shares=[2.0, 1.5, 0.8][: len(plots)]),
         column_shares=[1.0, 1.0, 1.05],
         name=Tab.CONVERGENCE,
     )  # fmt: skip
