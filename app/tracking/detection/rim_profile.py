@@ -75,18 +75,41 @@ def _darks(rays: Image, first: float, step: float, start: Array, beyond: float) 
     return ray.min(axis=1).astype(np.float64), where[np.argmin(ray, axis=1)]
 
 
-def _robust_regression(design: Array, value: Array, strength: Array) -> Array:
-    weight = np.clip(strength, 0.0, None) ** 2
-    weight = weight / max(weight.mean(), 1e-12)
-    answer = np.zeros(design.shape[1])
+@njit(cache=True, nogil=True, error_model="numpy")
+def _robust_regression(design, value, strength):
+    """Coefficients (3,) of value (p,) over design (p, 3), by Tukey's weights."""
+    count = len(value)
+    weight, size, residual = np.empty(count), np.empty(count), np.empty(count)
+    total = 0.0
+    for p in range(count):
+        weight[p] = max(strength[p], 0.0) ** 2
+        total += weight[p]
+    weight /= max(total / count, 1e-12)
+    answer = np.zeros(3)
     answer[0] = np.median(value)
     for _ in range(8):
-        residual = value - design @ answer
-        scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-3)
-        w = weight * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
+        for p in range(count):
+            modelled = design[p, 0] * answer[0] + design[p, 1] * answer[1] + design[p, 2] * answer[2]
+            residual[p] = value[p] - modelled
+            size[p] = abs(residual[p])
+        scale = max(1.4826 * np.median(size), 1e-3)
         # A prior as wide as any shading is likely to be keeps a half-seen outline from inventing one.
-        normal = (design * w[:, None]).T @ design + np.diag(np.full(design.shape[1], (scale / 0.3) ** 2))
-        answer = np.linalg.solve(normal, design.T @ (w * value))
+        prior = (scale / 0.3) ** 2
+        n00, n01, n02, n11, n12, n22 = prior, 0.0, 0.0, prior, 0.0, prior
+        v0, v1, v2 = 0.0, 0.0, 0.0
+        for p in range(count):
+            w = weight[p] * max(1.0 - (residual[p] / (4.685 * scale)) ** 2, 0.0) ** 2
+            x, y, z = design[p, 0], design[p, 1], design[p, 2]
+            n00, n01, n02 = n00 + w * x * x, n01 + w * x * y, n02 + w * x * z
+            n11, n12, n22 = n11 + w * y * y, n12 + w * y * z, n22 + w * z * z
+            v0, v1, v2 = v0 + w * x * value[p], v1 + w * y * value[p], v2 + w * z * value[p]
+        # Cramer's rule for the symmetric three.
+        c00, c01, c02 = n11 * n22 - n12 * n12, n02 * n12 - n01 * n22, n01 * n12 - n02 * n11
+        c11, c12, c22 = n00 * n22 - n02 * n02, n01 * n02 - n00 * n12, n00 * n11 - n01 * n01
+        determinant = n00 * c00 + n01 * c01 + n02 * c02
+        answer[0] = (c00 * v0 + c01 * v1 + c02 * v2) / determinant
+        answer[1] = (c01 * v0 + c11 * v1 + c12 * v2) / determinant
+        answer[2] = (c02 * v0 + c12 * v1 + c22 * v2) / determinant
     return answer
 
 
