@@ -103,7 +103,8 @@ def test_measured_sweeps_are_the_silent_ones(swept, relaxation):
     assert all(np.array_equal(one, other) for one, other in zip(silent, (body, plate, force), strict=True))
 
 
-def test_every_sweep_holds_its_own_residuals(swept):
+@pytest.mark.parametrize("relaxation", [1.0, 1.4])
+def test_every_sweep_holds_its_own_residuals(swept, relaxation):
     plain = PlainSolver(
         swept.grains, swept.motion, swept.walls, swept.contacts, swept.material, swept.impedance, swept.closing
     )
@@ -112,11 +113,11 @@ def test_every_sweep_holds_its_own_residuals(swept):
     force = expected[problem.rows].copy()
     body, plate = state_of(problem, force)
     residuals = np.empty((count, 3))
-    advance_and_measure(problem, body, plate, force, rest_of(problem), 1.0, residuals)
+    advance_and_measure(problem, body, plate, force, rest_of(problem), relaxation, residuals)
     world = plain.world(expected)
     for row in range(count):
         before = expected.copy()
-        plain.sweep(world, expected, problem.rows)
+        plain.sweep(world, expected, problem.rows, relaxation)
         assert residuals[row] == pytest.approx(
             (
                 greatest_change(expected, before),
