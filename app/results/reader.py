@@ -300,5 +300,5 @@ class StoredFrames(Lazily[Any]):
     def _read(self, k: int) -> Any:
         try:
             return self._stored.frame(k, self._rows, self._bodies)
-        except (OSError, RuntimeError, KeyError) as error:
+        except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
             raise InputError(self._stored.file, f"frame {k}", f"is damaged: {error}") from None

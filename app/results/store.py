@@ -127,7 +127,7 @@ def _open(file: Path) -> Iterator[h5py.File]:
     try:
         with store:
             yield store
-    except (OSError, RuntimeError, KeyError) as error:  # the library reads each dataset when it is asked for
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:  # the library reads when it is asked
         if isinstance(error, OSError) and error.filename is not None:
             raise
         raise InputError(file, "", f"is damaged: {error}") from None

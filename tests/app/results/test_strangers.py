@@ -49,3 +49,14 @@ def test_values_kept_in_another_file_are_not_read(stored, tmp_path):
         store.create_dataset("forces/fn", shape, np.float64, external=[(str(tmp_path / "secret"), 0, 8000)])
     with pytest.raises(InputError, match="another file"):
         load_results(stored)
+
+
+def test_numbers_of_a_kind_that_nothing_can_hold_are_damage(stored):
+    kind = h5py.h5t.IEEE_F64LE.copy()
+    kind.set_ebias(99_999)
+    with h5py.File(stored, "r+") as store:
+        size = store["frames/time"].shape
+        del store["frames/time"]
+        h5py.h5d.create(store.id, b"frames/time", kind, h5py.h5s.create_simple(size))
+    with pytest.raises(InputError, match="is damaged"):
+        load_results(stored)
