@@ -110,6 +110,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         return tracks.frames(start, stop), walls.frames(start, stop) if walls is not None else None
     origin = run.origin(("photographs", "tracking", "walls", "boundary"))
     if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
+        run.forget("tracking", "walls")
         return load_tracks(run.file(TRACKS))
     check(run)
     since = time.perf_counter()
@@ -182,8 +183,10 @@ def _solve(run: Run, log: VerdictLog) -> Results:
     origin = run.origin(FORCES_FROM, log)
     results = None
     if run.has(RESULTS, origin):
+        run.forget("solving")
         results = load_results(run.file(RESULTS))
         if run.experiment.config.solver.ensemble_size in (0, results.ensemble_size):
+            run.forget("ensemble")
             return results
         if results.ensemble_size:
             results = None  # the free formula is part of new error bars, and the former ones took its place

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -137,6 +138,13 @@ class Run:
             return True
         self.notes.append(f"{name} is damaged or was changed: it is made again.")
         return False
+
+    def forget(self, *stages: str) -> None:
+        """Remove what a process that was killed left of stages whose results are there."""
+        for stage in stages:
+            shutil.rmtree(self.folder / UNFINISHED / stage, ignore_errors=True)
+        with suppress(OSError):  # not empty, or not there
+            (self.folder / UNFINISHED).rmdir()
 
     def checkpoint(self, stage: str, fingerprint: str) -> Checkpoint:
         """Finished frames of an unfinished stage that is made from this."""

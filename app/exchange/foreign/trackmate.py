@@ -56,7 +56,7 @@ def _read_xml(file: Path, text: str, chosen: dict[str, str]) -> Spots:
         raise InputError(file, "", "declares entities, which TrackMate does not: it is not read")
     try:
         root = ElementTree.fromstring(text.encode("utf-8"))
-    except (ElementTree.ParseError, ValueError) as error:
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last: of an encoding
         raise InputError(file, "", f"is not XML: {error}") from None
     if root.tag == "Tracks":
         return _simple_tracks(file, root)

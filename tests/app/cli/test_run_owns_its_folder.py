@@ -200,6 +200,21 @@ def test_what_a_stopped_run_was_writing_is_removed_and_nothing_else(tracked, tmp
 
 
 @pytest.mark.screen  # several whole runs
+def test_pieces_that_a_kill_left_beside_whole_results_are_removed(tracked, tmp_path, monkeypatch):
+    arguments = ("solve", tracked, "--out", tmp_path / "out", *FEW)
+
+    def dying(self: Checkpoint) -> None:
+        raise StoppedError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "clear", dying)
+        with pytest.raises(StoppedError):
+            rodsight(*arguments)
+    assert list((tmp_path / "out").rglob("*.piece"))
+    assert rodsight(*arguments) == 0
+    assert not (tmp_path / "out" / ".unfinished").exists()
+
+
 def test_results_name_no_place_and_nobody(tracked, tmp_path, monkeypatch):
     monkeypatch.setattr(socket, "gethostname", lambda: "machine-of-somebody")
     home = Path(shutil.move(tracked, tmp_path / "of_somebody"))
