@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import re
@@ -99,6 +100,10 @@ class Photographs(Sequence[Image]):
                 found = list(folder.glob(pattern))
         except ValueError as error:
             raise InputError(whose, f"photographs.files = {pattern!r}", str(error)) from None
+        except OSError as error:
+            if error.errno != errno.ENAMETOOLONG:
+                raise
+            raise InputError(whose, f"photographs.files = {pattern[:60]!r} …", "is too long for a name") from None
         files = [file for file in found if file.is_file()]
         if not files:
             raise InputError(whose, f"photographs.files = {pattern!r}", "no file matches")

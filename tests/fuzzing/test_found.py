@@ -71,6 +71,12 @@ def test_an_empty_table_of_another_program_is_named(originals, tmp_path, file):
     assert file in ended.said
 
 
+def test_a_pattern_that_is_too_long_is_bad_input(originals):
+    ended = attempt(["check", str(originals.photographed), "--set", f"photographs.files={'a' * 5000}", "--quiet"])
+    assert complaint(ended, None, (2,)) == ""
+    assert "too long for a name" in ended.said
+
+
 def test_what_never_ends_or_answers_is_no_file(originals, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
