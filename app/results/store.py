@@ -5,6 +5,7 @@ What is in it is the table of `schema`; this file says how it begins and ends, a
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -81,7 +82,7 @@ def load_results(file: Path) -> Results:
             friction=float(cast(float, _attribute(file, store, "friction"))),
             frames=stored.frames(grains.count, walls.count),
             statistics=stored.statistics(),
-            configuration=str(_attribute(file, store, "configuration")),
+            configuration=_configuration(file, store),
             calibration=stored.part("calibration"),
             boundary=stored.part("boundary"),
             friction_check=stored.part("friction_check"),
@@ -156,6 +157,15 @@ def _attribute(file: Path, store: h5py.File, name: str) -> object:
     if name not in store.attrs:
         raise InputError(file, f"attribute {name}", "is missing")
     return store.attrs[name]
+
+
+def _configuration(file: Path, store: h5py.File) -> str:
+    text = str(_attribute(file, store, "configuration"))
+    try:
+        tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(file, "attribute configuration", f"is not TOML: {error}") from None
+    return text
 
 
 def _ensemble_size(store: h5py.File) -> int:

@@ -60,3 +60,10 @@ def test_numbers_of_a_kind_that_nothing_can_hold_are_damage(stored):
         h5py.h5d.create(store.id, b"frames/time", kind, h5py.h5s.create_simple(size))
     with pytest.raises(InputError, match="is damaged"):
         load_results(stored)
+
+
+def test_a_configuration_that_is_none_is_damage(stored):
+    with h5py.File(stored, "r+") as store:
+        store.attrs["configuration"] = "[a"
+    with pytest.raises(InputError, match="attribute configuration: is not TOML"):
+        load_results(stored)
