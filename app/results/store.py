@@ -79,7 +79,7 @@ def load_results(file: Path) -> Results:
             tracks=tracks,
             walls=walls,
             grains=grains,
-            friction=float(cast(float, _attribute(file, store, "friction"))),
+            friction=_friction(file, store),
             frames=stored.frames(grains.count, walls.count),
             statistics=stored.statistics(),
             configuration=_configuration(file, store),
@@ -157,6 +157,13 @@ def _attribute(file: Path, store: h5py.File, name: str) -> object:
     if name not in store.attrs:
         raise InputError(file, f"attribute {name}", "is missing")
     return store.attrs[name]
+
+
+def _friction(file: Path, store: h5py.File) -> float:
+    found = float(cast(float, _attribute(file, store, "friction")))
+    if not 0.0 <= found < np.inf:
+        raise InputError(file, f"attribute friction = {found:g}", "is no coefficient of friction")
+    return found
 
 
 def _configuration(file: Path, store: h5py.File) -> str:

@@ -67,3 +67,10 @@ def test_a_configuration_that_is_none_is_damage(stored):
         store.attrs["configuration"] = "[a"
     with pytest.raises(InputError, match="attribute configuration: is not TOML"):
         load_results(stored)
+
+
+def test_a_friction_below_zero_is_damage(stored):
+    with h5py.File(stored, "r+") as store:
+        store.attrs["friction"] = -0.25
+    with pytest.raises(InputError, match="attribute friction = -0.25"):
+        load_results(stored)
