@@ -72,5 +72,5 @@ def test_a_configuration_that_is_none_is_damage(stored):
 def test_a_friction_below_zero_is_damage(stored):
     with h5py.File(stored, "r+") as store:
         store.attrs["friction"] = -0.25
-    with pytest.raises(InputError, match="attribute friction = -0.25"):
+    with pytest.raises(InputError, match="is no coefficient of friction"):
         load_results(stored)
