@@ -13,21 +13,25 @@ import numpy as np
 from solver.bodies.grains import Array
 from solver.convex.program import Balance, ConvexForces, ConvexSettings, polish
 
-LARGEST_CHANGE = 0.6  # rms change of f_n over its rms deviation
+BROKEN = 3.0  # rms change of f_n by a strict balance, over its rms deviation, beyond which the list must lack pairs
+LARGEST_CHANGE = 0.6  # the same by the looser balance that then stands
 LOOSER = (0.3, 0.1, 0.03, 0.01, 0.003)  # of the price of an unbalance, tried one after the other
 
 
 def bring_into_balance(balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings) -> ConvexForces:
-    """The field nearest to the given one (c,) [N] under the highest price of an unbalance that leaves it its own.
+    """The field nearest to the given one (c,) [N] in balance; where pairs are missing, under a lower price.
 
-    fn_sd (c,) [N]: deviations of f_n. The last attempt stands where none does.
+    fn_sd (c,) [N]: deviations of f_n. The price of an unbalance is then the highest that leaves the field its own, or the
+    lowest where none does.
     """
     doubt = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
     found = polish(balance, fn, ft, settings)
+    if found.converged and _change(found.fn, fn) <= BROKEN * doubt:
+        return found
     for share in LOOSER:
+        found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))
         if found.converged and _change(found.fn, fn) <= LARGEST_CHANGE * doubt:
             break
-        found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))
     return found
 
 
