@@ -13,20 +13,24 @@ import numpy as np
 from solver.bodies.grains import Array
 from solver.convex.program import Balance, ConvexForces, ConvexSettings, polish
 
-BROKEN = 3.0  # rms change of f_n by a strict balance, over its rms deviation, beyond which the list must lack pairs
+# rms change of f_n by a strict balance, over its rms deviation, beyond which the list must lack pairs: overlaps of soft
+# grains tell forces one by one, and the balance is to leave them; hard ones are told by the balance.
+BROKEN_HARD, BROKEN_SOFT = 3.0, 0.6
 LARGEST_CHANGE = 0.6  # the same by the looser balance that then stands
 LOOSER = (0.3, 0.1, 0.03, 0.01, 0.003)  # of the price of an unbalance, tried one after the other
 
 
-def bring_into_balance(balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings) -> ConvexForces:
+def bring_into_balance(
+    balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings, *, soft: bool = False
+) -> ConvexForces:
     """The field nearest to the given one (c,) [N] in balance; where pairs are missing, under a lower price.
 
-    fn_sd (c,) [N]: deviations of f_n. The price of an unbalance is then the highest that leaves the field its own, or the
-    lowest where none does.
+    fn_sd (c,) [N]: deviations of f_n. The price of an unbalance is then the highest that leaves the field its own, or
+    the lowest where none does. soft: whether the grains are.
     """
     doubt = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
     found = polish(balance, fn, ft, settings)
-    if found.converged and _change(found.fn, fn) <= BROKEN * doubt:
+    if found.converged and _change(found.fn, fn) <= (BROKEN_SOFT if soft else BROKEN_HARD) * doubt:
         return found
     for share in LOOSER:
         found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))

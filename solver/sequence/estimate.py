@@ -108,7 +108,9 @@ def _mix(problem: FrameProblem, estimate: Estimate, positions: FramePosterior, m
     mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft)
     balance = assemble_frame_balance(problem, contacts, estimate.step)
     convex = problem.settings.ensemble.convex
-    polished = bring_into_balance(balance, mixture.fn, mixture.ft, mixture.spread_fn, convex)
+    polished = bring_into_balance(
+        balance, mixture.fn, mixture.ft, mixture.spread_fn, convex, soft=problem.settings.soft
+    )  # fmt: skip
     fn, ft = (polished.fn, polished.ft) if polished.converged else (mixture.fn, mixture.ft)
     members = estimate.members
     if not problem.motion.spans:  # no member has a history of its own yet
