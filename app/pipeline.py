@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.sequence.doubts import doubt_friction
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.judging.doubts import doubt_friction
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics
 from solver.together import available_cores
@@ -41,9 +41,9 @@ from .inference.inference import (
 )
 from .inference.settings import material_of, settings_of
 from .results.checkpoint import Checkpoint
-from .results.lazy import Lazily
+from .results.hdf5.lazy import Lazily
+from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
 from .results.results import Results, TruthContacts
-from .results.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
 from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment

@@ -26,9 +26,9 @@ from .experiment.experiment import Experiment, checksums
 from .lock import holding
 from .progress import Progress, silent
 from .results.checkpoint import Checkpoint
+from .results.hdf5.store import Provenance
 from .results.manifest import MANIFEST, Manifest
 from .results.results import Results
-from .results.store import Provenance
 from .verdicts.decisions import fingerprint
 from .verdicts.log import VerdictLog
 

@@ -15,7 +15,7 @@ import pyarrow.parquet
 from ..atomic import replacing, write_atomically
 from ..exchange.data_package import write_description
 from ..exchange.tidy_tables import TableName, make_table
-from ..results.store import load_results
+from ..results.hdf5.store import load_results
 from ..run_folder import RESULTS, SUMMARY
 from .plan import Case
 from .task import Outcome

@@ -9,16 +9,16 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import tyro
 
 from .. import __version__
-from .campaign import campaign
-from .docs import docs
-from .export import export, share
-from .look import compare, review, score, view
-from .make import synth
-from .run import check, record, run, solve, track
-from .settings import settings
-from .study import sensitivity, study
-from .take_in import import_
-from .workbench import init, open_
+from .commands.campaign import campaign
+from .commands.docs import docs
+from .commands.export import export, share
+from .commands.look import compare, review, score, view
+from .commands.make import synth
+from .commands.run import check, record, run, solve, track
+from .commands.settings import settings
+from .commands.study import sensitivity, study
+from .commands.take_in import import_
+from .commands.workbench import init, open_
 
 Command = Callable[..., int]
 METAVARS: dict[Any, str] = {int: "N", float: "NUMBER", str: "TEXT"}

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import xarray
 
+from ..results.hdf5.writer import columns_of_results
 from ..results.results import Results
 from ..results.schema import DIMENSIONS, SCHEMA, SCHEMA_VERSION, Entry, entries
-from ..results.writer import columns_of_results
 
 
 def make_dataset(results: Results) -> xarray.DataTree:

@@ -15,9 +15,9 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from ..atomic import replacing
+from ..results.hdf5.writer import columns_of_results
 from ..results.results import Results
 from ..results.schema import DIMENSIONS, entries
-from ..results.writer import columns_of_results
 from .data_package import write_description
 
 Kind = Literal["csv", "parquet"]

@@ -23,7 +23,7 @@ from ..experiment.experiment import Experiment, load_experiment
 from ..inference.inference import Inputs, SolvedFrame, correct_sequence, solve_frames
 from ..inference.settings import material_of, settings_of
 from ..results.checkpoint import Checkpoint
-from ..results.store import Provenance, save_tracks
+from ..results.hdf5.store import Provenance, save_tracks
 from ..run_folder import TRACKS, UNFINISHED, Run
 from ..tracking.follow import ReferenceGrains
 from ..tracking.stage import find_reference, track_photographs, write_found_tables

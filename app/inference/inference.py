@@ -21,13 +21,13 @@ from solver.calibration.calibrate import Calibration
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.contacts.verdicts import Verdicts
 from solver.convex.friction_check import FrictionCheck, WallFriction
-from solver.sequence.doubts import doubt_friction
 from solver.sequence.failure import describe_error, failed_frame, find_unseen
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_sequence
+from solver.sequence.judging.doubts import doubt_friction
+from solver.sequence.judging.statistic_intervals import with_deviations
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
-from solver.sequence.statistic_intervals import with_deviations
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics, no_statistics
 
 from ..errors import UndeterminedError

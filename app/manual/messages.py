@@ -20,9 +20,11 @@ COMPLAINTS = ("error", "_error")  # methods that make an InputError of a problem
 VALIDATED = "experiment/config/"  # where a ValueError is what is wrong with a key
 # Functions whose sentences are warnings: of a frame, of a run, of an experiment.
 WARNINGS = {
-    "solver/sequence/doubts.py": ("_stillness", "_noise", "_spacing", "_radii", "_boundary", "_softness", "_unseen",
-                                  "_disagreement", "_correction", "doubt_friction"),
-    "solver/sequence/judgement.py": ("judge", "_judge", "find_faults", "_tell_change"),
+    "solver/sequence/judging/doubts.py": (
+        "_stillness", "_noise", "_spacing", "_radii", "_boundary", "_softness", "_unseen", "_disagreement",
+        "_correction", "doubt_friction",
+    ),
+    "solver/sequence/judging/judgement.py": ("judge", "_judge", "find_faults", "_tell_change"),
     "solver/calibration/calibrate.py": ("_verdict", "_track_warning", "_prior_warning"),
     "solver/boundary/boundary.py": ("describe",),
     "app/experiment/plausibility.py": ("doubtful_loads", "open_sides", "rods_beyond_ends"),

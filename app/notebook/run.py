@@ -15,8 +15,8 @@ from .. import pipeline
 from ..exchange.tidy_tables import TableName, make_table
 from ..experiment.experiment import load_experiment
 from ..progress import Progress, silent
+from ..results.hdf5.store import load_results
 from ..results.results import Results
-from ..results.store import load_results
 from ..results.summary import summarize
 from ..run_folder import RECORDING, RESULTS, owned
 from ..run_folder import Run as RunFolder

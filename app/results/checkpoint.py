@@ -23,7 +23,7 @@ import numpy as np
 
 from ..atomic import write_atomically
 from ..errors import RunError
-from .lazy import Lazily
+from .hdf5.lazy import Lazily
 
 T = TypeVar("T")
 CHECKSUM = 32  # bytes at the beginning of a file

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
-from solver.sequence.statistic_intervals import DEVIATION
+from solver.sequence.judging.statistic_intervals import DEVIATION
 from solver.statistics.agreement import Agreement
 from solver.statistics.frame_statistics import FrameStatistics
 

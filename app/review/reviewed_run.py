@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..experiment.experiment import CONFIG_NAME, Experiment, load_experiment
+from ..results.hdf5.store import load_results, origin_of
 from ..results.results import Results
-from ..results.store import load_results, origin_of
 from ..run_folder import RESULTS, find_experiment
 from ..verdicts.decisions import Bodies
 from ..verdicts.log import VERDICTS, VerdictLog

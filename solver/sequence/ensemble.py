@@ -30,7 +30,7 @@ from solver.nlgs.warm_start import ForceMemory
 from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.demand import NO_DEMAND, ROUNDS, WINS, Demand, find_demand
 from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.judgement import SETTLED_DIFFERENCE
+from solver.sequence.judging.judgement import SETTLED_DIFFERENCE
 from solver.statistics.agreement import relative_change
 from solver.statistics.bearing import cone_share
 from solver.together import work_together

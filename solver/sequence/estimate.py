@@ -20,8 +20,8 @@ from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.demand import NO_DEMAND, Demand
 from solver.sequence.ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
 from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.information import measure_information
-from solver.sequence.judgement import Evidence, is_suspect, trust
+from solver.sequence.judging.information import measure_information
+from solver.sequence.judging.judgement import Evidence, is_suspect, trust
 from solver.sequence.state import SequenceState
 from solver.statistics.agreement import pearson
 from solver.statistics.balance import worst_unbalance

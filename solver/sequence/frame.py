@@ -12,12 +12,12 @@ from solver.contacts.verdicts import NO_VERDICTS, Verdicts
 from solver.detection.refinement import RefinedBlock
 from solver.detection.touch_probability import window_of
 from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.changes import find_changes
 from solver.sequence.estimate import Estimate, estimate_frame, mean_stress
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frame_problem import FrameProblem, SequenceProblem
 from solver.sequence.frame_report import find_ages, report_frame
-from solver.sequence.judgement import Evidence, Standing, judge
+from solver.sequence.judging.changes import find_changes
+from solver.sequence.judging.judgement import Evidence, Standing, judge
 from solver.sequence.state import SequenceState
 from solver.statistics.agreement import relative_change
 

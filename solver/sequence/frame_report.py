@@ -16,12 +16,12 @@ from solver.contacts.kinematics import relative_motion
 from solver.contacts.pairs import are_among, are_there, recall
 from solver.contacts.verdicts import sources
 from solver.nlgs.starts import measure_starts
-from solver.sequence.doubts import lower_bound, tell_doubts
 from solver.sequence.estimate import Estimate
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.intervals import calibrate_deviations
-from solver.sequence.judgement import (
+from solver.sequence.judging.doubts import lower_bound, tell_doubts
+from solver.sequence.judging.intervals import calibrate_deviations
+from solver.sequence.judging.judgement import (
     Evidence,
     Standing,
     free_standard_deviation,

@@ -13,7 +13,7 @@ from solver.bodies.packing import Packing
 from solver.contacts.pairs import Keys
 from solver.nlgs.warm_start import ForceMemory
 from solver.sequence.ensemble import EnsembleState
-from solver.sequence.judgement import Evidence
+from solver.sequence.judging.judgement import Evidence
 
 NOTHING_KNOWN = Evidence(True, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0)
 

@@ -121,7 +121,7 @@ class FrameStatistics:
         Array | None, Quantity("sum of the tangential forces on each wall, towards end 1", "N", "wall", since=2)
     ] = None
 
-    # Standard deviations that truths showed, NaN where none is known; `solver.sequence.statistic_intervals` sets them.
+    # Standard deviations that truths showed, NaN where none is known, as `solver.sequence.judging` sets them.
     friction_angle_sd: Annotated[float, _deviation_of("friction_angle", "rad")] = NAN
     wall_ratio_angle_sd: Annotated[float, _deviation_of("wall_ratio_angle", "rad")] = NAN
     principal_direction_sd: Annotated[float, _deviation_of("principal_direction", "rad")] = NAN

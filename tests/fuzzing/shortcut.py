@@ -11,7 +11,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from rodsight.cli import export, look, make, run, take_in
+from rodsight.cli.commands import export, look, make, run, take_in
 
 NAMED = {"set": "settings", "json": "as_json"}  # options whose argument has another name
 COMMANDS: dict[str, Callable[..., int]] = {

@@ -28,8 +28,8 @@ from solver.detection.touch_probability import ContactProbabilitySettings
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frames import solve_sequence
+from solver.sequence.judging.statistic_intervals import DEVIATION
 from solver.sequence.settings import EnsembleSettings, SequenceSettings
-from solver.sequence.statistic_intervals import DEVIATION
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics
 
 STORED = Path(__file__).with_name("forces.npz")

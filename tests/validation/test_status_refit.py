@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rich.console import Console
-from rodsight.study.status import WINDOW, StatusSample, observe_status, refit_status
+from rodsight.study.report.status import WINDOW, StatusSample, observe_status, refit_status
 from rodsight.study.truths import simulate
 
 from solver.sequence.frame_forces import FrameStatus
-from solver.sequence.judgement import NORMAL_DEVIATION, TANGENT_DEVIATION, trust
+from solver.sequence.judging.judgement import NORMAL_DEVIATION, TANGENT_DEVIATION, trust
 
 GRAINS, SEEDS = 250, (31, 32)
 NOISES = (0.0, 1e-5, 4e-5)

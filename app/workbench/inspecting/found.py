@@ -17,9 +17,9 @@ from solver.statistics.frame_statistics import FrameStatistics
 
 from ...experiment.units import Scale
 from ...results.checkpoint import Checkpoint, flatten
-from ...results.lazy import Lazily, Remembered
+from ...results.hdf5.lazy import Lazily, Remembered
+from ...results.hdf5.store import load_results, load_tracks
 from ...results.results import Results
-from ...results.store import load_results, load_tracks
 from ...run_folder import RESULTS, TRACKS, UNFINISHED
 from ...tracks import Tracks, TrackStatus, WallTracks
 

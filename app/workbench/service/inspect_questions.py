@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from pydantic import Field, StringConstraints
 
 from ...errors import InputError
+from ...results.hdf5.store import read_origin
 from ...results.results import Results
-from ...results.store import read_origin
 from ...run_folder import RESULTS
 from ...verdicts.log import VERDICTS, Entry, Origin, Verdict, VerdictLog
 from ..inspecting import found as inspecting

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...experiment.tables import read_table
-from ...results.store import load_tracks
+from ...results.hdf5.store import load_tracks
 from ...run_folder import TRACKS
 from ...tracks import Tracks
 from ..inspecting import found as inspecting

@@ -7,9 +7,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from rodsight.results.hdf5.store import load_results
+from rodsight.results.hdf5.writer import columns_of_results
 from rodsight.results.results import Results
-from rodsight.results.store import load_results
-from rodsight.results.writer import columns_of_results
 
 from tests.program import KEPT, TELLING, rodsight, wait_until_told
 
@@ -76,7 +76,7 @@ def test_the_results_file_has_the_public_layout(tracked, tmp_path, capsys):
 
 def test_results_read_back_as_they_were_stored(tracked, tmp_path, capsys):
     from rodsight.results.checkpoint import flatten
-    from rodsight.results.store import Provenance, save_results
+    from rodsight.results.hdf5.store import Provenance, save_results
 
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out), *FEW) == 0

@@ -16,7 +16,7 @@ from rodsight import pipeline
 from rodsight.experiment.input_files import InputFiles
 from rodsight.lock import LOCK, Holder, holding
 from rodsight.results.checkpoint import Checkpoint
-from rodsight.results.store import load_results
+from rodsight.results.hdf5.store import load_results
 from rodsight.verdicts.log import VERDICTS, Entry, Flag, VerdictLog
 
 from tests.program import rodsight

@@ -61,7 +61,7 @@ def test_a_signal_ends_a_run_in_one_line_and_keeps_its_frames(tracked, tmp_path,
 
 
 @pytest.mark.screen
-@pytest.mark.parametrize("module", ["tyro", "rodsight.cli.study", "rich.table"])
+@pytest.mark.parametrize("module", ["tyro", "rodsight.cli.commands.study", "rich.table"])
 @pytest.mark.parametrize("number", ENDS, ids=lambda number: number.name)
 def test_a_signal_while_modules_are_imported_is_one_line(module, number):
     command = [sys.executable, "-c", WHILE_IMPORTING, module, str(int(number))]

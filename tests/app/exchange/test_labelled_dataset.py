@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray
 from rodsight.exchange.labelled_dataset import make_dataset
-from rodsight.results.store import Provenance, save_results
+from rodsight.results.hdf5.store import Provenance, save_results
 
 from tests.app.results.full_results import make_full_results
 

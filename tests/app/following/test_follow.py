@@ -7,7 +7,7 @@ from rodsight.errors import InputError
 from rodsight.experiment.experiment import load_experiment
 from rodsight.following.follow import follow
 from rodsight.results.checkpoint import Checkpoint
-from rodsight.results.store import load_tracks
+from rodsight.results.hdf5.store import load_tracks
 from rodsight.run_folder import TRACKS, UNFINISHED, Run
 
 from solver.sequence.frame_forces import FrameForces

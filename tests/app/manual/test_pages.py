@@ -97,8 +97,8 @@ def test_every_message_has_its_cure():
         ("app/lock.py", "…: process … is at work in it; wait for it, or take another --out"),
         ("app/experiment/tables.py", "stands twice in its frame"),
         ("app/experiment/config/input_sections.py", "give either interval or times"),
-        ("solver/sequence/judgement.py", "the mean stress jumped by … % (> … %)"),
-        ("solver/sequence/doubts.py", "photographs are …° of shear apart: take them every .25°"),
+        ("solver/sequence/judging/judgement.py", "the mean stress jumped by … % (> … %)"),
+        ("solver/sequence/judging/doubts.py", "photographs are …° of shear apart: take them every .25°"),
         ("app/run_folder.py", "… is damaged or was changed: it is made again."),
     ],
 )

@@ -15,8 +15,8 @@ from solver.contacts.radius_tuning import RadiusTuning
 from solver.nlgs.starts import COLD_SWEEPS
 from solver.nlgs.sweep_record import SweepHistory
 from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.changes import find_changes
 from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.judging.changes import find_changes
 from solver.statistics.balance import grain_unbalance
 from solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
 from solver.statistics.frame_statistics import FrameStatistics

@@ -18,7 +18,7 @@ from solver.convex.friction_check import FrictionCheck
 from solver.nlgs.starts import COLD_SWEEPS
 from solver.sequence.ensemble import MEMBERS
 from solver.sequence.frame_forces import ERROR_PARTS, FrameForces
-from solver.sequence.statistic_intervals import DEVIATION
+from solver.sequence.judging.statistic_intervals import DEVIATION
 from tests.app.recording.fake_results import make_results, make_tuning
 
 CELL = np.array([[0.3, 0.01], [0.02, 0.4]])  # [m]

@@ -11,11 +11,11 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from rodsight.results import writer
 from rodsight.results.checkpoint import Checkpoint, flatten
-from rodsight.results.lazy import Lazily, Remembered
-from rodsight.results.refusable import created
-from rodsight.results.store import Provenance, load_results, save_results
+from rodsight.results.hdf5 import writer
+from rodsight.results.hdf5.lazy import Lazily, Remembered
+from rodsight.results.hdf5.refusable import created
+from rodsight.results.hdf5.store import Provenance, load_results, save_results
 from rodsight.results.summary import summarize
 
 from solver.sequence.frame_forces import FrameForces

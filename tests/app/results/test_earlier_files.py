@@ -16,9 +16,9 @@ from rodsight.exchange.tidy_tables import make_tables
 from rodsight.exchange.vtk_polydata import write_polydata
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.readback import read_forces
+from rodsight.results.hdf5.store import Provenance, load_results, read_origin, save_results
 from rodsight.results.results import Results
 from rodsight.results.schema import entries
-from rodsight.results.store import Provenance, load_results, read_origin, save_results
 from rodsight.results.summary import save_summary, summarize
 
 from tests.app.results.full_results import DEVIATIONS, make_full_results

@@ -8,8 +8,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from rodsight.results.reader import StoredFrames
-from rodsight.results.store import Provenance, load_results, save_results
+from rodsight.results.hdf5.reader import StoredFrames
+from rodsight.results.hdf5.store import Provenance, load_results, save_results
 
 from tests.app.results.full_results import make_full_results
 from tests.app.results.same import differences

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from rodsight.results.hdf5.store import Provenance, save_results, save_tracks
 from rodsight.results.schema import entries
-from rodsight.results.store import Provenance, save_results, save_tracks
 
 from solver.bodies.quantity import columns
 from solver.sequence.frame_forces import FrameForces

@@ -13,9 +13,9 @@ import pytest
 from rodsight.exchange.tidy_tables import make_tables
 from rodsight.exchange.vtk_polydata import write_polydata
 from rodsight.results import schema
+from rodsight.results.hdf5.store import Provenance, load_results, save_results
 from rodsight.results.schema import ATTRIBUTES, DIMENSIONS, PARTS, Entry, entries, unit_of
 from rodsight.results.schema_page import PAGE, schema_page
-from rodsight.results.store import Provenance, load_results, save_results
 
 from solver.bodies.grains import Array
 from solver.bodies.quantity import Quantity, quantities

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rodsight.errors import InputError
-from rodsight.results.results import Results
-from rodsight.results.store import (
+from rodsight.results.hdf5.store import (
     Provenance,
     load_results,
     load_tracks,
@@ -20,6 +19,7 @@ from rodsight.results.store import (
     save_results,
     save_tracks,
 )
+from rodsight.results.results import Results
 
 from solver.bodies.quantity import columns
 from solver.contacts.contacts import ContactSource, ContactState

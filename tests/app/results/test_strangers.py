@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from rodsight.errors import InputError
-from rodsight.results.store import Provenance, load_results, save_results
+from rodsight.results.hdf5.store import Provenance, load_results, save_results
 
 from tests.app.results.full_results import make_full_results
 

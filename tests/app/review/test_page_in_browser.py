@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
-from rodsight.results.store import load_results
+from rodsight.results.hdf5.store import load_results
 from rodsight.review.command import open_session
 from rodsight.review.reviewed_run import open_reviewed
 from rodsight.review.service.server import ReviewServer

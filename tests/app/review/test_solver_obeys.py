@@ -9,7 +9,7 @@ import urllib.request
 import h5py
 import numpy as np
 import pytest
-from rodsight.results.store import load_results
+from rodsight.results.hdf5.store import load_results
 from rodsight.verdicts.decisions import Bodies, decide
 from rodsight.verdicts.log import VERDICTS, Entry, Flag, Verdict, VerdictLog
 

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from rodsight.results.checkpoint import Checkpoint
-from rodsight.results.store import load_results
+from rodsight.results.hdf5.store import load_results
 from rodsight.sensitivity import spread
 from rodsight.sensitivity.design import Case
 from rodsight.sensitivity.spread import DEVIATION, RANGES, make_members, solve_member, solve_members, spread_around

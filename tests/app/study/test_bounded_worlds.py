@@ -1,7 +1,7 @@
 """Forces of packings without walls against the truth: a periodic cell, and the middle of a packing."""
 
 import pytest
-from rodsight.study.world_score import WorldPlan, score_world
+from rodsight.study.worlds.world_score import WorldPlan, score_world
 
 
 @pytest.mark.slow

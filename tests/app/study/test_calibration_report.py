@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.study.calibration_report import CalibrationStudy, TrustedFrames, broken, study_calibration
-from rodsight.study.contact_errors import ContactErrors
-from rodsight.study.numbers import Compared, compared_names
-from rodsight.study.report_page import report_page
-from rodsight.study.world_score import WorldPlan
+from rodsight.study.report.calibration_report import CalibrationStudy, TrustedFrames, broken, study_calibration
+from rodsight.study.report.report_page import report_page
+from rodsight.study.worlds.contact_errors import ContactErrors
+from rodsight.study.worlds.numbers import Compared, compared_names
+from rodsight.study.worlds.world_score import WorldPlan
 
 COUNT = 6000
 

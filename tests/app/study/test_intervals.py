@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from rodsight.study.contact_errors import ContactErrors
-from rodsight.study.intervals import covered, fit_intervals
+from rodsight.study.worlds.contact_errors import ContactErrors
+from rodsight.study.worlds.intervals import covered, fit_intervals
 
-from solver.sequence.intervals import Group
+from solver.sequence.judging.intervals import Group
 
 COUNT = 12_000
 

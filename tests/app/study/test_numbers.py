@@ -1,7 +1,7 @@
 """Which statistics are held against the truth's."""
 
 import numpy as np
-from rodsight.study.numbers import SHAPES, compared_names
+from rodsight.study.worlds.numbers import SHAPES, compared_names
 
 from tests.app.recording.fake_results import make_results
 

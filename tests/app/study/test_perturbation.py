@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 from rodsight.cli.main import main
-from rodsight.study.perturbation import (
+from rodsight.study.worlds.perturbation import (
     ADDED,
     FORCE_TOLERANCE,
     R_TOLERANCE,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.results.results import Results, TruthContacts
-from rodsight.study.real_forces import RealStudy, as_json, correlate_sides, study_real
-from rodsight.study.real_page import limits_of, real_page, rows_of
+from rodsight.study.real.real_forces import RealStudy, as_json, correlate_sides, study_real
+from rodsight.study.real.real_page import limits_of, real_page, rows_of
 from rodsight.synthetic.photoelastic import make_photoelastic
 
 from tests.app.recording.fake_results import make_results

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 from rodsight.sensitivity.spread import DEVIATION, deviation
+from rodsight.study.report.uncertainty import ErrorBars, coverage, fit_deviation, measure_error_bars, study_uncertainty
 from rodsight.study.truths import simulate
-from rodsight.study.uncertainty import ErrorBars, coverage, fit_deviation, measure_error_bars, study_uncertainty
 
 
 def test_coverage_of_a_normal_error_is_that_of_the_normal_law():
@@ -26,10 +26,10 @@ def test_the_fit_finds_how_the_errors_were_made():
 
 def test_a_study_prints_coverages_and_constants(tmp_path, monkeypatch):
     truth = simulate(0, grains=30, folder=tmp_path, turn=3.0)
-    monkeypatch.setattr("rodsight.study.uncertainty.simulate", lambda *_, **__: truth)
-    monkeypatch.setattr("rodsight.study.uncertainty.WINDOW", 4)
-    monkeypatch.setattr("rodsight.study.uncertainty.available_cores", lambda: 1)
-    monkeypatch.setattr("rodsight.study.uncertainty.NOISES", (1e-5,))
+    monkeypatch.setattr("rodsight.study.report.uncertainty.simulate", lambda *_, **__: truth)
+    monkeypatch.setattr("rodsight.study.report.uncertainty.WINDOW", 4)
+    monkeypatch.setattr("rodsight.study.report.uncertainty.available_cores", lambda: 1)
+    monkeypatch.setattr("rodsight.study.report.uncertainty.NOISES", (1e-5,))
     told = StringIO()
     fit = study_uncertainty(
         [0], [1], members=2, grains=30, estimator="nlgs", folder=tmp_path, console=Console(file=told, width=150)

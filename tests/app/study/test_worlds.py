@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 from rodsight.cli.main import main
-from rodsight.study import worlds
-from rodsight.study.world_score import WorldPlan, WorldScore, score_world
-from rodsight.study.worlds import as_json, print_worlds, study_worlds
+from rodsight.study.worlds import world_table
+from rodsight.study.worlds.world_score import WorldPlan, WorldScore, score_world
+from rodsight.study.worlds.world_table import as_json, print_worlds, study_worlds
 from rodsight.synthetic.worlds.names import WorldName
 from rodsight.synthetic.worlds.table import WORLDS
 
@@ -41,7 +41,7 @@ def test_trust_that_is_too_high_is_counted_apart_for_suspect_frames() -> None:
 
 def test_the_table_tells_every_world_and_why_one_was_refused() -> None:
     text = StringIO()
-    print_worlds(Console(file=text, width=worlds.WIDTH), [SCORE, REFUSED])
+    print_worlds(Console(file=text, width=world_table.WIDTH), [SCORE, REFUSED])
     told = text.getvalue()
     row = next(line for line in told.splitlines() if line.startswith("shear"))
     assert row.split() == [
@@ -50,7 +50,7 @@ def test_the_table_tells_every_world_and_why_one_was_refused() -> None:
     ]  # fmt: skip
     assert "nearly_jammed 0: tracks.csv: column theta" in told
     assert "Seeds for fitting: 0; for judging: 2." in told
-    assert all(heading in told for heading in worlds.HEADINGS)
+    assert all(heading in told for heading in world_table.HEADINGS)
 
 
 def test_json_says_the_same_without_nan() -> None:
@@ -69,7 +69,7 @@ def test_finished_worlds_are_kept_until_settings_or_size_change(tmp_path: Path, 
         solved.append((world, seed))
         return replace(SCORE, world=world, seed=seed)
 
-    monkeypatch.setattr(worlds, "score_world", fake)
+    monkeypatch.setattr(world_table, "score_world", fake)
     plan = WorldPlan(FEW, tmp_path)
     first = study_worlds(plan, ["shear", "camera"], [2, 1])
     assert [(score.world, score.seed) for score in first] == [("shear", 2), ("shear", 1), ("camera", 2), ("camera", 1)]
@@ -138,7 +138,7 @@ def test_the_command_prints_json_of_what_was_asked_for(tmp_path, monkeypatch, ca
         asked.append((plan.grains, plan.settings, world, seed))
         return replace(SCORE, world=world, seed=seed)
 
-    monkeypatch.setattr(worlds, "score_world", fake)
+    monkeypatch.setattr(world_table, "score_world", fake)
     arguments = [
         "study",
         "worlds",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.tables import read_table
-from rodsight.results.store import load_tracks
+from rodsight.results.hdf5.store import load_tracks
 from rodsight.tracks import Tracks, WallTracks
 
 

@@ -11,7 +11,7 @@ import pytest
 from rodsight.experiment.photographs import Photographs
 from rodsight.experiment.units import Scale
 from rodsight.results.checkpoint import Checkpoint
-from rodsight.results.store import Provenance, load_tracks, save_tracks
+from rodsight.results.hdf5.store import Provenance, load_tracks, save_tracks
 from rodsight.tracking.detection.detect import Detection
 from rodsight.tracking.follow import Execution, ReferenceGrains, Series, follow_photographs
 from rodsight.tracking.report.page import Tracked, tracking_report

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rodsight.results.store import load_results, read_origin
+from rodsight.results.hdf5.store import load_results, read_origin
 from rodsight.run_folder import RESULTS
 from rodsight.verdicts.decisions import Bodies, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog

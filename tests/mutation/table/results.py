@@ -11,7 +11,7 @@ COMPARISON = "tests/app/results/test_comparison.py"
 
 MUTANTS = [
     *mutants_of(
-        "app/results/frame_pieces.py",
+        "app/results/hdf5/frame_pieces.py",
         STORE,
         ("ends[path].append(ends[path][-1] + len(piece[counted]))", "ends[path].append(ends[path][-1] + 1)"),
         ("return value[measured]", "return value[: len(measured)]"),
@@ -19,7 +19,7 @@ MUTANTS = [
         ("np.flatnonzero(~np.isnan(rows).all(axis=0))", "np.flatnonzero(~np.isnan(rows).any(axis=0))"),
     ),
     *mutants_of(
-        "app/results/writer.py",
+        "app/results/hdf5/writer.py",
         STORE,
         ("self._waiting, self._count = [rows[count:].copy()], len(rows) - count", "self._waiting, self._count = [], 0"),
         ("self._written += count", "self._written = count"),
@@ -31,7 +31,7 @@ MUTANTS = [
         ("if len(shape) != len(each.dims) or shape != agreed:", "if len(shape) != len(each.dims):"),
     ),
     *mutants_of(
-        "app/results/reader.py",
+        "app/results/hdf5/reader.py",
         READER,
         ("every[self.number[self.sweep[k] : self.sweep[k + 1]]] = values", "every[: len(values)] = values"),
         ("slice(int(edges[k]), int(edges[k + 1]))", "slice(int(edges[k]), int(edges[k + 1]) - 1)"),
@@ -49,7 +49,7 @@ MUTANTS = [
         ),
     ),
     *mutants_of(
-        "app/results/store.py",
+        "app/results/hdf5/store.py",
         READER,
         ("(first, -1 if stop is None else stop)", "(first, first if stop is None else stop)"),
         ("not 1 <= found <= SCHEMA_VERSION", "not 1 <= found"),

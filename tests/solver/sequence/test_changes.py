@@ -8,8 +8,8 @@ import pytest
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
 from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.changes import correlate, find_changes
 from solver.sequence.frames import solve_sequence
+from solver.sequence.judging.changes import correlate, find_changes
 from solver.statistics.balance import grain_unbalance
 from tests.solver.sequence.test_frames import ENSEMBLE, SETTINGS, sheared_frames
 

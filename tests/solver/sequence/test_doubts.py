@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from solver.convex.friction_check import FrictionCheck
-from solver.sequence.doubts import (
+from solver.sequence.failure import failed_frame
+from solver.sequence.frame_forces import FrameStatus
+from solver.sequence.judging.doubts import (
     COARSE,
     COARSE_LOSS,
     FRICTION_LOSS,
@@ -17,10 +19,8 @@ from solver.sequence.doubts import (
     lower_bound,
     tell_doubts,
 )
-from solver.sequence.failure import failed_frame
-from solver.sequence.frame_forces import FrameStatus
-from solver.sequence.information import Information
-from solver.sequence.judgement import trust
+from solver.sequence.judging.information import Information
+from solver.sequence.judging.judgement import trust
 from tests.solver.sequence.test_judgement import SOUND
 
 CLEAR = Information(

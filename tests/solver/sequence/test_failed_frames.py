@@ -9,7 +9,7 @@ from solver.bodies.grains import Grains
 from solver.sequence import frames as sequence
 from solver.sequence.failure import find_fault
 from solver.sequence.frame_forces import FrameStatus
-from solver.sequence.judgement import CHAIN_UNBALANCED
+from solver.sequence.judging.judgement import CHAIN_UNBALANCED
 from tests.solver.sequence.test_frames import ENSEMBLE, SETTINGS, run, sheared_frames
 
 BAD, COUNT = 3, 7

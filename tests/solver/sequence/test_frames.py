@@ -11,9 +11,9 @@ from solver.nlgs.chain import ChainSettings
 from solver.nlgs.sweep_record import recorded_sweeps
 from solver.nlgs.warm_start import ForceMemory
 from solver.sequence import ensemble
-from solver.sequence.doubts import lower_bound
 from solver.sequence.frame_forces import FrameStatus
 from solver.sequence.frames import solve_sequence
+from solver.sequence.judging.doubts import lower_bound
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
 from tests.packings import LENGTH, squeezed_heap

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.sequence.intervals import (
+from solver.sequence.judging.intervals import (
     FLOOR,
     Group,
     Witness,

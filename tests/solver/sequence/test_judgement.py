@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from solver.sequence.frame_forces import FrameStatus
-from solver.sequence.judgement import (
+from solver.sequence.judging.judgement import (
     CHAIN_UNBALANCED,
     LOAD_SHARES,
     MOST_UNSEEN,

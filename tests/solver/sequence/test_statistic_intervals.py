@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.bodies.quantity import quantities
-from solver.sequence.statistic_intervals import DEVIATION, SIZED, with_deviations
+from solver.sequence.judging.statistic_intervals import DEVIATION, SIZED, with_deviations
 from solver.statistics.frame_statistics import FrameStatistics
 from tests.app.recording.fake_results import make_results
 

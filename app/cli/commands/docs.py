@@ -1,0 +1,54 @@
+"""The command that opens the documentation: docs."""
+
+from __future__ import annotations
+
+import webbrowser
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from ...errors import InputError
+
+
+def docs(
+    page: Annotated[
+        str | None, tyro.conf.Positional, tyro.conf.arg(metavar="PAGE", help="to open, such as troubleshooting")
+    ] = None,
+    /,
+    text: Annotated[
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print the page here instead of opening it")
+    ] = False,
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="write the pages there, and open none")] = None,
+) -> int:
+    """Open the documentation in the browser: the shipped pages, without a network.
+
+    Example: rodsight docs troubleshooting --text
+    """
+    from rich.console import Console
+
+    from ... import __version__
+    from ...manual.contents import pages
+    from ...manual.reading import page_text, reading_folder, write_pages
+    from ...recording.viewing.viewer import has_display
+    from ..terminal import tell
+
+    names = {file.removesuffix(".md"): file for file in pages()}
+    name = (page or "index").removesuffix(".md").replace("-", "_")
+    if name not in names:
+        near = get_close_matches(name, names, 1)
+        meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+        raise InputError("docs", str(page), f"is no page: {meant}")
+    console = Console()
+    if text:
+        from rich.markdown import Markdown
+
+        console.print(Markdown(page_text(names[name])))
+        return 0
+    first = write_pages(reading_folder(__version__) if out is None else out)
+    shown = first.with_name(f"{name}.html")
+    if out is None and has_display():
+        webbrowser.open(shown.resolve().as_uri())
+    tell(console, f"{shown}; in this terminal: rodsight docs {name} --text")
+    return 0

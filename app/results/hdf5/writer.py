@@ -1,0 +1,178 @@
+"""Results laid out as the columns of the schema, and written as HDF5 with labelled dimensions.
+
+Every dimension is an HDF5 dimension scale at the root of the file, as netCDF has them: xarray opens the file with the
+names and labels of its dimensions. What frames have is written frame after frame, in blocks of one size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..checkpoint import flatten
+from ..results import Results
+from ..schema import DIMENSIONS, PARTS, PER_FRAME, Entry, entries
+from .frame_pieces import Columns, Shapes, find_extents, piece_of
+
+COMPRESSED = 1024  # [bytes] and more: an index of compressed blocks takes twice as much
+BLOCK = 1 << 15  # [bytes] that are compressed together, and wait in memory until they are
+TEXTS = 256  # that wait likewise
+NO_LABELS = "This is a netCDF dimension but not a netCDF variable. {:10d}"  # what netCDF calls such a dimension
+
+
+def columns_of(part: str, whole: Any) -> Columns:
+    """What one object holds; nothing if it is None."""
+    if whole is None:
+        return {}
+    named = dict(flatten(whole))
+    return {each.path: named[each.attribute] for each in entries(part) if each.attribute in named}
+
+
+def columns_of_results(results: Results) -> Columns:
+    """Everything that results hold, in memory: for tables, which are made of all frames at once."""
+    every = list(_pieces(results))
+    extents = find_extents(every)
+    of_frames = {
+        each.path: np.concatenate([_as_stored(each, piece[each.path]) for piece in every])
+        for each in entries()
+        if each.path in extents.shape
+    }
+    return _of_the_whole(results) | extents.rows | of_frames
+
+
+def write_results(store: h5py.File, results: Results) -> None:
+    """Write everything. Frames are gone through twice, one after the other, and are never all in memory.
+
+    Raises ValueError where sizes disagree.
+    """
+    extents = find_extents(_pieces(results))
+    whole = _of_the_whole(results) | extents.rows
+    _write_scales(store, _shapes(whole) | extents.shape, whole)
+    _write_whole(store, whole)
+    shape = extents.shape
+    growing = [_GrowingColumn(store, each, shape[each.path]) for each in entries() if each.path in shape]
+    for piece in _pieces(results):
+        for column in growing:
+            column.add(piece)
+    for column in growing:
+        column.end()
+
+
+def write_columns(store: h5py.File, columns: Columns) -> None:
+    """Write the columns with their dimensions, units and meaning; raises ValueError where their sizes disagree."""
+    _write_scales(store, _shapes(columns), columns)
+    _write_whole(store, columns)
+
+
+class _GrowingColumn:
+    """A dataset that is filled from its first row on, in whole blocks."""
+
+    def __init__(self, store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> None:
+        self._entry, self._dataset = entry, _make_dataset(store, entry, shape)
+        self._block = self._dataset.chunks[0] if self._dataset.chunks else TEXTS
+        self._waiting: list[np.ndarray] = []
+        self._count = self._written = 0  # rows that wait, and that are there
+
+    def add(self, piece: Columns) -> None:
+        rows = _as_stored(self._entry, piece[self._entry.path])
+        self._waiting.append(rows)
+        self._count += len(rows)
+        if self._count >= self._block:
+            self._write(self._count - self._count % self._block)
+
+    def end(self) -> None:
+        if self._count:
+            self._write(self._count)
+
+    def _write(self, count: int) -> None:
+        rows = np.concatenate(self._waiting)
+        self._dataset[self._written : self._written + count] = rows[:count]
+        self._waiting, self._count = [rows[count:].copy()], len(rows) - count
+        self._written += count
+
+
+def _of_the_whole(results: Results) -> Columns:
+    """What a run has once."""
+    columns: Columns = {}
+    for part in PARTS:
+        if part not in PER_FRAME:
+            columns |= columns_of(part, getattr(results, part))
+    return columns
+
+
+def _pieces(results: Results) -> Iterator[Columns]:
+    for forces, statistics in zip(results.frames, results.statistics, strict=True):
+        yield piece_of(forces, statistics)
+
+
+def _as_stored(entry: Entry, values: np.ndarray) -> np.ndarray:
+    return values.astype(entry.dtype, copy=False)  # an integer where an enumeration was given
+
+
+def _shapes(columns: Columns) -> Shapes:
+    return {path: values.shape for path, values in columns.items()}
+
+
+def _write_scales(store: h5py.File, shapes: Shapes, columns: Columns) -> None:
+    """Write the dimensions of all columns, once their sizes are found to agree."""
+    sizes: dict[str, int] = {}
+    for each in entries():
+        if each.path in shapes:
+            shape = shapes[each.path]
+            agreed = tuple(sizes.setdefault(name, size) for name, size in zip(each.dims, shape, strict=False))
+            if len(shape) != len(each.dims) or shape != agreed:
+                raise ValueError(f"{each.path} has shape {shape}; its dimensions are {each.dims} {agreed}")
+    for name, size in sizes.items():
+        _write_scale(store, name, size, columns)
+
+
+def _write_whole(store: h5py.File, columns: Columns) -> None:
+    for each in entries():
+        if each.path in columns:
+            _make_dataset(store, each, columns[each.path].shape)[...] = _as_stored(each, columns[each.path])
+
+
+def _write_scale(store: h5py.File, name: str, size: int, columns: Mapping[str, np.ndarray]) -> None:
+    dimension = DIMENSIONS[name]
+    labels = columns.get(dimension.labelled_by, dimension.labels)
+    if name == "frame":
+        labels = np.arange(size)
+    if labels is None:
+        scale = store.create_dataset(name, (size,), np.float32)  # never filled: takes no room
+        scale.make_scale(NO_LABELS.format(size))
+    else:
+        labels = np.asarray(labels)
+        text = labels.dtype.kind in "OU"
+        scale = store.create_dataset(name, data=labels.astype(object) if text else labels,
+                                     dtype=h5py.string_dtype() if text else None)  # fmt: skip
+        scale.make_scale(name)
+    scale.attrs["long_name"] = dimension.meaning
+
+
+def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5py.Dataset:
+    """A dataset that is still to be filled, with what it is said to hold."""
+    quantity = entry.quantity
+    kind: Any = entry.dtype
+    if quantity.names is not None:
+        kind = h5py.enum_dtype({member.name.lower(): member.value for member in quantity.names}, basetype=np.uint8)
+    elif entry.dtype.kind == "O":
+        kind = h5py.string_dtype()
+    options: dict[str, Any] = {}
+    size = int(np.prod(shape)) * entry.dtype.itemsize
+    if size >= COMPRESSED and entry.dtype.kind != "O":
+        rows = max(min(BLOCK * shape[0] // size, shape[0]), 1)
+        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": 4, "shuffle": True}
+    dataset = store.create_dataset(entry.path, shape, kind, **options)
+    for axis, name in enumerate(entry.dims):
+        dataset.dims[axis].label = name
+        dataset.dims[axis].attach_scale(store[name])
+    dataset.attrs["long_name"] = quantity.meaning  # as netCDF's conventions and xarray call it
+    if quantity.unit:
+        dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit
+    if quantity.names is not None:
+        dataset.attrs["flag_values"] = np.array([member.value for member in quantity.names], np.uint8)
+        dataset.attrs["flag_meanings"] = " ".join(member.name.lower() for member in quantity.names)
+    return dataset

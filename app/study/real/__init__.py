@@ -1,0 +1,1 @@
+"""Runs held against forces that were measured. Stands on results alone."""

@@ -1,0 +1,54 @@
+"""A world made and solved as a run would solve it, with its true forces: what studies compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from solver.bodies.grains import Array
+from solver.contacts.pairs import Keys
+from solver.sequence.frame_forces import FrameForces
+
+from ...experiment.experiment import load_experiment
+from ...inference.inference import CorrectedSequence, SolvedFrame
+from ...progress import Progress, silent
+from ...synthetic.worlds.making import make_world
+from ...synthetic.worlds.names import WorldName
+from .world_score import WorldPlan, solve_world, true_forces
+
+
+@dataclass(frozen=True, slots=True)
+class SolvedWorld:
+    """One world of one seed, solved."""
+
+    world: WorldName
+    seed: int
+    sequence: CorrectedSequence
+    frames: list[SolvedFrame]
+    true: tuple[tuple[Keys, Array], ...]  # keys (t,) and forces (t, 2) [N] of every frame
+
+    @property
+    def checked(self) -> list[FrameForces]:
+        """The forces as a run states them, once the motion of all frames has been asked for the friction."""
+        return self.sequence.check_friction([each.forces for each in self.frames])[0]
+
+
+def solve_one(plan: WorldPlan, world: WorldName, seed: int, progress: Progress = silent) -> SolvedWorld:
+    """Make a world and solve it. Raises UnbalancedError where it cannot be simulated."""
+    with TemporaryDirectory() as folder:
+        made = make_world(Path(folder), world, seed, grains=plan.grains, kept=plan.folder / "kept", progress=progress)
+        experiment = load_experiment(made.folder, plan.settings)
+        sequence, frames = solve_world(experiment, progress)
+        return SolvedWorld(world, seed, sequence, frames, true_forces(experiment, sequence))
+
+
+def solve_worlds(
+    plan: WorldPlan, worlds: Sequence[WorldName], seeds: Sequence[int], progress: Progress = silent
+) -> Iterator[SolvedWorld]:
+    """Every world of every seed, one after the other."""
+    cases: list[tuple[WorldName, int]] = [(world, seed) for world in worlds for seed in seeds]
+    for done, (world, seed) in enumerate(cases):
+        progress("worlds", done, len(cases))
+        yield solve_one(plan, world, seed)

@@ -1,0 +1,1 @@
+"""What a solved frame is worth: status, trust, doubts, intervals. Reads forces; never solves."""
