@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from solver.sequence.judging.statistic_intervals import DEVIATION
@@ -54,11 +55,11 @@ class _Statistics(NamedTuple):
     friction_angle: float
     coordination_number: float
     mean_fn: float
-    deviations: dict[str, float]
+    deviations: Float[np.ndarray, " d"]  # of DEVIATION
 
     @classmethod
     def of(cls, told: FrameStatistics) -> _Statistics:
-        deviations = {name: float(getattr(told, f"{name}_sd")) for name in DEVIATION}
+        deviations = np.array([getattr(told, f"{name}_sd") for name in DEVIATION])
         return cls(told.friction_angle, told.coordination_number, told.mean_fn, deviations)
 
 
@@ -104,7 +105,9 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "friction_angle_degrees": _plain([float(np.rad2deg(each.friction_angle)) for each in statistics]),
         "coordination_number": _plain([each.coordination_number for each in statistics]),
         "mean_fn": _plain([each.mean_fn for each in statistics]),
-        "deviations": {name: _plain([each.deviations[name] for each in statistics]) for name in DEVIATION},
+        "deviations": {
+            name: _plain([float(each.deviations[n]) for each in statistics]) for n, name in enumerate(DEVIATION)
+        },
         "error_budget": _error_budget(frames),
         "fn_deviation": _plain([frame.fn_deviation for frame in frames]),
         "friction": _friction(results),

@@ -37,10 +37,13 @@ def test_frames_of_a_checkpoint_are_stored_as_those_in_memory(tmp_path):
 
 
 def peak_of(work) -> int:
+    """Most memory that the work took [bytes], beyond what it hands back."""
     tracemalloc.start()
     try:
-        work()
-        return tracemalloc.get_traced_memory()[1]
+        made = work()
+        now, most = tracemalloc.get_traced_memory()
+        del made
+        return most - now
     finally:
         tracemalloc.stop()
 
@@ -71,9 +74,9 @@ def test_twice_as_many_frames_take_no_more_memory(tmp_path, monkeypatch):
             statistics=Lazily(count, lambda k: few.statistics[k % 3]), **plain,
         )  # fmt: skip
 
-    def all_of_it(count: int) -> None:
+    def all_of_it(count: int) -> object:
         save_results(tmp_path / "results.h5", of(count), ORIGIN)
-        summarize(load_results(tmp_path / "results.h5"), None, {})
+        return summarize(load_results(tmp_path / "results.h5"), None, {})  # a row for every frame
 
     all_of_it(3)  # what is made once
     some, many = peak_of(lambda: all_of_it(60)), peak_of(lambda: all_of_it(120))

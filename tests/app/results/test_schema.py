@@ -177,7 +177,10 @@ def test_a_number_is_declared_where_it_is_computed_and_goes_everywhere(tmp_path,
     assert getattr(again.frames[2], "pull", np.empty(0)).tolist() == (np.arange(12.0) + 2).tolist()
     tables = make_tables(again)
     assert tables["frames"].column("drift").to_pylist() == [0.5, 1.5, 2.5]
-    assert tables["frames"].schema.field("drift").metadata == {b"unit": b"m"}
+    assert tables["frames"].schema.field("drift").metadata == {
+        b"unit": b"m",
+        b"meaning": b"how far the packing drifted",
+    }
     assert tables["grains"].column("pull").to_pylist()[12] == 1.0
     assert tables["contacts"].column("wear").to_pylist()[0] == 7.0
     write_polydata(again, tmp_path)
