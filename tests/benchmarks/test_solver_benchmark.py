@@ -88,6 +88,7 @@ def plain_turn(case: StaticPacking, order: NDArray[np.int64]) -> Turn:
     return lambda count: plain_sweeps(problem, *state, *force, FRICTION, count)
 
 
+@pytest.mark.slow
 def test_the_plain_kernel_gives_the_same_forces() -> None:
     case = packing(1000)
     problem = static_problem(case)

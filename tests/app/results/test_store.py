@@ -62,7 +62,7 @@ def thinned(results: Results, rng: np.random.Generator) -> Results:
     return replace(results, frames=frames)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     seed=st.integers(0, 2**32 - 1),
     frame_count=st.integers(1, 4),

@@ -45,6 +45,7 @@ def test_members_vary_everything_that_is_not_known():
     assert all(dict(each.values)["wall_friction"] == dict(each.values)["friction"] for each in members)
 
 
+@pytest.mark.slow
 def test_an_ensemble_changes_the_error_bars_and_never_the_forces(made_tracks, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("rodsight.pipeline.available_cores", lambda: 1)
     out, free = tmp_path / "out", tmp_path / "free"

@@ -122,6 +122,7 @@ def test_the_command_ranks_what_it_varied(made_tracks, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out) == stored
 
 
+@pytest.mark.slow
 def test_a_design_divides_the_variance(made_tracks, tmp_path, capsys):
     out = tmp_path / "out"
     design = ("--design", "sobol", "--samples", 6, "--factors", "friction=0.5:1.5", "kappa", "--workers", 1)
@@ -193,6 +194,7 @@ def test_a_mistake_is_named_in_one_line_and_nothing_is_written(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_scheduler_runs_the_study_on_its_workers(made_tracks, tmp_path, capsys):
     distributed = pytest.importorskip("dask.distributed", reason="needs the extra cluster")
     here, there = tmp_path / "here", tmp_path / "there"

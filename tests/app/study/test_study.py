@@ -59,6 +59,7 @@ def test_the_accuracy_of_exact_tracks_is_measured(truth):
     assert row.cpu > 0
 
 
+@pytest.mark.slow
 def test_the_papers_claims_are_listed_with_a_verdict(folder, monkeypatch):
     monkeypatch.setattr("rodsight.study.claims.simulate", lambda seed, **kw: simulate(seed, **{**kw, "turn": TURN}))
     shown = StringIO()

@@ -191,6 +191,7 @@ def test_a_share_of_the_load_is_evidence_only_where_a_load_is_known():
     assert np.isnan(run(imposed, snapshots)[2][1].evidence.load_share)
 
 
+@pytest.mark.slow
 def test_members_are_kept_when_asked_for():
     packing, snapshots = sheared_frames(4)
     asked = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40), keep_members=True)

@@ -37,6 +37,7 @@ def test_centres_are_exact_to_a_tenth_of_a_pixel(packed: tuple[Rods, Detection])
     assert 0.4 < np.sqrt((scaled**2).mean()) < 2.0
 
 
+@pytest.mark.slow
 def test_unknown_radii_are_measured() -> None:
     rods = lay_rods(2)
     found = detect_grains(rods.reference(), DetectionSettings(radius_range=(20.0, 55.0)))

@@ -31,7 +31,9 @@ def photograph(
     return np.ascontiguousarray(image.astype(np.float32) @ LUMA, dtype=np.float32)
 
 
-@pytest.mark.parametrize("blur", [0.6, 1.1, 1.5])
+@pytest.mark.parametrize(
+    "blur", [0.6, pytest.param(1.1, marks=pytest.mark.slow), pytest.param(1.5, marks=pytest.mark.slow)]
+)
 def test_the_blur_of_a_photograph_is_measured_and_does_not_move_radii(blur: float) -> None:
     x, y, radius = rods_on_a_grid(22.0, 60.0)
     image = photograph(Laboratory(blur=blur, light=0.0), x, y, radius)
