@@ -132,7 +132,9 @@ HALVED = {
 def budget_lines(summary: dict[str, Any]) -> list[str]:
     """What the forces err by, from where, and what halving the greatest cause would do; means over the frames."""
     budget = summary.get("error_budget")
-    known = [each for each in budget["relative_error"] if each is not None] if budget else []
+    if not budget:
+        return []
+    known = [each for each in budget["relative_error"] if each is not None]
     if not known:
         return []
     share = {

@@ -23,6 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from ...errors import InputError, RunError
 from ...recording.viewing.gate import SAFE_HEADERS, Gate
 from ..inspecting.found import run_stamp
+from . import inspect_questions, mend_questions, run_questions, setup_questions  # noqa: F401  they add their questions
 from .bench import Bench
 from .project import Project
 from .questions import BadRequest, answer
