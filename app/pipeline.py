@@ -28,7 +28,7 @@ from .experiment.boundary import bound_tracks, free_surfaces
 from .experiment.config.experiment_file import as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
-from .experiment.experiment import POSE_COLUMNS, load_experiment, read_grain_guess, read_times, read_tracks
+from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
 from .experiment.plausibility import check_inside, check_radii, doubtful_loads, open_sides, rods_beyond_ends
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
@@ -42,11 +42,12 @@ from .inference.inference import (
 from .inference.settings import material_of, settings_of
 from .results.checkpoint import Checkpoint
 from .results.hdf5.lazy import Lazily
-from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
+from .results.hdf5.store import Provenance, load_results, load_tracks, save_results, save_tracks
 from .results.results import Results, TruthContacts
 from .results.summary import save_summary, summarize
-from .results.truth import TRUTH_COLUMNS, names_of_told, read_truth, score, true_ids, true_names
-from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
+from .results.truth import TRUTH_COLUMNS, read_truth, score, true_ids
+from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run
+from .run_truth import load_truth, refuse_unnamed_truth
 from .sensitivity.error_budget import budget_cases, measure_budget
 from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
 from .sensitivity.study import Nominal
@@ -87,7 +88,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         if name is not None:
             experiment.table(name, columns)
     if experiment.config.truth is not None:
-        _refuse_unnamed_truth(run)
+        refuse_unnamed_truth(run)
     # Grains of photographs are named by truth_tracks where there is one, and not by their own ids.
     named = experiment.config.photographs is not None and experiment.config.truth_tracks is not None
     if experiment.config.truth is not None and ids is not None and not named:
@@ -161,21 +162,21 @@ def solve(run: Run) -> Results:
 def nominal_run(run: Run) -> tuple[Nominal, str]:
     """What the robustness study varies and compares with: the run as it was given, and its fingerprint."""
     log = VerdictLog(run.file(VERDICTS)).as_of_now()
-    results = _solve(run, log)
-    tracks, walls = track(run)
-    assert walls is not None
-    inputs = _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
+    results, inputs = _solve_with_inputs(run, log)
     return Nominal.of(inputs, results, load_truth(run, results)), run.origin(FORCES_FROM, log).fingerprint
 
 
 def solved_inputs(run: Run) -> tuple[Inputs, Results, TruthContacts | None]:
     """What the forces of a run follow from, with the forces and their truth, for whoever changes it a little."""
-    log = VerdictLog(run.file(VERDICTS)).as_of_now()
+    results, inputs = _solve_with_inputs(run, VerdictLog(run.file(VERDICTS)).as_of_now())
+    return replace(inputs, settings=inputs.settings.without_sweeps()), results, load_truth(run, results)
+
+
+def _solve_with_inputs(run: Run, log: VerdictLog) -> tuple[Results, Inputs]:
     results = _solve(run, log)
     tracks, walls = track(run)
     assert walls is not None
-    inputs = _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
-    return replace(inputs, settings=inputs.settings.without_sweeps()), results, load_truth(run, results)
+    return results, _inputs_of_solved(run, log, results, tracks, walls)
 
 
 def _solve(run: Run, log: VerdictLog) -> Results:
@@ -207,6 +208,11 @@ def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inp
     return Inputs(tracks, walls, material_of(config), settings_of(config), decisions.for_solver())
 
 
+def _inputs_of_solved(run: Run, log: VerdictLog, results: Results, tracks: Tracks, walls: WallTracks) -> Inputs:
+    """The same with the friction that was found, for sequences that are solved again."""
+    return _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
+
+
 def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     """Solve the sequence as it was given, and store it."""
     tracks, walls = track(run)
@@ -232,12 +238,17 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     check = sequence.find_friction(frames)
     judged = Lazily(len(frames), lambda k: doubt_friction(frames[k], check))
     results = replace(unsolved, frames=judged, statistics=statistics, friction_check=check)
-    save_results(run.file(RESULTS), results, origin)
-    run.manifest.add(RESULTS, origin.fingerprint)
-    results = load_results(run.file(RESULTS))
+    results = _store(run, results, origin)
     checkpoint.clear()
     run.timings.add("solving", since)
     return results
+
+
+def _store(run: Run, results: Results, origin: Provenance) -> Results:
+    """Results as they are read back from their file: a frame at a time."""
+    save_results(run.file(RESULTS), results, origin)
+    run.manifest.add(RESULTS, origin.fingerprint)
+    return load_results(run.file(RESULTS))
 
 
 def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint) -> None:
@@ -268,17 +279,14 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
     since = time.perf_counter()
     size = run.experiment.config.solver.ensemble_size
     checkpoint = run.checkpoint("ensemble", f"{origin.fingerprint} {size}")
-    inputs = _inputs(run, log, results.tracks, results.walls).with_friction(results.friction, results.friction_check)
-    inputs = calibrated_inputs(inputs)
+    inputs = calibrated_inputs(_inputs_of_solved(run, log, results, results.tracks, results.walls))
     members = solve_members(inputs, size, checkpoint, workers=available_cores(), progress=run.progress)
     former, estimator = results.frames, inputs.settings.sequence.estimator
     frames = Lazily(
         len(former), lambda k: frame_with_spread(former[k], [each.at(k) for each in members], estimator)
     )  # fmt: skip
     results = replace(results, frames=frames, ensemble_size=size, configuration=as_toml(run.experiment.config))
-    save_results(run.file(RESULTS), results, origin)
-    run.manifest.add(RESULTS, origin.fingerprint)
-    results = load_results(run.file(RESULTS))
+    results = _store(run, results, origin)
     checkpoint.clear()
     run.timings.add("ensemble", since)
     run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")
@@ -290,8 +298,7 @@ def add_error_budget(run: Run, workers: int) -> Results:
     since = time.perf_counter()
     log = VerdictLog(run.file(VERDICTS)).as_of_now()
     results, origin = _solve(run, log), run.origin(FORCES_FROM, log)
-    given = _inputs(run, log, results.tracks, results.walls).with_friction(results.friction, results.friction_check)
-    inputs = calibrated_inputs(given)
+    inputs = calibrated_inputs(_inputs_of_solved(run, log, results, results.tracks, results.walls))
     calibration = results.calibration
     scatter = 0.0
     if calibration is not None and calibration.applied:
@@ -300,9 +307,7 @@ def add_error_budget(run: Run, workers: int) -> Results:
     budget = measure_budget(inputs, results.frames, cases, workers=workers, progress=run.progress)
     former = results.frames
     results = replace(results, frames=Lazily(len(former), lambda k: budget.told(former[k])))
-    save_results(run.file(RESULTS), results, origin)
-    run.manifest.add(RESULTS, origin.fingerprint)
-    results = load_results(run.file(RESULTS))
+    results = _store(run, results, origin)
     run.timings.add("error budget", since)
     conclude(run, results, load_truth(run, results), since)
     return results
@@ -352,54 +357,6 @@ def conclude(run: Run, results: Results, truth: TruthContacts | None, since: flo
     summary = summarize(results, agreement, {**run.timings.seconds, "total": time.perf_counter() - since})
     save_summary(run.file(SUMMARY), summary)
     return summary
-
-
-def truth_of(file: Path) -> TruthContacts | None:
-    """The truth that the experiment of finished results names; None without one, or where the experiment is gone."""
-    origin = origin_of(file)
-    try:
-        experiment = find_experiment(file, origin)
-    except InputError:
-        return None
-    return load_truth(Run(load_experiment(experiment), file.parent, origin.frames), load_results(file))
-
-
-def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthContacts | None:
-    """The truth on the rows and frames of the results; None if the experiment names none.
-
-    file replaces the experiment's own. Grains that were detected have numbers of their own, so that
-    `truth_tracks` must tell which is which.
-    """
-    config, folder = run.experiment.config, run.experiment.folder
-    if file is None and config.truth is None:
-        return None
-    first = run.frames[0]
-    ids = results.tracks.id
-    if config.truth_tracks is not None:
-        find_names = true_names if config.tracks is None else names_of_told
-        ids = find_names(folder / config.truth_tracks, results.tracks, first)
-    else:
-        _refuse_unnamed_truth(run)
-    return read_truth(
-        file if file is not None else folder / str(config.truth),
-        ids,
-        results.walls.name,
-        first_frame=first,
-        frame_count=len(results.frames),
-        unseen=None if config.truth_tracks is None else true_ids(folder / config.truth_tracks),
-    ).outside(results.tracks.boundary)
-
-
-def _refuse_unnamed_truth(run: Run) -> None:
-    """Grains that are detected get names of their own, which a truth does not know."""
-    config = run.experiment.config
-    detected = config.photographs is not None and config.photographs.grains is None
-    if config.truth_tracks is None and detected:
-        raise InputError(
-            run.experiment.file,
-            "key truth",
-            "names grains by ids, but these grains were detected: give truth_tracks or photographs.grains",
-        )
 
 
 def _check_packing(run: Run, tracks: Tracks, walls: WallTracks) -> None:

@@ -15,6 +15,7 @@ from .. import pipeline
 from ..errors import InputError, RunError
 from ..experiment.experiment import load_experiment
 from ..run_folder import Run, owned
+from ..run_truth import load_truth
 from .plan import Case
 
 
@@ -39,7 +40,7 @@ def run_case(case: Case, folder: str) -> Outcome:
         run = Run(experiment, Path(folder) / case.name, case.frames)
         with owned(run):
             results = pipeline.solve(run)
-            truth = pipeline.load_truth(run, results)
+            truth = load_truth(run, results)
             if case.record:
                 pipeline.record(run, results, truth)
             if run.timings.seconds:

@@ -15,8 +15,9 @@ from .commands.export import export, share
 from .commands.look import compare, review, score, view
 from .commands.make import synth
 from .commands.run import check, record, run, solve, track
+from .commands.sensitivity import sensitivity
 from .commands.settings import settings
-from .commands.study import sensitivity, study
+from .commands.study import study
 from .commands.take_in import import_
 from .commands.workbench import init, open_
 

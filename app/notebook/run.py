@@ -20,6 +20,7 @@ from ..results.results import Results
 from ..results.summary import summarize
 from ..run_folder import RECORDING, RESULTS, owned
 from ..run_folder import Run as RunFolder
+from ..run_truth import load_truth, truth_of
 from .inline import show_recording
 from .settings import as_texts
 
@@ -184,7 +185,7 @@ class Run:
         """
         from ..figures.gallery import draw_figure
 
-        truth = pipeline.truth_of(self._source) if name == "truth" and isinstance(self._source, Path) else None
+        truth = truth_of(self._source) if name == "truth" and isinstance(self._source, Path) else None
         return draw_figure(self.results, name, frame, width=width, truth=truth)
 
     def __repr__(self) -> str:
@@ -241,7 +242,7 @@ def run(
     at = RunFolder(loaded, folder, frames, progress)
     with owned(at):
         results = pipeline.solve(at)
-        truth = pipeline.load_truth(at, results)
+        truth = load_truth(at, results)
         pipeline.record(at, results, truth)
         pipeline.conclude(at, results, truth, began)
     return Run(at.file(RESULTS))

@@ -191,12 +191,12 @@ def _write_figures(
     width: Width,
 ) -> str:
     """Write the figures of a run, that against the truth where its experiment names one; returns what to tell."""
-    from ... import pipeline
     from ...figures.gallery import write_figures
     from ...results.hdf5.store import load_results
+    from ...run_truth import truth_of
 
     folder = file.parent / "figures" if out is None else out
-    results, truth = load_results(file), pipeline.truth_of(file)
+    results, truth = load_results(file), truth_of(file)
     try:
         files = write_figures(results, folder, formats, frame=frame, width=width, truth=truth)
     except (IndexError, ValueError) as error:

@@ -119,7 +119,6 @@ def score(
     """
     import numpy as np
 
-    from ... import pipeline
     from ...experiment.experiment import load_experiment
     from ...results.hdf5.store import load_results, origin_of
     from ...results.summary import summarize
@@ -128,13 +127,14 @@ def score(
     from ...review.judging import scoring
     from ...review.reviewed_run import Reviewed
     from ...run_folder import RESULTS, Run, find_experiment
+    from ...run_truth import load_truth
     from ...study.baselines import baseline_lists, score_baselines, tell_baselines
     from ..summary_table import print_summary
 
     file = results / RESULTS if results.is_dir() else results
     solved, origin = load_results(file), origin_of(file)
     run = Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames)
-    known = pipeline.load_truth(run, solved, truth)
+    known = load_truth(run, solved, truth)
     reviewed = Reviewed(file, solved, run.experiment, origin.frames[0])
     verdicts = scoring.score_verdicts(reviewed)
     if known is None and verdicts is None:
@@ -281,9 +281,9 @@ def _cell(value: str | int | float | None, form: str) -> str:
 
 def _compare_with_truth(results: Results, origin: Provenance, path: Path, name: str) -> Comparison:
     from ...experiment.experiment import load_experiment
-    from ...pipeline import load_truth
     from ...results.comparison import compare_with_truth
     from ...run_folder import RESULTS, Run, find_experiment
+    from ...run_truth import load_truth
 
     file = path / RESULTS if path.is_dir() else path
     run = Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames)

@@ -88,6 +88,7 @@ def run(
     Example: rodsight run sample_data/shear --view web
     """
     from ... import pipeline
+    from ...run_truth import load_truth
     from ..summary_table import print_summary
     from ..watching import watching
     from .look import show
@@ -100,7 +101,7 @@ def run(
         _follow(request, idle)
     with open_run(request) as plain, watching(plain, view, console) as (run, watch):
         results = pipeline.solve(run)
-        truth = pipeline.load_truth(run, results)
+        truth = load_truth(run, results)
         recording = pipeline.record(run, results, truth)
         summary = pipeline.conclude(run, results, truth, began)
     print_summary(console, summary)
@@ -209,6 +210,7 @@ def solve(
     Example: rodsight solve sample_data/shear --set material.friction=0.3
     """
     from ... import pipeline
+    from ...run_truth import load_truth
     from ..summary_table import print_summary
 
     request = Request(experiment, settings, quiet, out, frames)
@@ -216,7 +218,7 @@ def solve(
     began = time.perf_counter()
     with open_run(request) as run:
         results = pipeline.solve(run)
-        truth = pipeline.load_truth(run, results)
+        truth = load_truth(run, results)
         summary = pipeline.conclude(run, results, truth, began)
     console = request.console
     print_summary(console, summary)
@@ -240,13 +242,14 @@ def record(
     Example: rodsight record sample_data/shear --sweeps all
     """
     from ... import pipeline
+    from ...run_truth import load_truth
     from .look import show
 
     request = Request(experiment, settings, quiet, out, frames, max_size, full_frames)
     request = request.laid_over("recording.sweeps", sweeps)
     with open_run(request) as run:
         results = pipeline.solve(run)
-        recording = pipeline.record(run, results, pipeline.load_truth(run, results))
+        recording = pipeline.record(run, results, load_truth(run, results))
     console = request.console
     _tell_notes(run, console)
     return show(recording, "none", console)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.cli.commands.study import sensitivity
+from rodsight.cli.commands.sensitivity import sensitivity
 from rodsight.errors import InputError
 from rodsight.experiment.experiment import load_experiment
 from rodsight.sensitivity.design import Case, choose_factors, one_at_a_time, plan, space_filling, vary
