@@ -24,9 +24,10 @@ from .files.writing import writing
 from .look import entities
 from .look.axes import Axes, round_step
 from .look.canvas import Canvas
+from .look.clock import Clock, strain_ways
 from .look.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
 from .look.force_style import ForceRange, ForceStyle
-from .look.scene import Clock, Scene, tracks_in_cell
+from .look.scene import Scene, tracks_in_cell
 from .look.texts import printable
 from .look.values import known, log_scalar
 from .packing_layers.grains_and_walls import log_grains_and_walls
@@ -71,8 +72,10 @@ def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale 
             stream.set_log_time_enabled(False)
             stream.send_recording_name(printable(scene.name))
             axes = _log_styles(stream, scene, comparison)
-            for frame in range(len(base.frames)):
-                _log_frame(Clock(stream, frame, frame, frame), scene, comparison, axes)
+            ways = strain_ways([forces.strain for forces in base.frames])
+            for frame, way in enumerate(ways):
+                clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), way)
+                _log_frame(clock, scene, comparison, axes)
             stream.reset_time()
             text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
             stream.log(SUMMARY, text, static=True)

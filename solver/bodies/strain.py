@@ -40,3 +40,10 @@ def logarithmic_strain(gradient: Float[Array, "2 2"]) -> Float[Array, "2 2"]:
 def shear_of(strain: Float[Array, "2 2"]) -> float:
     """Difference of the principal strains [rad], the amount of shear where it is small; NaN of NaN."""
     return float(np.hypot(strain[0, 0] - strain[1, 1], strain[0, 1] + strain[1, 0]))
+
+
+def way_of(step: Float[Array, "2 2"]) -> float:
+    """How far a strain goes: its shear, or its greatest principal strain where that is greater; NaN of NaN."""
+    if not np.isfinite(step).all():
+        return float("nan")
+    return max(shear_of(step), float(np.abs(np.linalg.eigvalsh(0.5 * (step + step.T))).max()))

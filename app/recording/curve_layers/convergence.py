@@ -9,8 +9,8 @@ from solver.bodies.grains import Array
 from solver.nlgs.sweep_record import SweepHistory
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba
-from ..look.scene import Clock
 from ..look.values import log_scalar, send_scalars
 
 SMALLEST = 1e-16  # residuals below are drawn here: rounding level

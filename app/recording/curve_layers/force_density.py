@@ -11,8 +11,8 @@ from solver.statistics.force_statistics import mean_normal_force
 
 from ..look import entities
 from ..look.axes import Axes, log_texts
+from ..look.clock import Clock
 from ..look.colours import INK, SERIES, packed_one
-from ..look.scene import Clock
 
 LARGEST = 8.0  # f_n / ⟨f_n⟩ at the right end of the axis
 BINS = 32

@@ -18,8 +18,8 @@ from solver.nlgs.sweep_record import SweepHistory
 
 from ..look import entities
 from ..look.axes import Axes
+from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba, packed
-from ..look.scene import Clock
 
 DECADES = (-6.0, 4.0)  # log10 of a residual, bottom and top
 MOST_POINTS = 220  # of a curve

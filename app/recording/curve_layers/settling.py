@@ -10,8 +10,9 @@ from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 
 from ...tracks import Tracks, TrackStatus
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import BOUNDARY, GAINED, INFERRED, INK, LOST, SERIES, Rgba
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 from ..look.texts import printable
 from ..look.values import log_scalar, log_scalars
 from .convergence import power_of_ten

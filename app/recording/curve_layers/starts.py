@@ -8,8 +8,8 @@ import rerun as rr
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import SERIES
-from ..look.scene import Clock
 from ..look.values import log_scalar
 from .convergence import power_of_ten
 

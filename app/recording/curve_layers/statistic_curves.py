@@ -13,8 +13,9 @@ from solver.statistics.frame_statistics import FrameStatistics
 
 from ...results.schema import unit_of
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import SERIES
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 from ..look.texts import printable
 from ..look.values import log_scalar, log_scalars
 

@@ -11,8 +11,8 @@ from solver.statistics.frame_statistics import FrameStatistics
 
 from ..look import entities
 from ..look.axes import log_cross_hairs, log_texts, polar
+from ..look.clock import Clock
 from ..look.colours import FAINT, INK, SERIES, packed, packed_one
-from ..look.scene import Clock
 
 BINS = 36  # of contact directions, 10° each
 STRESS_REACH = 1.75  # of the views, in units of the circle

@@ -24,7 +24,8 @@ from ..curve_layers.settling import log_settling, log_settling_styles
 from ..curve_layers.starts import log_start_styles, log_starts
 from ..curve_layers.statistic_curves import log_statistics, log_statistics_styles
 from ..curve_layers.stress_and_fabric import log_polar_axes, log_rose, log_stress
-from ..look.scene import Clock, Scene
+from ..look.clock import Clock, StrainWay
+from ..look.scene import Scene
 from ..look.texts import printable
 from ..packing_layers.backdrop import log_photograph
 from ..packing_layers.changes import log_changes
@@ -79,6 +80,7 @@ class Recorder:
         self._density = ForceDensity()
         self._facts: list[FrameFacts] = []
         self._next_sweep = 0
+        self._way = StrainWay()
         self._swept = False
         self._clipped = self._drawn = 0
         self.network_rows = 0
@@ -116,7 +118,8 @@ class Recorder:
         """Write one frame."""
         scene = self._running()
         span = forces.history.count + 1  # the reported field has a place of its own
-        clock = Clock(self._stream, forces.frame, self._next_sweep, self._next_sweep + span - 1)
+        time, strain = float(scene.tracks.time[forces.frame]), self._way.go(forces.strain)
+        clock = Clock(self._stream, forces.frame, self._next_sweep, self._next_sweep + span - 1, time, strain)
         self._next_sweep += span
         if photograph is not None:
             log_photograph(clock, scene.canvas, photograph)

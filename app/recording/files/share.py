@@ -135,13 +135,20 @@ def _smaller_photographs(batch: pa.RecordBatch, scale: float) -> Iterator[Chunk]
         stretch = [width / shape[0], height / shape[1], 1.0]
         yield Chunk.from_columns(
             entities.PHOTOGRAPH,
-            [rr.TimeColumn(name, sequence=_integers(batch, name)[row : row + 1]) for name in _timelines(batch)],
+            _time_columns(batch.slice(row, 1)),
             [*rr.EncodedImage.columns(blob=[data.tobytes()]), *rr.Transform3D.columns(scale=[stretch])],
         )
 
 
-def _timelines(batch: pa.RecordBatch) -> list[str]:
-    return [name for name in (entities.FRAME, entities.SWEEP) if name in batch.schema.names]
+def _time_columns(batch: pa.RecordBatch) -> list[rr.TimeColumn]:
+    columns = [
+        rr.TimeColumn(name, sequence=_integers(batch, name))
+        for name in (entities.FRAME, entities.SWEEP, entities.STRAIN)
+        if name in batch.schema.names
+    ]
+    if entities.TIME in batch.schema.names:
+        columns.append(rr.TimeColumn(entities.TIME, duration=_integers(batch, entities.TIME).astype("timedelta64[ns]")))
+    return columns
 
 
 def _integers(batch: pa.RecordBatch, name: str) -> np.ndarray:

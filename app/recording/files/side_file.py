@@ -11,8 +11,8 @@ from rerun.chunk import RrdReader
 
 from ...errors import InputError
 from ...results.results import Results
+from ..look.clock import Clock, strain_ways
 from ..look.force_style import ForceRange, ForceStyle
-from ..look.scene import Clock
 from ..packing_layers.network import SweepChoice, send_sweeps, visible_sweeps
 from ..tabs.layout_property import read_layout
 from .recorder import BATCHES
@@ -52,10 +52,12 @@ def record_side_file(results: Results, recording: Path | str, target: Path | str
         with writing(stream, part):
             stream.set_log_time_enabled(False)
             first = 0
-            for forces in results.frames:
+            ways = strain_ways([forces.strain for forces in results.frames])
+            for forces, way in zip(results.frames, ways, strict=True):
                 span = forces.history.count + 1
                 if forces.frame in frames and forces.contacts.count:
-                    clock = Clock(stream, forces.frame, first, first + span - 1)
+                    time = float(results.tracks.time[forces.frame])
+                    clock = Clock(stream, forces.frame, first, first + span - 1, time, way)
                     rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
                     send_sweeps(clock, style, rows[1:], fn[1:], thin=True)  # the first has the geometry: not again
                 first += span

@@ -1,10 +1,14 @@
 """The written schema of a recording: every timeline, every entity, every component, in one place.
 
-Two timelines. `frame` counts photographs from 0. `sweep` counts Gauss-Seidel sweeps over the whole run:
-frame k occupies the values first_sweep[k] … first_sweep[k+1] − 1, one value per sweep and a last one for the
-reported field (that one alone where a frame was not swept at all). Rows that belong to a frame carry both
-timelines; on `frame` the last row of a frame wins, so `frame` shows the reported forces while `sweep` shows the
-solve on its way to them.
+Four timelines. `frame` counts photographs from 0; `time` [s] and `microstrain` say when and how far into the test
+they were taken. `sweep` counts Gauss-Seidel sweeps over the whole run: frame k occupies the values first_sweep[k] …
+first_sweep[k+1] − 1, one value per sweep and a last one for the reported field (that one alone where a frame was not
+swept at all). Rows that belong to a frame carry all timelines; on those of photographs the last row of a frame wins, so
+`frame` shows the reported forces while `sweep` shows the solve on its way to them.
+
+`microstrain` is the way of the packing's strain, in millionths, so that it never turns back: of every step between
+photographs its shear, or its greatest principal strain where that is greater. A shear test that goes one way only is
+thus drawn over its shear, an oedometer over its axial strain. Files without `frames/strain` have no such timeline.
 
 The first row of a frame carries the geometry, the later ones only widths and colours. The sweeps are those of the
 Gauss-Seidel chain, its own last one included; the row after it shows the reported field, which the estimator
@@ -27,6 +31,8 @@ APPLICATION_ID = "rodsight"
 
 FRAME = "frame"
 SWEEP = "sweep"
+TIME = "time"  # a duration
+STRAIN = "microstrain"
 
 PHOTOGRAPH = "/photograph"
 WALLS = "/walls"
@@ -162,19 +168,19 @@ BANDED = (
 class When(Enum):
     """On which rows an entity has data."""
 
-    START = "first sweep of every frame, on both timelines"
-    START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on both timelines"
-    START_AND_END = "cleared at the first sweep of every frame, set at its last row, on both timelines"
-    END = "last row of every frame, on both timelines"
-    SWEEPS = "every sweep on `sweep`, the last one of every frame on `frame`"
-    FOUND = "when there is something to say, on both timelines"
+    START = "first sweep of every frame, on all timelines"
+    START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on all timelines"
+    START_AND_END = "cleared at the first sweep of every frame, set at its last row, on all timelines"
+    END = "last row of every frame, on all timelines"
+    SWEEPS = "every sweep on `sweep`, the last one of every frame on the others"
+    FOUND = "when there is something to say, on all timelines"
     STATIC = "once, without a time"
 
     @property
     def timelines(self) -> frozenset[str]:
         if self is When.STATIC:
             return frozenset()
-        return frozenset({FRAME, SWEEP})
+        return frozenset({FRAME, SWEEP, TIME, STRAIN})
 
 
 class Condition(Enum):

@@ -6,7 +6,6 @@ import tomllib
 from dataclasses import dataclass, replace
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from solver.bodies.cell import Cell
@@ -17,7 +16,6 @@ from solver.contacts.radius_tuning import RadiusTuning
 
 from ...results.results import TruthContacts
 from ...tracks import Tracks, WallTracks
-from . import entities
 from .canvas import Canvas
 from .force_style import ForceStyle
 from .texts import printable
@@ -127,41 +125,6 @@ def tracks_in_cell(tracks: Tracks, walls: WallTracks) -> Tracks:
         Cell.at_rest(cell).wrapped(place) for cell, place in zip(walls.cell, tracks.position, strict=True)
     ])  # fmt: skip
     return replace(tracks, position=inside)
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """Puts rows at the right place of both timelines."""
-
-    stream: rr.RecordingStream
-    frame: int
-    first: int  # value on `sweep` of the frame's first row
-    last: int  # … of its last row, first where the frame has one row only
-
-    def start(self) -> None:
-        """What is logged next belongs to the frame's first row."""
-        self._set(self.first)
-
-    def end(self) -> None:
-        """What is logged next belongs to the frame's last row."""
-        self._set(self.last)
-
-    def frame_only(self) -> None:
-        """What is logged next belongs to the frame on `frame`, and to nothing on `sweep`."""
-        self.stream.reset_time()
-        self.stream.set_time(entities.FRAME, sequence=self.frame)
-
-    def _set(self, sweep: int) -> None:
-        self.stream.reset_time()
-        self.stream.set_time(entities.FRAME, sequence=self.frame)
-        self.stream.set_time(entities.SWEEP, sequence=sweep)
-
-    def columns(self, rows: NDArray[np.int64]) -> list[rr.TimeColumn]:
-        """Both timelines for rows of this frame, counted from its first (k,)."""
-        return [
-            rr.TimeColumn(entities.FRAME, sequence=np.full(len(rows), self.frame, np.int64)),
-            rr.TimeColumn(entities.SWEEP, sequence=self.first + rows),
-        ]
 
 
 def setting(configuration: str, section: str, key: str) -> object | None:

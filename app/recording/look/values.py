@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
-from .scene import Clock
+from .clock import Clock
 
 
 def known(values: NDArray[np.floating]) -> pa.Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..look import entities
 from ..look.canvas import Canvas
-from ..look.scene import Clock
+from ..look.clock import Clock
 
 JPEG_QUALITY = 80
 OPACITY = 0.38  # over the dark background of the views

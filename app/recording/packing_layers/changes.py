@@ -12,8 +12,9 @@ from solver.contacts.pairs import are_among, are_there
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import GAINED, GAP_RAMP, LOST, packed, packed_one
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 from ..look.values import known
 
 GAP_RANGE_SHARE = 0.004  # of the mean radius: the gap at which colour no longer changes, in either direction

@@ -11,8 +11,9 @@ from solver.sequence.frame_forces import FrameForces
 
 from ...tracks import TrackStatus, WallTracks
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
-from ..look.scene import Clock, Scene, cell_corners
+from ..look.scene import Scene, cell_corners
 from ..look.texts import printable
 from ..look.values import known
 

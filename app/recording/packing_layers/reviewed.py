@@ -10,8 +10,9 @@ from solver.contacts.contacts import ContactSource
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import ADDED, FORBIDDEN, packed_one
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 
 BY_PEOPLE = (ContactSource.ADDED_BY_REVIEWER, ContactSource.FORBIDDEN_BY_REVIEWER)
 

@@ -11,8 +11,9 @@ from solver.sequence.frame_forces import FrameForces
 
 from ...tracks import TrackStatus
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, LOST, SUSPECT, packed_one
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 
 ALUMINIUM = (128, 136, 150, 255)
 CHAIN_RADIUS_SHARE = 0.55  # of the grain's, for a chain at the top of the range

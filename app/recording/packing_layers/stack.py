@@ -14,8 +14,9 @@ from solver.bodies.wall_shapes import STRAIGHT
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import FAINT, INK, LOADED_WALL, Rgba, packed, packed_one
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 from .network import SweepChoice, visible_sweeps
 
 LAYERS = 8  # frames of the run, at most

@@ -10,8 +10,9 @@ from solver.bodies.grains import Array
 from solver.sequence.frame_forces import FrameForces
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import OPEN, PROBABILITY_RAMP, SERIES, packed, packed_one
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 from ..look.values import known, log_scalar
 
 _RAMP = packed(PROBABILITY_RAMP)

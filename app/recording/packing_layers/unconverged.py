@@ -16,8 +16,9 @@ from solver.statistics.balance import unbalances
 from solver.statistics.force_statistics import mean_normal_force
 
 from ..look import entities
+from ..look.clock import Clock
 from ..look.colours import DOUBT_RAMP, OPEN, packed, packed_one
-from ..look.scene import Clock, Scene
+from ..look.scene import Scene
 from .grains_and_walls import last_seen
 from .network import SweepChoice, visible_sweeps
 

@@ -141,6 +141,7 @@ def _frame(
         0.1 * np.abs(ft) + 1.0, status, f"{status.name.lower()}: invented", sweeps, reached[0],
         reached[1], 0.02, 0.06 + 0.1 * np.exp(-frame), 0.03 if frame else np.nan,
         0.95 - 0.3 * float(np.exp(-frame)), frame, history,
+        strain=0.5 * np.radians(0.25) * frame * np.array([[0.0, 1.0], [1.0, 0.0]]),
     )  # fmt: skip
 
 

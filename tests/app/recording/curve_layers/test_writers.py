@@ -12,8 +12,9 @@ from rodsight.recording.curve_layers.stress_and_fabric import BINS, ROSE_REACH, 
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
+from rodsight.recording.look.clock import Clock
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
-from rodsight.recording.look.scene import Clock, Scene
+from rodsight.recording.look.scene import Scene
 from rodsight.recording.look.texts import printable
 from rodsight.recording.packing_layers.changes import gap_colours
 from rodsight.recording.packing_layers.grains_and_walls import _spin_marks, last_seen
