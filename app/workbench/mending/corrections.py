@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,10 +35,12 @@ def corrections_of(found: Understood) -> list[Correction]:
     return [Correction(frame, name, _pose(x, y, theta)) for frame, name, x, y, theta in rows]
 
 
-def correct(draft: Draft, found: Understood, correction: Correction) -> None:
-    """Write a correction; one of the same rod and photograph gives way."""
-    others = [each for each in corrections_of(found) if (each.frame, each.id) != (correction.frame, correction.id)]
-    _write(draft, found, [*others, correction], f"rod {correction.id} in photograph {correction.frame}")
+def correct(draft: Draft, found: Understood, told: Sequence[Correction]) -> None:
+    """Write corrections, one step of undo; those of the same rods and photographs give way."""
+    anew = {(each.frame, each.id) for each in told}
+    others = [each for each in corrections_of(found) if (each.frame, each.id) not in anew]
+    what = f"rod {told[0].id} in photograph {told[0].frame}"
+    _write(draft, found, [*others, *told], what + (f" and {len(told) - 1} that follow" if len(told) > 1 else ""))
 
 
 def take_back(draft: Draft, found: Understood, frame: int, name: int) -> None:

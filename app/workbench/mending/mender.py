@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 
 from ...experiment.photographs import Image
-from ...tracking.correlation.correlator import Fits, SearchRange
+from ...tracking.correlation.correlator import Fits, Rows, SearchRange
 from ...tracking.registration.registration import Registration
 from ...tracking.tracker import Tracker
 
 KEPT = 3  # photographs that are ready to be correlated with
-REACH = 6.0  # [px] about the given place, and
-SWEEP = 0.35  # [rad] about the given angle, that are searched where the place itself does not fit
-FITS = 0.6  # correlation from which on a fit from the given pose is not searched around
+NEAR = 6.0, 0.35  # [px], [rad] about the given pose that are searched where the pose itself does not fit, and
+WIDE = (
+    0.9  # [radii], at any angle, where nothing is found there: a rod that is dropped on its place is meant to be there
+)
+FITS = 0.6  # correlation from which on nothing else is searched
+SIDE = 88  # pixels of a picture of a rod
+SURE = 0.5  # correlation that a fit from a wide search must have: among many poses some correlate by accident
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +62,12 @@ class Mender:
         registration, given = self._registration(frame), np.array([pose], dtype=np.float64)
         before = registration.fit(rows, given, steps=0)
         after = registration.fit(rows, given)
-        if not _good(after, FITS):
-            within = SearchRange(given, np.full(1, REACH), SWEEP)
-            best = registration.correlator.search(registration.photograph, rows, within, 1)[0, 0]
-            again = registration.fit(rows, best[None, :3])
-            if best[3] > 0.0 and again.converged[0] and again.zncc[0] > after.zncc[0]:
-                after = again
+        reach = max(NEAR[0], WIDE * float(self.circles[rows[0], 2]))
+        for within, least in ((NEAR, 0.0), ((reach, np.pi), SURE)):
+            if not _good(after, FITS):
+                again = _searched(registration, rows, given, within)
+                if _good(again, least) and (again.zncc[0] > after.zncc[0] or not after.converged[0]):
+                    after = again
         hopeless = float(registration.patches.accidental_zncc[rows[0]])
         found = _good(after, hopeless)
         chosen = after if found else before
@@ -72,6 +77,10 @@ class Mender:
             float(after.sigma[0]) if found else float("nan"), found,
         )  # fmt: skip
 
+    def prepare(self, frame: int) -> None:
+        """Make a photograph ready to be correlated with."""
+        self._registration(frame)
+
     def circle(self, name: int) -> tuple[float, float, float]:
         """Centre and radius [px] of a rod on the first photograph. KeyError: no such."""
         rows = np.flatnonzero(self.ids == name)
@@ -79,6 +88,19 @@ class Mender:
             raise KeyError(name)
         x, y, radius = self.circles[rows[0]].tolist()
         return x, y, radius
+
+    def pictures(self, frame: int, name: int, poses: Sequence[tuple[float, float, float]]) -> list[NDArray[np.uint8]]:
+        """Squares of SIDE pixels: the rod on the first photograph, then the photograph `frame` at each of the poses,
+        turned back as if the rod had not moved, each with what it differs from the first by (128: by nothing)."""
+        x, y, radius = self.circle(name)
+        first = _cut_out(self._photograph(0), (x, y, 0.0), radius)
+        there = _offsets(radius)
+        disc = np.hypot(*there) < 0.92 * radius
+        told = [first]
+        for pose in poses:
+            here = _cut_out(self._photograph(frame), pose, radius)
+            told += [here, _difference(here, first, disc) + 128.0]
+        return [np.clip(np.rint(each), 0, 255).astype(np.uint8) for each in told]
 
     def _registration(self, frame: int) -> Registration:
         with self._lock:
@@ -88,6 +110,41 @@ class Mender:
                     self._ready.popitem(last=False)
             self._ready.move_to_end(frame)
             return self._ready[frame]
+
+
+def _offsets(radius: float) -> tuple[Array, Array]:
+    """Of the pixels of a square that holds a rod, x and y from its centre [px of the photograph]."""
+    along = 1.1 * radius * (2.0 * (np.arange(SIDE) + 0.5) / SIDE - 1.0)
+    y, x = np.meshgrid(along, along, indexing="ij")
+    return x, y
+
+
+def _cut_out(image: Image, pose: tuple[float, float, float], radius: float) -> Array:
+    """A rod (SIDE, SIDE) [grey], turned back by the angle of its pose."""
+    x, y = _offsets(radius)
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    column, row = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+    cut = cv2.remap(
+        image, column.astype(np.float32), row.astype(np.float32), cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+    return cut.astype(np.float64)
+
+
+def _difference(here: Array, first: Array, disc: NDArray[np.bool_]) -> Array:
+    """What is left [grey] within a disc once the light is taken off; 0 outside."""
+    a, b = here[disc] - here[disc].mean(), first[disc] - first[disc].mean()
+    gain = float(a @ b / max(float(a @ a), 1e-9))
+    left = np.zeros_like(here)
+    left[disc] = max(gain, 0.0) * a - b
+    return left
+
+
+def _searched(registration: Registration, rows: Rows, given: Array, within: tuple[float, float]) -> Fits:
+    """The fit from the most similar pose about a given one, so far [px] and so far turned [rad]."""
+    reach, sweep = within
+    around = SearchRange(given, np.full(1, reach), sweep)
+    best = registration.correlator.search(registration.photograph, rows, around, 1)[0, 0]
+    return registration.fit(rows, best[None, :3] if best[3] > 0.0 else given)
 
 
 def _good(fits: Fits, least: float) -> bool:

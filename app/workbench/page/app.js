@@ -36,8 +36,11 @@ app.change = (question, values = {}, words = "", then = null) => app.queue(async
 app.take = (project) => {
   app.project = project;
   app.frame = Math.min(app.frame, Math.max(project.files.length - 1, 0));
+  app.step.taken?.(app);
   app.paint();
 };
+
+app.goTo = (name) => app.go(STEPS.find((each) => each.name === name));
 
 app.open = (project, step = null) => {
   at("home").hidden = true;

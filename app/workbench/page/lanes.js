@@ -7,20 +7,38 @@ export const TONES = { settled: "#2fbf93", settling: "#56b4e9", rearranging: "#e
 export function showLanes(app, facts) {
   const count = app.project.files.length;
   at("time").classList.add("shown");
-  const canvas = h("canvas", { id: "lanes", title: "status · trust · friction angle", "aria-label": "Frames" });
-  const go = (event) => app.show(Math.floor((event.clientX - canvas.getBoundingClientRect().left) / canvas.clientWidth * count));
-  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); go(event); canvas.onpointermove = go; });
-  canvas.addEventListener("pointerup", () => { canvas.onpointermove = null; });
+  const canvas = lane(app, count, "status · trust · friction angle");
   const status = facts?.status[app.frame];
   const words = facts && app.frame < facts.count
     ? [h("span", { style: { color: TONES[status] ?? "inherit", fontWeight: 650 } }, status), ` · T ${digits(facts.trust[app.frame], 2)} · φ ${digits(facts.friction_angle[app.frame], 3)}°`]
     : ["not solved yet"];
-  at("time").replaceChildren(
-    h("button", { class: "quiet", onclick: () => app.show(app.frame - 1), title: "←" }, "◂"), h("button", { class: "quiet", onclick: () => app.show(app.frame + 1), title: "→" }, "▸"),
+  at("time").replaceChildren(...arrows(app),
     h("div", { class: "frame" }, h("div", {}, `frame ${app.frame} of ${count - 1}`), h("div", { class: "soft", style: { fontSize: "12.5px" } }, words)),
     canvas,
     h("button", { class: "quiet", title: "To the next frame in doubt (J)", onclick: () => jump(app, facts) }, "next flag ▸"));
   requestAnimationFrame(() => draw(app, canvas, facts, count));
+}
+
+/** Of the photographs that are tracked: how many rods are lost or doubtful in each, and where a hand put things right. */
+export function showDoubts(app, told) {
+  const count = app.project.files.length, here = told && app.frame < told.lost_count.length;
+  const canvas = lane(app, count, "lost · doubtful · corrected");
+  at("time").replaceChildren(...arrows(app),
+    h("div", { class: "frame" }, h("div", {}, `photograph ${app.frame} of ${count - 1}`), h("div", { class: "soft", style: { fontSize: "12.5px" } }, here ? `${told.lost_count[app.frame]} lost · ${told.doubtful_count[app.frame]} doubtful` : "")),
+    canvas);
+  requestAnimationFrame(() => {
+    const { c, step, height } = begin(canvas, count);
+    const most = Math.max(1, ...(told?.lost_count ?? []).map((lost, k) => lost + told.doubtful_count[k]));
+    (told?.lost_count ?? []).forEach((lost, k) => {
+      let low = height - 2;
+      for (const [number, style] of [[lost, TONES.suspect], [told.doubtful_count[k], "#f0e442"]]) {
+        const tall = number ? Math.max(3, number / most * (height - 14)) : 0;
+        c.fillStyle = style; c.fillRect(k * step + 0.5, low - tall, Math.max(step - 1, 1), tall); low -= tall;
+      }
+    });
+    for (const each of told?.corrections ?? []) { c.fillStyle = TONES.settled; c.beginPath(); c.arc((each.frame + 0.5) * step, 7, 3.5, 0, 7); c.fill(); }
+    c.strokeStyle = colour("ink"); c.lineWidth = 2; c.strokeRect(app.frame * step + 1, 1, Math.max(step - 2, 2), height - 2);
+  });
 }
 
 /** To the next frame that is suspect, failed, rearranging or has lost rods. */
@@ -32,12 +50,7 @@ export function jump(app, facts) {
 }
 
 function draw(app, canvas, facts, count) {
-  const dense = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-  canvas.width = width * dense; canvas.height = height * dense;
-  const c = canvas.getContext("2d");
-  c.scale(dense, dense);
-  const step = width / count;
-  c.fillStyle = colour("ground"); c.fillRect(0, 0, width, height);
+  const { c, step, height } = begin(canvas, count);
   for (let k = 0; k < (facts?.count ?? 0); k += 1) {
     c.fillStyle = TONES[facts.status[k]] ?? "#888"; c.fillRect(k * step + 0.5, 0, Math.max(step - 1, 1), 9);
     const trust = facts.trust[k];
@@ -51,4 +64,23 @@ function draw(app, canvas, facts, count) {
     c.stroke();
   }
   c.strokeStyle = colour("ink"); c.lineWidth = 2; c.strokeRect(app.frame * step + 1, 1, Math.max(step - 2, 2), height - 2);
+}
+
+const arrows = (app) => [["◂", -1, "←"], ["▸", 1, "→"]].map(([words, by, key]) => h("button", { class: "quiet", onclick: () => app.show(app.frame + by), title: key, "aria-label": by < 0 ? "before" : "next" }, words));
+
+/** An empty strip of frames; a press goes to a frame. */
+function lane(app, count, title) {
+  const canvas = h("canvas", { id: "lanes", title, "aria-label": title });
+  const go = (event) => app.show(Math.floor((event.clientX - canvas.getBoundingClientRect().left) / canvas.clientWidth * count));
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); go(event); canvas.onpointermove = go; });
+  canvas.addEventListener("pointerup", () => { canvas.onpointermove = null; });
+  return canvas;
+}
+
+function begin(canvas, count) {
+  const dense = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, c = canvas.getContext("2d");
+  canvas.width = width * dense; canvas.height = height * dense;
+  c.scale(dense, dense);
+  c.fillStyle = colour("ground"); c.fillRect(0, 0, width, height);
+  return { c, step: width / count, height };
 }

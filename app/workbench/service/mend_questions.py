@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...experiment.tables import read_table
 from ...results.hdf5.store import load_tracks
 from ...run_folder import TRACKS
-from ...tracks import Tracks
+from ...tracks import Tracks, TrackStatus
 from ..inspecting import found as inspecting
 from ..mending import corrections
-from ..mending.mender import Mender
+from ..mending.following import Tracked, follow_on
+from ..mending.mender import Mended, Mender
 from .bench import Bench
 from .project import Project
 from .questions import Number, Text, Whole, question
 
 DETECTIONS = "detections.csv"
+WEAK = 0.75  # correlation below which a rod is shown as doubtful
+DOUBTFUL = (TrackStatus.SUSPECT, TrackStatus.ROBUST)
+OBEYED = 1.0  # [px] between a correction and the track that obeys it
+Pose = tuple[float, float, float]
 
 
 @question
@@ -36,67 +43,147 @@ def poses(bench: Bench, at: Text, frame: Whole) -> dict[str, Any]:
             last = inspecting.rods_of(tracks, int(before[-1]), scale)
             k = last["id"].index(int(tracks.id[row]))
             lost.append({"frame": int(before[-1]), **{key: last[key][k] for key in ("id", "x", "y", "r", "angle")}})
-    return {"frame": frame, "rods": seen, "lost": lost, "corrections": told_corrections(opened)}
+    weak = _doubtful(tracks)
+    return {
+        "frame": frame, "rods": seen, "lost": lost, "corrections": told_corrections(opened),
+        "doubtful": tracks.id[weak[frame] & tracks.present[frame]].tolist(),
+        "lost_count": (~tracks.present).sum(axis=1).tolist(), "doubtful_count": weak.sum(axis=1).tolist(),
+    }  # fmt: skip
+
+
+@question
+def make_ready(bench: Bench, at: Text, frame: Whole) -> dict[str, Any]:
+    """Prepare a photograph for rods to be correlated in it, so that the first one is answered at once."""
+    opened = bench.project(at)
+    _mender(opened).prepare(frame)
+    return {"ready": frame}
 
 
 @question
 def correlate(bench: Bench, at: Text, frame: Whole, id: Whole, x: Number, y: Number, angle: Number) -> dict[str, Any]:
-    """Fit a rod from where a hand puts it; nothing is written. angle [rad]: of the picture, clockwise as seen."""
+    """Fit a rod from where a hand puts it; nothing is written. angle [rad]: of the picture, clockwise as seen.
+
+    With pictures, of side `side` and one byte a pixel: the rod on the first photograph; where the hand put it, and what
+    that differs by; where it was found, likewise.
+    """
     opened = bench.project(at)
-    return _correlated(opened, frame, id, (x, y, angle))
+    _exists(opened, frame)
+    found = _correlated(opened, id, frame, (x, y, angle))
+    mender = _mender(opened)
+    pictures = mender.pictures(frame, id, [(x, y, angle), (found.x, found.y, found.angle)])
+    return _told(found) | {
+        "first": mender.circle(id), "side": len(pictures[0]), "pictures": [_as_text(each) for each in pictures],
+    }  # fmt: skip
 
 
 @question
-def mend(bench: Bench, at: Text, frame: Whole, id: Whole, x: Number, y: Number, angle: Number) -> dict[str, Any]:
-    """The same, and the pose that is found is a correction that the next run obeys."""
+def mend(
+    bench: Bench, at: Text, frame: Whole, id: Whole, x: Number, y: Number, angle: Number, following: bool = False
+) -> dict[str, Any]:
+    """The same, and the pose that is found is a correction that the next run obeys.
+
+    following: so are those in the photographs after it, until the rod's track holds by itself.
+    """
     opened = bench.project(at)
-    if frame == 0:
-        raise InputError("photograph 0", "", "is the first photograph: mend its rods in step Rods")
-    mended = _correlated(opened, frame, id, (x, y, angle))
-    theta = float(opened.given_scale().angle_to_world(np.array(mended["angle"])))
-    pose = (mended["x"], mended["y"], theta)
-    corrections.correct(opened.draft, opened.understood(), corrections.Correction(frame, id, pose))
-    return {"mended": mended, "corrections": told_corrections(opened), "project": opened.describe()}
+    _exists(opened, frame)
+    _not_first(frame)
+    found = _correlated(opened, id, frame, (x, y, angle))
+    poses, ended = {frame: found}, ""
+    if following:
+        by_hand = {each.frame for each in corrections.corrections_of(opened.understood()) if each.id == id}
+        followed = follow_on(_mender(opened), _tracked(opened), id, (frame, found), by_hand.__contains__)
+        poses, ended = poses | followed.poses, followed.ended
+    told = [corrections.Correction(k, id, _as_written(opened, each)) for k, each in poses.items()]
+    corrections.correct(opened.draft, opened.understood(), told)
+    return _settled(opened) | {"mended": _told(found), "count": len(told), "ended": ended}
 
 
 @question
 def mark_lost(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
     """Say that a rod is not to be seen in a photograph."""
     opened = bench.project(at)
-    if frame == 0:
-        raise InputError("photograph 0", "", "is the first photograph: mend its rods in step Rods")
-    corrections.correct(opened.draft, opened.understood(), corrections.Correction(frame, id, None))
-    return {"corrections": told_corrections(opened), "project": opened.describe()}
+    _exists(opened, frame)
+    _not_first(frame)
+    corrections.correct(opened.draft, opened.understood(), [corrections.Correction(frame, id, None)])
+    return _settled(opened)
 
 
 @question
 def take_back(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
     opened = bench.project(at)
     corrections.take_back(opened.draft, opened.understood(), frame, id)
-    return {"corrections": told_corrections(opened), "project": opened.describe()}
+    return _settled(opened)
 
 
 def told_corrections(opened: Project) -> list[dict[str, Any]]:
-    """The corrections as plain values, angles of the picture."""
-    told = []
+    """The corrections as plain values, angles of the picture; obeyed: the last run did what they say."""
+    told: list[dict[str, Any]] = []
+    tracked = _tracked(opened) if (opened.results / TRACKS).is_file() else None
     for each in corrections.corrections_of(opened.understood()):
         x, y, theta = each.pose if each.pose is not None else (None, None, None)
-        told.append({"frame": each.frame, "id": each.id, "x": x, "y": y, "angle": None if theta is None else -theta})
+        told.append({
+            "frame": each.frame, "id": each.id, "x": x, "y": y, "angle": None if theta is None else -theta,
+            "obeyed": _obeyed(tracked, each),
+        })  # fmt: skip
     return told
 
 
-def _correlated(opened: Project, frame: int, name: int, pose: tuple[float, float, float]) -> dict[str, Any]:
-    mender = opened.mender(lambda: _make(opened))
+def _obeyed(tracked: Tracked | None, told: corrections.Correction) -> bool:
+    rows = np.flatnonzero(tracked.id == told.id) if tracked is not None else ()
+    if tracked is None or len(rows) != 1 or told.frame >= len(tracked.pose):
+        return False
+    x, y = tracked.pose[told.frame, rows[0], :2]
+    return bool(np.isnan(x)) if told.pose is None else bool(np.hypot(x - told.pose[0], y - told.pose[1]) < OBEYED)
+
+
+def _settled(opened: Project) -> dict[str, Any]:
+    return {"corrections": told_corrections(opened), "project": opened.describe()}
+
+
+def _exists(opened: Project, frame: int) -> None:
+    count = opened.photograph_count()
+    if frame >= count:
+        raise InputError(opened.draft.file, f"photograph {frame}", f"is not there: {count} are")
+
+
+def _not_first(frame: int) -> None:
+    if frame == 0:
+        raise InputError("photograph 0", "", "is the first photograph: mend its rods in step Rods")
+
+
+def _correlated(opened: Project, name: int, frame: int, pose: Pose) -> Mended:
     try:
-        found = mender.correlate(frame, name, pose)
-        x, y, radius = mender.circle(name)
+        return _mender(opened).correlate(frame, name, pose)
     except KeyError:
         raise InputError("rods", f"id = {name}", "is not the id of a rod") from None
-    numbers = {
-        key: inspecting.plain([getattr(found, key)])[0]
-        for key in ("zncc", "residual", "zncc_before", "residual_before", "sigma")
-    }
-    return {"x": found.x, "y": found.y, "angle": found.angle, "found": found.found, **numbers, "first": [x, y, radius]}
+
+
+def _told(found: Mended) -> dict[str, Any]:
+    keys = ("zncc", "residual", "zncc_before", "residual_before", "sigma")
+    numbers = {key: inspecting.plain([getattr(found, key)])[0] for key in keys}
+    return {"x": found.x, "y": found.y, "angle": found.angle, "found": found.found, **numbers}
+
+
+def _as_written(opened: Project, found: Mended) -> Pose:
+    return found.x, found.y, float(opened.given_scale().angle_to_world(np.array(found.angle)))
+
+
+def _as_text(picture: NDArray[np.uint8]) -> str:
+    return base64.b64encode(picture.tobytes()).decode("ascii")
+
+
+def _doubtful(tracks: Tracks) -> NDArray[np.bool_]:
+    """Which poses (f, n) a person should look at."""
+    return np.isin(tracks.status, DOUBTFUL) | (tracks.zncc < WEAK)
+
+
+def _tracked(opened: Project) -> Tracked:
+    tracks, scale = _tracks(opened), opened.given_scale()
+    return Tracked(tracks.id, np.dstack([scale.to_pixels(tracks.position), -tracks.rotation]))
+
+
+def _mender(opened: Project) -> Mender:
+    return opened.mender(lambda: _make(opened))
 
 
 def _make(opened: Project) -> Mender:

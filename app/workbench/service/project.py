@@ -39,6 +39,7 @@ class Project:
         self._job: Job | None = None
         self._found: tuple[Any, Found | None] = (None, None)
         self._mender: tuple[Any, Mender] | None = None
+        self._mending = threading.Lock()
 
     @property
     def key(self) -> str:
@@ -125,7 +126,7 @@ class Project:
 
     def mender(self, make: Callable[[], Mender]) -> Mender:
         """What correlates its rods again; made anew where the run's rods have changed."""
-        with self.lock:
+        with self._mending:  # not the other lock: pictures are answered while it is made
             stamp = self.results, run_stamp(self.results)[1]
             if self._mender is None or self._mender[0] != stamp:
                 self._mender = stamp, make()

@@ -13,7 +13,7 @@ from typing import Any
 from ...errors import InputError
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import RAW_SUFFIXES, natural_key
-from ...run_folder import SUMMARY, UNFINISHED
+from ...run_folder import SUMMARY, TRACKS, UNFINISHED
 
 PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
 DEEPEST = 3  # folders below the one that was opened
@@ -90,7 +90,7 @@ def run_facts(folder: Path) -> dict[str, Any] | None:
     try:
         summary = json.loads((folder / SUMMARY).read_bytes())
     except (OSError, ValueError):
-        return {"unfinished": True} if unfinished else None
+        return {"unfinished": unfinished} if unfinished or (folder / TRACKS).is_file() else None
     trust = [each for each in summary.get("trust", []) if isinstance(each, int | float)]
     return {
         "unfinished": unfinished,

@@ -1,6 +1,5 @@
 """The workbench in a real headless Chromium: from a folder of photographs to forces, by mouse and keyboard."""
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,71 +7,17 @@ import pytest
 from playwright.sync_api import Page, expect
 from rodsight.experiment.experiment import load_experiment
 from rodsight.verdicts.log import VERDICTS, VerdictLog
-from rodsight.workbench.service.bench import Bench
-from rodsight.workbench.service.server import WorkbenchServer
 
+from tests.app.workbench.hand import drag, fill, go, idle, on_screen, opened
 from tests.program import rodsight
 
 pytestmark = pytest.mark.screen
 
 
 @pytest.fixture
-def server(photographs_only):
-    server = WorkbenchServer(Bench(photographs_only))
-    thread = threading.Thread(target=server.serve, daemon=True)
-    thread.start()
-    yield server
-    server.shutdown()
-    thread.join()
-    server.close()
-
-
-@pytest.fixture
-def tab(page: Page, server: WorkbenchServer) -> Iterator[Page]:
-    page.set_viewport_size({"width": 1280, "height": 720})
-    wrong = []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.goto(server.address)
-    idle(page)
-    yield page
-    assert wrong == []
-
-
-def idle(tab: Page) -> None:
-    """Wait until the page has done what it was told, and the photograph has the size that the new step leaves it."""
-    tab.wait_for_function("() => globalThis.bench && bench.done > 0")
-    tab.evaluate("bench.busy.then(() => null)")
-    tab.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn(null))))")
-
-
-def go(tab: Page, step: str) -> None:
-    tab.click(f"#step-{step}")
-    idle(tab)
-
-
-def fill(tab: Page, field: str, text: str) -> None:
-    tab.fill(f"#field-{field}", text)
-    tab.keyboard.press("Enter")
-    idle(tab)
-
-
-def on_screen(tab: Page, place: tuple[float, float]) -> tuple[float, float]:
-    """Where a pixel of the photograph is on the page."""
-    x, y = tab.evaluate(
-        """(p) => { const box = bench.stage.canvas.getBoundingClientRect(), s = bench.stage.toScreen(p);
-        return [s[0] + box.left, s[1] + box.top]; }""",
-        list(place),
-    )
-    return x, y
-
-
-def drag(tab: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
-    tab.mouse.move(*on_screen(tab, start))
-    tab.mouse.down()
-    tab.mouse.move(*on_screen(tab, (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))))
-    tab.mouse.move(*on_screen(tab, end))
-    tab.mouse.up()
-    idle(tab)
+def tab(page: Page, photographs_only: Path) -> Iterator[Page]:
+    with opened(page, photographs_only) as tab:
+        yield tab
 
 
 def mark(tab: Page, step: str) -> str:
