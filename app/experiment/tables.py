@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .input_files import InputFiles
+from .plain_rows import split_plain
 
 GREATEST = 2**53  # beyond it a number with a point no longer tells two whole ones apart
 
@@ -19,7 +20,7 @@ GREATEST = 2**53  # beyond it a number with a point no longer tells two whole on
 class Table:
     """Columns of one file, with the line of each row."""
 
-    def __init__(self, file: Path, columns: Mapping[str, list[str]], line: list[int], *, of: str = "row") -> None:
+    def __init__(self, file: Path, columns: Mapping[str, list[str]], line: Sequence[int], *, of: str = "row") -> None:
         self.file = file
         self._columns = columns
         self._line = line
@@ -45,10 +46,19 @@ class Table:
         return self._columns[column]
 
     def integers(self, column: str) -> NDArray[np.int64]:
-        return np.array([self._number(int, column, row) for row in range(len(self))], np.int64)
+        try:
+            values = list(map(int, self._columns[column]))
+        except ValueError:
+            values = []
+        if not values or min(values) < -GREATEST or max(values) > GREATEST:  # one by one, to name what is wrong
+            values = [self._number(int, column, row) for row in range(len(self))]
+        return np.array(values, np.int64)
 
     def numbers(self, column: str) -> NDArray[np.float64]:
-        values = np.array([self._number(float, column, row) for row in range(len(self))], np.float64)
+        try:
+            values = np.array(list(map(float, self._columns[column])), np.float64)
+        except ValueError:  # one by one, to name it
+            values = np.array([self._number(float, column, row) for row in range(len(self))], np.float64)
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise self.error(int(bad[0]), column, "is not a finite number")
@@ -92,6 +102,9 @@ def read_table(
         content = (InputFiles() if inputs is None else inputs).read(file)
         if b"\0" in content:
             raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL character")
+        plain = split_plain(content, columns, optional)
+        if plain is not None:
+            return Table(file, plain.values, plain.line)
         with io.StringIO(content.decode("utf-8-sig"), newline="") as stream:
             reader = csv.reader(stream)
             header = [name.strip() for name in next(reader, [])]

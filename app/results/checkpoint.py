@@ -8,7 +8,6 @@ of itself, its number and that fingerprint: one that is damaged, or of another r
 from __future__ import annotations
 
 import hashlib
-import io
 import shutil
 from collections.abc import Mapping
 from contextlib import suppress
@@ -24,9 +23,11 @@ import numpy as np
 from ..atomic import write_atomically
 from ..errors import RunError
 from .hdf5.lazy import Lazily
+from .packed_arrays import pack, unpack
 
 T = TypeVar("T")
 CHECKSUM = 32  # bytes at the beginning of a file
+FORMAT = "packed arrays"  # part of the checksum: what an earlier version left in another form is not there
 MOST_KEPT = 2  # frames that were read last
 
 
@@ -60,18 +61,15 @@ class Checkpoint:
 
     def save(self, frame: int, *values: Any) -> None:
         """Keep dataclasses of arrays and numbers."""
-        stream = io.BytesIO()
-        named = {f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)}
-        np.savez(stream, allow_pickle=False, **named)
-        content = stream.getvalue()
+        content = pack({f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)})
         write_atomically(self._file(frame), self._checksum(frame, content) + content)
 
     def load(self, frame: int, *kinds: type) -> list[Any]:
         content = self._content(frame)
         if content is None:
             raise RunError(f"{self._file(frame)}: was damaged meanwhile; the same command does it again")
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
+        arrays = unpack(content)
+        return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
 
     def lazily(self, count: int, *kinds: type) -> tuple[Lazily[Any], ...]:
         """The first frames, read whenever they are asked for: a sequence for each kind."""
@@ -91,7 +89,9 @@ class Checkpoint:
         return content if whole[:CHECKSUM] == self._checksum(frame, content) else None
 
     def _checksum(self, frame: int, content: bytes) -> bytes:
-        return hashlib.sha256(f"{self._fingerprint} {frame} ".encode() + content).digest()
+        found = hashlib.sha256(f"{FORMAT} {self._fingerprint} {frame} ".encode())
+        found.update(content)
+        return found.digest()
 
     def _file(self, frame: int) -> Path:
         return self.folder / f"{frame:06d}.piece"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from rodsight.errors import RunError
 from rodsight.results.checkpoint import Checkpoint, flatten
+from rodsight.results.packed_arrays import pack, unpack
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.statistics.frame_statistics import FrameStatistics
@@ -73,3 +75,30 @@ def test_a_frame_of_another_run_or_place_is_none(tmp_path):
     assert one.finished() == 1
     (tmp_path / "one" / "000001.piece").write_bytes((tmp_path / "one" / "000000.piece").read_bytes())
     assert one.finished() == 1
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.array(True),
+        np.float64(2.5),
+        np.zeros((3, 0)),
+        np.arange(6.0).reshape(2, 3).T,
+        np.arange(8)[::2],
+        np.array(["wall", "é"]),
+    ],
+)
+def test_an_array_comes_back_as_it_was(array):
+    array = np.asarray(array)
+    found = unpack(pack({"before": np.ones(3, bool), "it": array}))
+    assert list(found) == ["before", "it"]
+    assert (found["it"].dtype, found["it"].shape) == (array.dtype, array.shape)
+    by_column = array.flags.f_contiguous and not array.flags.c_contiguous
+    assert found["it"].flags.c_contiguous is not by_column  # sums are rounded as they were
+    assert found["it"].tobytes() == array.tobytes()
+    assert found["it"].flags.writeable
+
+
+def test_objects_are_refused():
+    with pytest.raises(ValueError, match="names is an array of objects"):
+        pack({"names": np.array([{}])})
