@@ -25,7 +25,7 @@ from .look import entities
 from .look.axes import Axes, round_step
 from .look.canvas import Canvas
 from .look.clock import Clock, strain_ways
-from .look.colours import INK, OPEN, SERIES, make_ramp, packed, packed_one
+from .look.colours import DIFFERENCE_RAMP, INK, OPEN, SERIES, packed, packed_one
 from .look.force_style import ForceRange, ForceStyle
 from .look.scene import Scene, tracks_in_cell
 from .look.texts import printable
@@ -47,12 +47,7 @@ SUMMARY = "/compare/summary"
 
 DIFFERENCE_SHARE = 0.4  # of the drawn range of forces: the difference that is drawn widest and brightest
 
-# Cool where the second has more, over dark grey, to warm where the first has more.
-_DIFFERENCE_WAY = (
-    (0.80, 0.10, 225.0), (0.62, 0.14, 250.0), (0.42, 0.05, 265.0), (0.40, 0.0, 0.0), (0.45, 0.06, 40.0),
-    (0.66, 0.17, 45.0), (0.86, 0.14, 85.0),
-)  # fmt: skip
-_RAMP = packed(make_ramp(_DIFFERENCE_WAY))
+_RAMP = packed(DIFFERENCE_RAMP)
 
 
 def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale | None = None) -> int:

@@ -124,11 +124,11 @@ class Recorder:
         if photograph is not None:
             log_photograph(clock, scene.canvas, photograph)
         log_grains_and_walls(clock, scene, forces)
-        self.network_rows += log_network(clock, scene, forces, self._sweeps, self._kept)
+        self.network_rows += log_network(clock, scene, forces, self._former, self._sweeps, self._kept)
         log_starts(clock, forces)
         self._log_solve(clock, scene, forces)
         log_unconverged(clock, scene, forces, self._sweeps, self._kept)
-        log_touching(clock, scene, forces)
+        log_touching(clock, forces)
         log_reviewed(clock, scene, forces)
         log_changes(clock, scene, forces, self._former)
         log_settling(clock, scene, forces)

@@ -58,6 +58,11 @@ _PROBABILITY_WAY = (
     (0.66, 0.07, 200.0),
     (0.50, 0.07, 215.0),
 )
+# Less, in blue, over nothing to more, in orange.
+_DIFFERENCE_WAY = (
+    (0.80, 0.10, 225.0), (0.62, 0.14, 250.0), (0.42, 0.05, 265.0), (0.40, 0.0, 0.0), (0.45, 0.06, 40.0),
+    (0.66, 0.17, 45.0), (0.86, 0.14, 85.0),
+)  # fmt: skip
 RAMP_LEVELS = 64
 
 
@@ -102,3 +107,4 @@ FORCE_RAMP = make_ramp(_FORCE_WAY)
 GAP_RAMP = make_ramp(_GAP_WAY)
 DOUBT_RAMP = make_ramp(_DOUBT_WAY)
 PROBABILITY_RAMP = make_ramp(_PROBABILITY_WAY)
+DIFFERENCE_RAMP = make_ramp(_DIFFERENCE_WAY)

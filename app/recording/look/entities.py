@@ -46,7 +46,6 @@ SLIDING = "/contacts/sliding"
 GAPS = "/contacts/gap"
 GAINED = "/contacts/gained"
 PARTED = "/contacts/parted"
-PROBABILITY = "/contacts/probability"
 VERDICTS = "/contacts/verdict"
 FORCE_LEGEND = "/legend/force"
 SCALE_BAR = "/legend/scale"
@@ -54,8 +53,7 @@ SCALE_BAR_LENGTH = "/legend/scale/length"
 FORCE_LEGEND_TICKS = "/legend/force/ticks"
 GAP_LEGEND = "/legend/gap"
 GAP_LEGEND_TICKS = "/legend/gap/ticks"
-PROBABILITY_LEGEND = "/legend/probability"
-PROBABILITY_LEGEND_TICKS = "/legend/probability/ticks"
+COLOUR_LEGENDS = "/legend/by"  # and the quantity
 MAP_LEGEND = "/legend/unconverged"
 MAP_LEGEND_TICKS = "/legend/unconverged/ticks"
 
@@ -159,6 +157,17 @@ TRUTH_ERROR = "/truth/relative_l2"
 SUMMARY = "/summary"
 
 
+# What contacts may be coloured by, beside f_n: each is a component of FORCES.
+COLOURED_BY = TANGENTIAL, SLIDES, BEARS, TOUCHES, AGE, CHANGE, ERROR = (
+    "ft", "sliding", "bearing", "touching", "age", "change", "error",
+)  # fmt: skip
+
+
+def coloured_by(name: str) -> str:
+    """Archetype of the colours by a quantity of COLOURED_BY; their component is its `colors`."""
+    return f"by_{name}"
+
+
 # Curves whose deviation is known.
 BANDED = (
     FRICTION_ANGLE, PRINCIPAL_DIRECTION, COORDINATION_NUMBER, SLIDING_FRACTION, MOBILISATION, SIGMA_1, SIGMA_2,
@@ -223,7 +232,10 @@ _SCALAR = _of("Scalars", "scalars")
 _LINE = _of("SeriesLines", "colors", "names", "widths")
 _LANE = _of("StateChange", "state") | _of("StateConfiguration", "values", "labels", "colors")
 _FORCE_VALUES = frozenset({"i", "j", "grain_a", "body_b", "fn", "ft"})
-_CONTACT_VALUES = _FORCE_VALUES | {"gap_um", "fn_sd", "mobilisation", "state", "age", "probability"}
+_CONTACT_VALUES = _FORCE_VALUES | {
+    "gap_um", "fn_sd", "mobilisation", "state", "age", "probability", "sliding_probability", "bearing_probability",
+}  # fmt: skip
+_CONTACT_COLOURS = frozenset(f"{coloured_by(name)}:colors" for name in COLOURED_BY)
 _GRAIN_VALUES = frozenset({"id", "x_mm", "y_mm", "theta_deg", "sigma_um", "zncc", "status", "unbalance"})
 
 
@@ -245,8 +257,10 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(GRAIN_SPINS, "mark at the rim that was at the top in frame 0", _STRIPS, When.START),
     Entity(GRAINS_LOST, "cross over every grain without a pose", _STRIPS, When.START),
     Entity(
-        FORCES, "contacts, centre to centre (wall: centre to contact point); width and colour grow with f_n",
-        _STRIPS | _CONTACT_VALUES, When.START_AND_SWEEPS,
+        FORCES,
+        "contacts, centre to centre (wall: centre to contact point); width and colour grow with f_n; further colours, "
+        "to be chosen among, by other quantities",
+        _STRIPS | _CONTACT_VALUES | _CONTACT_COLOURS, When.START_AND_SWEEPS,
     ),
     Entity(
         FORCES_ACROSS, "second halves of the contacts across the edge of a periodic cell, as reported",
@@ -257,10 +271,6 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
     Entity(PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),
     Entity(
-        PROBABILITY, "contacts, colour by the probability that they touch; grey where it was not computed",
-        _STRIPS | {"probability", "grain_a", "body_b"}, When.START,
-    ),
-    Entity(
         VERDICTS, "contacts that a reviewer added or forbade", _STRIPS | {"source", "grain_a", "body_b"}, When.START,
     ),
     Entity(SCALE_BAR, "a bar of a round length", _STRIPS, When.STATIC),
@@ -269,8 +279,8 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
     Entity(GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
     Entity(GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
-    Entity(PROBABILITY_LEGEND, "colour of P(touch)", _STRIPS, When.STATIC),
-    Entity(PROBABILITY_LEGEND_TICKS, "its values", _TICKS, When.STATIC),
+    *(Entity(f"{COLOUR_LEGENDS}/{name}", f"colour by {name}", _STRIPS, When.STATIC) for name in COLOURED_BY),
+    *(Entity(f"{COLOUR_LEGENDS}/{name}/ticks", "its values", _TICKS, When.STATIC) for name in COLOURED_BY),
     Entity(MAP_LEGEND, "colour of unbalance and change", _STRIPS, When.STATIC),
     Entity(MAP_LEGEND_TICKS, "its values, over the mean f_n", _TICKS, When.STATIC),
     _scalar(SWEEP_FORCE_CHANGE, "log10 of the greatest |Δf|/|f|", When.SWEEPS, Condition.SWEPT),
@@ -389,12 +399,3 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(TRUTH_ERROR, "relative L2 error of (f_n, f_t)", When.END, Condition.TRUTH),
     Entity(SUMMARY, "settings, trust, legend", _of("TextDocument", "text", "media_type"), When.STATIC),
 )  # fmt: skip
-
-
-def describe_schema() -> str:
-    """The schema as a Markdown table."""
-    rows = [
-        f"| `{e.path}` | {e.meaning} | {', '.join(sorted(e.components))} | {e.when.value} | {e.condition.value} |"
-        for e in SCHEMA
-    ]
-    return "\n".join(["| entity | meaning | components | when | where |", "|---|---|---|---|---|", *rows])

@@ -16,7 +16,7 @@ from ..look.canvas import Canvas
 from ..look.colours import ADDED, BOUNDARY, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba, packed_one
 from ..look.scene import Scene
 from .changes import gap_colours, gap_range
-from .touching import probability_colours
+from .contact_colours import COLOURINGS
 from .unconverged import DECADES, doubt_colours
 
 PIECES = 48
@@ -37,11 +37,9 @@ def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
         [(0.5, "grains: force missing to balance; lines: |Δf|", INK)],
     )  # fmt: skip
     share = np.linspace(0.0, 1.0, PIECES)
-    log_ramp_legend(
-        stream, scene.canvas, entities.PROBABILITY_LEGEND, entities.PROBABILITY_LEGEND_TICKS,
-        probability_colours(share), [(0.0, "P(touch) 0"), (0.5, "0.5"), (1.0, "1")],
-        [(0.5, "point: sliding", SLIDING)],
-    )  # fmt: skip
+    for name, colouring in COLOURINGS.items():
+        path = f"{entities.COLOUR_LEGENDS}/{name}"
+        log_ramp_legend(stream, scene.canvas, path, f"{path}/ticks", colouring.colours(share), colouring.texts(scene))
 
 
 def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:

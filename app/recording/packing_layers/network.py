@@ -21,6 +21,7 @@ from ..look.colours import SLIDING, packed_one
 from ..look.force_style import ForceStyle
 from ..look.scene import Scene
 from ..look.values import known
+from .contact_colours import contact_colours
 
 CHUNK_BYTES = 1_000_000  # of one columnar message: the viewers load and drop data by the message
 FIRST_SWEEPS = 8  # kept whatever the spacing
@@ -34,8 +35,10 @@ class SweepChoice(StrEnum):
     NONE = "none"  # the reported field only
 
 
-def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepChoice, kept: int) -> int:
-    """Log one frame's contact forces, from its first sweep to the reported field.
+def log_network(
+    clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None, choice: SweepChoice, kept: int
+) -> int:
+    """Log one frame's contact forces, from its first sweep to the reported field; former: those of the frame before.
 
     At most `kept` sweeps with SweepChoice.LOG. Returns the rows written.
     """
@@ -51,6 +54,7 @@ def log_network(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepCh
             draw_order=20.0,
         ),
         contact_values(scene, forces),
+        *contact_colours(scene, forces, former),
     )
     if scene.walls.cell is not None:
         _log_far_halves(clock, scene, forces)
@@ -120,7 +124,15 @@ def contact_values(scene: Scene, forces: FrameForces) -> rr.AnyValues:
         state=pa.array([ContactState(s).name.lower() for s in forces.state.tolist()], pa.string()),
         age=pa.array(forces.age.astype(np.int32)),
         probability=known(forces.probability.astype(np.float32)),
+        sliding_probability=_where_known(forces.sliding_probability, forces),
+        bearing_probability=_where_known(forces.bearing_probability, forces),
     )
+
+
+def _where_known(probability: Array | None, forces: FrameForces) -> pa.Array:
+    """Values of contacts (c,), absent where files of earlier versions have none."""
+    values = np.full(forces.contacts.count, np.nan) if probability is None else probability
+    return known(values.astype(np.float32))
 
 
 def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from ..look.canvas import Canvas
 from ..packing_layers.stack import STACK_HEIGHT_SHARE
 from .axis_ranges import Extremes
 from .views import (
+    contacts_by,
     curve_view,
     drawn_view,
     flags_view,
@@ -35,6 +36,7 @@ class Tab(StrEnum):
     STATISTICS = "Statistics"
     LOADS = "Stress and walls"
     CONTACTS = "Contacts"
+    MAPS = "Contact maps"
     RODS = "3D"
     STACK = "Stack"
     TRUTH = "Truth"
@@ -76,6 +78,7 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: b
         Tab.STATISTICS: _statistics(layout),
         Tab.LOADS: _loads(layout),
         Tab.CONTACTS: _contacts(layout),
+        Tab.MAPS: _maps(layout),
         Tab.RODS: _rods(layout),
         Tab.STACK: _stack(layout),
     }
@@ -226,7 +229,8 @@ def _loads(layout: Layout) -> rrb.Container:
 
 def _contacts(layout: Layout) -> rrb.Container:
     changes = [entities.GAPS, entities.GAINED, entities.PARTED, entities.VERDICTS]
-    touching = [entities.WALLS, entities.GRAINS, entities.PROBABILITY, entities.SLIDING]
+    touching = [entities.WALLS, entities.GRAINS, entities.FORCES, entities.SLIDING]
+    touching.append(f"{entities.COLOUR_LEGENDS}/{entities.TOUCHES}/**")
     counts = [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]
     plots = [
         curve_view("Contacts", counts, layout.extremes, height=220.0),
@@ -238,12 +242,35 @@ def _contacts(layout: Layout) -> rrb.Container:
     return rrb.Horizontal(
         packing_view("Gaps, changes, verdicts", layout.canvas, [*_PACKING, *changes, f"{entities.GAP_LEGEND}/**"]),
         packing_view(
-            "Probability that they touch; sliding", layout.canvas, [*touching, f"{entities.PROBABILITY_LEGEND}/**"]
+            "Probability that they touch; points: sliding",
+            layout.canvas,
+            touching,
+            contacts_by(entities.TOUCHES, radius=0.1 * layout.canvas.grain_radius),
         ),
         rrb.Vertical(*plots),
         column_shares=[1.0, 1.0, 0.8],
         name=Tab.CONTACTS,
     )
+
+
+def _maps(layout: Layout) -> rrb.Container:
+    """The contacts, each map coloured by another quantity; what is chosen in one is chosen in all."""
+    thin = 0.13 * layout.canvas.grain_radius
+    legend = f"{entities.FORCE_LEGEND}/**"
+    first = [entities.WALLS, entities.FORCES, entities.SLIDING, legend]
+    views = [packing_view("Normal force f_n", layout.canvas, first)]
+    for quantity, name, radius in (
+        (entities.TANGENTIAL, "Tangential force f_t", None),
+        (entities.CHANGE, "Change of f_n since the frame before", None),
+        (entities.ERROR, "Standard deviation of f_n", None),
+        (entities.SLIDES, "Probability that it slides", thin),
+        (entities.BEARS, "Probability that it bears force", thin),
+        (entities.TOUCHES, "Probability that it touches", thin),
+        (entities.AGE, "Age: frames since it began", thin),
+    ):
+        contents = [entities.WALLS, entities.FORCES, f"{entities.COLOUR_LEGENDS}/{quantity}/**"]
+        views.append(packing_view(name, layout.canvas, contents, contacts_by(quantity, radius=radius)))
+    return rrb.Grid(*views, grid_columns=4, name=Tab.MAPS)
 
 
 def _rods(layout: Layout) -> rrb.View:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
+from rerun.blueprint.visualizers import Visualizer
 
 from ..look import entities
 from ..look.canvas import Canvas
@@ -13,8 +16,8 @@ PLOT_HEIGHT = 300.0  # px, of a curve view whose height is not told
 _TOP = (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop)
 
 
-def packing_view(name: str, canvas: Canvas, contents: list[str]) -> rrb.View:
-    """A view of the packing with a scale bar, and room for a legend below it."""
+def packing_view(name: str, canvas: Canvas, contents: list[str], contacts: Visualizer | None = None) -> rrb.View:
+    """A view of the packing with a scale bar, and room for a legend below it; contacts: how else they are drawn."""
     return rrb.Spatial2DView(
         origin="/",
         contents=[*contents, f"{entities.SCALE_BAR}/**"],
@@ -23,7 +26,18 @@ def packing_view(name: str, canvas: Canvas, contents: list[str]) -> rrb.View:
         visual_bounds=rrb.VisualBounds2D(
             x_range=[canvas.left, canvas.right], y_range=[canvas.top, canvas.bottom + canvas.legend_height]
         ),
+        overrides={entities.FORCES: contacts} if contacts else None,
     )
+
+
+def contacts_by(quantity: str, *, radius: float | None = None) -> Visualizer:
+    """Contacts coloured by one of entities.COLOURED_BY; radius [px]: of all lines, else they are as wide as f_n."""
+    style = rr.LineStrips2D.from_fields(radii=None if radius is None else [radius])
+    source = f"{entities.coloured_by(quantity)}:colors"
+    chosen = VisualizerComponentMapping(
+        "LineStrips2D:colors", ComponentSourceKind.SourceComponent, source_component=source
+    )
+    return style.visualizer(mappings=[chosen])
 
 
 def drawn_view(name: str, origin: str, x_range: tuple[float, float], y_range: tuple[float, float]) -> rrb.View:
@@ -58,8 +72,9 @@ def solid_view(name: str, origin: str, eye: tuple[float, float, float], target: 
 def lanes_view() -> rrb.View:
     """Status and tracking of the frames as lanes."""
     return rrb.StateTimelineView(
-        origin="/frames", contents=[entities.STATUS_LANE, entities.TRACKING_LANE], name="Status of the frames"
-    )
+        origin="/frames", contents=[entities.STATUS_LANE, entities.TRACKING_LANE], name="Status of the frames",
+        time_view=whole_axis(),
+    )  # fmt: skip
 
 
 def flags_view() -> rrb.View:
@@ -77,8 +92,9 @@ def curve_view(
     height: float = PLOT_HEIGHT,
     entries: int | None = None,
     corner: rrb.Corner2D = rrb.Corner2D.RightTop,
+    axis: rrb.TimeAxis | None = None,
 ) -> rrb.View:
-    """A plot of curves.
+    """A plot of curves, over the whole test where no other axis is given.
 
     extremes: of the curves, to leave room for the legend; y_range is taken instead where it is given. height [px] of
     the plot in a usual window; entries of the legend, by default one per path, none for a single one.
@@ -91,8 +107,14 @@ def curve_view(
         origin="/",
         contents=contents,
         name=name,
-        axis_x=rrb.TimeAxis(link="Independent"),
+        axis_x=axis or whole_axis(),
         axis_y=rrb.ScalarAxis(range=y_range) if y_range else None,
         plot_legend=rrb.PlotLegend(corner, visible=entries > 0),
         background=rrb.archetypes.PlotBackground(color=BACKGROUND),  # the curves' colours are made for a dark one
     )
+
+
+def whole_axis() -> rrb.TimeAxis:
+    """All of the timeline: else the viewer shows a minute, or 2000 of a sequence, about the cursor."""
+    everything = rrb.TimeRangeBoundary.infinite()
+    return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(start=everything, end=everything))

@@ -5,6 +5,7 @@ import pytest
 from rodsight.experiment.units import Scale
 from rodsight.recording.look.canvas import LARGEST_PHOTOGRAPH, NOMINAL_RADIUS, Canvas
 from rodsight.recording.look.colours import (
+    _DIFFERENCE_WAY,
     _DOUBT_WAY,
     _FORCE_WAY,
     _GAP_WAY,
@@ -26,7 +27,7 @@ GAMUT = 0.01  # of linear sRGB: what clipping may change without being seen
 EVEN = 1e-6  # relative: rounding
 
 
-@pytest.mark.parametrize("way", [_FORCE_WAY, _GAP_WAY, _DOUBT_WAY, _PROBABILITY_WAY])
+@pytest.mark.parametrize("way", [_FORCE_WAY, _GAP_WAY, _DOUBT_WAY, _PROBABILITY_WAY, _DIFFERENCE_WAY])
 def test_a_ramp_is_perceptually_even_and_can_be_shown(way):
     lab = even_way(lab_from_lch(way), RAMP_LEVELS)
     steps = np.linalg.norm(np.diff(lab, axis=0), axis=1)

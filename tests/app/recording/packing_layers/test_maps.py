@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
-from rodsight.recording.packing_layers.touching import probability_colours
+from rodsight.recording.packing_layers.contact_colours import COLOURINGS
 from rodsight.recording.packing_layers.unconverged import doubt_colours
 
 from solver.contacts.contacts import Contacts
@@ -74,8 +74,8 @@ def test_probabilities_are_shown_per_contact_and_counted(tmp_path):
     path = write_recording(
         replace(results, frames=[replace(frame, probability=probability)]), tmp_path / "run.rrd"
     ).path
-    shown = latest(path, entities.PROBABILITY, entities.FRAME, 0)
-    assert shown["LineStrips2D:colors"] == probability_colours(probability).tolist()
+    shown = latest(path, entities.FORCES, entities.FRAME, 0)
+    assert shown["by_touching:colors"] == COLOURINGS["touching"].colours(probability).tolist()
     assert np.allclose(shown["probability"], probability, atol=1e-7)  # float32
     expected = latest(path, entities.EXPECTED_COUNT, entities.FRAME, 0)["Scalars:scalars"]
     assert expected == pytest.approx([probability.sum()])
