@@ -156,7 +156,6 @@ TRUTH_ERROR = "/truth/relative_l2"
 
 SUMMARY = "/summary"
 
-
 # What contacts may be coloured by, beside f_n: each is a component of FORCES.
 COLOURED_BY = TANGENTIAL, SLIDES, BEARS, TOUCHES, AGE, CHANGE, ERROR = (
     "ft", "sliding", "bearing", "touching", "age", "change", "error",
