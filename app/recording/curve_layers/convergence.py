@@ -20,7 +20,7 @@ def log_residual_styles(stream: rr.RecordingStream) -> None:
     """Log names and colours of the residual curves."""
     _log_style(stream, entities.SWEEP_NATURAL_MAP, "natural map", SERIES[0], 1.5)
     _log_style(stream, entities.SWEEP_UNBALANCE, "worst unbalance / mean f_n", SERIES[1], 1.5)
-    _log_style(stream, entities.SWEEP_FORCE_CHANGE, "force change |Δf|/|f|", SERIES[3], 1.0)
+    _log_style(stream, entities.SWEEP_FORCE_CHANGE, "greatest |Δf|/|f| of a contact", SERIES[3], 1.0)
 
 
 def log_tolerance(clock: Clock, tolerance: float) -> None:

@@ -15,16 +15,18 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.nlgs.starts import COLD_SWEEPS
 from solver.nlgs.sweep_record import SweepHistory
+from solver.statistics.force_statistics import mean_normal_force
 
 from ..look import entities
 from ..look.axes import Axes
 from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba, packed
+from ..packing_layers.unconverged import changes_per_sweep
 
-DECADES = (-6.0, 4.0)  # log10 of a residual, bottom and top
+DECADES = (-6.0, 2.0)  # log10 of a residual, bottom and top
 MOST_POINTS = 220  # of a curve
 LEAST_SWEEPS = 1000  # that the axis has room for
-COLOURS: tuple[Rgba, ...] = (SERIES[0], SERIES[1], SERIES[3])  # natural map, unbalance, force change
+COLOURS: tuple[Rgba, ...] = (SERIES[0], SERIES[1], SERIES[3])  # natural map, unbalance, mean change
 COLD: Rgba = (176, 222, 128, 150)
 _POWERS = "⁰¹²³⁴⁵⁶"
 
@@ -44,7 +46,7 @@ class ResidualPlot:
         """
         cold = np.full(len(COLD_SWEEPS), np.nan) if cold is None else cold
         axes = self._axes or self._begin(clock.stream, history.count)
-        residuals = np.stack([history.natural_map, history.unbalance, history.force_change])
+        residuals = np.stack([history.natural_map, history.unbalance, mean_changes(history)])
         curves = [axes_points(axes, *envelope(each)) for each in residuals]
         known = np.isfinite(cold) & (cold > 0.0)
         strips = [*curves, axes_points(axes, COLD_SWEEPS[known].astype(float), cold[known])]
@@ -88,7 +90,7 @@ class ResidualPlot:
             (0.24, 0.98, "natural map", COLOURS[0]),
             (0.24, 0.91, "… of a cold start", (*COLD[:3], 255)),
             (0.68, 0.98, "worst unbalance / mean f_n", COLOURS[1]),
-            (0.68, 0.91, "force change |Δf|/|f|", COLOURS[2]),
+            (0.68, 0.91, "change per sweep / mean f_n", COLOURS[2]),
         ]  # fmt: skip
         if level:
             notes.append((0.46, 0.84, "straight: stopping level", INK))
@@ -102,6 +104,20 @@ class ResidualPlot:
             guides=level,
         )
         return axes
+
+
+def mean_changes(history: SweepHistory) -> Array:
+    """Mean |Δf| of a sweep over the mean f_n that the chain ends with (s,), between the sweeps whose forces are kept.
+
+    NaN where they are not. The greatest |Δf| / |f| of a contact, in contrast, tells of the weakest contacts alone.
+    """
+    mean = np.full(history.count, np.nan)
+    if len(history.recorded) > 1 and history.fn.shape[1]:
+        change = changes_per_sweep(history.recorded, history.fn, history.ft).mean(axis=1)
+        level = mean_normal_force(history.fn[-1])
+        if level > 0.0:
+            mean[history.recorded[1:]] = change / level
+    return mean
 
 
 def envelope(residual: Array) -> tuple[Array, Array]:

@@ -297,8 +297,7 @@ SCHEMA: tuple[Entity, ...] = (
     ),
     Entity(
         CHANGE_MAP,
-        "contacts, colour by the change since the recorded row before over the mean f_n; in the last row of a frame "
-        "the step from the chain to the reported field",
+        "contacts, colour by the change of a sweep over the mean f_n, on average since the recorded one before",
         _STRIPS, When.START_AND_SWEEPS,
     ),
     Entity(STATUS_LANE, "status of the frame", _LANE, When.START),

@@ -21,7 +21,8 @@ from .unconverged import DECADES, doubt_colours
 
 PIECES = 48
 TICKS_BELOW, NOTES_BELOW = 0.10, 0.42  # of the legend's height, from its line to the texts
-_POWERS = ("10⁻⁴", "0.001", "0.01", "0.1")  # texts of the decades of the maps
+_POWERS = ("grains 10⁻⁴", "0.001", "0.01", "0.1", "1")  # texts of the decades of the maps: of unbalance
+_CHANGES = ("lines 10⁻⁶", "10⁻⁵", "10⁻⁴", "0.001", "0.01")  # … and of change
 
 
 def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
@@ -33,8 +34,8 @@ def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     decades = int(DECADES[1] - DECADES[0])
     log_ramp_legend(
         stream, scene.canvas, entities.MAP_LEGEND, entities.MAP_LEGEND_TICKS, doubt_colours(10.0**power),
-        [(k / decades, _POWERS[k]) for k in range(decades)] + [(1.0, "1 × mean f_n")],
-        [(0.5, "grains: force missing to balance; lines: |Δf|", INK)],
+        [(k / decades, text) for k, text in enumerate(_POWERS[-decades - 1 :])],
+        [(k / decades, text, INK) for k, text in enumerate(_CHANGES[-decades - 1 :])],
     )  # fmt: skip
     share = np.linspace(0.0, 1.0, PIECES)
     for name, colouring in COLOURINGS.items():

@@ -1,7 +1,8 @@
 """Writes where a frame has not converged: the unbalance of every grain and the change of every contact.
 
-Both maps are of the forces as recorded, on the contacts of the frame. The change is the one since the recorded
-sweep before; in the last row of a frame it is the step from the chain's own last sweep to the reported field.
+Both maps are of the forces as recorded, on the contacts of the frame, over the mean f_n of the reported field. The
+change is that of one sweep, on average since the recorded sweep before; the last row of a frame, which is that of the
+reported field, keeps the change with which the chain ended.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from ..look.scene import Scene
 from .grains_and_walls import last_seen
 from .network import SweepChoice, visible_sweeps
 
-DECADES = (-4.0, 0.0)  # log10 of the mean f_n: the ends of the colour ramp
+DECADES = (-4.0, 0.0)  # log10 of the mean f_n: the ends of the colour ramp for an unbalance
+SWEEP_SHARE = 0.01  # that times as much for the change of one sweep
 LEVELS = 33  # colours that are told apart: few of them keep the file small
 
 _RAMP = packed(DOUBT_RAMP)[np.round(np.linspace(0, len(DOUBT_RAMP) - 1, LEVELS)).astype(int)]
@@ -36,7 +38,9 @@ def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: Swe
     mean = mean_normal_force(forces.fn)  # of the reported field: what every row is measured by
     unbalance = unbalances(forces.contacts, fn, ft, scene.weight) / mean
     change = np.full(fn.shape, np.nan)
-    change[1:] = np.hypot(np.diff(fn, axis=0), np.diff(ft, axis=0)) / mean
+    if len(rows) > 2:
+        change[1:-1] = changes_per_sweep(rows[:-1], fn[:-1], ft[:-1]) / (SWEEP_SHARE * mean)
+        change[-1] = change[-2]
     lost = ~scene.tracks.present[clock.frame]
     unbalance[:, lost | ~scene.grains.free] = np.nan  # no balance is asked of the boundary
     clock.start()
@@ -68,6 +72,12 @@ def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: Swe
         if colours.size:
             lengths = np.full(len(colours), colours.shape[1])
             clock.stream.send_columns(path, when, columns(colors=colours.ravel()).partition(lengths))
+
+
+def changes_per_sweep(sweep: NDArray[np.int64], fn: NDArray[np.floating], ft: NDArray[np.floating]) -> Array:
+    """How much a force changes in a sweep [N] (r − 1, c), on average between sweeps (r,) with forces (r, c) [N]."""
+    change = np.hypot(np.diff(fn, axis=0), np.diff(ft, axis=0))
+    return np.asarray(change / np.diff(sweep)[:, None], np.float64)
 
 
 def doubt_colours(share: Array) -> NDArray[np.uint32]:

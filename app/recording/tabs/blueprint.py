@@ -21,6 +21,7 @@ from .views import (
     drawn_view,
     flags_view,
     lanes_view,
+    near_axis,
     packing_view,
     polar_view,
     solid_view,
@@ -128,14 +129,14 @@ def _convergence(layout: Layout) -> rrb.Container:
         drawn_view("Residuals of this frame over its sweeps", "/solve/plot", *PLOT_BOUNDS),
         curve_view(
             "log₁₀ residuals: every sweep, or the last of a frame", [*residuals, entities.TOLERANCE],
-            y_range=(-6.4, 4.4),
+            y_range=(-6.4, 4.4), axis=near_axis(),
         ),
     ]  # fmt: skip
     if high > low:  # the same number in every frame is no curve
         plots.append(curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes))
     return rrb.Horizontal(
         packing_view("Network as it forms", layout.canvas, [*_PACKING, *_FORCES]),
-        packing_view("Unbalance of grains, change since the last row", layout.canvas, maps),
+        packing_view("Unbalance of grains, change per sweep, over mean f_n", layout.canvas, maps),
         rrb.Vertical(*plots, row_shares=[2.0, 1.5, 0.8][: len(plots)]),
         column_shares=[1.0, 1.0, 1.05],
         name=Tab.CONVERGENCE,
@@ -147,9 +148,11 @@ def _settling(layout: Layout) -> rrb.Container:
     doubts = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
     below = [
         curve_view("Doubts: ε, ū and H", doubts, layout.extremes, height=190.0),
-        curve_view("Sweeps saved", [entities.SAVED_SWEEPS]),
-        curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes),
+        curve_view("Sweeps that the former forces save", [entities.SAVED_SWEEPS]),
     ]
+    longest = layout.extremes.get(entities.FRAMES_SINCE_RESET, (0.0, 0.0))[1]
+    if longest < layout.frame_count - 1:  # counting the frames is no curve
+        below.append(curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes))
     if layout.budget:
         below[1:] = [curve_view("Error budget: shares of the variance", [entities.ERROR_BUDGET], y_range=_SHARE,
                                 entries=6)]  # fmt: skip
@@ -162,7 +165,7 @@ def _settling(layout: Layout) -> rrb.Container:
         rrb.Horizontal(
             *below,
             flags_view(),
-            column_shares=[1.0, *([1.6] if layout.budget else [0.8, 0.8]), 1.4],
+            column_shares=[1.0, *([1.6] if layout.budget else [0.8] * (len(below) - 1)), 1.4],
         ),
         row_shares=[1.0, 2.0, 1.8],
         name=Tab.SETTLING,

@@ -118,3 +118,8 @@ def whole_axis() -> rrb.TimeAxis:
     """All of the timeline: else the viewer shows a minute, or 2000 of a sequence, about the cursor."""
     everything = rrb.TimeRangeBoundary.infinite()
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(start=everything, end=everything))
+
+
+def near_axis() -> rrb.TimeAxis:
+    """A minute of the timeline, or 2000 of a sequence, about the cursor: of what has a value for every sweep."""
+    return rrb.TimeAxis(link="Independent")

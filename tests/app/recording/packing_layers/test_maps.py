@@ -7,7 +7,7 @@ import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.contact_colours import COLOURINGS
-from rodsight.recording.packing_layers.unconverged import doubt_colours
+from rodsight.recording.packing_layers.unconverged import changes_per_sweep, doubt_colours
 
 from solver.contacts.contacts import Contacts
 from solver.statistics.balance import grain_unbalance, unbalances
@@ -58,13 +58,20 @@ def test_maps_follow_the_sweeps_and_end_with_the_reported_field(tmp_path):
     late = latest(path, entities.CHANGE_MAP, entities.SWEEP, 39)["LineStrips2D:colors"]
     end = latest(path, entities.CHANGE_MAP, entities.SWEEP, 40)["LineStrips2D:colors"]
     assert early != late
-    mean = frame.fn[frame.fn > 0].mean()
-    step = np.hypot(frame.fn - frame.history.fn[-1], frame.ft - frame.history.ft[-1]) / mean
-    assert end == doubt_colours(step).tolist()
+    mean, history = frame.fn[frame.fn > 0].mean(), frame.history
+    step = np.hypot(history.fn[39] - history.fn[38], history.ft[39] - history.ft[38]) / mean
+    assert late == end == doubt_colours(100.0 * step).tolist()  # a hundredth of the range of the unbalance
     grains = latest(path, entities.UNBALANCE_MAP, entities.FRAME, 0)["Points2D:colors"]
     weightless, here = np.zeros((results.grains.count, 2)), results.tracks.present[0]
     unbalance = grain_unbalance(frame.contacts, frame.fn, frame.ft, weightless, here)
     assert grains == doubt_colours(unbalance).tolist()
+
+
+def test_a_change_between_distant_sweeps_is_that_of_one_of_them_on_average():
+    fn = np.array([[1.0, 5.0], [4.0, 5.0], [4.0, 15.0]])
+    ft = np.array([[0.0, 2.0], [4.0, 2.0], [4.0, 2.0]])
+    found = changes_per_sweep(np.array([0, 1, 11]), fn, ft)
+    assert found.tolist() == [[5.0, 0.0], [0.0, 1.0]]
 
 
 def test_probabilities_are_shown_per_contact_and_counted(tmp_path):
