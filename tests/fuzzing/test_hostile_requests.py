@@ -57,6 +57,8 @@ PATHS = (
     "/crop?at=../..&frame=0&x=0&y=0&width=9",
     "/page/app.js",
     "/page/..%2fserver.py",
+    "/viewer/module.wasm",
+    "/recording/{key}/experiment/recording.rrd",
     "/growing.rrd",
     "/{key}/growing.rrd",
     "/../results.h5",

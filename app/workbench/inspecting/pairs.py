@@ -19,7 +19,7 @@ from ...verdicts.decisions import Bodies
 from ...verdicts.log import Body, VerdictLog
 from .found import plain
 
-MOST = 400  # pairs of a list
+MOST = 5000  # pairs of a list
 STANDS = 0.05  # of the mean force: a resultant that is left over below it is borne
 
 

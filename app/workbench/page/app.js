@@ -151,7 +151,7 @@ function showKeys() {
 
 addEventListener("keydown", (event) => {
   const typing = /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName) && event.target.type !== "range";
-  if (event.target.closest?.("dialog")) return;
+  if (event.target.closest?.("dialog, #recording")) return; // the viewer has keys of its own
   if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && app.project && !typing) {
     event.preventDefault();
     undo(event.shiftKey ? "redo" : "undo");

@@ -1,23 +1,25 @@
 // Step 8: the network under a magnifying glass: any contact or rod with its numbers, its past and its pictures;
 // verdicts by keys, those pairs first on which most hangs; blind, where the picture alone shall speak.
 
-import { ask, chart, colour, digits, fact, h, tell } from "/page/dom.js";
+import { ask, at, chart, colour, digits, fact, h, tell } from "/page/dom.js";
 import { COLOURINGS, drawChange, drawLegend, drawNetwork } from "/page/network.js";
 import { showLanes, jump } from "/page/lanes.js";
+import { Recording } from "/page/recording.js";
 
 const VERDICTS = { c: "contact", n: "no contact", u: "unsure" };
 const SAID = { contact: "#2fbf93", "no contact": "#d55e00", unsure: "#f0e442" };
-let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, by = "fn", blind = false, who = null, since = 0, frameOf = -1, without = null;
+let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, by = "fn", blind = false, who = null, since = 0, frameOf = -1, without = null, recording = null;
 
 export const inspect = {
   name: "inspect", title: "Inspect", digits: false,
   mark: (app) => (app.project.run?.frames !== undefined ? "good" : "missing"),
   get dim() { return blind ? 1 : 0.72; },
   hint: (app) => (!facts ? "" : blind ? "Blind: judge by the photograph alone. C contact · N none · U unsure · Z undo" : chosen ? "C contact · N no contact · U unsure · Z undo · Space next at stake" : "Click a contact or a rod; Space goes to the pair on which most hangs"),
-  keyHelp: [["C N U", "contact, no contact, unsure"], ["Z", "take the last verdict back"], ["Space", "the pair on which most hangs and nothing is said of"], ["W", "the forces without this contact"], ["B", "blind, or not"], ["J", "the next flagged frame"]],
+  keyHelp: [["C N U", "contact, no contact, unsure"], ["Z", "take the last verdict back"], ["Space", "the pair on which most hangs and nothing is said of"], ["W", "the forces without this contact"], ["B", "blind, or not"], ["V", "the recording, or the photograph"], ["J", "the next flagged frame"]],
   enter(app) { facts = null; net = null; chosen = null; past = null; frameOf = -1; app.queue(async () => { who ??= (await ask("reviewer")).name; facts = (await ask("run_told", { at: app.project.at })).frames; await load(app); }); },
-  moved(app) { app.queue(() => load(app)); },
-  tool,
+  leave() { closeRecording(); },
+  moved(app) { recording?.show(app.frame); app.queue(() => load(app)); },
+  tool: (app) => tool(app),
   panel(app) {
     if (!facts) return h("p", {}, "There is nothing to inspect yet: run the experiment first (step 6).");
     if (facts.provisional) return h("p", {}, "The run is not finished: what it has found so far is shown in step 6.");
@@ -25,7 +27,7 @@ export const inspect = {
     return [
       h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", disabled: blind, onchange: (event) => { by = event.target.value; app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === by }, how.words)))),
       h("div", { class: "field" }, h("label", { htmlFor: "who" }, "reviewer"), h("input", { id: "who", value: who ?? "", onchange: (event) => { who = event.target.value.trim() || "reviewer"; app.queue(() => load(app, true)); } })),
-      h("div", { class: "row" }, h("button", { class: blind ? "on" : "", id: "blind", onclick: () => { blind = !blind; app.paint(); }, title: "B" }, "Blind"), h("button", { class: "primary", id: "next", onclick: () => nextAtStake(app) }, "Next at stake"), h("span", { class: "soft" }, list ? `${judged} judged of ${list.length}` : "")),
+      h("div", { class: "row" }, h("button", { class: blind ? "on" : "", id: "blind", onclick: () => toggleBlind(app), title: "B" }, "Blind"), h("button", { class: recording ? "on" : "", id: "show-recording", disabled: blind, onclick: () => toggleRecording(app), title: blind ? "It shows what was found: not while you judge blind" : "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null, h("button", { class: "primary", id: "next", onclick: () => nextAtStake(app) }, "Next at stake"), h("span", { class: "soft" }, list ? `${judged} judged of ${list.length}` : "")),
       chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
       !blind && list && !chosen ? [h("h3", {}, "Most hangs on"), h("div", { class: "list" }, list.slice(0, 14).map((each) => h("button", { onclick: () => pick(app, each, true) }, h("span", { style: { flex: "1" } }, pairName(each)), h("span", { class: "soft" }, `P ${digits(each.probability, 2)} · ${digits(each.stake, 2)} N`), each.verdict ? h("span", { class: "swatch", style: { background: SAID[each.verdict] } }) : null)))] : null,
     ];
@@ -47,7 +49,8 @@ export const inspect = {
   key(app, event) {
     const key = event.key.toLowerCase();
     if (event.key === " ") { nextAtStake(app); return true; }
-    if (key === "b") { blind = !blind; app.paint(); return true; }
+    if (key === "b") { toggleBlind(app); return true; }
+    if (key === "v") { toggleRecording(app); return true; }
     if (key === "j") { jump(app, facts); return true; }
     if (key === "z") { undo(app); return true; }
     if (event.key === "Escape" && chosen) { chosen = null; past = null; without = null; app.paint(); return true; }
@@ -57,6 +60,21 @@ export const inspect = {
   },
   timeline(app) { showLanes(app, facts); },
 };
+
+function toggleBlind(app) { blind = !blind; if (blind) closeRecording(); app.paint(); }
+
+function closeRecording() { recording?.close(); recording = null; }
+
+/** The recording in the place of the photograph, at the page's frame; a contact that is clicked there has its card here. */
+function toggleRecording(app) {
+  if (recording) { closeRecording(); app.paint(); return; }
+  if (!facts || facts.provisional || blind) return;
+  const clicked = (x, y, what) => { if (net && list) choose(app, [x, y], what.startsWith("/contacts")); };
+  recording = new Recording(at("recording"), app.project.at, { frame: (frame) => app.show(frame), clicked });
+  recording.open(app.frame);
+  app.recording = recording;
+  app.paint();
+}
 
 const shuffled = (pair) => { let x = 2166136261; for (const letter of `${pair.i} ${pair.j}`) x = Math.imul(x ^ letter.charCodeAt(0), 16777619); return (x ^ (x >>> 15)) >>> 0; };
 const named = (body) => (typeof body === "number" ? `rod ${body}` : `wall ${body}`);
@@ -81,18 +99,30 @@ function pick(app, pair, look = false) {
 
 const meanRadius = () => net.rods.r.reduce((a, b) => a + b, 0) / Math.max(net.rods.r.length, 1);
 
-function tool(app) {
-  return { click: (p) => {
-    if (!net || !list) return;
-    const reach = 0.42 * meanRadius();
-    let best = null, least = reach;
-    for (const each of list) { const away = Math.hypot(each.point[0] - p[0], each.point[1] - p[1]); if (away < least) { least = away; best = each; } }
-    if (best) { pick(app, best); return; }
-    const n = net.rods.id.findIndex((_, k) => Math.hypot(net.rods.x[k] - p[0], net.rods.y[k] - p[1]) < net.rods.r[k]);
-    past = null; rodPast = null; without = null; chosen = n < 0 ? null : { id: net.rods.id[n] };
-    app.paint();
-    if (chosen) { const { id } = chosen; ask("rod", { at: app.project.at, id }).then((answer) => { if (chosen?.id === id) { rodPast = answer; app.paint(); } }, (error) => tell(error.message, true)); }
-  } };
+const tool = (app) => ({ click: (p) => { if (net && list) choose(app, p); } });
+
+/** The contact near a place, or the rod that is there; line: what was clicked is drawn from centre to centre. */
+function choose(app, p, line = false) {
+  const drawn = line ? nearestLine(p) : null;
+  if (drawn) { pick(app, drawn); return; }
+  const reach = 0.42 * meanRadius();
+  let best = null, least = reach;
+  for (const each of list) { const away = Math.hypot(each.point[0] - p[0], each.point[1] - p[1]); if (away < least) { least = away; best = each; } }
+  if (best) { pick(app, best); return; }
+  const n = net.rods.id.findIndex((_, k) => Math.hypot(net.rods.x[k] - p[0], net.rods.y[k] - p[1]) < net.rods.r[k]);
+  past = null; rodPast = null; without = null; chosen = n < 0 ? null : { id: net.rods.id[n] };
+  app.paint();
+  if (chosen) { const { id } = chosen; ask("rod", { at: app.project.at, id }).then((answer) => { if (chosen?.id === id) { rodPast = answer; app.paint(); } }, (error) => tell(error.message, true)); }
+}
+
+function nearestLine(p) {
+  let best = -1, least = 0.7 * meanRadius();
+  net.line.forEach(([x1, y1, x2, y2], n) => {
+    const along = [x2 - x1, y2 - y1], square = along[0] ** 2 + along[1] ** 2 || 1, t = Math.min(Math.max(((p[0] - x1) * along[0] + (p[1] - y1) * along[1]) / square, 0), 1);
+    const away = Math.hypot(x1 + t * along[0] - p[0], y1 + t * along[1] - p[1]);
+    if (away < least) { least = away; best = n; }
+  });
+  return best < 0 ? null : list.find((each) => each.i === net.i[best] && each.j === net.j[best]) ?? null;
 }
 
 function askWithout(app) {

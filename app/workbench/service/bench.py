@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import threading
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ class Bench:
 
     def __init__(self, root: Path) -> None:
         self.root = root.resolve()
+        self.key = secrets.token_urlsafe(32)  # in the address of a recording, which the page alone is told
         self._projects: dict[str, Project] = {}
         self._lock = threading.Lock()
         self.closed = False

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import secrets
 import socket
 from collections.abc import AsyncIterator
 from importlib.resources import files
@@ -27,6 +28,7 @@ from . import inspect_questions, mend_questions, run_questions, setup_questions 
 from .bench import Bench
 from .project import Project
 from .questions import BadRequest, answer
+from .recordings import PATH, Viewer, answer_recording, answer_viewer
 
 LARGEST_BODY = 256 * 1024  # bytes of a question
 WIDEST = 20_000  # [px] of a picture
@@ -41,8 +43,9 @@ HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
 class Guard:
     """Lets through what the gate has nothing against, and gives every answer the safe headers."""
 
-    def __init__(self, application: ASGIApp, gate: Gate) -> None:
+    def __init__(self, application: ASGIApp, gate: Gate, key: str) -> None:
         self.application, self.gate = application, gate
+        self.named = f"{PATH}{key}/"  # what begins so may be asked for without a cookie: the viewer keeps none
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -67,7 +70,9 @@ class Guard:
                 return PlainTextResponse(f"{name} stands twice", 400)
         entering = request.url.path == "/" and "token" in request.query_params
         headers = {name: value for name in HEADERS if (value := request.headers.get(name)) is not None}
-        objection = self.gate.objection(headers, changes=request.method != "GET", entering=entering)
+        beginning = request.url.path[: len(self.named)].encode()
+        named = secrets.compare_digest(beginning, self.named.encode())
+        objection = self.gate.objection(headers, changes=request.method != "GET", entering=entering or named)
         if objection is not None:
             return PlainTextResponse(objection, 403)
         if not entering:
@@ -81,6 +86,8 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
     """The server's whole behaviour, without a network."""
     page = files(__name__.rsplit(".", 2)[0]) / "page"
     assets = {file.name: file.read_bytes() for file in page.iterdir() if _kind(file.name) is not None}
+
+    viewer = Viewer()
 
     async def asset(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")
@@ -123,9 +130,11 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
         Route("/photograph", picture, methods=["GET"]),
         Route("/crop", crop, methods=["GET"]),
         Route("/events", events, methods=["GET"]),
+        Route("/viewer/{name}", lambda request: answer_viewer(viewer, request), methods=["GET"]),
+        Route(f"{PATH}{bench.key}/{{at:path}}/{{name}}", lambda request: answer_recording(bench, request)),
         Route("/ask/{name}", ask, methods=["POST"]),
     ]
-    return Guard(Starlette(routes=routes), gate)
+    return Guard(Starlette(routes=routes), gate, bench.key)
 
 
 class WorkbenchServer:

@@ -2,6 +2,7 @@
 
 import pytest
 from rodsight.workbench.service.bench import Bench
+from starlette.testclient import TestClient
 
 from .conftest import HOST, Visitor
 
@@ -11,7 +12,16 @@ def stranger(tmp_path):
     return Visitor(Bench(tmp_path))
 
 
-@pytest.mark.parametrize("path", ["/", "/page/app.js", "/photograph?at=.&frame=0"])
+@pytest.fixture
+def stranger_to():
+    """Somebody without a cookie at the doors of a visitor's server."""
+    return lambda visitor: TestClient(visitor.client.app, base_url=HOST)
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/", "/page/app.js", "/photograph?at=.&frame=0", "/viewer/script.js", "/recording/guess/mine/recording.rrd"],
+)
 def test_without_the_cookie_nothing_is_served(stranger, path):
     assert stranger.client.get(path).status_code == 403
 
@@ -43,6 +53,36 @@ def test_every_answer_carries_the_policy(visitor):
         assert "default-src 'none'" in headers["Content-Security-Policy"]
         assert headers["Cache-Control"] == "no-store"
         assert headers["X-Frame-Options"] == "DENY"
+
+
+def test_a_recording_is_given_under_its_secret_name_alone(visitor, stranger_to, photographs_only):
+    at = visitor.ask("begin", roll=0, name="mine")["at"]
+    assert "no recording" in visitor.refused("recording", at=at)
+    run = photographs_only / "runs" / "mine"
+    run.mkdir(parents=True)
+    (run / "recording.rrd").write_bytes(b"what was recorded")
+    told = visitor.ask("recording", at=at)
+    (address,) = told["addresses"]
+    assert visitor.bench.key in address
+    answer = stranger_to(visitor).get(address)  # as the viewer asks: without the page's cookie
+    assert answer.content == b"what was recorded"
+    assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+    wrong = "A" if visitor.bench.key[0] != "A" else "B"
+    assert (
+        stranger_to(visitor).get(address.replace(visitor.bench.key, wrong + visitor.bench.key[1:])).status_code == 403
+    )
+    assert stranger_to(visitor).get(address, headers={"Host": "evil.example"}).status_code == 403
+    assert stranger_to(visitor).get(address.replace("recording.rrd", "tracks.h5")).status_code == 404
+    above = address.replace("/my%20photographs/", "/..%2f../")
+    assert stranger_to(visitor).get(above).status_code in (404, 422)
+
+
+def test_the_viewer_is_the_installed_one_as_a_module(visitor):
+    script = visitor.client.get("/viewer/script.js")
+    assert script.text.endswith("export default wasm_bindgen;\n")
+    packed = visitor.client.get("/viewer/module.wasm")
+    assert packed.headers["Content-Encoding"] == "gzip"
+    assert packed.content[:4] == b"\0asm"
 
 
 def test_no_path_leads_out_of_the_folder(visitor):

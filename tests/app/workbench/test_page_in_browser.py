@@ -86,6 +86,16 @@ def judge_by_key(tab: Page, run: Path) -> None:
     tab.keyboard.press("z")
     idle(tab)
     assert [str(entry.verdict) for _, entry in log.verdicts()] == ["contact"]
+    show_the_recording(tab)
+
+
+def show_the_recording(tab: Page) -> None:
+    frame = tab.evaluate("bench.frame")
+    tab.keyboard.press("v")
+    tab.wait_for_function("(frame) => bench.recording?.opened && bench.recording.heard === frame", arg=frame)
+    tab.click("#step-photographs")
+    idle(tab)
+    expect(tab.locator("#recording")).to_be_hidden()
 
 
 def test_the_sample_is_a_click_away(tab, photographs_only):

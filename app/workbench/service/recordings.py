@@ -1,0 +1,97 @@
+"""The recording of a run as the page gets it: the viewer of the installed wheel, and the file under a secret name.
+
+Nothing of it is loaded before somebody asks for the recording.
+"""
+
+from __future__ import annotations
+
+import gzip
+import threading
+from typing import Any
+from urllib.parse import quote
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+
+from ...errors import InputError
+from ...recording.look.canvas import Canvas
+from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
+from ...run_folder import RECORDING, SIDE
+from .bench import Bench
+from .project import Project
+from .questions import Text, question
+from .run_questions import scale_of
+
+FILES = (RECORDING, SIDE)
+PATH = "/recording/"  # what the viewer asks for, without the page's cookie: <key>/<experiment>/<file>
+
+
+@question
+def recording(bench: Bench, at: Text) -> dict[str, Any]:
+    """Where the viewer finds the recording; and how many pixels of the photograph are one of its own."""
+    opened = bench.project(at)
+    files = [name for name in FILES if (opened.results / name).is_file()]
+    if RECORDING not in files:
+        raise InputError(opened.results, "", "holds no recording: let the run come to its end")
+    folder = f"{PATH}{bench.key}/{quote(opened.key)}/"
+    size = sum((opened.results / name).stat().st_size for name in files)
+    return {"addresses": [folder + name for name in files], "bytes": size, "shrink": _shrink(opened)}
+
+
+def _shrink(opened: Project) -> int:
+    found = opened.found()
+    if found is None:
+        return 1
+    return Canvas.around(found.tracks, scale_of(opened), opened.understood().shape).shrink
+
+
+class Viewer:
+    """The wheel's web viewer, read once, when it is first asked for."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._viewer: WebViewer | None = None
+        self._packed = b""
+
+    def script(self) -> bytes:
+        """As a module, which needs no script element of the page's own."""
+        return self._read().script + b"\nexport default wasm_bindgen;\n"
+
+    def module(self, *, packed: bool) -> bytes:
+        """WebAssembly; packed: by gzip, a third of its size."""
+        module = self._read().module
+        if not packed:
+            return module
+        with self._lock:
+            self._packed = self._packed or gzip.compress(module, 1)
+            return self._packed
+
+    def _read(self) -> WebViewer:
+        with self._lock:
+            if self._viewer is None:
+                self._viewer = read_web_viewer()
+            return self._viewer
+
+
+def answer_viewer(viewer: Viewer, request: Request) -> Response:
+    """The script, or the module."""
+    if request.url.path.endswith(".js"):
+        return Response(viewer.script(), media_type="text/javascript")
+    packed = "gzip" in request.headers.get("Accept-Encoding", "")
+    encoding = "gzip" if packed else "identity"
+    headers = {"Content-Encoding": encoding, "Vary": "Accept-Encoding"}
+    return Response(viewer.module(packed=packed), media_type="application/wasm", headers=headers)
+
+
+def answer_recording(bench: Bench, request: Request) -> Response:
+    """The file; whether its name is the right one, the guard has seen."""
+    name = request.path_params["name"]
+    if name not in FILES:
+        return PlainTextResponse("there is nothing here", 404)
+    try:
+        file = bench.project(request.path_params["at"]).results / name
+    except InputError as error:
+        return PlainTextResponse(str(error), 422)
+    if not file.is_file():
+        return PlainTextResponse("the recording is not there any more", 404)
+    return FileResponse(file, media_type="application/octet-stream")
