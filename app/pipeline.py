@@ -37,6 +37,7 @@ from .inference.inference import (
     Inputs,
     SolvedFrame,
     correct_sequence,
+    renew_first,
     solve_frames,
 )
 from .inference.settings import material_of, settings_of
@@ -235,6 +236,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     _solve_frames(run, sequence, checkpoint)
     frames, statistics = checkpoint.lazily(len(sequence.snapshots), FrameForces, FrameStatistics)
     _refuse_nothing(run, frames)
+    frames, statistics = _with_first_renewed(run, sequence, frames, statistics)
     check = sequence.find_friction(frames)
     judged = Lazily(len(frames), lambda k: doubt_friction(frames[k], check))
     results = replace(unsolved, frames=judged, statistics=statistics, friction_check=check)
@@ -242,6 +244,29 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     checkpoint.clear()
     run.timings.add("solving", since)
     return results
+
+
+def _with_first_renewed(
+    run: Run,
+    sequence: CorrectedSequence,
+    frames: Sequence[FrameForces],
+    statistics: Sequence[FrameStatistics],
+) -> tuple[Sequence[FrameForces], Sequence[FrameStatistics]]:
+    """The same with the first frame as it is seen from the others; as it was, where that is impossible."""
+    try:
+        first = renew_first(sequence, frames)
+    except MemoryError:  # not the frame's fault
+        raise
+    except Exception as error:
+        run.note_failure("first photograph", 0, error)
+        run.notes.append("The first photograph could not be solved again when all were known (failures.log).")
+        return frames, statistics
+    if first is None:
+        return frames, statistics
+    return (
+        Lazily(len(frames), lambda k: first.forces if k == 0 else frames[k]),
+        Lazily(len(frames), lambda k: first.statistics if k == 0 else statistics[k]),
+    )
 
 
 def _store(run: Run, results: Results, origin: Provenance) -> Results:

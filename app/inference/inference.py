@@ -6,7 +6,7 @@ after the last one, bit for bit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -23,7 +23,7 @@ from solver.contacts.verdicts import Verdicts
 from solver.convex.friction_check import FrictionCheck, WallFriction
 from solver.sequence.failure import describe_error, failed_frame, find_unseen
 from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.frames import solve_sequence
+from solver.sequence.frames import solve_first_again, solve_sequence
 from solver.sequence.judging.doubts import doubt_friction
 from solver.sequence.judging.statistic_intervals import with_deviations
 from solver.sequence.settings import SequenceSettings
@@ -35,6 +35,7 @@ from ..progress import Observer, unheard
 from ..tracks import Tracks, WallTracks
 from .boundary import measure_noise, mend
 from .calibration import calibrate_tracks, known_radii
+from .first_frame import ask_first_again
 from .friction_and_radii import friction_of, measure_friction, measure_friction_of_walls, tuned_radii
 from .radii import calibrate_with_radii
 from .settings import InferenceSettings
@@ -197,6 +198,33 @@ def solve_frames(
             members = sequence.settings.keep_members
             forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
         yield SolvedFrame(forces, statistics, state)
+
+
+def renew_first(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> SolvedFrame | None:
+    """The first frame as it is solved when all frames are known; None where that changes nothing.
+
+    frames: all of them, in order. It follows from those after the first alone: asked again, it is the same bit for bit.
+    """
+    if not sequence.settings.asks_positions or not frames or frames[0].status is FrameStatus.FAILED:
+        return None
+    positions = ask_first_again(sequence, frames)
+    if positions is None or not positions.fn.any():
+        return None
+    forces, state = solve_first_again(
+        sequence.packing, sequence.snapshots, sequence.settings, positions,
+        verdicts=sequence.verdicts, failed=sequence.failed,
+    )  # fmt: skip
+    return SolvedFrame(forces, _summarize(sequence, forces), state)
+
+
+def solve_all(sequence: CorrectedSequence, progress: Callable[[int], None] = lambda _: None) -> list[SolvedFrame]:
+    """All frames as a run states them: the first as it is seen from the others. progress hears how many are solved."""
+    frames = []
+    for frame in solve_frames(sequence):
+        frames.append(frame)
+        progress(len(frames))
+    first = renew_first(sequence, [each.forces for each in frames])
+    return frames if first is None else [first, *frames[1:]]
 
 
 def infer_frames(inputs: Inputs) -> Iterator[SolvedFrame]:

@@ -29,7 +29,7 @@ from ..experiment.experiment import (
 )
 from ..experiment.tables import Table
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
-from ..inference.inference import Inputs, correct_sequence, solve_frames
+from ..inference.inference import Inputs, correct_sequence, solve_all
 from ..inference.settings import material_of, settings_of
 from ..progress import Progress, silent
 from ..results.results import Results
@@ -90,10 +90,7 @@ def solve(
         sequence = correct_sequence(Inputs(followed, bounded, material_of(sections), settings_of(sections)))
     except UndeterminedError as error:
         raise InputError("settings", f"key {error.key}", str(error)) from None
-    solved = []
-    for frame in solve_frames(sequence):
-        solved.append(frame)
-        progress("solving", len(solved), followed.frame_count)
+    solved = solve_all(sequence, lambda done: progress("solving", done, followed.frame_count))
     frames, packing = [each.forces for each in solved], sequence.packing
     unsolved = Results(
         "solved", sequence.tracks, sequence.walls, packing.grains, packing.material.friction, (), (),

@@ -12,7 +12,7 @@ from solver.bodies.grains import Array
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.frame_statistics import FrameStatistics
 
-from ..inference.inference import Inputs, infer_frames
+from ..inference.inference import Inputs, correct_sequence, solve_all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,5 +69,5 @@ def gather(frame: NDArray[np.int64], forces: Sequence[FrameForces], statistics: 
 def infer(inputs: VariedInputs) -> Networks:
     """Calibrate, find contacts and solve, as a run does."""
     quiet = replace(inputs, settings=inputs.settings.without_sweeps())
-    frames = list(infer_frames(quiet))
+    frames = solve_all(correct_sequence(quiet))
     return gather(inputs.frames, [each.forces for each in frames], [each.statistics for each in frames])

@@ -5,7 +5,7 @@ Gathering what all frames tell takes as long as a frame or two; it is done when 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,13 +23,18 @@ class Positions:
     """The positions of a sequence as a witness of its forces."""
 
     def __init__(
-        self, packing: Packing, snapshots: Sequence[Snapshot], settings: PosteriorSettings, workers: int | None = None
+        self,
+        packing: Packing,
+        snapshots: Sequence[Snapshot],
+        settings: PosteriorSettings,
+        workers: int | None = None,
+        told: Mapping[int, FramePosterior] | None = None,
     ) -> None:
-        """workers: threads; None: one for every core."""
+        """workers: threads; None: one for every core. told: what they say of some frames, where it is known better."""
         self._workers = workers
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._gathered: SequenceEvidence | None = None
-        self._known: dict[int, FramePosterior | None] = {}
+        self._known: dict[int, FramePosterior | None] = dict(told or {})
 
     def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
         """What they say of frame k, in which people saw so much; None where no two bodies are near."""
@@ -48,4 +53,9 @@ class Positions:
         if evidence.contacts.count == 0:
             return None
         settings = self._gathered.settings.alone() if k == 0 else self._gathered.settings  # no motion leads to frame 0
-        return infer_frame(evidence, settings, np.random.default_rng([SEED, k]), self._workers)
+        return infer_frame(evidence, settings, draws_of(k), self._workers)
+
+
+def draws_of(k: int) -> np.random.Generator:
+    """The random numbers of frame k."""
+    return np.random.default_rng([SEED, k])

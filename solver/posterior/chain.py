@@ -47,6 +47,9 @@ def pairs_of(evidence: FrameEvidence) -> Pairs:
         odds=np.log(share / (1.0 - share)),
         friction=np.ascontiguousarray(evidence.friction),
         group=evidence.known.group,
+        deviation=np.zeros(contacts.count)
+        if evidence.gap_deviation is None
+        else evidence.gap_deviation / evidence.diameter,
     )
 
 

@@ -26,6 +26,7 @@ class FrameEvidence:
     known: KnownForces
     # At the packing's edge, what pushes them from outside is not among the pairs, but is of the size of what is.
     edge: Bool[NDArray[np.bool_], " n"] | None = None  # None: no grain
+    gap_deviation: Float[Array, " c"] | None = None  # [m] of an error that a gap has for itself; None: none has
 
     @property
     def diameter(self) -> float:

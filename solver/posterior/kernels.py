@@ -9,6 +9,8 @@ of a grain 1/s², or zero where its balance is not known, minus the logarithm of
     open      (h − γ)²/(2 b²) + γ/ℓ,  0 ≤ γ
     gauge     K/(2 c) (Σ_bears (f − 1))² + K/(2 c) (Σ z − Σ P)²
 
+with b² larger by the square of an error that a pair's gap has for itself.
+
 A contact is drawn as a whole: bears or not, f and t from the law without Coulomb's bound, and the draw is refused
 where it breaks the bound, which makes it exact. f and t are then drawn once more, each given the other.
 """
@@ -40,6 +42,7 @@ class Pairs(NamedTuple):
     odds: Array  # (c,) ln P/(1 − P) before gap and balance are looked at
     friction: Array  # (c,)
     group: Rows  # (c,) group whose normal forces have a known sum, −1: none
+    deviation: Array  # (c,) of an error that this gap has for itself; 0: none
 
 
 class Centres(NamedTuple):
@@ -135,16 +138,22 @@ def _height(c, i, j, normal, gap, error, offset):  # type: ignore[no-untyped-def
     return h
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _width(c, deviation, common):  # type: ignore[no-untyped-def]
+    """Give b of pair c: that of all pairs, `common`, widened by its own error."""
+    return common if deviation[c] == 0.0 else math.sqrt(common * common + deviation[c] * deviation[c])
+
+
 @njit(cache=True, nogil=True)
 def _draw_contacts(rng, pairs, centres, law, state):  # type: ignore[no-untyped-def]
     # Every field is taken out once: taken out within the loop, it would be counted as a reference each time.
     first, second, normal, gap = pairs.i, pairs.j, pairs.normal, pairs.gap
-    prior, friction, group = pairs.odds, pairs.friction, pairs.group
+    prior, friction, group, deviation = pairs.odds, pairs.friction, pairs.group, pairs.deviation
     lever, balanced, group_load = centres.lever, centres.balanced, centres.group_load
     state_bears, state_fn, state_ft, open_gap = state.bears, state.fn, state.ft, state.open_gap
     error, resultant, group_sum = state.error, state.resultant, state.group_sum
     kappa, offset, excess, bearing = state.common
-    tight, w, inner = 1.0 / law.width**2, 1.0 / law.balance**2, law.width / law.open_gap
+    w = 1.0 / law.balance**2
     pull, hold = law.gauge / len(gap), law.share / len(gap)
     for c in range(len(gap)):
         i, j, g, nx, ny = first[c], second[c], group[c], normal[c, 0], normal[c, 1]
@@ -153,6 +162,8 @@ def _draw_contacts(rng, pairs, centres, law, state):  # type: ignore[no-untyped-
             excess -= old_fn - 1.0
             bearing -= 1.0
         h = _height(c, i, j, normal, gap, error, offset)
+        width = _width(c, deviation, law.width)
+        tight, inner = 1.0 / width**2, width / law.open_gap
         # ΣF, ΣM without this contact. −½ A f² + B f is the logarithm of f's law, likewise for t.
         wi, li = w * balanced[i], lever[i]
         fx, fy = old_fn * nx - old_ft * ny, old_fn * ny + old_ft * nx
@@ -175,7 +186,7 @@ def _draw_contacts(rng, pairs, centres, law, state):  # type: ignore[no-untyped-
         root, root_t, rough = math.sqrt(a), math.sqrt(at), friction[c] > 0.0
         odds = prior[c] + 0.5 * (b * b / a - h * h * tight) - 0.5 * pull * (1.0 - 2.0 * excess)
         odds += log_normal_cdf(b / root) + LOG_ROOT_TWO_PI - hold * (bearing - law.expected + 0.5)
-        odds += h / law.open_gap - 0.5 * inner * inner - LOG_ROOT_TWO_PI - log_normal_cdf(h / law.width - inner)
+        odds += h / law.open_gap - 0.5 * inner * inner - LOG_ROOT_TWO_PI - log_normal_cdf(h / width - inner)
         volume = root * inner
         if rough:
             odds += 0.5 * bt * bt / at
@@ -201,8 +212,8 @@ def _draw_contacts(rng, pairs, centres, law, state):  # type: ignore[no-untyped-
             bearing += 1.0
             open_gap[c] = 0.0
         else:
-            low = inner - h / law.width
-            open_gap[c] = law.width * (draw_above(rng, low) - low)
+            low = inner - h / width
+            open_gap[c] = width * (draw_above(rng, low) - low)
         if bears or bore:
             dn, dt = fn - old_fn, ft - old_ft
             fx, fy = dn * nx - dt * ny, dn * ny + dt * nx
@@ -225,7 +236,7 @@ def _draw_errors(rng, pairs, centres, law, state):  # type: ignore[no-untyped-de
     first, second, normal, gap = pairs.i, pairs.j, pairs.normal, pairs.gap
     bears, fn, open_gap, error = state.bears, state.fn, state.open_gap, state.error
     start, row, deviation, radius_deviation = centres.start, centres.row, centres.deviation, centres.radius_deviation
-    kappa, offset, tight = state.common[0], state.common[1], 1.0 / law.width**2
+    kappa, offset, own = state.common[0], state.common[1], pairs.deviation
     n, m = len(radius_deviation), len(deviation)
     factor = np.empty((m // n, 7))  # of every frame: Cholesky L of ε's precision, L⁻¹ of its pull and of its tie to δ
     for first_row in range(n):
@@ -237,6 +248,7 @@ def _draw_errors(rng, pairs, centres, law, state):  # type: ignore[no-untyped-de
             yy, xy, bx, by, xr, yr = xx, 0.0, 0.0, 0.0, 0.0, 0.0
             for q in range(start[g], start[g + 1]):
                 c = row[q]
+                tight = 1.0 / _width(c, own, law.width) ** 2
                 side = -1.0 if first[c] == g else 1.0  # height falls as j's error goes along the normal
                 nx, ny = side * normal[c, 0], side * normal[c, 1]
                 rest = _height(c, first[c], second[c], normal, gap, error, offset) + nx * ex + ny * ey + er
@@ -274,10 +286,12 @@ def _draw_common(rng, pairs, law, state):  # type: ignore[no-untyped-def]
     """Draw κ, then the offset; recompute the sums, which would else gather rounding."""
     first, second, normal, gap = pairs.i, pairs.j, pairs.normal, pairs.gap
     bears, fn, open_gap, error, common = state.bears, state.fn, state.open_gap, state.error, state.common
-    tight = 1.0 / law.width**2
+    own, precision = pairs.deviation, 0.0
     a, b = 1.0 / law.stiffness_sd**2, law.stiffness_mean / law.stiffness_sd**2
     excess = bearing = 0.0
     for c in range(len(gap)):
+        tight = 1.0 / _width(c, own, law.width) ** 2
+        precision += tight
         if bears[c]:
             a += tight * fn[c] * fn[c]
             b -= tight * fn[c] * _height(c, first[c], second[c], normal, gap, error, common[1])
@@ -286,11 +300,11 @@ def _draw_common(rng, pairs, law, state):  # type: ignore[no-untyped-def]
     root = math.sqrt(a)
     common[0] = (b / root + draw_above(rng, -b / root)) / root
     common[2], common[3] = excess, bearing
-    a, b = 1.0 / law.offset_sd**2 + tight * len(gap), 0.0
+    a, b = 1.0 / law.offset_sd**2 + precision, 0.0
     for c in range(len(gap)):
         rest = _height(c, first[c], second[c], normal, gap, error, 0.0)
         rest += common[0] * fn[c] if bears[c] else -open_gap[c]
-        b += tight * rest
+        b += rest / _width(c, own, law.width) ** 2
     common[1] = b / a + rng.standard_normal() / math.sqrt(a)
 
 

@@ -6,7 +6,7 @@ Whatever goes wrong in one frame, the frames around it are solved: it is reporte
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +18,7 @@ from solver.contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
 from solver.detection.precision import believed_precision, measure_precision, with_precision
 from solver.detection.refinement import RefinedBlock, block_of, refine
 from solver.mixture.positions import Positions
+from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.failure import describe_error, failed_frame, find_fault, find_unseen, forget_forces
 from solver.sequence.frame import pose_frame, solve_frame
 from solver.sequence.frame_forces import FrameForces
@@ -46,28 +47,16 @@ def solve_sequence(
     show nothing, or cannot be solved, join them. observer: hears what a frame could not be solved for.
     Raises ValueError where times do not ascend.
     """
-    _check_times(snapshots)
-    state = SequenceState.first(packing) if state is None else state
     verdicts = {} if verdicts is None else verdicts
-    failed = find_unseen(snapshots) | dict(failed or {})
-    settings, remark = settings.for_radii(packing.grains.radius), ""
-    known = int(np.any([each.present for each in snapshots], axis=0).sum()) if snapshots else 0
-    unbelieved = find_ignored(verdicts) | failed.keys()
-    if unbelieved.issuperset(range(len(snapshots))):
-        failed = dict.fromkeys(range(len(snapshots)), "no frame is believed that it could be solved beside") | failed
-    else:
-        snapshots = bridge_frames(snapshots, unbelieved)
-        snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
-    asked = settings.asks_positions and len(snapshots) > 1
-    positions = Positions(packing, snapshots, settings.posterior, settings.workers) if asked else None
-    sequence = SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known)
-    blocks = _Blocks(sequence)
+    ready = _prepare(packing, snapshots, settings, verdicts, failed)
+    state = SequenceState.first(packing) if state is None else state
+    blocks = _Blocks(ready.sequence)
     for k in range(first, len(snapshots)):
         frame = following = None
-        reason = failed.get(k, "")
+        reason = ready.failed.get(k, "")
         if not reason:
             try:
-                problem = pose_frame(sequence, k, state, blocks.find(k), verdicts.get(k, NO_VERDICTS))
+                problem = pose_frame(ready.sequence, k, state, blocks.find(k), verdicts.get(k, NO_VERDICTS))
                 frame, following = solve_frame(problem, state)
                 reason = find_fault(frame)
             except MemoryError:  # not the frame's fault
@@ -80,10 +69,66 @@ def solve_sequence(
             n, w = packing.grains.count, len(packing.pressure)
             frame = failed_frame(k, reason, n, w, with_members=settings.keep_members)
             following = forget_forces(state)
-        if remark and k == 0:
-            frame = replace(frame, reason=f"{remark}; {frame.reason}")
+        if ready.remark and k == 0:
+            frame = replace(frame, reason=f"{ready.remark}; {frame.reason}")
         state = following
         yield frame, state
+
+
+def solve_first_again(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: SequenceSettings,
+    positions: FramePosterior,
+    *,
+    verdicts: Mapping[int, Verdicts] | None = None,
+    failed: Mapping[int, str] | None = None,
+) -> tuple[FrameForces, SequenceState]:
+    """Solve frame 0 once more, with what its positions say now that the frames after it are known.
+
+    Arguments as of `solve_sequence`. Raises what a frame raises that cannot be solved.
+    """
+    verdicts = {} if verdicts is None else verdicts
+    ready = _prepare(packing, snapshots, settings, verdicts, failed, {0: positions})
+    problem = pose_frame(
+        ready.sequence, 0, SequenceState.first(packing), _Blocks(ready.sequence).find(0), verdicts.get(0, NO_VERDICTS)
+    )
+    frame, state = solve_frame(problem, SequenceState.first(packing))
+    told = [ready.remark, "later photographs tell the errors of its grains' own", frame.reason]
+    return replace(frame, reason="; ".join(each for each in told if each)), state
+
+
+@dataclass(frozen=True, slots=True)
+class _Ready:
+    """A sequence that is ready to be solved."""
+
+    sequence: SequenceProblem
+    failed: Mapping[int, str]
+    remark: str
+
+
+def _prepare(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: SequenceSettings,
+    verdicts: Mapping[int, Verdicts],
+    failed: Mapping[int, str] | None,
+    told: Mapping[int, FramePosterior] | None = None,
+) -> _Ready:
+    """Bridge what cannot be believed, measure the precision; told: what the positions of some frames say already."""
+    _check_times(snapshots)
+    failed = find_unseen(snapshots) | dict(failed or {})
+    settings, remark = settings.for_radii(packing.grains.radius), ""
+    known = int(np.any([each.present for each in snapshots], axis=0).sum()) if snapshots else 0
+    unbelieved = find_ignored(verdicts) | failed.keys()
+    if unbelieved.issuperset(range(len(snapshots))):
+        failed = dict.fromkeys(range(len(snapshots)), "no frame is believed that it could be solved beside") | failed
+    else:
+        snapshots = bridge_frames(snapshots, unbelieved)
+        snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
+    asked = settings.asks_positions and len(snapshots) > 1
+    positions = Positions(packing, snapshots, settings.posterior, settings.workers, told) if asked else None
+    return _Ready(SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known), failed, remark)
 
 
 def _check_times(snapshots: Sequence[Snapshot]) -> None:

@@ -24,7 +24,7 @@ from solver.statistics.agreement import compare_forces, relative_change
 
 from ...experiment.experiment import load_experiment, read_tracks
 from ...experiment.walls import read_walls
-from ...inference.inference import Inputs, correct_sequence, solve_frames
+from ...inference.inference import Inputs, correct_sequence, solve_all
 from ...inference.settings import material_of, settings_of
 from ...progress import Progress, silent
 from ...synthetic.worlds.making import make_world
@@ -168,7 +168,7 @@ def _solve(inputs: Inputs, told: int) -> list[tuple[Keys, Array]]:
     def forces(frame: FrameForces) -> tuple[Keys, Array]:
         return on_told_grains(frame.contacts.key, np.column_stack([frame.fn, frame.ft]), bodies, walls, told)
 
-    return [forces(solved.forces) for solved in solve_frames(sequence)]
+    return [forces(solved.forces) for solved in solve_all(sequence)]
 
 
 def _without(tracks: Tracks, walls: WallTracks, gone: int) -> Perturbation:

@@ -21,7 +21,7 @@ from ...errors import InputError
 from ...experiment.boundary import bound_tracks
 from ...experiment.experiment import Experiment, load_experiment, read_tracks
 from ...experiment.walls import read_walls
-from ...inference.inference import CorrectedSequence, Inputs, SolvedFrame, correct_sequence, solve_frames
+from ...inference.inference import CorrectedSequence, Inputs, SolvedFrame, correct_sequence, solve_all
 from ...inference.settings import material_of, settings_of
 from ...progress import Progress, silent
 from ...results.truth import names_of_told, read_truth, true_ids
@@ -110,11 +110,7 @@ def solve_world(experiment: Experiment, progress: Progress) -> tuple[CorrectedSe
     assert walls is not None
     config = experiment.config
     sequence = correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config).without_sweeps()))
-    frames = []
-    for solved in solve_frames(sequence):
-        frames.append(solved)
-        progress("solving", len(frames), tracks.frame_count)
-    return sequence, frames
+    return sequence, solve_all(sequence, lambda done: progress("solving", done, tracks.frame_count))
 
 
 def true_forces(experiment: Experiment, sequence: CorrectedSequence) -> tuple[tuple[Keys, Array], ...]:

@@ -1,0 +1,118 @@
+"""The first frame once more, when the frames after it are known.
+
+No motion leads to it: its forces rest on positions, where constant errors of centres and radii count most. The forces
+of later frames, which motion tells, tell these errors apart from overlap better than any calibration beforehand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.bodies.bridging import bridge_frames
+from solver.bodies.grains import Array
+from solver.calibration.calibrate import Calibration
+from solver.calibration.equations import rotate_offsets
+from solver.calibration.gaps import GapRows
+from solver.calibration.known_forces import find_grain_errors
+from solver.contacts.contacts import Contacts
+from solver.contacts.verdicts import NO_VERDICTS
+from solver.mixture.positions import draws_of
+from solver.posterior.frame_posterior import FramePosterior, infer_frame
+from solver.posterior.sequence_evidence import SequenceEvidence, gather_evidence
+from solver.sequence.frame_forces import FrameForces, FrameStatus
+
+from ..tracks import Tracks, WallTracks
+from .snapshots import make_snapshots, measure_sequence
+
+if TYPE_CHECKING:
+    from .inference import CorrectedSequence
+
+FRAMES = 16  # after the first that tell of the errors: later, other contacts bear
+FEWEST = 2  # below which nothing is asked again
+BEARS = 0.8  # P(bears) from which on a pair's gap is known by its force
+WORTH = 0.5  # scatter of errors over the noise of a position below which there is nothing to gain
+SEED = 1  # of the draws behind the deviations that are left
+UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
+
+
+def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> FramePosterior | None:
+    """What the positions of the first frame say of its forces, once those of the others are known.
+
+    None where that is no better: where calibration had nothing of each grain's own to correct, or too little is known.
+    """
+    calibration = sequence.calibration
+    rows, force = _known_pairs(frames)
+    if calibration is None or 0 in sequence.failed or len(np.unique(rows.frame)) < FEWEST:
+        return None
+    told, walls = _as_told(sequence.tracks, sequence.walls, calibration), sequence.walls
+    evidence = _gather(sequence, told)
+    centre, radius = _errors_beforehand(evidence)
+    if centre == radius == 0.0:
+        return None
+    measured = measure_sequence(told, walls)
+    found = find_grain_errors(
+        measured, rows, force, centre=centre, radius=radius, rng=np.random.default_rng(SEED)
+    )  # fmt: skip
+    better = replace(
+        told,
+        radius=told.radius + found.radius,
+        position=told.position + rotate_offsets(measured, found.offset),
+    )
+    evidence = _gather(sequence, better)
+    first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS))
+    if first.contacts.count == 0:
+        return None
+    first = replace(first, gap_deviation=found.gap_deviation(measured, _rows_of(0, first.contacts)))
+    return infer_frame(first, evidence.settings.alone(), draws_of(0), sequence.settings.workers)
+
+
+def _known_pairs(frames: Sequence[FrameForces]) -> tuple[GapRows, Array]:
+    """Pairs that surely bear in the frames after the first, and their normal forces (m,) [N]."""
+    rows, forces = [], []
+    for frame in frames[1 : FRAMES + 1]:
+        if frame.status in UNSOUND or frame.bearing_probability is None:
+            continue
+        known = (frame.bearing_probability > BEARS) & (frame.fn > 0.0)
+        rows.append(_rows_of(frame.frame, frame.contacts.select(known)))
+        forces.append(frame.fn[known])
+    if not rows:
+        none = np.empty(0, np.int32)
+        return GapRows(none, none, none, none), np.empty(0)
+    return (
+        GapRows(*(np.concatenate([getattr(each, name) for each in rows]) for name in ("frame", "i", "j", "pair"))),
+        np.concatenate(forces),
+    )
+
+
+def _rows_of(frame: int, contacts: Contacts) -> GapRows:
+    numbers = np.arange(contacts.count, dtype=np.int32)  # of pairs: nobody asks which are the same
+    return GapRows(
+        np.full(contacts.count, frame, np.int32), contacts.i.astype(np.int32), contacts.j.astype(np.int32), numbers
+    )
+
+
+def _as_told(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:
+    """Every grain with its own errors again; what all share stays corrected."""
+    own = rotate_offsets(measure_sequence(tracks, walls), calibration.offset)
+    return replace(
+        tracks,
+        radius=tracks.radius - (calibration.radius - calibration.radius_offset),
+        position=tracks.position - own,
+    )
+
+
+def _gather(sequence: CorrectedSequence, tracks: Tracks) -> SequenceEvidence:
+    snapshots = bridge_frames(make_snapshots(tracks, sequence.walls), sequence.failed)
+    packing = replace(sequence.packing, grains=replace(sequence.packing.grains, radius=tracks.radius))
+    return gather_evidence(packing, snapshots, sequence.settings.posterior)
+
+
+def _errors_beforehand(evidence: SequenceEvidence) -> tuple[float, float]:
+    """Standard deviations [m] of errors of centres and of radii, 0: too small to be told from noise."""
+    noise, worth = evidence.noise.sigma, WORTH * evidence.noise.sigma
+    centre = float(np.sqrt(max(float(np.median(evidence.centre_deviation)) ** 2 - noise**2, 0.0)))
+    return centre if centre > worth else 0.0, evidence.radius_deviation if evidence.radius_deviation > worth else 0.0
