@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ...experiment.units import Scale
 from ..inspecting.found import Found, find_run, run_stamp
 from ..mending.mender import Mender
 from ..running.job import Job
+from ..setup.circles import circles_of
 from ..setup.draft import Draft
 from ..setup.folder import run_facts, run_folder
 from ..setup.steps import Understood, judge
@@ -199,11 +201,13 @@ def _walls(found: Understood) -> list[dict[str, Any]]:
         return []
     ends = found.scale.to_pixels(found.walls.endpoints[0])
     plates = found.data.get("walls", {})
+    circles = {each.name: asdict(each) for each in circles_of(found)}
     told = []
     for name, line, pressure in zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True):
         plate = plates.get(name)
         told.append({
-            "name": name, "line": line, "pressure": None if pressure != pressure else pressure,
+            "name": name, "line": line, "circle": circles.get(name),
+            "pressure": None if pressure != pressure else pressure,
             "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
         })  # fmt: skip
     return told

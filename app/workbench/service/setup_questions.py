@@ -10,13 +10,16 @@ from pydantic import Field
 from solver.bodies.wall_shapes import STRAIGHT
 
 from ...errors import InputError
-from ..setup import edits
+from ..setup import circles, edits
 from ..setup.steps import Understood
 from .bench import Bench
 from .project import Project
 from .questions import Line, Number, Numbers, Point, Shape, Text, Whole, question
 
 Pressure = Annotated[float, Field(ge=1e-3, le=1e11)]
+Three = Annotated[list[Point], Field(min_length=3, max_length=3)]
+Round = Annotated[list[Number], Field(min_length=3, max_length=3)]
+LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
 Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
 
 
@@ -111,9 +114,37 @@ def find_walls(bench: Bench, at: Text) -> dict[str, Any]:
 
 
 @question
+def draw_circle(
+    bench: Bench, at: Text, points: Three | None = None, place: Round | None = None, name: Text | None = None,
+    side: Literal["in", "out"] = "in",
+) -> dict[str, Any]:  # fmt: skip
+    """Draw a circular wall, or the named one anew: through three points, by its place, or around the rods.
+
+    side: where the packing is. place: x, y and radius [px].
+    """
+    opened = bench.project(at)
+    found = _scaled(opened)
+    name = _free("circle", found) if name is None else name
+    if points is not None:
+        circle = circles.circle_through(np.array(points), name, side)
+    elif place is not None:
+        circle = circles.Circle(name, place[0], place[1], place[2], side)
+    else:
+        circle = circles.circle_around(found, name)
+    if not circle.radius > LEAST_CIRCLE:
+        raise InputError("circle", f"radius {circle.radius:.3g} px", "is too small for a wall")
+    circles.set_circles(opened.draft, found, circles.with_circle(circles.circles_of(found), circle), f"wall {name}")
+    return opened.describe() | {"wall": name}
+
+
+@question
 def delete_wall(bench: Bench, at: Text, name: Text) -> dict[str, Any]:
     opened = bench.project(at)
     found = _scaled(opened)
+    if any(each.name == name for each in circles.circles_of(found)):
+        left = [each for each in circles.circles_of(found) if each.name != name]
+        circles.set_circles(opened.draft, found, left, f"wall {name} deleted")
+        return opened.describe()
     edits.set_walls(opened.draft, found, [each for each in _walls(found) if each[0] != name], f"wall {name} deleted")
     return opened.describe()
 
@@ -238,6 +269,11 @@ def _name_for(line: Any, found: Understood) -> str:
     along = line[1] - line[0]
     steep = abs(along[1]) > abs(along[0])
     name = ("right" if along[1] < 0 else "left") if steep else ("bottom" if along[0] > 0 else "top")
+    return _free(name, found)
+
+
+def _free(name: str, found: Understood) -> str:
+    """A wall's name that is not taken: this one, or with a number."""
     taken = found.walls.name if found.walls is not None else ()
     return next(each for each in (name, *(f"{name}{k}" for k in range(2, 1000))) if each not in taken)
 

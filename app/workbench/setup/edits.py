@@ -19,6 +19,7 @@ from ...experiment.units import Scale
 from ...experiment.walls import WALL_COLUMNS
 from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from ...tracking.walls.inner_edge import find_bars, meeting_lines, snap_to_edge
+from .circles import arcs_table, circles_of, renamed
 from .draft import Draft, as_table
 from .steps import Understood, judge
 
@@ -53,10 +54,13 @@ def set_scale(draft: Draft, keys: dict[str, Any]) -> None:
             return
         after = judge(draft).scale
         if after is not None:
-            bars = walls.sides == STRAIGHT
+            bars, circles = walls.sides == STRAIGHT, circles_of(before)
             names = [name for name, bar in zip(walls.name, bars, strict=True) if bar]
             ends = scale.to_pixels(walls.endpoints[0])[bars]
-            draft.write("walls", {walls_file(before): _walls_table(names, ends, after)})
+            if names:
+                draft.write("walls", {walls_file(before): _walls_table(names, ends, after)})
+            if circles:
+                draft.write("circles", {before.data["walls"]["arcs"]: arcs_table(circles, after)})
 
 
 def walls_file(found: Understood) -> str:
@@ -107,9 +111,11 @@ def set_walls(draft: Draft, found: Understood, walls: Sequence[tuple[str, Array]
     told = found.data.get("walls", {})
     kept = {key: value for key, value in told.items() if not isinstance(value, dict)}
     names = [name for name, _ in walls]
-    plates = {key: value for key, value in told.items() if isinstance(value, dict) and key in names}
+    known = {*names, *(each.name for each in circles_of(found))}
+    plates = {key: value for key, value in told.items() if isinstance(value, dict) and key in known}
     if not walls:
-        draft.set_keys(what, {"walls": None}, {walls_file(found): None})
+        rest = {key: value for key, value in {**kept, **plates}.items() if key != "file"} if "arcs" in kept else None
+        draft.set_keys(what, {"walls": rest}, {walls_file(found): None})
         return
     table = _walls_table(names, np.array([line for _, line in walls]), found.scale)
     draft.set_keys(what, {"walls": {**kept, "file": walls_file(found), **plates}}, {walls_file(found): table})
@@ -130,10 +136,12 @@ def rename_wall(draft: Draft, found: Understood, wall: str, name: str) -> None:
     if name in walls.name or not name.isidentifier():
         raise InputError(draft.file, f"wall {name!r}", "must be a word of letters and digits that no other wall has")
     bars = walls.sides == STRAIGHT
-    if not bars[walls.name.index(wall)]:
-        raise InputError(draft.file, f"wall {wall!r}", "is a circle: its name stands in the table of arcs")
-    names = [name if each == wall else each for each, bar in zip(walls.name, bars, strict=True) if bar]
     section = {name if key == wall else key: value for key, value in found.data["walls"].items()}
+    if not bars[walls.name.index(wall)]:
+        table = arcs_table(renamed(circles_of(found), wall, name), scale)
+        draft.set_keys(f"wall {name}", {"walls": section}, {section["arcs"]: table})
+        return
+    names = [name if each == wall else each for each, bar in zip(walls.name, bars, strict=True) if bar]
     table = _walls_table(names, scale.to_pixels(walls.endpoints[0])[bars], scale)
     draft.set_keys(f"wall {name}", {"walls": section}, {walls_file(found): table})
 

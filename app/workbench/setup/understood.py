@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import STRAIGHT
 
 from ...experiment.photographs import Image
+from .circles import circles_of
 from .steps import Understood
 
 # Told apart by the colour-blind (Okabe and Ito); blue, green, red.
@@ -26,7 +28,12 @@ def draw_understood(photograph: Image, found: Understood) -> bytes:
     _draw_rods(picture, found, grow, wide)
     if found.walls is not None and found.scale is not None:
         ends = grow * (found.scale.to_pixels(found.walls.endpoints[0]) + 0.5)
+        for each in circles_of(found):
+            centre = _at(grow * (np.array([each.x, each.y]) + 0.5))
+            cv2.circle(picture, centre, round(grow * each.radius), COLOURS[1], 2 * wide, cv2.LINE_AA)
         for k, (name, pressure) in enumerate(zip(found.walls.name, found.walls.pressure, strict=True)):
+            if found.walls.sides[k] != STRAIGHT:
+                continue
             words = name if np.isnan(pressure) else f"{name}: {pressure / 1e3:g} kPa"
             _draw_wall(
                 picture, ends[k], words, COLOURS[(k + 1) % len(COLOURS)], wide, loaded=bool(pressure == pressure)

@@ -1,5 +1,8 @@
 """An experiment is set up from photographs by questions, and what is done is what `rodsight check` reads."""
 
+import shutil
+import tomllib
+
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
@@ -83,6 +86,55 @@ def test_walls_need_the_scale_and_names_are_words(begun):
     assert (told["walls"][0]["name"], told["walls"][0]["pressure"]) == ("plate", 5e4)
     told = visitor.ask("delete_wall", at=at, name="plate")
     assert told["walls"] == []
+
+
+def test_a_circle_is_a_wall_beside_bars_and_check_reads_it(begun, photographs_only):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_photographs", at=at, name="mine", interval=30.0)
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    visitor.ask("draw_wall", at=at, line=[[60.0, 300.0], [300.0, 310.0]], snap=False, name=None)
+    x, y, r = 240.0, 260.0, 200.0
+    points = [[x + r, y], [x, y + r], [x - r, y]]
+    assert "line" in visitor.refused("draw_circle", at=at, points=[[0.0, 0.0], [50.0, 50.0], [100.0, 100.0]])
+    told = visitor.ask("draw_circle", at=at, points=points)
+    ring = next(wall for wall in told["walls"] if wall["circle"])["circle"]
+    assert (ring["x"], ring["y"], ring["radius"]) == pytest.approx((x, y, r), abs=1e-2)
+    visitor.ask("set_plate", at=at, name="circle", pressure=5e4)
+    visitor.ask("rename_wall", at=at, name="circle", to="drum")
+    told = visitor.ask("set_scale", at=at, pixel_size=5e-4)  # it stays where it is in the picture
+    ring = next(wall for wall in told["walls"] if wall["circle"])
+    assert (ring["name"], ring["pressure"]) == ("drum", 5e4)
+    assert ring["circle"]["radius"] == pytest.approx(r, abs=1e-2)
+    walls = read_walls(load_experiment(photographs_only / "my photographs"), 4)
+    np.testing.assert_allclose(np.linalg.norm(walls.endpoints[0, 1, 1] - walls.endpoints[0, 1, 0]), 2.0 * r * 5e-4)
+    bar = next(wall["name"] for wall in told["walls"] if not wall["circle"])
+    visitor.ask("delete_wall", at=at, name=bar)
+    told = visitor.ask("draw_circle", at=at, place=[x, y, 1.1 * r], name="drum", side="out")
+    assert [wall["circle"]["side"] for wall in told["walls"]] == ["out"]
+    assert told["walls"][0]["pressure"] == 5e4
+    assert rodsight("check", photographs_only / "my photographs", "--quiet") == 0
+    told = visitor.ask("delete_wall", at=at, name="drum")
+    assert told["walls"] == []
+    assert "walls" not in load_toml(photographs_only / "my photographs")
+
+
+def test_the_least_circle_holds_all_rods(begun, made_photographs, photographs_only):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    assert "rods" in visitor.refused("draw_circle", at=at)
+    shutil.copy(made_photographs / "grains.csv", photographs_only / "my photographs")
+    Draft(photographs_only / "my photographs").set_keys("rods", {"photographs.grains": "grains.csv"})
+    told = visitor.ask("draw_circle", at=at)
+    ring, rods = told["walls"][0]["circle"], told["rods"]
+    reach = np.hypot(np.array(rods["x"]) - ring["x"], np.array(rods["y"]) - ring["y"]) + np.array(rods["r"])
+    assert reach.max() == pytest.approx(ring["radius"], rel=0.01)
+    assert not any("beyond" in says for step in told["steps"] for says in step["says"] if step["name"] == "walls")
+
+
+def load_toml(folder):
+    return tomllib.loads((folder / "experiment.toml").read_text())
 
 
 @pytest.mark.screen

@@ -1,0 +1,114 @@
+"""Circular walls of an experiment that is being set up: through three points, or around the rods; a table of arcs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from solver.bodies.grains import Array
+from solver.bodies.wall_shapes import IN, STRAIGHT, circle_of
+
+from ...errors import InputError
+from ...experiment.units import Scale
+from ...experiment.walls import ARC_COLUMNS
+from .draft import Draft, as_table
+from .steps import Understood
+
+ARCS = "arcs.csv"
+RIM = 24  # points of a rod's rim that a circle around the rods must hold
+FLAT = 1e-3  # a triangle lower than this share of its longest side is a line
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circular wall on the first photograph."""
+
+    name: str
+    x: float  # [px]
+    y: float
+    radius: float  # [px]
+    side: str = "in"  # where the packing is: in or out
+
+
+def circles_of(found: Understood) -> list[Circle]:
+    """The circular walls that are told."""
+    walls, scale = found.walls, found.scale
+    if walls is None or scale is None:
+        return []
+    centre, radius, _ = circle_of(walls.endpoints[0])
+    place = scale.to_pixels(centre)
+    pixels = radius / scale.size_at(place)
+    return [
+        Circle(walls.name[w], float(place[w, 0]), float(place[w, 1]), float(pixels[w]), _side(int(walls.sides[w])))
+        for w in np.flatnonzero(walls.sides != STRAIGHT).tolist()
+    ]
+
+
+def set_circles(draft: Draft, found: Understood, circles: Sequence[Circle], what: str) -> None:
+    """Write the circular walls; what was told of those that go, goes. Bars stay as they are."""
+    if found.scale is None:
+        raise InputError(draft.file, "key photographs.pixel_size", "is missing: set the scale before the walls")
+    told = dict(found.data.get("walls", {}))
+    gone = {each.name for each in circles_of(found)} - {each.name for each in circles}
+    told = {key: value for key, value in told.items() if key not in gone}
+    file = told.pop("arcs", ARCS)
+    if circles:
+        told = {"arcs": file, **told}
+    elif "file" not in told:
+        told = {}
+    draft.set_keys(what, {"walls": told or None}, {file: arcs_table(circles, found.scale) if circles else None})
+
+
+def arcs_table(circles: Sequence[Circle], scale: Scale) -> bytes:
+    """The table of arcs of frame 0, in metres."""
+    place = np.array([[each.x, each.y] for each in circles])
+    world, size = scale.to_world(place), scale.size_at(place)
+    rows = [
+        (0, each.name, *np.round(world[k], 7).tolist(), round(each.radius * float(size[k]), 7), each.side)
+        for k, each in enumerate(circles)
+    ]
+    return as_table(ARC_COLUMNS, rows)
+
+
+def circle_through(points: Array, name: str, side: str) -> Circle:
+    """The circle through three points (3, 2) [px]. Raises InputError where they lie on a line."""
+    a, b, c = points
+    ab, ac = b - a, c - a
+    twice = float(ab[0] * ac[1] - ab[1] * ac[0])
+    longest = max(float(ab @ ab), float(ac @ ac), float((c - b) @ (c - b)))
+    if abs(twice) < FLAT * longest:
+        raise InputError("circle", "", "the three points lie on a line: click them far apart on the rim")
+    d, e = float(ab @ ab), float(ac @ ac)
+    from_a = np.array([ac[1] * d - ab[1] * e, ab[0] * e - ac[0] * d]) / (2.0 * twice)
+    return Circle(name, float(a[0] + from_a[0]), float(a[1] + from_a[1]), float(np.linalg.norm(from_a)), side)
+
+
+def circle_around(found: Understood, name: str) -> Circle:
+    """The least circle that holds the rods of the first photograph. Raises InputError where there are too few."""
+    rods = found.rods
+    if rods is None or len(rods.id) < 8:
+        raise InputError("circle", "", "needs the rods: look for them first (step Rods), or click three points")
+    angle = 2.0 * np.pi * np.arange(RIM) / RIM
+    rim = np.stack([
+        rods.x[:, None] + rods.radius[:, None] * np.cos(angle), rods.y[:, None] + rods.radius[:, None] * np.sin(angle)
+    ], axis=-1)  # fmt: skip
+    (x, y), radius = cv2.minEnclosingCircle(rim.reshape(-1, 1, 2).astype(np.float32))
+    return Circle(name, float(x), float(y), float(radius))
+
+
+def with_circle(circles: Sequence[Circle], circle: Circle) -> list[Circle]:
+    """The circles with one more, or with the one of the same name as it is now."""
+    if any(each.name == circle.name for each in circles):
+        return [circle if each.name == circle.name else each for each in circles]
+    return [*circles, circle]
+
+
+def renamed(circles: Sequence[Circle], name: str, to: str) -> list[Circle]:
+    return [replace(each, name=to) if each.name == name else each for each in circles]
+
+
+def _side(side: int) -> str:
+    return "in" if side == IN else "out"
