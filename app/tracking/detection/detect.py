@@ -141,9 +141,8 @@ def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radi
 def _refine(outliner: Outliner, x: Array, y: Array, radius: Array, *, fixed_radius: bool) -> Detection:
     if len(x) == 0:
         return Detection(x, y, radius, np.empty(0), np.empty(0))
-    first = _each(
-        len(x), lambda k: outliner.measure(x[k], y[k], radius[k], min(_window(radius[k], True), 2.0), 0.0, np.inf)
-    )
+    window = np.minimum([_window(each, True) for each in radius], 2.0)
+    first = [Measured(*one) for one in outliner.measure(_rough(x, y, radius, window, np.inf)).tolist()]
     width = outliner.estimate_blur(first)
     free = _each(
         len(x), lambda k: _closer(outliner, first[k], outliner.measure_closely(*first[k].circle, width, 0.0, np.inf))
@@ -199,6 +198,7 @@ def _judge(
     overlap: the share of the smaller radius that is let pass.
     """
     unjudged = np.ones(len(rough.x), dtype=np.bool_)
+    judged_circles = np.full((len(rough.x), 4), np.nan)  # x, y, radius, quality of those that were measured
     tree = KDTree(np.stack([rough.x, rough.y], axis=1)) if known and len(rough.x) else None
     while True:
         left = np.flatnonzero(unjudged)
@@ -209,34 +209,37 @@ def _judge(
         # what a better circle strikes out later.
         chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
         unjudged[chosen] = False
-        judged = _alternatives(outliner, rough, chosen, tree)
+        if tree is not None:  # which is the grain is told by those of the other known radii about it
+            chosen = np.concatenate([_around(rough, tree, k) for k in chosen])
+        new = np.unique(chosen[np.isnan(judged_circles[chosen, 0])])
+        judged_circles[new] = _measure(outliner, rough, new, known, quality_least)
+        judged = judged_circles[chosen]
         table = np.concatenate([table, judged[judged[:, 3] > quality_least]])
         # A longer outline is the more significant at the same share.
         table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
         table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=overlap)]
 
 
-def _alternatives(outliner: Outliner, rough: Circles, chosen: NDArray[np.intp], tree: KDTree | None) -> Array:
-    """x, y, radius, quality (c, 4) of every chosen circle, and of the circles of other known radii around it.
+def _measure(outliner: Outliner, rough: Circles, rows: NDArray[np.intp], known: bool, quality_least: float) -> Array:
+    """x, y, radius, quality (c, 4) of some of the rough circles."""
+    size = rough.radius[rows]
+    window = np.array([_window(each, known) for each in size])
+    scatter = 0.3 if known else np.inf
+    found = outliner.measure(_rough(rough.x[rows], rough.y[rows], size, window, scatter))
+    if not known:
+        return found[:, [0, 1, 2, 4]]
+    quality = 2.0 * found[:, 4]
+    # Now that it is centred, a narrower view keeps paint near the rim out of it. Alone it is too easily satisfied.
+    again = np.flatnonzero(quality > quality_least)
+    window = np.full(len(again), 0.5 * RING_UNCERTAINTY)
+    found[again] = outliner.measure(_rough(found[again, 0], found[again, 1], size[again], window, scatter))
+    quality[again] = np.minimum(found[again, 4], quality[again])
+    return np.column_stack([found[:, :2], size, quality])
 
-    tree: of all rough centres where radii are known, else None. Which of the circles is the grain is told by those
-    about it: the better one may lie over another grain.
-    """
-    known = tree is not None
-    rows = []
-    for k in chosen:
-        for m in [k] if tree is None else _around(rough, tree, k):
-            scatter = 0.3 if known else np.inf
-            size = float(rough.radius[m])
-            one = outliner.measure(float(rough.x[m]), float(rough.y[m]), size, _window(size, known), 0.0, scatter)
-            quality = one.quality
-            if known and quality > 0.0:
-                # Now that it is centred, a narrower view keeps paint near the rim out of it. Alone it is
-                # too easily satisfied.
-                one = outliner.measure(one.x, one.y, size, 0.5 * RING_UNCERTAINTY, 0.0, scatter)
-                quality = min(one.quality, 2.0 * quality)
-            rows.append((one.x, one.y, rough.radius[m] if known else one.radius, quality))
-    return np.array(rows).reshape(-1, 4)
+
+def _rough(x: Array, y: Array, radius: Array, window: Array, scatter: float) -> Array:
+    """Rough circles (c, 6) as they are measured, without a shift of their edges."""
+    return np.column_stack([x, y, radius, window, np.zeros(len(x)), np.full(len(x), scatter)])
 
 
 def _around(rough: Circles, tree: KDTree, k: int) -> NDArray[np.intp]:

@@ -15,6 +15,7 @@ from ..correlation.interpolation import interpolate
 
 # Samples along a radius [1/px].
 DENSITY = 4
+MARGIN = 3.0  # [px] that they reach beyond the window in which edges are looked for
 HALF, TWICE, NOWHERE = np.float32(0.5), np.float32(2.0), np.float32(np.inf)
 
 # Points of the outline, one per pixel, that one dot of paint may spoil together.
@@ -26,12 +27,20 @@ class Outline:
     """Edge points of one grain."""
 
     angle: Array  # (p,) [rad] from the rough centre
-    distance: Array  # (p,) [px] of the edge from the rough centre, NaN where there is none
-    strength: Image  # (p,) [grey/px] slope of the edge
-    beyond: Image  # (p,) [grey] two pixels outside the edge, or the darkest up to there
+    edges: Array  # (p, 3) distance [px], slope [grey/px], grey level two pixels outside, or the darkest up to there
     in_view: NDArray[np.bool_]  # (p,) whether the photograph reaches there
     rays: Image  # (p, s) [grey] the rays themselves, at distances first + k / DENSITY
     first: float  # [px]
+
+    @property
+    def distance(self) -> Array:
+        """Of the edge from the rough centre (p,) [px], NaN where there is none."""
+        return self.edges[:, 0]
+
+    @property
+    def strength(self) -> Image:
+        """Slope of the edge (p,) [grey/px]."""
+        return self.edges[:, 1].astype(np.float32)
 
 
 @njit(cache=True, nogil=True)
@@ -57,17 +66,23 @@ def trace_outline(
 
     narrow: gaps may end before the two pixels outside the edge where their dark is read.
     """
-    angle = np.arange(0.0, 2.0 * np.pi, 1.0 / radius)
-    margin = 3.0
-    first = radius - window - margin
-    count = int(np.ceil(2.0 * (window + margin) * DENSITY)) + 1
-    ray = np.empty((len(angle), count), np.float32)
+    angle, rays, edges, in_view = trace(coefficients, x, y, radius, window, narrow)
+    return Outline(angle, edges, in_view, rays, radius - window - MARGIN)
+
+
+@njit(cache=True, nogil=True)
+def trace(coefficients, x, y, radius, window, narrow):
+    """Rays (p, s) about a place, their angles (p,), the steepest descent of each (p, 3) and which lie in view (p,)."""
+    step = 1.0 / radius
+    angle = np.empty(int(np.ceil(2.0 * np.pi / step)))
+    for p in range(len(angle)):
+        angle[p] = p * step
+    ray = np.empty((len(angle), int(np.ceil(2.0 * (window + MARGIN) * DENSITY)) + 1), np.float32)
+    first = radius - window - MARGIN
     sample_rays(coefficients, x, y, angle, first, 1.0 / DENSITY, ray)
-    edges = np.empty((len(angle), 3))
-    in_view = np.empty(len(angle), np.bool_)
+    edges, in_view = np.empty((len(angle), 3)), np.empty(len(angle), np.bool_)
     find_steepest(ray, first, radius, window, narrow, edges, in_view)
-    strength, beyond = edges[:, 1].astype(np.float32), edges[:, 2].astype(np.float32)
-    return Outline(angle, edges[:, 0], strength, beyond, in_view, ray, first)
+    return angle, ray, edges, in_view
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -4,33 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.together import available_cores, work_together
 
 from ...experiment.photographs import Image
 from ..correlation.noise import image_noise
 from ..correlation.splines import spline_coefficients
+from .circle_kernels import DARK_HALF, ON_CIRCLE, SMALL, SURE_SLOPE, lowest_tenth, measure_circles, see_edges
 from .edges import DENSITY, Circle, Outline, fit_circle, trace_outline
 from .rim_profile import locate_edges
 from .rings import local_contrast, tile_size
 
-# An edge is one where the light falls by this share of the local contrast per pixel,
-EDGE_SLOPE = 0.08
-# to a level that exceeds the darkest met around the grain by no more than this share: where grains nearly
-# touch, the gap's dark is not reached, which shifts an edge but does not make it less of one.
+# The level beyond an edge exceeds the darkest met around the grain by no more than this share of the contrast: where
+# grains nearly touch, the gap's dark is not reached, which shifts an edge but does not make it less of one.
 DARK_EXCESS = 0.12
 DARK_EXCESS_JUDGED = 0.3
-# What is brighter than this share of the way from the dark about a grain to its light is paint, not a gap.
-DARK_HALF = 0.5
 # Contrast below this many standard deviations of the noise [1] is none.
 NOISE_CONTRAST = 12.0
-# A circle that has left the window in which its points were looked for, by this many times, is none of theirs.
-ASTRAY = 2.5
-# Points this close to the circle [px] count as its outline.
-ON_CIRCLE = 0.7
 # Fewer points do not make a circle (of a small one this share of its rays will do, but no fewer than that;
 # the other two where grains are plain); less
 # of the outline in view does not make a grain.
@@ -38,13 +33,10 @@ LEAST_POINTS = 12
 LEAST_SHARE, FEWEST_POINTS = 0.3, 8
 PLAIN_SHARE, PLAIN_FEWEST = 0.2, 6
 LEAST_VIEW = 0.35
-# A small circle is none if its points lie on one side: a chipped rim has as many. Half a circle's have 0.64.
-ONE_SIDED = 0.55
-# And more of it must be in view: the light part of something larger looks like one where the picture ends.
+# Of a small circle more must be in view: the light part of something larger looks like one where the picture ends.
 LEAST_VIEW_SMALL = 0.75
 
-# The radius [px] of a small circle.
-SMALL = 12.0
+TOGETHER = 64  # circles at least that are worth a thread of their own
 
 # Widths of the blur that are tried [px], and the one assumed where no outline tells.
 BLUR_WIDTHS = np.arange(0.3, 2.2, 0.3)
@@ -97,25 +89,30 @@ class Outliner:
         """
         return self.plain or radius <= SMALL
 
-    def measure(self, x: float, y: float, radius: float, window: float, shift: float, scatter: float) -> Measured:
-        """The circle through the steepest points within `window` [px] of radius + shift [px].
+    def measure(self, rough: Array) -> Array:
+        """The circles through the steepest points about rough ones (c, 6).
 
-        scatter [px]: by how much the radius may differ; infinite: it is free.
+        rough: x, y, radius [px]; the window [px] about radius + shift; that shift [px]; by how much the radius may
+        differ [px], infinite: it is free. Returns x, y, radius, sigma, quality (c, 5) as in `Measured`; NaN and 0
+        where there is no circle.
         """
-        outline = trace_outline(self._coefficients, x, y, radius + shift, window, narrow=self.narrow(radius))
-        seen, local = self._edges(outline, x, y, DARK_HALF if self.plain else DARK_EXCESS_JUDGED)
-        if seen.sum() < self._least_points(outline) or outline.in_view.mean() < self._least_view(radius):
-            return Measured(x, y, radius, np.nan, 0.0)
-        circle = fit_circle(
-            x, y, radius + shift, outline.angle[seen], outline.distance[seen],
-            np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2, radius_scatter=scatter, scale_least=0.1,
-        )  # fmt: skip
-        moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
-        if not moved < ASTRAY * window:
-            return Measured(x, y, radius, np.nan, 0.0)
-        if radius <= SMALL and _one_sidedness(circle, outline.angle[seen]) > ONE_SIDED:
-            return Measured(x, y, radius, np.nan, 0.0)
-        return _measured(circle, outline, shift)
+        found = np.empty((len(rough), 5))
+        radius = rough[:, 2]
+        small, count = radius <= SMALL, len(rough)
+        share, fewest = self._least_seen()
+        rules = np.column_stack([
+            np.full(count, DARK_HALF if self.plain else DARK_EXCESS_JUDGED), small | self.plain, np.full(count, share),
+            np.full(count, fewest), np.full(count, LEAST_POINTS),
+            np.where(small & (not self.plain), LEAST_VIEW_SMALL, LEAST_VIEW),
+        ])  # fmt: skip
+        parts = np.array_split(np.arange(count), max(min(available_cores(), count // TOGETHER), 1))
+        work_together([partial(self._measure, rough, rules, found, part) for part in parts], None)
+        return found
+
+    def _measure(self, rough: Array, rules: Array, found: Array, part: NDArray[np.intp]) -> None:
+        if len(part):
+            rows = slice(part[0], part[-1] + 1)
+            measure_circles(self._coefficients, self._dark, self._contrast, rough[rows], rules[rows], found[rows])
 
     def measure_closely(
         self, x: float, y: float, radius: float, width: float, shift: float, scatter: float
@@ -127,13 +124,13 @@ class Outliner:
             return Measured(x, y, radius, np.nan, 0.0)
         steepest = fit_circle(
             x, y, radius + shift, outline.angle[seen], outline.distance[seen],
-            np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2, radius_scatter=np.inf, scale_least=0.1,
+            np.minimum(outline.strength[seen] / (SURE_SLOPE * local), 1.0) ** 2, radius_scatter=np.inf, scale_least=0.1,
         )  # fmt: skip
         edge, level, _, dark = _fit_profiles(outline, seen, width, width)
         good = np.isfinite(edge)
         if good.sum() < self._least_points(outline):
             return Measured(x, y, radius, np.nan, 0.0)
-        excess = (dark[good] - np.percentile(dark[good], 10.0)) / (DARK_EXCESS * local)
+        excess = (dark[good] - lowest_tenth(dark[good])) / (DARK_EXCESS * local)
         weight = (np.minimum(level[good] / (0.6 * local), 1.0) * np.clip(1.0 - excess, 0.05, 1.0)) ** 2
         circle = fit_circle(
             x, y, radius + shift, outline.angle[good], edge[good], weight, radius_scatter=scatter, scale_least=0.05
@@ -160,23 +157,20 @@ class Outliner:
 
     def _edges(self, outline: Outline, x: float, y: float, excess: float) -> tuple[NDArray[np.bool_], float]:
         """Which rays meet an edge, and the local contrast [grey]."""
-        height, width = self._contrast.shape
-        place = min(max(int(y), 0), height - 1), min(max(int(x), 0), width - 1)
-        local = float(self._contrast[place])
-        seen = np.isfinite(outline.distance) & (outline.strength > EDGE_SLOPE * local)
-        seen &= outline.beyond < float(self._dark[place]) + DARK_HALF * local
-        if seen.any():
-            # The tenth-darkest part, not the single darkest ray: noise makes that one.
-            dark = float(np.percentile(outline.beyond[seen], 10.0))
-            seen &= outline.beyond < dark + excess * local
+        seen = np.zeros(len(outline.angle), np.bool_)
+        local = see_edges(outline.edges, self._dark, self._contrast, x, y, excess, seen)
         return seen, local
 
     def _least_view(self, radius: float) -> float:
         return LEAST_VIEW if self.plain or radius > SMALL else LEAST_VIEW_SMALL
 
     def _least_points(self, outline: Outline) -> int:
-        share, fewest = (PLAIN_SHARE, PLAIN_FEWEST) if self.plain else (LEAST_SHARE, FEWEST_POINTS)
+        share, fewest = self._least_seen()
         return max(min(LEAST_POINTS, round(share * len(outline.angle))), fewest)
+
+    def _least_seen(self) -> tuple[float, int]:
+        """Share and least number of the rays that must see an edge."""
+        return (PLAIN_SHARE, PLAIN_FEWEST) if self.plain else (LEAST_SHARE, FEWEST_POINTS)
 
 
 def _best_width(outlines: list[tuple[Outline, NDArray[np.bool_]]], widths: Array, extent: float) -> float:
@@ -202,12 +196,6 @@ def _fit_profiles(
 ) -> tuple[Array, Array, Array, Array]:
     start = np.where(seen, outline.distance, np.nan)
     return locate_edges(outline.rays, outline.first, 1.0 / DENSITY, start, outline.angle, width, extent=extent)
-
-
-def _one_sidedness(circle: Circle, angle: Array) -> float:
-    """How much the points on the circle lie on one side of it: 0 all about, 1 in one place."""
-    on = angle[np.abs(circle.residual) < ON_CIRCLE]
-    return float(np.hypot(np.cos(on).mean(), np.sin(on).mean())) if len(on) else 1.0
 
 
 def _measured(circle: Circle, outline: Outline, shift: float) -> Measured:

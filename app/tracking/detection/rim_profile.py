@@ -46,7 +46,8 @@ def locate_edges(
     edge [px] (NaN where none fits), level A [grey], misfit [grey] and dark B [grey], all (p,).
     """
     count = len(start)
-    dark, end = _darks(rays, first, step, start, max(DARK, DARK_WIDTHS * extent))
+    dark, end = np.empty(count), np.empty(count)
+    _find_darks(rays, first, step, start, max(DARK, DARK_WIDTHS * extent), dark, end)
     inside, outside = max(INSIDE, INSIDE_WIDTHS * extent), max(OUTSIDE, OUTSIDE_WIDTHS * extent)
     fitted = np.empty((count, 4))
     harmonics = np.stack([np.ones(count), np.cos(angle), np.sin(angle)], axis=1)
@@ -63,16 +64,19 @@ def locate_edges(
     return fitted[:, 0], fitted[:, 1], fitted[:, 3], dark
 
 
-def _darks(rays: Image, first: float, step: float, start: Array, beyond: float) -> tuple[Array, Array]:
-    """The lowest grey level of every ray up to `beyond` [px] outside its edge (p,), and where it is met (p,) [px].
+@njit(cache=True, nogil=True)
+def _find_darks(rays, first, step, start, beyond, dark, where):
+    """Write the lowest grey level (p,) of every ray up to `beyond` [px] outside its edge, and where it is met [px].
 
     Farther out is the light of the next grain.
     """
-    where = first + step * np.arange(rays.shape[1])
-    outside = where - np.nan_to_num(start)[:, None]
-    between = (outside >= NEAREST_DARK) & (outside <= beyond + 0.5 * step) & np.isfinite(rays)
-    ray = np.where(between, rays, np.inf)
-    return ray.min(axis=1).astype(np.float64), where[np.argmin(ray, axis=1)]
+    for p in range(len(start)):
+        edge = start[p] if np.isfinite(start[p]) else 0.0
+        dark[p], where[p] = np.inf, first
+        for k in range(rays.shape[1]):
+            outside = first + step * k - edge
+            if outside >= NEAREST_DARK and outside <= beyond + 0.5 * step and rays[p, k] < dark[p]:
+                dark[p], where[p] = rays[p, k], first + step * k
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

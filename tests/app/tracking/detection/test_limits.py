@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.photographs import LUMA
 from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
-from rodsight.tracking.detection.outlines import Outliner
+from rodsight.tracking.detection.outlines import Measured, Outliner
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 
@@ -38,7 +38,8 @@ def test_the_blur_of_a_photograph_is_measured_and_does_not_move_radii(blur: floa
     x, y, radius = rods_on_a_grid(22.0, 60.0)
     image = photograph(Laboratory(blur=blur, light=0.0), x, y, radius)
     outliner = Outliner(image, 22.0)
-    measured = [outliner.measure(a, b, 22.0, 2.0, 0.0, np.inf) for a, b in zip(x, y, strict=True)]
+    rough = np.column_stack([x, y, *(np.full(len(x), each) for each in (22.0, 2.0, 0.0, np.inf))])
+    measured = [Measured(*one) for one in outliner.measure(rough).tolist()]
     # A pixel is a square of side 1: it blurs by 1/sqrt(12) more.
     assert outliner.estimate_blur(measured) == pytest.approx(np.hypot(blur, 0.29), abs=BLUR_ALLOWED)
     found = detect_grains(image, DetectionSettings(radius_range=(15.0, 30.0)))

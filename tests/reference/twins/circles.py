@@ -1,0 +1,36 @@
+"""One circle measured in plain numpy, as `app/tracking/detection/circle_kernels.py` measures many."""
+
+from __future__ import annotations
+
+import numpy as np
+from rodsight.experiment.photographs import Image
+from rodsight.tracking.detection.edges import fit_circle, trace_outline
+
+from solver.bodies.grains import Array
+
+
+def measured(coefficients: Image, dark: Image, contrast: Image, rough: Array, rules: Array) -> list[float]:
+    """x, y, radius, sigma, quality of the circle about x, y, radius, window, shift, scatter (6,)."""
+    x, y, radius, window, shift, scatter = rough
+    excess, narrow, share, fewest, enough, least_view = rules
+    none = [x, y, radius, np.nan, 0.0]
+    outline = trace_outline(coefficients, x, y, radius + shift, window, narrow=narrow == 1.0)
+    height, width = contrast.shape
+    place = min(max(int(y), 0), height - 1), min(max(int(x), 0), width - 1)
+    local, beyond = float(contrast[place]), outline.edges[:, 2].astype(np.float32)
+    seen = np.isfinite(outline.distance) & (outline.strength > 0.08 * local)
+    seen &= beyond < float(dark[place]) + 0.5 * local
+    if seen.any():
+        seen &= beyond < float(np.percentile(beyond[seen], 10.0)) + excess * local
+    if seen.sum() < max(min(enough, round(share * len(seen))), fewest) or outline.in_view.mean() < least_view:
+        return none
+    angle, distance = outline.angle[seen], outline.distance[seen]
+    weight = np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2
+    circle = fit_circle(x, y, radius + shift, angle, distance, weight, radius_scatter=scatter, scale_least=0.1)
+    moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
+    if not moved < 2.5 * window:
+        return none
+    on = np.abs(circle.residual) < 0.7
+    if radius <= 12.0 and (not on.any() or abs(np.exp(1j * angle[on]).mean()) > 0.55):
+        return none
+    return [circle.x, circle.y, circle.radius - shift, circle.sigma, float(on.sum() / outline.in_view.sum())]
