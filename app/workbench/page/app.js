@@ -11,8 +11,9 @@ import { material } from "/page/material.js";
 import { run } from "/page/run.js";
 import { mend } from "/page/mend.js";
 import { inspect } from "/page/inspect.js";
+import { share } from "/page/share.js";
 
-export const STEPS = [photographs, scale, walls, rods, material, run, mend, inspect];
+export const STEPS = [photographs, scale, walls, rods, material, run, mend, inspect, share];
 
 export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, tell };
 globalThis.bench = app; // for the curious, and for tests

@@ -33,7 +33,7 @@ export function tell(text, wrong = false) {
   timer = setTimeout(() => { at("toast").className = ""; }, wrong ? 7000 : 2600);
 }
 
-export const SIGNS = { good: "✓", doubtful: "!", missing: "·" };
+export const SIGNS = { good: "✓", doubtful: "!", missing: "○" };
 export const sign = (mark) => h("span", { class: `sign ${mark}`, title: mark }, SIGNS[mark] ?? "");
 
 /** A number field that tells its value when it is left or Enter is pressed. */

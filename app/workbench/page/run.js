@@ -16,7 +16,7 @@ export const run = {
   panel(app) {
     const { project } = app, state = told?.state ?? "idle", busy = state === "running" || state === "pausing";
     return [
-      project.ready ? h("p", {}, "The same as ", h("kbd", {}, `rodsight run ${quoted(project.at)}`), " typed in this folder. Pausing costs one frame at most.") : h("p", {}, "Something is still missing: the steps marked · say what."),
+      project.ready ? h("p", {}, "The same as ", h("kbd", {}, `rodsight run ${quoted(project.at)}`), " typed in this folder. Pausing costs one frame at most.") : h("p", {}, "Something is still missing: the steps marked ○ say what."),
       h("div", { class: "row" },
         busy
           ? [h("button", { id: "pause", disabled: state === "pausing", onclick: () => act(app, "run_pause") }, state === "pausing" ? "Pausing …" : "Pause"), h("button", { disabled: state === "pausing", onclick: () => act(app, "run_cancel") }, "Cancel")]

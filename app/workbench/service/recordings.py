@@ -1,4 +1,5 @@
-"""The recording of a run as the page gets it: the viewer of the installed wheel, and the file under a secret name.
+"""The recording of a run as the page gets it: the viewer of the installed wheel, the file under a secret name; and as
+one HTML file to be sent to anybody.
 
 Nothing of it is loaded before somebody asks for the recording.
 """
@@ -7,19 +8,23 @@ from __future__ import annotations
 
 import gzip
 import threading
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 from urllib.parse import quote
 
+from pydantic import Field
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from ...errors import InputError
+from ...recording.files.share import share_recording
 from ...recording.look.canvas import Canvas
+from ...recording.viewing.single_page import write_single_page
 from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
 from ...run_folder import RECORDING, SIDE
 from .bench import Bench
 from .project import Project
-from .questions import Text, question
+from .questions import Number, Text, Whole, question
 from .run_questions import scale_of
 
 FILES = (RECORDING, SIDE)
@@ -36,6 +41,47 @@ def recording(bench: Bench, at: Text) -> dict[str, Any]:
     folder = f"{PATH}{bench.key}/{quote(opened.key)}/"
     size = sum((opened.results / name).stat().st_size for name in files)
     return {"addresses": [folder + name for name in files], "bytes": size, "shrink": _shrink(opened)}
+
+
+@question
+def share(
+    bench: Bench, at: Text, first: Whole = 0, stop: Whole | None = None, scale: Annotated[Number, Field(gt=0, le=1)] = 1.0
+) -> dict[str, Any]:  # fmt: skip
+    """Write the HTML file that any browser opens, as `rodsight share --html` does; frames first … stop − 1."""
+    opened = bench.project(at)
+    source, target = opened.results / RECORDING, opened.results / f"{opened.results.name}-share.rrd"
+    if not source.is_file():
+        raise InputError(opened.results, "", "holds no recording: let the run come to its end")
+    try:
+        report = share_recording(source, target, first=first, stop=stop, scale=scale)
+    except ValueError as error:
+        raise InputError(source, "", str(error)) from None
+    write_single_page(target, target.with_suffix(".html"), title=opened.name)
+    return shared(bench, at) | {"frames": report.frames}
+
+
+@question
+def shared(bench: Bench, at: Text) -> dict[str, Any]:
+    """The file that is there to be sent; file None: none yet. old: the recording is newer."""
+    opened = bench.project(at)
+    page, recording = _page_of(opened), opened.results / RECORDING
+    if not page.is_file():
+        return {"file": None, "ready": recording.is_file()}
+    told = page.stat()
+    old = recording.is_file() and recording.stat().st_mtime > told.st_mtime
+    return {"file": str(page), "name": page.name, "bytes": told.st_size, "old": old, "ready": recording.is_file()}
+
+
+def answer_shared(bench: Bench, request: Request) -> Response:
+    """The HTML file, to be kept by the browser and not opened: it is no page of ours."""
+    page = _page_of(bench.project(request.query_params.get("at", "")))
+    if not page.is_file():
+        return PlainTextResponse("nothing has been written to be shared yet", 404)
+    return FileResponse(page, media_type="application/octet-stream", filename=page.name)
+
+
+def _page_of(opened: Project) -> Path:
+    return opened.results / f"{opened.results.name}-share.html"
 
 
 def _shrink(opened: Project) -> int:

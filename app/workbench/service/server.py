@@ -28,7 +28,7 @@ from . import inspect_questions, mend_questions, run_questions, setup_questions 
 from .bench import Bench
 from .project import Project
 from .questions import BadRequest, answer
-from .recordings import PATH, Viewer, answer_recording, answer_viewer
+from .recordings import PATH, Viewer, answer_recording, answer_shared, answer_viewer
 
 LARGEST_BODY = 256 * 1024  # bytes of a question
 WIDEST = 20_000  # [px] of a picture
@@ -131,6 +131,7 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
         Route("/crop", crop, methods=["GET"]),
         Route("/events", events, methods=["GET"]),
         Route("/viewer/{name}", lambda request: answer_viewer(viewer, request), methods=["GET"]),
+        Route("/shared", lambda request: _answered(lambda: answer_shared(bench, request)), methods=["GET"]),
         Route(f"{PATH}{bench.key}/{{at:path}}/{{name}}", lambda request: answer_recording(bench, request)),
         Route("/ask/{name}", ask, methods=["POST"]),
     ]

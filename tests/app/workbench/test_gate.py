@@ -1,5 +1,7 @@
 """Strangers get nothing from the workbench, and every answer carries the safe headers."""
 
+import os
+
 import pytest
 from rodsight.workbench.service.bench import Bench
 from starlette.testclient import TestClient
@@ -20,7 +22,14 @@ def stranger_to():
 
 @pytest.mark.parametrize(
     "path",
-    ["/", "/page/app.js", "/photograph?at=.&frame=0", "/viewer/script.js", "/recording/guess/mine/recording.rrd"],
+    [
+        "/",
+        "/page/app.js",
+        "/photograph?at=.&frame=0",
+        "/viewer/script.js",
+        "/shared?at=.",
+        "/recording/guess/mine/recording.rrd",
+    ],
 )
 def test_without_the_cookie_nothing_is_served(stranger, path):
     assert stranger.client.get(path).status_code == 403
@@ -75,6 +84,28 @@ def test_a_recording_is_given_under_its_secret_name_alone(visitor, stranger_to, 
     assert stranger_to(visitor).get(address.replace("recording.rrd", "tracks.h5")).status_code == 404
     above = address.replace("/my%20photographs/", "/..%2f../")
     assert stranger_to(visitor).get(above).status_code in (404, 422)
+
+
+def test_what_is_shared_is_told_and_kept_by_the_browser(visitor, photographs_only):
+    at = visitor.ask("begin", roll=0, name="mine")["at"]
+    assert visitor.ask("shared", at=at) == {"file": None, "ready": False}
+    assert "no recording" in visitor.refused("share", at=at)
+    assert visitor.client.get("/shared", params={"at": at}).status_code == 404
+    run = photographs_only / "runs" / "mine"
+    run.mkdir(parents=True)
+    page, recording = run / "mine-share.html", run / "recording.rrd"
+    page.write_text("a page with the viewer in it")
+    recording.write_bytes(b"")
+    os.utime(recording, (1e9, 1e9))
+    told = visitor.ask("shared", at=at)
+    assert (told["file"], told["bytes"], told["old"]) == (str(page), page.stat().st_size, False)
+    os.utime(page, (5e8, 5e8))
+    assert visitor.ask("shared", at=at)["old"]
+    answer = visitor.client.get("/shared", params={"at": at})
+    assert answer.headers["Content-Disposition"].startswith("attachment")
+    assert answer.text == "a page with the viewer in it"
+    assert visitor.client.get("/shared", params={"at": ".."}).status_code == 422
+    assert visitor.post("share", {"at": at, "scale": 2.0}).status_code == 400
 
 
 def test_the_viewer_is_the_installed_one_as_a_module(visitor):

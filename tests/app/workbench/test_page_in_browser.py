@@ -67,6 +67,11 @@ def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
     assert tab.evaluate("bench.project.run.frames") == 4
     assert (photographs_only / "runs" / "my photographs" / "results.h5").is_file()
     judge_by_key(tab, photographs_only / "runs" / "my photographs")
+    go(tab, "share")
+    tab.click("#write-page")
+    idle(tab)
+    expect(tab.locator("#shared")).to_contain_text("my photographs-share.html")
+    assert (photographs_only / "runs" / "my photographs" / "my photographs-share.html").stat().st_size > 10e6
     assert rodsight("check", photographs_only / "my photographs", "--quiet") == 0
 
 
