@@ -45,7 +45,8 @@ def recording(bench: Bench, at: Text) -> dict[str, Any]:
 
 @question
 def share(
-    bench: Bench, at: Text, first: Whole = 0, stop: Whole | None = None, scale: Annotated[Number, Field(gt=0, le=1)] = 1.0
+    bench: Bench, at: Text, first: Whole = 0, stop: Whole | None = None,
+    scale: Annotated[Number, Field(gt=0.0, le=1.0)] = 1.0,
 ) -> dict[str, Any]:  # fmt: skip
     """Write the HTML file that any browser opens, as `rodsight share --html` does; frames first … stop − 1."""
     opened = bench.project(at)
