@@ -29,7 +29,7 @@ def show_recording(recording: Path) -> Any:
 
         from ..recording.viewing.single_page import single_page
 
-        page = single_page(recording, title=recording.parent.name).replace(*NO_ADDRESS)
+        page = single_page([recording], title=recording.parent.name).replace(*NO_ADDRESS)
         style = f"width: 100%; height: {HEIGHT}px; border: 0"
         return HTML(f'<iframe srcdoc="{html.escape(page, quote=True)}" style="{style}"></iframe>')
     from ..recording.viewing.viewer import open_viewer

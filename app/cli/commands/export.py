@@ -118,7 +118,7 @@ def share(
     source: Annotated[
         Path | None,
         tyro.conf.Positional,
-        tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, or a run's folder"),
+        tyro.conf.arg(metavar="RECORDING_OR_DIR", help="a recording, a run's folder, or with --html a folder of runs"),
     ] = None,
     /,
     frames: Frames = None,
@@ -142,6 +142,8 @@ def share(
         return _repair(repair, out, console)
     assert source is not None
     recording = source / RECORDING if source.is_dir() else source
+    if source.is_dir() and not recording.is_file() and html:
+        return _share_several(source, parse_frames(frames), scale, out, console)
     if not recording.is_file():
         raise InputError(recording, "", "there is no such recording")
     return _share(recording, parse_frames(frames), scale, html, out, console)
@@ -234,6 +236,7 @@ def _scale_of(results: Results, pixel_size: float | None) -> Scale:
 def _share(
     recording: Path, frames: tuple[int, int | None], scale: float, page: bool, out: Path | None, console: Console
 ) -> int:
+    from ...recording.files.cards import make_card
     from ...recording.files.share import share_recording
     from ...recording.viewing.single_page import write_single_page
     from ...run_folder import RECORDING
@@ -251,11 +254,43 @@ def _share(
     tell(console, f"{told} To look at it: rodsight view {target}")
     if page:
         file = out if out is not None else target.with_suffix(".html")
-        size = write_single_page(target, file, title=name or "Rodsight")
+        size = write_single_page([target], file, title=name or "Rodsight", cards=[make_card(target)])
         tell(
             console,
             f"{file}: {_size(size)}, viewer included; any browser opens it, also without network or server.",
         )
+    return 0
+
+
+def _share_several(
+    folder: Path, frames: tuple[int, int | None], scale: float, out: Path | None, console: Console
+) -> int:
+    """Write one page of all runs in a folder: a card for each, and one viewer for all."""
+    from tempfile import TemporaryDirectory
+
+    from ...recording.files.cards import make_card
+    from ...recording.files.catalogue import RECORDING, find_recordings, read_entries
+    from ...recording.files.share import share_recording
+    from ...recording.viewing.single_page import write_single_page
+
+    recordings = [entry.file for entry in read_entries(find_recordings(folder)) if entry.properties is not None]
+    if not recordings:
+        raise InputError(folder, "", "holds no recording that can be read: neither recording.rrd nor runs with one")
+    name = folder.resolve().name
+    file = out if out is not None else folder / f"{name}-share.html"
+    with TemporaryDirectory(prefix="rodsight-") as place:
+        parts = [Path(place) / f"{k}.rrd" for k in range(len(recordings))]
+        for recording, part in zip(recordings, parts, strict=True):
+            try:
+                share_recording(recording, part, first=frames[0], stop=frames[1], scale=scale)
+            except ValueError as error:
+                raise InputError(recording, "", str(error)) from None
+        cards = [
+            make_card(part, recording.parent.name if recording.name == RECORDING else recording.stem)
+            for recording, part in zip(recordings, parts, strict=True)
+        ]
+        size = write_single_page(parts, file, title=name, cards=cards)
+    tell(console, f"{file}: {_size(size)}, {len(parts)} runs and one viewer; any browser opens it.")
     return 0
 
 

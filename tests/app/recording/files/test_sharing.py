@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.units import Scale
+from rodsight.recording.files.cards import make_card
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.readback import read_forces
 from rodsight.recording.files.repair import repair_recording
 from rodsight.recording.files.share import share_recording
 from rodsight.recording.look import entities
+from rodsight.recording.look.canvas import Canvas
+from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.tabs.layout_property import read_layout
 from rodsight.recording.viewing.single_page import write_single_page
 from rodsight.recording.viewing.viewer import viewer_binary
@@ -89,6 +92,35 @@ def test_a_file_with_nothing_in_it_cannot_be_mended(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["noise.rrd"]
 
 
+def test_a_card_names_its_run_and_shows_every_contact_grain_and_wall_of_the_last_frame(results, tmp_path):
+    path = write_recording(replace(results, name="<b>shear"), tmp_path / "run.rrd").path
+    card = make_card(path)
+    assert "&lt;b&gt;shear" in card
+    assert "<b>" not in card
+    last = results.frames[-1]
+    assert card.count("<path") == last.contacts.count + results.walls.count
+    assert card.count("<circle") == results.grains.count
+    style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(results.frames))
+    for colour in set(style.colours(last.fn).tolist()):  # the reported field, not a sweep
+        assert f"#{colour:08x}" in card
+
+
+def test_a_folder_of_runs_is_one_page_with_a_card_for_each_and_one_viewer(tmp_path, capsys):
+    path = write_recording(make_results(1, sweeps=5), tmp_path / "run.rrd").path
+    for name in ("first", "second", "damaged"):
+        (tmp_path / "runs" / name).mkdir(parents=True)
+        content = path.read_bytes()[: 500 if name == "damaged" else None]
+        (tmp_path / "runs" / name / "recording.rrd").write_bytes(content)
+    with pytest.raises(SystemExit) as end:
+        main(["share", str(tmp_path / "runs"), "--html"])
+    assert not end.value.code
+    assert "2 runs" in capsys.readouterr().out
+    text = (tmp_path / "runs" / "runs-share.html").read_text()
+    assert [text.count(f'id="recording-{k}"') for k in range(3)] == [1, 1, 0]
+    assert [text.count(f"<h2>{name}</h2>") for name in ("first", "second", "damaged")] == [1, 1, 0]
+    assert text.count('id="module"') == 1
+
+
 @pytest.mark.screen
 def test_the_command_writes_a_small_file_and_a_page_and_tells_their_size(recording, tmp_path, capsys):
     folder = tmp_path / "shear"
@@ -116,8 +148,14 @@ def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_pa
     # Frames that all look alike: whichever the playing viewer shows, the forces must be there.
     path = write_recording(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
     file = tmp_path / "run.html"
-    write_single_page(path, file, title="<shear> & test")
+    write_single_page([path, path], file, title="<shear> & test", cards=[make_card(path), "the same"])
     page.goto(f"file://{file}?renderer=webgl")
+    told = page.inner_text("body")  # before there is a viewer
+    assert "<shear> & test" in told
+    assert "fake" in told
+    assert "Drag the slider" in told
+    assert page.locator("svg path").count() > 50
+    page.get_by_role("button").nth(1).click()
     page.wait_for_function("() => window.rodsight || document.title === 'failed'")
     assert page.title() == "<shear> & test", page.inner_text("body")
     wait_for_forces(page)
@@ -126,9 +164,9 @@ def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_pa
 @pytest.mark.screen
 def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording, page):
     file = tmp_path / "run.html"
-    write_single_page(recording.path, file, title="empty")
-    text = file.read_text()
-    file.write_text(text.replace('handle.send_rrd_to_channel("recording", await unpack("recording"));', ""))
+    write_single_page([recording.path], file, title="empty")
+    text = file.read_text().replace("PATIENCE = 60000", "PATIENCE = 5000")  # it waits for what never comes
+    file.write_text(text.replace('handle.send_rrd_to_channel("recording", await unpack(`recording-${number}`));', ""))
     page.goto(f"file://{file}?renderer=webgl")
     page.wait_for_function("() => window.rodsight && seen.colours() > 20")  # the viewer has drawn itself
     wait_until_still(page)

@@ -1,0 +1,103 @@
+"""A recording as a card of a page: its name, a picture of its last force network, what came of it.
+
+The picture is drawn here, as SVG, from what is recorded: it is there before a viewer is, and without one.
+"""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+from rerun.chunk import RrdReader
+
+from ..look import entities
+from ..look.canvas import Canvas
+from ..look.colours import BACKGROUND, OUTLINE, Rgba
+from ..look.texts import printable
+from ..tabs.layout_property import read_layout
+from .catalogue import Value, read_properties
+
+MOST_LINES = 4000  # of contacts or grains in a picture, the widest first: it is a few centimetres wide
+
+
+def make_card(recording: Path, name: str | None = None) -> str:
+    """The card of a recording, as HTML, under a name or that of its experiment.
+
+    Raises ValueError where the recording is not one of this version, OSError where it cannot be read.
+    """
+    canvas = read_layout(recording).canvas
+    known = read_properties(recording)
+    experiment = str(known.get("experiment:name", recording.stem))
+    named = html.escape(printable(name or experiment))
+    facts = "".join(f"<li>{html.escape(fact)}</li>" for fact in _facts(known))
+    return f"{_network(recording, canvas)}<h2>{named}</h2><ul>{facts}</ul>"
+
+
+def _facts(known: dict[str, Value]) -> list[str]:
+    """What came of a run, in a few words each."""
+    facts = []
+    if {"experiment:frames", "experiment:grains"} <= set(known):
+        facts.append(f"{known['experiment:grains']} grains, {known['experiment:frames']} photographs")
+    frames, share = known.get("experiment:frames"), known.get("outcome:settled_share")
+    if isinstance(frames, int) and isinstance(share, float):
+        suspect = known.get("outcome:suspect_frames") or 0
+        facts.append(f"{round(share * frames)} frames settled, {suspect} suspect")
+    median, least = known.get("outcome:trust_median"), known.get("outcome:trust_least")
+    if isinstance(median, float) and isinstance(least, float):
+        facts.append(f"trust {median:.2f} (least {least:.2f})")
+    return facts
+
+
+def _network(recording: Path, canvas: Canvas) -> str:
+    """The force network of the last frame, its grains and walls, as SVG."""
+    forces = _last(recording, entities.FORCES)
+    walls, grains = _last(recording, entities.WALLS), _last(recording, entities.GRAINS)
+    lines = [*_lines(walls), *sorted(_lines(forces), key=lambda line: line[1])[-MOST_LINES:]]
+    circles = list(zip(grains.get("Ellipses2D:centers", []), grains.get("Ellipses2D:half_sizes", []), strict=True))
+    box = f"{canvas.left:.0f} {canvas.top:.0f} {canvas.width:.0f} {canvas.height:.0f}"
+    thin = 0.04 * canvas.grain_radius
+    return "".join([
+        f'<svg viewBox="{box}" style="background:{_hex(BACKGROUND)}" stroke-linecap="round" fill="none">',
+        f'<g stroke="{_hex(OUTLINE)}" stroke-opacity="0.5" stroke-width="{thin:.2f}">',
+        *(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size[0]:.1f}"/>' for (x, y), size in circles[:MOST_LINES]),
+        "</g>",
+        *(f'<path d="{d}" stroke="{colour}" stroke-width="{2.0 * radius:.1f}"/>' for d, radius, colour in lines),
+        "</svg>",
+    ])  # fmt: skip
+
+
+def _lines(shown: dict[str, Any]) -> list[tuple[str, float, str]]:
+    """Way, radius [px] and colour of every line of an entity."""
+    strips = shown.get("LineStrips2D:strips", [])
+    radii = shown.get("LineStrips2D:radii", [])
+    colours = [f"#{colour:08x}" for colour in shown.get("LineStrips2D:colors", [])]
+    ways = ["M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in strip) for strip in strips]
+    return list(zip(ways, radii, colours, strict=True))
+
+
+def _last(recording: Path, entity: str) -> dict[str, Any]:
+    """The components of an entity as the last frame shows them."""
+    batches = []
+    for chunk in RrdReader(str(recording)).store().stream().filter(content=entity).to_chunks():
+        batch = chunk.to_record_batch()
+        if {entities.FRAME, entities.SWEEP} <= set(batch.schema.names):
+            batches.append(batch)
+    last = max((pc.max(_integers(batch, entities.FRAME)).as_py() for batch in batches), default=None)
+    rows = []
+    for batch in batches:
+        rows += batch.filter(pc.equal(_integers(batch, entities.FRAME), last)).to_pylist()
+    shown: dict[str, Any] = {}
+    for row in sorted(rows, key=lambda row: row[entities.SWEEP]):
+        shown |= {name: value for name, value in row.items() if value is not None}
+    return shown
+
+
+def _integers(batch: pa.RecordBatch, name: str) -> pa.Array:
+    return batch.column(name).cast(pa.int64())
+
+
+def _hex(colour: Rgba) -> str:
+    return "#" + "".join(f"{part:02x}" for part in colour[:3])
