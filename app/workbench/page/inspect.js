@@ -4,11 +4,13 @@
 import { ask, at, chart, colour, digits, fact, h, tell } from "/page/dom.js";
 import { COLOURINGS, drawChange, drawLegend, drawNetwork } from "/page/network.js";
 import { showLanes, jump } from "/page/lanes.js";
+import { agreementSection } from "/page/agreement.js";
 import { Recording } from "/page/recording.js";
 
 const VERDICTS = { c: "contact", n: "no contact", u: "unsure" };
 const SAID = { contact: "#2fbf93", "no contact": "#d55e00", unsure: "#f0e442" };
-let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, by = "fn", blind = false, who = null, since = 0, frameOf = -1, without = null, recording = null;
+let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, by = "fn", blind = false, who = null, since = 0, frameOf = -1, without = null, recording = null, wanted = null;
+const judges = { open: false, told: null };
 
 export const inspect = {
   name: "inspect", title: "Inspect", digits: false,
@@ -30,6 +32,7 @@ export const inspect = {
       h("div", { class: "row" }, h("button", { class: blind ? "on" : "", id: "blind", onclick: () => toggleBlind(app), title: "B" }, "Blind"), h("button", { class: recording ? "on" : "", id: "show-recording", disabled: blind, onclick: () => toggleRecording(app), title: blind ? "It shows what was found: not while you judge blind" : "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null, h("button", { class: "primary", id: "next", onclick: () => nextAtStake(app) }, "Next at stake"), h("span", { class: "soft" }, list ? `${judged} judged of ${list.length}` : "")),
       chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
       !blind && list && !chosen ? [h("h3", {}, "Most hangs on"), h("div", { class: "list" }, list.slice(0, 14).map((each) => h("button", { onclick: () => pick(app, each, true) }, h("span", { style: { flex: "1" } }, pairName(each)), h("span", { class: "soft" }, `P ${digits(each.probability, 2)} · ${digits(each.stake, 2)} N`), each.verdict ? h("span", { class: "swatch", style: { background: SAID[each.verdict] } }) : null)))] : null,
+      blind ? null : agreementSection(app, judges, (each) => { chosen = null; wanted = each; if (each.frame === app.frame) app.queue(() => load(app, true)); else app.show(each.frame); }),
     ];
   },
   draw(app, c, k) {
@@ -86,6 +89,7 @@ async function load(app, again = false) {
   const { at } = app.project, { frame } = app;
   [net, list] = await Promise.all([ask("network", { at, frame }), ask("candidates", { at, frame, reviewer: who }).then((answer) => answer.pairs)]);
   frameOf = frame; without = null; since = performance.now();
+  if (wanted?.frame === frame) { const named = wanted; wanted = null; const same = list.find((each) => each.i === named.i && each.j === named.j); if (same) { pick(app, same, true); return; } }
   if (chosen?.j !== undefined) { const same = list.find((each) => each.i === chosen.i && each.j === chosen.j); if (same) chosen = same; else chosen = past?.point[frame] ? { ...chosen, point: past.point[frame], verdict: null, fn: null } : null; }
   app.paint();
 }
@@ -94,6 +98,7 @@ function pick(app, pair, look = false) {
   chosen = pair; past = null; rodPast = null; without = null; since = performance.now();
   if (look) app.stage.centre(...pair.point, 55 / meanRadius());
   app.paint();
+  at("panel").scrollTop = 0;
   ask("pair", { at: app.project.at, i: pair.i, j: pair.j }).then((answer) => { if (chosen === pair) { past = answer; app.paint(); } }, (error) => tell(error.message, true));
 }
 
@@ -144,6 +149,7 @@ function say(app, verdict) {
   app.queue(async () => {
     await ask("judge", { at: app.project.at, frame: app.frame, i: pair.i, j: pair.j, verdict, reviewer: who, seconds: Math.round(seconds * 10) / 10, blind });
     pair.verdict = verdict;
+    if (judges.open) judges.told = await ask("agreement", { at: app.project.at });
     tell(`${pairName(pair)}: ${verdict}. The next run obeys it`);
     nextAtStake(app); app.paint();
   });
@@ -166,6 +172,8 @@ function pairCard(app) {
   const with_ = (value, sd, unit, count = 3) => (value === null || value === undefined ? "–" : `${digits(value, count)}${sd !== null && sd !== undefined ? ` ± ${digits(sd, 2)}` : ""} ${unit}`);
   return h("div", { class: "card here", id: "card" },
     h("div", { class: "fact" }, h("b", {}, pairName(chosen)), chosen.verdict ? h("span", { class: "pill", style: { color: SAID[chosen.verdict], borderColor: "currentColor" } }, chosen.verdict) : null),
+    past ? strip(app) : h("div", { class: "strip" }),
+    h("div", { class: "verdicts" }, Object.entries(VERDICTS).map(([key, verdict]) => h("button", { class: chosen.verdict === verdict ? "on" : "", onclick: () => say(app, verdict) }, h("kbd", {}, key.toUpperCase()), ` ${verdict}`))),
     blind ? null : [
       row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], "N")), fact("f_t", with_(net.ft[row], net.ft_sd[row], "N")), fact("it is", `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: not taken for a contact"),
       past ? fact("gap", with_(past.gap[k] === null ? null : past.gap[k] * 1e6, past.gap_sd[k] * 1e6, "µm")) : null,
@@ -176,15 +184,14 @@ function pairCard(app) {
       h("p", {}, without.stands ? `Without it, the nearest forces in balance move ${digits(without.share, 3)} times the mean force (orange: more, blue: less).` : `Without it nothing near balances the rods: ${digits(without.unbalance, 2)} of the mean force is left over. It is needed.`),
       without.stands ? h("div", { class: "list" }, without.most.slice(0, 4).map((each) => h("div", {}, h("span", { style: { flex: "1" } }, pairName(each)), h("span", {}, `${each.change > 0 ? "+" : ""}${digits(each.change, 3)} N`)))) : null,
     ] : h("button", { id: "without", onclick: () => askWithout(app) }, h("kbd", {}, "W"), " What if it were not there?"),
-    past ? strip(app) : null,
-    h("div", { class: "row" }, Object.entries(VERDICTS).map(([key, verdict]) => h("button", { class: chosen.verdict === verdict ? "on" : "", onclick: () => say(app, verdict) }, h("kbd", {}, key.toUpperCase()), ` ${verdict}`))));
+  );
 }
 
 /** The contact in this photograph and its neighbours in time, its point always in the middle. */
 function strip(app) {
   const width = Math.max(Math.round(1.7 * meanRadius()), 8);
   const frames = [-1, 0, 1].map((d) => app.frame + d).filter((k) => k >= 0 && k < facts.count && past.point[k]);
-  return h("div", { class: "row", style: { flexWrap: "nowrap" } }, frames.map((k) => h("img", { alt: `frame ${k}`, title: `frame ${k}`, style: { width: "86px", height: "86px", borderRadius: "7px", outline: k === app.frame ? `2px solid ${colour("accent")}` : "none" },
+  return h("div", { class: "strip" }, frames.map((k) => h("img", { alt: `frame ${k}`, title: `frame ${k}`, class: k === app.frame ? "here" : "",
     src: `/crop?${new URLSearchParams({ at: app.project.at, frame: k, x: Math.max(0, Math.round(past.point[k][0] * 100)), y: Math.max(0, Math.round(past.point[k][1] * 100)), width })}` })));
 }
 
@@ -195,11 +202,11 @@ function rodCard(app) {
     h("div", { class: "fact" }, h("b", {}, named(chosen.id)), h("span", { class: "pill" }, n < 0 ? "lost" : net.rods.status[n])),
     rodPast ? [
       fact("radius", `${digits(rodPast.radius * 1e3, 4)} mm`), fact("turned by", rodPast.rotation[k] === null ? "unknown" : `${digits(rodPast.rotation[k] * 180 / Math.PI, 3)}°`),
-      fact("place", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), fact("unbalance / mean f_n", digits(rodPast.unbalance[k], 2)),
+      fact("place", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), blind ? null : fact("unbalance / mean f_n", digits(rodPast.unbalance[k], 2)),
       h("span", { class: "soft" }, "correlation over the frames"), chart(58, (c, w, hh) => spark(app, c, w, hh, seen.zncc, null, false)),
     ] : null,
-    h("span", { class: "soft" }, "touches"),
-    h("div", { class: "list" }, touching.map(([i, j, fn]) => h("button", { onclick: () => { const pair = list.find((each) => each.i === i && each.j === j); if (pair) pick(app, pair); } }, h("span", { style: { flex: "1" } }, named(i === chosen.id ? j : i)), h("span", {}, `${digits(fn, 3)} N`)))));
+    blind ? h("p", {}, "What it touches is not told while you judge blind.") : h("span", { class: "soft" }, "touches"),
+    blind ? null : h("div", { class: "list" }, touching.map(([i, j, fn]) => h("button", { onclick: () => { const pair = list.find((each) => each.i === i && each.j === j); if (pair) pick(app, pair); } }, h("span", { style: { flex: "1" } }, named(i === chosen.id ? j : i)), h("span", {}, `${digits(fn, 3)} N`)))));
 }
 
 /** A line over the frames with its band of one standard deviation; a bar marks this frame. */

@@ -10,10 +10,12 @@ from pydantic import Field, StringConstraints
 from ...errors import InputError
 from ...results.hdf5.store import read_origin
 from ...results.results import Results
+from ...review.reviewed_run import Reviewed
 from ...run_folder import RESULTS
 from ...verdicts.log import VERDICTS, Entry, Origin, Verdict, VerdictLog
 from ..inspecting import found as inspecting
 from ..inspecting import pairs
+from ..inspecting.agreement import agreement as compare_judges
 from .bench import Bench
 from .project import Project
 from .questions import BadRequest, Number, Text, Whole, question
@@ -80,6 +82,16 @@ def rod(bench: Bench, at: Text, id: Whole) -> dict[str, Any]:
             float("nan") if f.grain_unbalance is None else f.grain_unbalance[row] for f in _results(opened, 0).frames
         ]),
     }  # fmt: skip
+
+
+@question
+def agreement(bench: Bench, at: Text) -> dict[str, Any]:
+    """How far people agree with one another and with the program, on what has been judged."""
+    opened = bench.project(at)
+    results, experiment = _results(opened, 0), opened.understood().experiment
+    if experiment is None:
+        raise InputError(opened.draft.file, "", "cannot be read")
+    return compare_judges(Reviewed(opened.results / RESULTS, results, experiment, _first(opened)))
 
 
 @question

@@ -119,3 +119,35 @@ def test_forces_without_a_contact_differ_and_nothing_is_written(solved):
     assert len(gone) >= 1
     assert sorted(file.name for file in folder.iterdir()) == before
     assert "no contact" in visitor.refused("without", at=at, frame=FRAME, i=pair["i"], j=pair["i"])
+
+
+def test_eyes_are_compared_with_one_another_and_with_the_program(solved):
+    visitor, at, _, _ = solved
+    assert visitor.ask("agreement", at=at) == {
+        "frames": [], "total": None, "precision": None, "recall": None, "disputed": [], "judges": [],
+    }  # fmt: skip
+    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"]
+    seen = [each for each in told if each["detected"]]
+    unseen = [each for each in told if not each["detected"]]
+
+    def say(who, pair, verdict):
+        visitor.ask("judge", at=at, frame=FRAME, i=pair["i"], j=pair["j"], verdict=verdict, reviewer=who)
+
+    for pair in seen[:4]:
+        say("anna", pair, "contact")
+        say("ben", pair, "contact" if pair is not seen[0] else "no contact")
+    say("anna", unseen[0], "no contact")
+    say("ben", unseen[0], "no contact")
+    told = visitor.ask("agreement", at=at)
+    (row,) = told["frames"]
+    assert row["frame"] == FRAME
+    assert (row["hits"], row["false"], row["missed"], row["rejected"]) == (3, 0, 0, 1)  # a draw is nobody's word
+    assert told["precision"] is None  # five pairs say too little
+    judges = {(each["first"], each["second"]): each for each in told["judges"]}
+    both = judges["anna", "ben"]
+    assert (both["count"], both["observed"]) == (5, 0.8)
+    assert both["kappa"] == pytest.approx((0.8 - (0.8 * 0.6 + 0.2 * 0.4)) / (1.0 - (0.8 * 0.6 + 0.2 * 0.4)), rel=1e-4)
+    assert judges["anna", "detector"]["observed"] == 1.0
+    (pair,) = told["disputed"]
+    assert (pair["i"], pair["j"]) == (seen[0]["i"], seen[0]["j"])
+    assert pair["said"] == {"anna": "contact", "ben": "no contact"}
