@@ -29,12 +29,12 @@ from ..look.scene import Scene
 from ..look.texts import printable
 from ..packing_layers.backdrop import log_photograph
 from ..packing_layers.changes import log_changes
+from ..packing_layers.film import FilmWriter
 from ..packing_layers.grains_and_walls import log_grains_and_walls
 from ..packing_layers.legends import log_legends
 from ..packing_layers.network import SweepChoice, chosen_sweeps, log_network
 from ..packing_layers.reviewed import log_reviewed
 from ..packing_layers.rods_in_3d import log_rods
-from ..packing_layers.stack import StackWriter
 from ..packing_layers.touching import log_touching, log_touching_styles
 from ..packing_layers.true_forces import TruthWriter
 from ..packing_layers.unconverged import log_unconverged
@@ -74,7 +74,7 @@ class Recorder:
         self._sweeps, self._kept, self._flush_every, self._flush = sweeps, kept, flush_every, flush
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
-        self._stack: StackWriter | None = None
+        self._film: FilmWriter | None = None
         self._plot: ResidualPlot | None = None
         self._former: FrameForces | None = None
         self._density = ForceDensity()
@@ -97,7 +97,7 @@ class Recorder:
         self._scene = scene
         stream.send_recording_name(printable(scene.name))
         send_experiment(stream, scene)
-        self._stack = StackWriter(scene)
+        self._film = FilmWriter(scene)
         self._plot = ResidualPlot(scene.tolerance)
         log_settling_styles(stream)
         log_start_styles(stream)
@@ -137,8 +137,8 @@ class Recorder:
         log_rose(clock, forces)
         self._density.log(clock, forces.fn, statistics.tail_exponent)
         log_rods(clock, scene, forces)
-        if self._stack is not None:
-            self._stack.log(clock, forces)
+        if self._film is not None:
+            self._film.log(clock, forces)
         agreement = self._truth.log(clock, forces) if self._truth else None
         self._former = forces
         self._clipped += scene.style.clipped(forces.fn)

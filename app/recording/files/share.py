@@ -86,7 +86,7 @@ def _chosen(chunks: list[Chunk], first: int, stop: int, sweeps: tuple[int, int],
     for chunk in chunks:
         if chunk.entity_path == f"/__properties/{PROPERTY}":
             continue  # it has another number of frames now
-        if _is_layer_outside(chunk.entity_path, first, stop):
+        if _is_picture_outside(chunk.entity_path, first, stop):
             continue
         timelines = set(chunk.timeline_names)
         if not timelines & {entities.FRAME, entities.SWEEP}:
@@ -107,10 +107,10 @@ def _chosen(chunks: list[Chunk], first: int, stop: int, sweeps: tuple[int, int],
             yield chunk
 
 
-def _is_layer_outside(path: str, first: int, stop: int) -> bool:
-    """Whether an entity is the static layer of a frame that is not shared."""
+def _is_picture_outside(path: str, first: int, stop: int) -> bool:
+    """Whether an entity is the static picture of a frame that is not shared."""
     head, _, frame = path.rpartition("/")
-    return head == entities.STACK_LAYERS and not first <= int(frame) < stop
+    return head == entities.FILM_FRAMES and not first <= int(frame) < stop
 
 
 def _smaller_photographs(batch: pa.RecordBatch, scale: float) -> Iterator[Chunk]:

@@ -142,9 +142,9 @@ RADIUS_TICKS = "/statistics/radius_curve/axes/ticks"
 
 RODS = "/rods/bodies"
 ROD_CHAINS = "/rods/chains"
-STACK_LAYERS = "/stack/frames/layer"  # and the number of the frame below it
-STACK_PLACE = "/stack/frames/place"
-STACK_SWEEPS = "/stack/sweeps/layers"
+FILM_FRAMES = "/film/frames/picture"  # and the number of the frame below it
+FILM_PLACE = "/film/frames/place"
+FILM_SWEEPS = "/film/sweeps/pictures"
 
 TRUTH_FORCES = "/truth/force"
 TRUTH_SCATTER = "/truth/scatter/contacts"
@@ -225,8 +225,7 @@ def _of(archetype: str, *names: str) -> frozenset[str]:
 _STRIPS = _of("LineStrips2D", "strips", "radii", "colors", "draw_order")
 _POINTS = _of("Points2D", "positions", "radii", "colors", "draw_order")
 _TICKS = _of("Points2D", "positions", "radii", "colors", "labels", "show_labels")
-_LINES_3D = _of("LineStrips3D", "strips", "radii", "colors")
-_LABELS_3D = _of("Points3D", "positions", "radii", "colors", "labels", "show_labels")
+_FILM = _STRIPS | _TICKS
 _SCALAR = _of("Scalars", "scalars")
 _LINE = _of("SeriesLines", "colors", "names", "widths")
 _LANE = _of("StateChange", "state") | _of("StateConfiguration", "values", "labels", "colors")
@@ -382,11 +381,11 @@ SCHEMA: tuple[Entity, ...] = (
         _of("Capsules3D", "lengths", "radii", "translations", "quaternions", "colors", "fill_mode"), When.END,
     ),
     Entity(
-        STACK_LAYERS, "strong forces of at most twelve frames, one above the other, an entity each below this one [m]",
-        _LINES_3D | _LABELS_3D, When.STATIC, per_frame=True,
+        FILM_FRAMES, "strong forces of at most nine frames side by side, an entity each below this one",
+        _FILM, When.STATIC, per_frame=True,
     ),
-    Entity(STACK_PLACE, "where the frame lies among them", _LINES_3D, When.START),
-    Entity(STACK_SWEEPS, "strong forces of some sweeps, one above the other [m]", _LINES_3D | _LABELS_3D, When.START),
+    Entity(FILM_PLACE, "which of them is the nearest", _of("LineStrips2D", "strips", "radii", "colors"), When.START),
+    Entity(FILM_SWEEPS, "strong forces of some sweeps side by side", _FILM, When.START),
     Entity(TRUTH_FORCES, "true contact forces, same widths and colours", _STRIPS | _FORCE_VALUES, When.START,
            Condition.TRUTH),
     Entity(TRUTH_SCATTER, "inferred over true f_n", _POINTS, When.END, Condition.TRUTH),

@@ -13,7 +13,7 @@ from ..curve_layers.stress_and_fabric import ROSE_REACH, STRESS_REACH
 from ..look import entities
 from ..look.axes import PLOT_BOUNDS
 from ..look.canvas import Canvas
-from ..packing_layers.stack import STACK_HEIGHT_SHARE
+from ..packing_layers.film import COLUMNS, SWEEP_COLUMNS, film_bounds
 from .axis_ranges import Extremes
 from .views import (
     contacts_by,
@@ -39,7 +39,7 @@ class Tab(StrEnum):
     CONTACTS = "Contacts"
     MAPS = "Contact maps"
     RODS = "3D"
-    STACK = "Stack"
+    FILM = "Film"
     TRUTH = "Truth"
     SUMMARY = "Summary"
 
@@ -81,7 +81,7 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: b
         Tab.CONTACTS: _contacts(layout),
         Tab.MAPS: _maps(layout),
         Tab.RODS: _rods(layout),
-        Tab.STACK: _stack(layout),
+        Tab.FILM: _film(layout),
     }
     if layout.truth:
         tabs[Tab.TRUTH] = _truth(layout)
@@ -282,14 +282,12 @@ def _rods(layout: Layout) -> rrb.View:
     return solid_view(Tab.RODS, "/rods", eye, (x, y, -0.3 * layout.rod_length))
 
 
-def _stack(layout: Layout) -> rrb.Container:
-    x, y, size = _middle(layout.canvas)
-    middle = 0.5 * STACK_HEIGHT_SHARE * size
-    eye, target = (x + 1.2 * size, y + 0.5 * size, middle + size), (x, y - 0.1 * size, middle)
+def _film(layout: Layout) -> rrb.Container:
     return rrb.Horizontal(
-        solid_view("Frames, the later the nearer", "/stack/frames", eye, target),
-        solid_view("Sweeps of this frame, the later the nearer", "/stack/sweeps", eye, target),
-        name=Tab.STACK,
+        drawn_view("Strong forces of frames, the nearest framed", "/film/frames", *film_bounds(layout.canvas, COLUMNS)),
+        drawn_view("Strong forces of this frame's sweeps", "/film/sweeps", *film_bounds(layout.canvas, SWEEP_COLUMNS)),
+        column_shares=[COLUMNS, SWEEP_COLUMNS],
+        name=Tab.FILM,
     )
 
 

@@ -18,7 +18,7 @@ from solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.scene import Scene, setting
 from ..look.texts import printable
-from ..packing_layers.stack import STRONG, STRONG_SWEEPS
+from ..packing_layers.film import STRONG, STRONG_SWEEPS
 
 MOST_DOUBTS = 5  # frames whose reasons are told
 PACKAGES = ("rodsight", "numpy", "numba", "scipy", "rerun-sdk")
@@ -170,15 +170,16 @@ def _legend(scene: Scene, clipped: int, drawn: int) -> str:
         "- Timeline **frame**: one step per photograph, reported forces. Timeline **sweep**: the solve itself; "
         "switch to it for the tab *Convergence*. After the last sweep of a frame one more value shows the "
         "reported field: the estimator *ensemble* makes it of several chains and convex members, so that the "
-        "forces may step there.\n"
+        "forces may step there. Timelines **time** and **microstrain**: the same frames by when they were taken, and "
+        "by how far the packing had been strained, in millionths.\n"
         "- **Unbalance and change**: grains glow by the force that is missing to their balance, contacts by how much "
-        "they changed since the recorded row before, which may be many sweeps back (in a frame's last row: from the "
-        "chain to the reported field), both over the mean f_n.\n"
+        "a sweep changes them, on average since the recorded sweep before (in a frame's last row: as the sweeps "
+        "ended), both over the mean f_n.\n"
         "- **Warm and cold start**: the residual after one sweep from the former forces, and after one from zero "
         "forces, on the problem of the frame's last sub-step. The sweeps saved are those that zero forces need to "
         "come as far.\n"
-        f"- **Stack**: forces above {STRONG:g} times the mean of some frames, and above {STRONG_SWEEPS:g} times the "
-        "mean of some sweeps of this frame, the later the nearer. The bright outline is this frame."
+        f"- **Film**: forces above {STRONG:g} times the mean of some frames, and above {STRONG_SWEEPS:g} times the "
+        "mean of some sweeps of this frame. The bright outline is about the frame that is nearest to this one."
     )
 
 
