@@ -52,8 +52,7 @@ from .run_truth import load_truth, refuse_unnamed_truth
 from .sensitivity.error_budget import budget_cases, measure_budget
 from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
 from .sensitivity.study import Nominal
-from .tracking.report.page import tracking_report
-from .tracking.stage import DETECTIONS, gather_report, track_photographs, write_found_tables
+from .tracking import DETECTIONS
 from .tracks import Tracks, WallTracks
 from .verdicts.decisions import Bodies, decide
 from .verdicts.log import VERDICTS, Flag, VerdictLog
@@ -114,6 +113,8 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
         run.forget("tracking", "walls")
         return load_tracks(run.file(TRACKS))
+    from .tracking.stage import track_photographs, write_found_tables  # not where rods are tracked already
+
     check(run)
     since = time.perf_counter()
     start, stop = run.frame_range(len(experiment.photographs()))
@@ -144,6 +145,9 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
 
 def report_tracking(run: Run, tracks: Tracks, walls: WallTracks | None) -> Path:
     """Write the page that shows how well the photographs were tracked."""
+    from .tracking.report.page import tracking_report
+    from .tracking.stage import gather_report
+
     run.progress("report", 0, 1)
     tracked = gather_report(run.experiment, run.folder, tracks, walls, run.frames[0])
     write_atomically(run.file(REPORT), tracking_report(tracked).encode())

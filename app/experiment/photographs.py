@@ -15,7 +15,6 @@ from pathlib import Path
 from threading import Lock
 from typing import Literal, Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -231,6 +230,8 @@ def _to_grey(file: Path, pixels: NDArray, weight: NDArray[np.float32]) -> Image:
     elif pixels.shape[2] <= 2:  # grey, with or without an opacity
         grey = pixels[:, :, 0].astype(np.float32)
     else:
+        import cv2
+
         grey = cv2.transform(pixels[:, :, :3].astype(np.float32), weight[None, :])
     if scale != 1.0:
         grey *= scale
@@ -266,6 +267,8 @@ def _decode(content: bytes) -> NDArray | None:
 
 
 def _decode_alone(content: bytes) -> NDArray | None:
+    import cv2  # not where there are tracks
+
     # A decoder's complaints would reach standard error beside our own single line.
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(0)

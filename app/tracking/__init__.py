@@ -1,1 +1,3 @@
 """From photographs to tracks. Stands on experiment and results; knows no forces."""
+
+DETECTIONS = "detections.csv"  # in a run's folder: the rods of the first photograph as they were found

@@ -26,6 +26,7 @@ from ..experiment.walls import read_walls
 from ..progress import Observer, Progress
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
+from . import DETECTIONS
 from .detection.channels import count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from .detection.strangers import describe_channels, describe_strangers
@@ -40,7 +41,7 @@ BAR_DEPTH = 3.0
 
 Columns = dict[str, NDArray[Any]]
 
-DETECTIONS, WALLS = "detections.csv", "tracked_walls.csv"
+WALLS = "tracked_walls.csv"
 
 
 def untold(sentence: str) -> None:

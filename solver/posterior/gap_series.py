@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import nnls
 from scipy.special import ndtri
 
 from solver.bodies.grains import Array
@@ -95,6 +94,8 @@ def measure_noise(series: GapSeries, stated: float) -> GapNoise:
                 lively = _variance_by_quantile(change, LIVELY)
     if len(lag) < 2:
         return GapNoise(2.0 * stated**2, max(lively - 4.0 * stated**2, 0.0))
+    from scipy.optimize import nnls  # a tenth of all that is imported, and not for every start
+
     # Relative errors weigh the same at every lag.
     design = np.column_stack([np.full(len(lag), 2.0), lag]) / np.array(spread)[:, None]
     noise = max(float(nnls(design, np.ones(len(lag)))[0][0]), 2.0 * DOUBTFUL * stated**2)
