@@ -8,12 +8,14 @@ differs from the overlap of touching surfaces is an error that all gaps share.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr
 
 from solver.bodies.grains import Array
+from solver.together import work_together
 
 ROUNDS = 60
 START = 0.2  # quantile of all gaps near which those of touching pairs are looked for first
@@ -61,7 +63,7 @@ def fit_touching(gap: Array, trait: Array, reach: float, narrow: float) -> Touch
     g = gap[known]
     low, high = np.quantile(g, [0.25, 0.75])
     starts = ((float(np.quantile(g, START)), narrow), (float(np.median(g)), max(0.75 * float(high - low), narrow)))
-    found = [_maximise(gap, trait, reach, *start) for start in starts]
+    found = work_together([partial(_maximise, gap, trait, reach, *start) for start in starts], None)
     return max(found, key=lambda each: each[0])[1]
 
 
@@ -71,6 +73,7 @@ def _maximise(gap: Array, trait: Array, reach: float, a: float, s: float) -> tup
     g, x = gap[frame, column], trait[column]
     per_frame = np.maximum(np.bincount(frame, minlength=len(gap)), 1)
     share, slope = np.full(len(gap), 0.6), np.zeros(trait.shape[1])
+    plane = np.asfortranarray(np.column_stack([np.ones(len(g)), x]))
     least, total, likelihood = s, 0.0, -np.inf
     for _ in range(ROUNDS):
         mean = a + x @ slope
@@ -80,7 +83,7 @@ def _maximise(gap: Array, trait: Array, reach: float, a: float, s: float) -> tup
         total = float(weight.sum())
         if total < ENOUGH:
             break
-        a, slope = _fit_mean(g, x, weight)
+        a, slope = _fit_mean(g, plane, weight)
         s = min(float(np.sqrt(weight @ (g - a - x @ slope) ** 2 / total)), WIDEST * max(reach - a, least))
         share = np.clip(np.bincount(frame, weight, minlength=len(gap)) / per_frame, LEAST_SHARE, MOST_SHARE)
     pairs = max(total / max(len(gap), 1), 1.0)  # frames tell of the same pairs again
@@ -89,13 +92,14 @@ def _maximise(gap: Array, trait: Array, reach: float, a: float, s: float) -> tup
 
 def _densities(rest: Array, s: float, room: Array, share: Array) -> tuple[Array, Array]:
     """Densities of touching and of open gaps that exceed the mean by `rest` [m], at most by room [m]."""
-    touching = share * np.exp(-0.5 * (rest / s) ** 2) / (s * np.sqrt(2.0 * np.pi))
-    opened = (1.0 - share) * (ndtr(rest / s) - ndtr((rest - room) / s)) / np.maximum(room, s)
+    scaled = rest / s
+    touching = share * np.exp(-0.5 * scaled**2) / (s * np.sqrt(2.0 * np.pi))
+    opened = (1.0 - share) * (ndtr(scaled) - ndtr((rest - room) / s)) / np.maximum(room, s)
     return touching, opened
 
 
-def _fit_mean(g: Array, x: Array, weight: Array) -> tuple[float, Array]:
-    """Weighted plane through the gaps; flat along traits that do not vary."""
-    design = np.column_stack([np.ones(len(g)), x]) * np.sqrt(weight)[:, None]
-    found = np.linalg.lstsq(design, g * np.sqrt(weight), rcond=1e-9)[0]
+def _fit_mean(g: Array, plane: Array, weight: Array) -> tuple[float, Array]:
+    """Weighted plane through the gaps, over ones and traits (c, 1 + t); flat along traits that do not vary."""
+    root = np.sqrt(weight)
+    found = np.linalg.lstsq(plane * root[:, None], g * root, rcond=1e-9)[0]
     return float(found[0]), np.asarray(found[1:], dtype=np.float64)
