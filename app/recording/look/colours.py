@@ -50,14 +50,8 @@ _FORCE_WAY = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.
 _GAP_WAY = ((0.58, 0.150, 255.0), (0.74, 0.09, 240.0), (0.95, 0.0, 0.0), (0.76, 0.11, 60.0), (0.64, 0.17, 45.0))
 # Quiet slate, violet, magenta, rose, pale: what is far from converged glows.
 _DOUBT_WAY = ((0.36, 0.045, 260.0), (0.46, 0.10, 285.0), (0.58, 0.19, 330.0), (0.74, 0.15, 5.0), (0.95, 0.03, 60.0))
-# Doubtful magenta over pale to a quiet teal where two bodies surely touch.
-_PROBABILITY_WAY = (
-    (0.60, 0.20, 350.0),
-    (0.76, 0.11, 20.0),
-    (0.90, 0.03, 110.0),
-    (0.66, 0.07, 200.0),
-    (0.50, 0.07, 215.0),
-)
+# Doubtful yellow to a quiet blue where two bodies surely touch, darker all the way: it holds in grey, too.
+_PROBABILITY_WAY = ((0.93, 0.13, 103.0), (0.81, 0.12, 70.0), (0.67, 0.05, 10.0), (0.47, 0.075, 240.0))
 # Less, in blue, over nothing to more, in orange.
 _DIFFERENCE_WAY = (
     (0.80, 0.10, 225.0), (0.62, 0.14, 250.0), (0.42, 0.05, 265.0), (0.40, 0.0, 0.0), (0.45, 0.06, 40.0),

@@ -188,8 +188,8 @@ def _statistics(layout: Layout) -> rrb.Container:
     return rrb.Vertical(
         rrb.Horizontal(
             density,
-            polar_view("Stress / pressure", "/statistics/stress", STRESS_REACH),
-            polar_view("Fabric: contacts between grains", "/statistics/rose", ROSE_REACH),
+            polar_view("Principal stresses over the pressure", "/statistics/stress", STRESS_REACH),
+            polar_view("Directions of contacts and forces", "/statistics/rose", ROSE_REACH),
             column_shares=[1.45, 1.0, 1.0],
         ),
         rrb.Horizontal(*below),
@@ -236,7 +236,7 @@ def _contacts(layout: Layout) -> rrb.Container:
     touching.append(f"{entities.COLOUR_LEGENDS}/{entities.TOUCHES}/**")
     counts = [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]
     plots = [
-        curve_view("Contacts", counts, layout.extremes, height=220.0),
+        curve_view("Contacts in number", counts, layout.extremes, height=220.0),
         curve_view("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
         curve_view("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
     ]
@@ -304,12 +304,14 @@ def _truth(layout: Layout) -> rrb.Container:
     agreement = [entities.TRUTH_R_FN, entities.TRUTH_R_FT, entities.TRUTH_ERROR]
     return rrb.Vertical(
         rrb.Horizontal(
-            packing_view("Inferred", layout.canvas, [*_PACKING, *_FORCES]),
-            packing_view("True", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]),
+            packing_view("Inferred forces", layout.canvas, [*_PACKING, *_FORCES]),
+            packing_view(
+                "True forces", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]
+            ),
         ),
         rrb.Horizontal(
             drawn_view("f_n: inferred over true", "/truth/scatter", (-60.0, 425.0), (-15.0, 455.0)),
-            curve_view("Correlation, relative L2", agreement, y_range=(-0.45, 1.05), corner=_LOW),
+            curve_view("Agreement with the truth", agreement, y_range=(-0.45, 1.05), corner=_LOW),
         ),
         row_shares=[1.7, 1.0],
         name=Tab.TRUTH,

@@ -4,7 +4,18 @@ from itertools import combinations
 
 import pytest
 from rodsight.figures.page import COLOURS
-from rodsight.recording.look.colours import ADDED, FORBIDDEN, GAINED, LOST, SERIES
+from rodsight.recording.look.colours import (
+    ADDED,
+    DIFFERENCE_RAMP,
+    DOUBT_RAMP,
+    FORBIDDEN,
+    FORCE_RAMP,
+    GAINED,
+    GAP_RAMP,
+    LOST,
+    PROBABILITY_RAMP,
+    SERIES,
+)
 
 from tests.app.recording.look.colour_vision import VISIONS, cie76
 
@@ -16,11 +27,28 @@ GROUPS = {
 }
 
 
+RAMPS = {
+    "force": FORCE_RAMP, "gap": GAP_RAMP, "doubt": DOUBT_RAMP, "probability": PROBABILITY_RAMP,
+    "difference": DIFFERENCE_RAMP,
+}  # fmt: skip
+BOTH_WAYS = {"gap", "difference"}
+
+
 @pytest.mark.parametrize("group", GROUPS)
 @pytest.mark.parametrize("vision", [name for name in VISIONS if name != "grey"])
 def test_colours_of_a_group_are_apart(group, vision):
     for one, other in combinations(GROUPS[group], 2):
         assert cie76(one, other, vision) >= APART, (one, other)
+
+
+@pytest.mark.parametrize("ramp", RAMPS)
+@pytest.mark.parametrize("vision", VISIONS)
+def test_the_middle_of_a_ramp_is_apart_from_its_ends(ramp, vision):
+    low, middle, high = (tuple(RAMPS[ramp][row].tolist()) for row in (0, len(RAMPS[ramp]) // 2, -1))
+    assert cie76(low, middle, vision) >= APART
+    assert cie76(middle, high, vision) >= APART
+    if not (ramp in BOTH_WAYS and vision == "grey"):  # without a hue more and less look alike
+        assert cie76(low, high, vision) >= APART
 
 
 @pytest.mark.parametrize("pair", [(SERIES[0], SERIES[1]), (SERIES[2], SERIES[3]), (GAINED, LOST)])
