@@ -42,12 +42,12 @@ const TONE = { settled: "good", settling: "good", rearranging: "doubtful", suspe
 
 function rollTile(app, each) {
   return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await ask("begin", { roll: each.roll, name: each.name })), "Reading photographs …") },
-    h("span", { class: "picture empty" }, "+"),
+    h("img", { class: "picture", alt: "", src: `/glimpse?${new URLSearchParams({ roll: each.roll })}` }),
     h("span", { class: "words" }, h("b", {}, each.folder === "." ? each.name : each.folder), h("span", {}, `${each.count} photographs, ${each.first} … ${each.last}`), h("span", {}, "Set up an experiment from these")));
 }
 
 function sampleTile(app) {
   return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await ask("sample")), "Copying the sample …") },
-    h("span", { class: "picture empty" }, "◍"),
+    h("img", { class: "picture", alt: "", src: "/glimpse" }),
     h("span", { class: "words" }, h("b", {}, "The sample: simple shear"), h("span", {}, "250 rods, 24 photographs, with the true forces to compare with")));
 }

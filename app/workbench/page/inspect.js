@@ -20,6 +20,7 @@ export const inspect = {
   keyHelp: [["C N U", "contact, no contact, unsure"], ["Z", "take the last verdict back"], ["Space", "the pair on which most hangs and nothing is said of"], ["W", "the forces without this contact"], ["B", "blind, or not"], ["V", "the recording, or the photograph"], ["J", "the next flagged frame"]],
   enter(app) { facts = null; net = null; chosen = null; past = null; frameOf = -1; app.queue(async () => { who ??= (await ask("reviewer")).name; facts = (await ask("run_told", { at: app.project.at })).frames; await load(app); }); },
   leave() { closeRecording(); },
+  rodsOfFrame: () => net.rods.x.flatMap((x, n) => [x, net.rods.y[n], net.rods.r[n]]), // for tests
   moved(app) { recording?.show(app.frame); app.queue(() => load(app)); },
   tool: (app) => tool(app),
   panel(app) {

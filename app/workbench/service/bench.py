@@ -10,10 +10,11 @@ from typing import Any
 from ... import __version__
 from ...errors import InputError
 from ...experiment.experiment import CONFIG_NAME
+from ...experiment.photographs import read_photograph
 from ..setup import edits
 from ..setup.draft import Draft
 from ..setup.folder import as_name, copy_sample, find_experiments, find_rolls, home_of, sample_folder
-from .project import Project
+from .project import Project, as_jpeg
 
 
 class Bench:
@@ -59,6 +60,18 @@ class Bench:
             "experiments": [project.glance() for project in experiments],
             "sample": sample_folder() is not None and not any(each.folder.name == "shear" for each in experiments),
         }  # fmt: skip
+
+    def glimpse(self, roll: int | None, widest: int) -> bytes:
+        """The first of some photographs, as JPEG; None: of the sample."""
+        if roll is None:
+            folder = sample_folder()
+            files = [] if folder is None else sorted((folder / "photos").iterdir())[:1]
+        else:
+            rolls = find_rolls(self.root)
+            files = list(rolls[roll].files[:1]) if 0 <= roll < len(rolls) else []
+        if not files:
+            raise InputError(self.root, "photographs", "are not there any more")
+        return as_jpeg(read_photograph(files[0]), widest)
 
     def begin(self, roll: int, name: str) -> Project:
         """Make an experiment of photographs."""

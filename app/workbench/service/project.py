@@ -28,6 +28,15 @@ QUALITY = 90  # of JPEG
 CROP = 240  # [px] of a crop as it is sent
 
 
+def as_jpeg(image: Image, widest: int) -> bytes:
+    """A photograph as JPEG, no wider or higher than so many pixels."""
+    shrink = min(1.0, widest / max(image.shape))
+    if shrink < 1.0:
+        image = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+    grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+
+
 class Project:
     """An experiment's folder under the folder that the workbench was opened on."""
 
@@ -77,12 +86,7 @@ class Project:
 
     def picture(self, frame: int, widest: int) -> bytes:
         """One photograph as JPEG, no wider or higher than so many pixels."""
-        image = self.photograph(frame)
-        shrink = min(1.0, widest / max(image.shape))
-        if shrink < 1.0:
-            image = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-        grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-        return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+        return as_jpeg(self.photograph(frame), widest)
 
     @property
     def name(self) -> str:

@@ -32,6 +32,7 @@ from .recordings import PATH, Viewer, answer_recording, answer_shared, answer_vi
 
 LARGEST_BODY = 256 * 1024  # bytes of a question
 WIDEST = 20_000  # [px] of a picture
+GLIMPSE = 480  # [px] of a picture on the first page
 NEWS = 0.4  # [s] between looks for what is new
 KINDS = {
     ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
@@ -102,6 +103,12 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
             media_type="image/jpeg",
         ))  # fmt: skip
 
+    def glimpse(request: Request) -> Response:
+        query = request.query_params
+        return _answered(lambda: Response(
+            bench.glimpse(_whole(query, "roll") if "roll" in query else None, GLIMPSE), media_type="image/jpeg",
+        ))  # fmt: skip
+
     def crop(request: Request) -> Response:
         query = request.query_params
         return _answered(lambda: Response(
@@ -128,6 +135,7 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
         Route("/", asset, methods=["GET"]),
         Route("/page/{name}", asset, methods=["GET"]),
         Route("/photograph", picture, methods=["GET"]),
+        Route("/glimpse", glimpse, methods=["GET"]),
         Route("/crop", crop, methods=["GET"]),
         Route("/events", events, methods=["GET"]),
         Route("/viewer/{name}", lambda request: answer_viewer(viewer, request), methods=["GET"]),

@@ -205,6 +205,14 @@ def test_what_somebody_else_writes_is_seen(begun, photographs_only):
     assert marks(visitor.ask("project", at=told["at"]))["photographs"] == "good"
 
 
+def test_the_first_page_shows_photographs_that_wait(visitor):
+    for query in ({"roll": 0}, {}):
+        answer = visitor.client.get("/glimpse", params=query)
+        assert (answer.status_code, answer.headers["Content-Type"]) == (200, "image/jpeg")
+    assert visitor.client.get("/glimpse", params={"roll": 7}).status_code == 422
+    assert visitor.client.get("/glimpse", params={"roll": "x"}).status_code == 400
+
+
 def test_photographs_come_as_pictures_of_any_size(begun):
     visitor, told = begun
     answer = visitor.client.get("/photograph", params={"at": told["at"], "frame": 1, "size": 100})
