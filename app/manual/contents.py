@@ -10,6 +10,7 @@ CONTENTS: dict[str, dict[str, str]] = {
     "Begin": {
         "index.md": "Start",
         "photographs.md": "Your own photographs",
+        "workbench.md": "The workbench",
         "views.md": "What the views show",
         "trust.md": "How far to trust it",
         "troubleshooting.md": "Troubleshooting",

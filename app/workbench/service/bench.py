@@ -63,12 +63,13 @@ class Bench:
 
     def glimpse(self, roll: int | None, widest: int) -> bytes:
         """The first of some photographs, as JPEG; None: of the sample."""
+        files: list[Path] = []
         if roll is None:
             folder = sample_folder()
-            files = [] if folder is None else sorted((folder / "photos").iterdir())[:1]
+            files += [] if folder is None else sorted((folder / "photos").iterdir())[:1]
         else:
             rolls = find_rolls(self.root)
-            files = list(rolls[roll].files[:1]) if 0 <= roll < len(rolls) else []
+            files += rolls[roll].files[:1] if 0 <= roll < len(rolls) else ()
         if not files:
             raise InputError(self.root, "photographs", "are not there any more")
         return as_jpeg(read_photograph(files[0]), widest)
