@@ -24,7 +24,7 @@ export const inspect = {
   moved(app) { recording?.show(app.frame); app.queue(() => load(app)); },
   tool: (app) => tool(app),
   panel(app) {
-    if (!facts) return h("p", {}, "There is nothing to inspect yet: run the experiment first (step 6).");
+    if (!facts) return [h("p", {}, "There is nothing to inspect yet: forces are found when the experiment is run."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (facts.provisional) return h("p", {}, "The run is not finished: what it has found so far is shown in step 6.");
     const judged = list ? list.filter((each) => each.verdict).length : 0;
     return [
@@ -62,7 +62,7 @@ export const inspect = {
     if (VERDICTS[key] && chosen?.j !== undefined) { say(app, VERDICTS[key]); return true; }
     return false;
   },
-  timeline(app) { showLanes(app, facts); },
+  timeline(app) { if (facts) showLanes(app, facts); else at("time").classList.remove("shown"); },
 };
 
 function toggleBlind(app) { blind = !blind; if (blind) closeRecording(); app.paint(); }

@@ -1,6 +1,6 @@
 // Step 7: rods that tracking lost or took for others: picked, dragged, turned, correlated again from there at once.
 
-import { ask, digits, fact, h, tell } from "/page/dom.js";
+import { ask, at, digits, fact, h, tell } from "/page/dom.js";
 import { showDoubts } from "/page/lanes.js";
 
 const KEPT = "#2fbf93", WEAK = "#f0e442", SEEN = "#56b4e980";
@@ -16,7 +16,7 @@ export const mend = {
   taken(app) { load(app); },
   tool,
   panel(app) {
-    if (app.project.run === null) return h("p", {}, "There are no tracks yet: run the experiment first (step 6).");
+    if (app.project.run === null) return [h("p", {}, "There are no tracks yet: rods are followed when the experiment is run."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (!told) return lacking ? h("div", { class: "says" }, h("p", {}, h("span", { class: "sign doubtful" }, "!"), lacking)) : h("p", {}, "Reading tracks …");
     const waits = told.corrections.filter((each) => !each.obeyed).length;
     return [
@@ -61,7 +61,7 @@ export const mend = {
     correlate(app);
     return true;
   },
-  timeline(app) { showDoubts(app, told); },
+  timeline(app) { if (app.project.run !== null) showDoubts(app, told); else at("time").classList.remove("shown"); },
 };
 
 const handle = (g) => [g.x + 1.45 * g.r * Math.cos(g.angle), g.y + 1.45 * g.r * Math.sin(g.angle)];

@@ -1,6 +1,6 @@
 // Step 6: the run itself: begun, paused, gone on with, cancelled; forces appear while it goes on.
 
-import { ask, digits, fact, h, tell } from "/page/dom.js";
+import { ask, digits, fact, h, sign, tell } from "/page/dom.js";
 import { drawLegend, drawNetwork } from "/page/network.js";
 import { showLanes } from "/page/lanes.js";
 
@@ -16,7 +16,7 @@ export const run = {
   panel(app) {
     const { project } = app, state = told?.state ?? "idle", busy = state === "running" || state === "pausing";
     return [
-      project.ready ? h("p", {}, "The same as ", h("kbd", {}, `rodsight run ${quoted(project.at)}`), " typed in this folder. Pausing costs one frame at most.") : h("p", {}, "Something is still missing: the steps marked ○ say what."),
+      project.ready ? h("p", {}, "The same as ", h("kbd", {}, `rodsight run ${quoted(project.at)}`), " typed in this folder. Pausing costs one frame at most.") : [h("p", {}, "Something is still missing:"), h("div", { class: "list", id: "lacks" }, lacks(app))],
       h("div", { class: "row" },
         busy
           ? [h("button", { id: "pause", disabled: state === "pausing", onclick: () => act(app, "run_pause") }, state === "pausing" ? "Pausing …" : "Pause"), h("button", { disabled: state === "pausing", onclick: () => act(app, "run_cancel") }, "Cancel")]
@@ -40,6 +40,12 @@ export const run = {
   },
   timeline(app) { showLanes(app, facts); },
 };
+
+/** The steps without which a run cannot begin, each a click away. */
+const lacks = (app) => [
+  ...app.project.steps.filter((step) => step.mark === "missing").map((step) => h("button", { onclick: () => app.goTo(step.name) }, sign("missing"), h("span", { class: "two" }, h("b", {}, step.name[0].toUpperCase() + step.name.slice(1)), h("span", { class: "soft" }, step.says[0] ?? "")))),
+  ...app.project.others.map((text) => h("div", {}, sign("missing"), h("span", { class: "two" }, text))),
+];
 
 const quoted = (text) => (/[^\w./-]/.test(text) ? `"${text}"` : text);
 const time = (seconds) => (seconds < 90 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);

@@ -14,7 +14,7 @@ export const share = {
   },
   panel(app) {
     if (!told) return h("p", {}, "Looking …");
-    if (!told.ready) return h("p", {}, "There is no recording to share yet: let the run come to its end (step 6).");
+    if (!told.ready) return [h("p", {}, "There is no recording to share yet: it is written at the end of a run."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     const frames = app.project.run?.frames ?? app.project.files.length;
     const field = (id, words, value, placeholder, onchange) => h("div", { class: "field" }, h("label", { htmlFor: id }, words), h("input", { id, value, placeholder, inputMode: "numeric", onchange: (event) => onchange(event.target.value.trim()) }));
     return [

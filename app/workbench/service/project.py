@@ -31,9 +31,8 @@ CROP = 240  # [px] of a crop as it is sent
 def as_jpeg(image: Image, widest: int) -> bytes:
     """A photograph as JPEG, no wider or higher than so many pixels."""
     shrink = min(1.0, widest / max(image.shape))
-    if shrink < 1.0:
-        image = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-    grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    small = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA) if shrink < 1.0 else image
+    grey = np.clip(np.rint(small), 0, 255).astype(np.uint8)
     return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
 
 

@@ -17,6 +17,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from ...errors import InputError
+from ...recording.files.cards import make_card
 from ...recording.files.share import share_recording
 from ...recording.look.canvas import Canvas
 from ...recording.viewing.single_page import write_single_page
@@ -57,7 +58,7 @@ def share(
         report = share_recording(source, target, first=first, stop=stop, scale=scale)
     except ValueError as error:
         raise InputError(source, "", str(error)) from None
-    write_single_page(target, target.with_suffix(".html"), title=opened.name)
+    write_single_page([target], target.with_suffix(".html"), title=opened.name, cards=[make_card(target)])
     return shared(bench, at) | {"frames": report.frames}
 
 

@@ -103,6 +103,18 @@ def show_the_recording(tab: Page) -> None:
     expect(tab.locator("#recording")).to_be_hidden()
 
 
+def test_what_is_missing_is_a_click_away(tab):
+    tab.get_by_text("Set up an experiment from these").click()
+    idle(tab)
+    for step in ("mend", "inspect", "share"):
+        go(tab, step)
+        tab.get_by_role("button", name="To the run").click()
+        idle(tab)
+    expect(tab.locator("#lacks button b")).to_have_text(["Photographs", "Scale", "Walls"])
+    tab.locator("#lacks button").nth(1).click()
+    expect(tab.locator("#panel h2")).to_have_text("Scale")
+
+
 def test_the_sample_is_a_click_away(tab, photographs_only):
     tab.get_by_text("The sample: simple shear").click()
     idle(tab)
