@@ -263,11 +263,13 @@ def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -
     """Which circles do not overlap what has been found, x, y, radius, … (c, 4), by more than the share allowed."""
     if len(found) == 0 or len(x) == 0:
         return np.ones(len(x), dtype=np.bool_)
-    count = min(8, len(found))
-    distance, index = KDTree(found[:, :2]).query(np.stack([x, y], axis=1), k=count)
-    distance, other = distance.reshape(len(x), count), found[index.reshape(len(x), count), 2]
-    limit = radius[:, None] + other - allowed * np.minimum(radius[:, None], other)
-    return (distance >= limit).all(axis=1)
+    tree, apart = KDTree(found[:, :2]), np.ones(len(x), dtype=np.bool_)
+    for count in (1, min(8, len(found))):  # most overlap the nearest one already
+        rows = np.flatnonzero(apart)
+        distance, index = tree.query(np.stack([x[rows], y[rows]], axis=1), k=[*range(1, count + 1)])
+        size, other = radius[rows, None], found[index, 2]
+        apart[rows] = (distance >= size + other - allowed * np.minimum(size, other)).all(axis=1)
+    return apart
 
 
 def _each(count: int, one: Callable[[int], Measured]) -> list[Measured]:
