@@ -136,7 +136,7 @@ def _convergence(layout: Layout) -> rrb.Container:
         plots.append(curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes))
     return rrb.Horizontal(
         packing_view("Network as it forms", layout.canvas, [*_PACKING, *_FORCES]),
-        packing_view("Unbalance of grains, change per sweep, over mean f_n", layout.canvas, maps),
+        packing_view("Unbalance and change per sweep", layout.canvas, maps),
         rrb.Vertical(*plots, row_shares=[2.0, 1.5, 0.8][: len(plots)]),
         column_shares=[1.0, 1.0, 1.05],
         name=Tab.CONVERGENCE,
