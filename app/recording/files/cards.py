@@ -9,8 +9,9 @@ import html
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
+from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from ..look import entities
@@ -85,18 +86,18 @@ def _last(recording: Path, entity: str) -> dict[str, Any]:
         batch = chunk.to_record_batch()
         if {entities.FRAME, entities.SWEEP} <= set(batch.schema.names):
             batches.append(batch)
-    last = max((pc.max(_integers(batch, entities.FRAME)).as_py() for batch in batches), default=None)
+    last = max((int(_frames(batch).max()) for batch in batches if batch.num_rows), default=0)
     rows = []
     for batch in batches:
-        rows += batch.filter(pc.equal(_integers(batch, entities.FRAME), last)).to_pylist()
+        rows += batch.filter(pa.array(_frames(batch) == last)).to_pylist()
     shown: dict[str, Any] = {}
     for row in sorted(rows, key=lambda row: row[entities.SWEEP]):
         shown |= {name: value for name, value in row.items() if value is not None}
     return shown
 
 
-def _integers(batch: pa.RecordBatch, name: str) -> pa.Array:
-    return batch.column(name).cast(pa.int64())
+def _frames(batch: pa.RecordBatch) -> NDArray[np.int64]:
+    return batch.column(entities.FRAME).cast(pa.int64()).to_numpy(zero_copy_only=False)
 
 
 def _hex(colour: Rgba) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
-from rerun.blueprint.visualizers import Visualizer
+from rerun.blueprint.visualizers import Visualizer  # pyright: ignore[reportPrivateImportUsage]
 
 from ..look import entities
 from ..look.canvas import Canvas
