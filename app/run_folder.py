@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 import time
 import traceback
@@ -34,6 +35,7 @@ from .verdicts.log import VerdictLog
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 REPORT = "tracking_report.html"
+LATER = re.compile(r"recording-part-\d+\.rrd")  # of a long recording, which opens as one by its first file
 SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
 FAILURES = "failures.log"  # tracebacks of what failed a frame
 OWN = (
@@ -159,7 +161,8 @@ def owned(run: Run) -> Iterator[Run]:
     """
     with holding(run.folder, run.notes.append):
         for part in (*run.folder.glob(f"*{PART}"), *(run.folder / UNFINISHED).rglob(f"*{PART}")):
-            if part.parent != run.folder or part.name.removesuffix(PART) in OWN:
+            name = part.name.removesuffix(PART)
+            if part.parent != run.folder or name in OWN or LATER.fullmatch(name):
                 part.unlink(missing_ok=True)
         yield run
 

@@ -32,6 +32,7 @@ def show_recording(recording: Path) -> Any:
         page = single_page([recording], title=recording.parent.name).replace(*NO_ADDRESS)
         style = f"width: 100%; height: {HEIGHT}px; border: 0"
         return HTML(f'<iframe srcdoc="{html.escape(page, quote=True)}" style="{style}"></iframe>')
-    from ..recording.viewing.viewer import open_viewer
+    from ..recording.parts import parts_of
+    from ..recording.viewing.viewer import ViewerKind, open_viewer
 
-    return open_viewer(recording)
+    return open_viewer(recording, ViewerKind.NATIVE, *parts_of(recording)[1:])

@@ -12,6 +12,7 @@ import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from rodsight.recording.viewing.recording_server import RecordingServer
 from rodsight.review.command import open_session
 from rodsight.review.reviewed_run import open_reviewed
 from rodsight.review.service.session import Viewpoint
@@ -78,6 +79,21 @@ def memory_of_review(out: Path, count: int) -> Memory:
     return {"review": {int(frame): size for frame, size in (in_a_fork(review) or {}).items()}}
 
 
+def memory_of_view(out: Path, count: int) -> Memory:
+    """What serving the recording takes, by the share of it that a browser has got."""
+
+    def serve() -> dict[str, int]:
+        file, sent, taken = out / "recording.rrd", 0, {}
+        server = RecordingServer([file])
+        for piece in server.pieces(file):
+            sent += len(piece)
+            held = resident(os.getpid())
+            taken |= {str(k): held for k in range(len(taken) + 1, 1 + count * sent // file.stat().st_size)}
+        return taken
+
+    return {"view": {int(frame): size for frame, size in (in_a_fork(serve) or {}).items()}}
+
+
 def growth(taken: dict[int, int]) -> tuple[int, int, float]:
     """The most around frame EARLY and among the last frames [bytes], and by which share it grew."""
     last = max(taken)
@@ -102,7 +118,7 @@ def resident(process: int) -> int:
 def measure(tracked: Path, work: Path, count: int, tell: Callable[[str], object] = print) -> Memory:
     """Run, record and review so many photographs; gives what that took."""
     experiment, out = lengthen(tracked, work / "long", count), work / "out"
-    found = memory_of_run(experiment, out) | memory_of_review(out, count)
+    found = memory_of_run(experiment, out) | memory_of_review(out, count) | memory_of_view(out, count)
     for line in describe(found):
         tell(line)
     return found

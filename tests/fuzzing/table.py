@@ -21,6 +21,7 @@ _ROWS = {
     "faults": ("refused reads and writes", "ends without their one line", "test_faults"),
     "frames": ("photographs of one long run", "stages whose memory grows by more than 5 % from frame 50 on",
                "test_long_runs"),
+    "scrubbed": ("photographs of one recording", "pictures that took more than 20 s", "test_scrubbing"),
     "requests": ("hostile requests", "let in, or answered with a traceback", "test_hostile_requests"),
 }  # fmt: skip
 

@@ -53,6 +53,7 @@ def view(
 
     Example: rodsight view runs/shear --web
     """
+    from ...recording.parts import parts_of
     from ...run_folder import RECORDING, SIDE
 
     if recording.is_dir() and (only_list or not (recording / RECORDING).is_file()):
@@ -63,7 +64,7 @@ def view(
     side = file.with_name(SIDE)
     also = (side,) if recording.is_dir() and side.is_file() else ()
     if web:
-        return _serve([file, *also], Console())
+        return _serve([*parts_of(file), *also], Console())
     return show(file, "native", Console(), *also)
 
 
@@ -201,9 +202,10 @@ def compare(
 
 def show(recording: Path, how: str, console: Console, *also: Path) -> int:
     """Open a recording, or say how to. Exit status 0."""
+    from ...recording.parts import parts_of
     from ...recording.viewing.viewer import open_viewer
 
-    hint = open_viewer(recording, how, *also)
+    hint = open_viewer(recording, how, *parts_of(recording)[1:], *also)
     if hint is not None:
         console.print(hint, highlight=False, soft_wrap=True)
     return 0

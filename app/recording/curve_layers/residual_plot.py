@@ -38,6 +38,11 @@ class ResidualPlot:
         self._tolerance = tolerance
         self._axes: Axes | None = None
 
+    def go_on(self, stream: rr.RecordingStream) -> None:
+        """Log the axes into another stream, too."""
+        if self._axes is not None:
+            self._log_axes(stream, self._axes)
+
     def log(self, clock: Clock, history: SweepHistory, cold: Array | None, marked: NDArray[np.int64]) -> None:
         """Draw one frame (at least one sweep).
 
@@ -79,10 +84,14 @@ class ResidualPlot:
             )
 
     def _begin(self, stream: rr.RecordingStream, count: int) -> Axes:
-        """Log the axes, static."""
         decades = float(np.ceil(np.log10(max(count, LEAST_SWEEPS)) - 1e-9))
-        axes = self._axes = Axes((0.0, decades), DECADES)
-        level = []
+        self._axes = Axes((0.0, decades), DECADES)
+        self._log_axes(stream, self._axes)
+        return self._axes
+
+    def _log_axes(self, stream: rr.RecordingStream, axes: Axes) -> None:
+        """Log the axes, static."""
+        decades, level = axes.x_range[1], []
         if self._tolerance is not None and self._tolerance > 0.0:
             height = float(np.clip(np.log10(self._tolerance), *DECADES))
             level = [axes.points(np.array([0.0, decades]), np.full(2, height))]
@@ -103,7 +112,6 @@ class ResidualPlot:
             notes=[(x * decades, DECADES[0] + y * (DECADES[1] - DECADES[0]), text, of) for x, y, text, of in notes],
             guides=level,
         )
-        return axes
 
 
 def mean_changes(history: SweepHistory) -> Array:

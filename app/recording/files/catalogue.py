@@ -19,6 +19,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from ..look import entities
+from ..parts import is_later_part
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import read_layout
 from ..viewing.viewer import viewer_binary, viewer_environment
@@ -43,7 +44,7 @@ class CatalogueRow:
 def find_recordings(folder: Path | str) -> list[Path]:
     """The recordings of a folder: files in it, and those of the runs in its folders, by name."""
     folder = Path(folder)
-    loose = [file for file in folder.glob("*.rrd") if file.name not in _PARTS]
+    loose = [file for file in folder.glob("*.rrd") if file.name not in _PARTS and not is_later_part(file)]
     return sorted([*loose, *folder.glob(f"*/{RECORDING}")])
 
 

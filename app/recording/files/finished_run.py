@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+import uuid
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from ..look.canvas import Canvas
 from ..look.force_style import ForceRange, ForceStyle
 from ..look.scene import Scene, tracks_in_cell
 from ..packing_layers.network import SweepChoice
+from ..parts import forget_parts, part_of
 from ..tabs.axis_ranges import find_extremes
 from ..tabs.blueprint import Layout, Tab, make_blueprint
 from ..tabs.layout_property import send_layout
@@ -30,6 +32,7 @@ from .writing import writing
 
 FrameProgress = Callable[[int, int], None]  # frames done, frames in all
 
+PART_FRAMES = 2000  # photographs in one file: more make the viewer slow to open it
 LONG = 200  # frames from which on the index of a recording, .2 MB a frame in memory, is made by a process of its own
 WHOLE = ".whole.part"  # a recording that has been given its index
 LEAST_ROWS = 4  # sweeps of a frame that even a short solve keeps
@@ -44,13 +47,14 @@ class RecordingFile:
     """A recording as it was written."""
 
     path: Path
-    size: int  # [bytes]
+    size: int  # [bytes] of all its parts
     seconds: float
     frames: int
     network_rows: int  # rows of widths and colours, the reported fields among them
     sweeps: SweepChoice  # as written, which is less than asked for where the size was limited
     clipped: int  # forces above the drawn range
     notes: tuple[str, ...]  # sentences for the user
+    parts: int = 1  # files
 
 
 def write_recording(
@@ -65,8 +69,11 @@ def write_recording(
     max_size: int | None = None,
     tolerance: float | None = None,
     active: Tab = Tab.EXPERIMENT,
+    part_frames: int = PART_FRAMES,
 ) -> RecordingFile:
     """Write a run as a recording with its blueprint; an older file is replaced only when the new one is whole.
+
+    part_frames: photographs in one file; more make files beside the first that open alone, and with it as one.
 
     photograph: frame → grey picture (H, W) or None; needs `scale`. sweeps: see SweepChoice.
     tolerance: stopping level of the residual, drawn into the plot. max_size [bytes]: fewer sweeps are
@@ -83,8 +90,9 @@ def write_recording(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, ForceRange.of(results.frames)), truth, tolerance, results.radius_tuning,
     )  # fmt: skip
-    run = _Run(results, scene, photograph, active, progress)
-    part = path.with_name(path.name + ".part")
+    run = _Run(results, scene, photograph, active, progress, part_frames)
+    parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
+    unfinished = [each.with_name(each.name + ".part") for each in parts]
     notes: tuple[str, ...] = ()
     plans = _plans(SweepChoice(sweeps), limited=max_size is not None)
     try:
@@ -93,20 +101,29 @@ def write_recording(
                 shown = f"{plan.kept} sweeps per frame" if plan.kept else "the reported fields only"
                 notes = (f"Limited to {_megabytes(max_size or 0)}: {shown} instead of sweeps = {sweeps}.",)
             last = number == len(plans) - 1
-            recorder = _write(run, part, plan, notes, None if last else max_size)
-            if recorder is not None and (max_size is None or part.stat().st_size <= max_size or last):
+            recorder = _write(run, unfinished, plan, notes, None if last else max_size)
+            if recorder is not None and (max_size is None or _size(unfinished) <= max_size or last):
                 break
         else:
             raise AssertionError("the last plan is always written")
-        if max_size is not None and part.stat().st_size > max_size:
+        if max_size is not None and _size(unfinished) > max_size:
             notes = (*notes, f"Still larger than {_megabytes(max_size)}: the frames themselves need that much.")
-        os.replace(part, path)
+        if len(parts) > 1:
+            notes = (*notes, f"The recording is {len(parts)} files, which open alone or, by the first, as one.")
+        for part, file in reversed(list(zip(unfinished, parts, strict=True))):  # the first tells that all are there
+            os.replace(part, file)
+        forget_parts(path, len(parts) + 1)
     finally:
-        part.unlink(missing_ok=True)
+        for part in unfinished:
+            part.unlink(missing_ok=True)
     return RecordingFile(
-        path, path.stat().st_size, time.perf_counter() - begin, len(results.frames), recorder.network_rows,
-        plan.sweeps, recorder.clipped, notes,
+        path, _size(parts), time.perf_counter() - begin, len(results.frames), recorder.network_rows,
+        plan.sweeps, recorder.clipped, notes, len(parts),
     )  # fmt: skip
+
+
+def _size(files: list[Path]) -> int:
+    return sum(each.stat().st_size for each in files)
 
 
 def layout_of(results: Results, scene: Scene, *, photographs: bool) -> Layout:
@@ -127,6 +144,7 @@ class _Run:
     photograph: PhotographSource | None
     active: Tab
     progress: FrameProgress | None
+    part_frames: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,27 +166,35 @@ def _plans(choice: SweepChoice, *, limited: bool) -> list[_Plan]:
     return plans
 
 
-def _write(run: _Run, part: Path, plan: _Plan, notes: tuple[str, ...], max_size: int | None) -> Recorder | None:
-    """Write the whole run to `part`; None, early, where it grows beyond max_size."""
-    results, photograph = run.results, run.photograph
-    stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
+def _write(run: _Run, parts: list[Path], plan: _Plan, notes: tuple[str, ...], max_size: int | None) -> Recorder | None:
+    """Write the whole run, part by part; None, early, where it grows beyond max_size."""
+    results, photograph, total = run.results, run.photograph, len(run.results.frames)
     layout = layout_of(results, run.scene, photographs=photograph is not None)
-    indexed = len(results.frames) < LONG
-    with writing(stream, part, make_blueprint(layout, active=run.active), indexed=indexed) as written:
-        recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept, flush=written.flush)
-        recorder.start(run.scene)
-        send_layout(stream, layout)
-        for done, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
-            recorder.frame(forces, statistics, photograph(forces.frame) if photograph else None)
-            if run.progress:
-                run.progress(done + 1, len(results.frames))
-            written.check()
-            if max_size is not None and written.size > max_size:
-                return None
-        recorder.finish(notes)
-    if not indexed:
-        _give_index(part)
-    _check_whole(part)
+    name, recorder, before = str(uuid.uuid4()), None, 0
+    for number, part in enumerate(parts):
+        begin, end = number * run.part_frames, min((number + 1) * run.part_frames, total)
+        indexed = end - begin < LONG
+        stream = rr.RecordingStream(entities.APPLICATION_ID, recording_id=name, batcher_config=BATCHES)
+        with writing(stream, part, make_blueprint(layout, active=run.active), indexed=indexed) as written:
+            if recorder is None:
+                recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept, flush=written.flush)
+                recorder.start(run.scene)
+            else:
+                recorder.go_on(stream, written.flush)
+            send_layout(stream, layout)
+            for k in range(begin, end):
+                forces = results.frames[k]
+                recorder.frame(forces, results.statistics[k], photograph(forces.frame) if photograph else None)
+                if run.progress:
+                    run.progress(k + 1, total)
+                written.check()
+                if max_size is not None and before + written.size > max_size:
+                    return None
+            recorder.finish(notes)
+        if not indexed:
+            _give_index(part)
+        _check_whole(part)
+        before += part.stat().st_size
     return recorder
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rerun.chunk import RrdReader
 
 from solver.bodies.grains import Array
 
 from ..look import entities
+from ..parts import chunks_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ def read_forces(path: Path | str, *, truth: bool = False) -> dict[int, RecordedF
         raise FileNotFoundError(f"there is no recording {path}")
     entity = entities.TRUTH_FORCES if truth else entities.FORCES
     found: dict[int, RecordedForces] = {}
-    for chunk in RrdReader(str(path)).store().stream().filter(content=entity).to_chunks():
+    for chunk in chunks_of(Path(path), content=entity):
         batch = chunk.to_record_batch()
         if not {entities.FRAME, "fn"} <= set(batch.schema.names):
             continue  # rows of widths and colours only

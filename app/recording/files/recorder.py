@@ -92,13 +92,25 @@ class Recorder:
 
     def start(self, scene: Scene) -> None:
         """Write what does not change: styles, axes, legends, the properties of the recording."""
-        stream = self._stream
-        stream.set_log_time_enabled(False)
         self._scene = scene
-        stream.send_recording_name(printable(scene.name))
-        send_experiment(stream, scene)
         self._film = FilmWriter(scene)
         self._plot = ResidualPlot(scene.tolerance)
+        if scene.truth is not None:
+            self._truth = TruthWriter(scene, scene.truth)
+        self._begin(self._stream)
+
+    def go_on(self, stream: rr.RecordingStream, flush: Callable[[rr.RecordingStream], None]) -> None:
+        """Write the frames to come into another stream, which has all that does not change as well."""
+        self._stream, self._flush, self._swept = stream, flush, False
+        self._begin(stream)
+        if self._plot is not None:
+            self._plot.go_on(stream)
+
+    def _begin(self, stream: rr.RecordingStream) -> None:
+        scene = self._running()
+        stream.set_log_time_enabled(False)
+        stream.send_recording_name(printable(scene.name))
+        send_experiment(stream, scene)
         log_settling_styles(stream)
         log_start_styles(stream)
         log_statistics_styles(stream, scene)
@@ -110,8 +122,7 @@ class Recorder:
             log_tolerance_style(stream)
         if scene.radius_tuning is not None:
             log_radius_curve(stream, scene.radius_tuning)
-        if scene.truth is not None:
-            self._truth = TruthWriter(scene, scene.truth)
+        if self._truth is not None:
             self._truth.log_axes(stream)
 
     def frame(self, forces: FrameForces, statistics: FrameStatistics, photograph: Photograph | None = None) -> None:

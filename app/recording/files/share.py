@@ -14,6 +14,7 @@ from rerun.chunk import Chunk, RrdReader
 
 from ...atomic import replacing
 from ..look import entities
+from ..parts import chunks_of, parts_of
 from ..tabs.blueprint import make_blueprint
 from ..tabs.layout_property import PROPERTY, read_layout, send_layout
 from ..viewing.viewer import run_tool
@@ -48,7 +49,8 @@ def share_recording(
     if not 0 <= first < stop <= layout.frame_count:
         raise ValueError(f"{first}:{stop} is not a range of the frames 0:{layout.frame_count}")
     entry = RrdReader(str(source)).recordings()[0]
-    chunks = RrdReader(str(source)).store().stream().to_chunks()
+    size = sum(each.stat().st_size for each in parts_of(source))
+    chunks = list(chunks_of(source))
     sweeps = _sweeps_of(chunks, first, stop)
     layout = replace(layout, frame_count=stop - first)
     with replacing(target) as part:
@@ -64,7 +66,7 @@ def share_recording(
             run_tool("optimize", loose, "-o", part)
         finally:
             loose.unlink(missing_ok=True)
-    return SharedRecording(target, target.stat().st_size, source.stat().st_size, stop - first)
+    return SharedRecording(target, target.stat().st_size, size, stop - first)
 
 
 def _sweeps_of(chunks: list[Chunk], first: int, stop: int) -> tuple[int, int]:

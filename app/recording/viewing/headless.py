@@ -18,6 +18,7 @@ from types import TracebackType
 
 from rerun.experimental import ViewerClient
 
+from ..parts import parts_of
 from .viewer import viewer_binary, viewer_environment
 
 START_SECONDS = 60.0
@@ -181,7 +182,8 @@ class HeadlessViewer:
 
     def _open(self) -> None:
         client = self._running()
-        client.open(str(self.recording.resolve()))
+        for file in parts_of(self.recording.resolve()):
+            client.open(str(file))
         end = time.monotonic() + ANSWER_SECONDS
         while True:
             client.take_screenshot(max_size=64)  # views exist once they were drawn

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from ...atomic import replacing, write_atomically
+from ..parts import chunks_of
 from .headless import HeadlessViewer, NoPictureError
 
 PictureProgress = Callable[[int, int], None]  # pictures done, pictures in all
@@ -88,10 +89,8 @@ def write_film(
 
 def timeline_values(recording: Path, timeline: str) -> tuple[int, int]:
     """First and last value of a timeline, read from the file."""
-    from rerun.chunk import RrdReader
-
     least, most = [], []
-    for chunk in RrdReader(str(recording)).store().stream().filter(has_timeline=timeline).to_chunks():
+    for chunk in chunks_of(recording, timeline=timeline):
         values = np.asarray(chunk.to_record_batch().column(timeline).to_pylist())
         least.append(int(values.min()))
         most.append(int(values.max()))

@@ -20,9 +20,10 @@ from ...errors import InputError
 from ...recording.files.cards import make_card
 from ...recording.files.share import share_recording
 from ...recording.look.canvas import Canvas
+from ...recording.parts import parts_of
 from ...recording.viewing.single_page import write_single_page
 from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
-from ...run_folder import RECORDING, SIDE
+from ...run_folder import LATER, RECORDING, SIDE
 from .bench import Bench
 from .project import Project
 from .questions import Number, Text, Whole, question
@@ -37,6 +38,7 @@ def recording(bench: Bench, at: Text) -> dict[str, Any]:
     """Where the viewer finds the recording; and how many pixels of the photograph are one of its own."""
     opened = bench.project(at)
     files = [name for name in FILES if (opened.results / name).is_file()]
+    files += [each.name for each in parts_of(opened.results / RECORDING)[1:]]
     if RECORDING not in files:
         raise InputError(opened.results, "", "holds no recording: let the run come to its end")
     folder = f"{PATH}{bench.key}/{quote(opened.key)}/"
@@ -134,7 +136,7 @@ def answer_viewer(viewer: Viewer, request: Request) -> Response:
 def answer_recording(bench: Bench, request: Request) -> Response:
     """The file; whether its name is the right one, the guard has seen."""
     name = request.path_params["name"]
-    if name not in FILES:
+    if name not in FILES and not LATER.fullmatch(name):
         return PlainTextResponse("there is nothing here", 404)
     try:
         file = bench.project(request.path_params["at"]).results / name
