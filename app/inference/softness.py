@@ -33,7 +33,8 @@ def find_softness(
     if not seen and material.stiffness is None:
         return settings
     trust = SEEN_AT_MOST if seen else TOLD_AT_MOST
-    return replace(settings, soft=True, soft_trust=trust, posterior=_told(material, settings, packing))
+    posterior = _told(material, settings, packing)
+    return replace(settings, soft=True, overlap_seen=seen, soft_trust=trust, posterior=posterior)
 
 
 def _told(material: RodMaterial, settings: SequenceSettings, packing: Packing) -> PosteriorSettings:

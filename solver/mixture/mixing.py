@@ -1,7 +1,7 @@
 """The mixture of both witnesses on the contacts of a frame, with its deviations.
 
 What either counts is said by `solver.posterior.mixing`. Where grains are soft their overlaps tell the forces one by
-one, and the motion, which takes them for hard, is not heard.
+one, and the motion, which takes them for hard, is heard the less the more they are pressed beside how far they slide.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from solver.contacts.pairs import recall
 from solver.posterior.frame_posterior import FramePosterior
 from solver.posterior.mixing import ForceField, mix_fields
 
+PRESSED = 0.3  # overlap over what neighbours move by, at which motion is worth half of what it is for hard grains
 OFFERED = 0.3  # P(bears) from which on a pair that the motion's network lacks is offered to it
 
 
@@ -50,25 +51,27 @@ def mix_on(
     *,
     own_scale: bool,
     soft_trust: float | None,
+    worth: float = 1.0,
 ) -> Mixture:
     """Mix the motion's field on `contacts` with what positions tell of them.
 
     motion_trust: NaN where no motion led to the frame; own_scale: loads or weight tell positions the scale of forces,
     which counts there, and of soft grains; soft_trust: the most that overlaps of soft grains are believed, None: grains
-    are hard. Errors: ValueError where either is without force.
+    are hard; worth: of the motion, as `worth_of_motion` says. Errors: ValueError where either is without force.
     """
-    found = mix_fields(ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust), positions)
+    worth = 1.0 if soft_trust is None else 0.0 if np.isnan(motion_trust) else worth
+    found = mix_fields(
+        ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust), positions, worth
+    )  # fmt: skip
     told = _on(contacts, positions)
     factor = float(motion.fn.sum() / positions.fn.sum())
+    force, share, trust = recall(contacts.key, found.key, found.force, fill=0.0), found.share, found.trust
     if soft_trust is not None:
-        factor = 1.0 if own_scale else factor
-        force = factor * np.column_stack([told.fn, told.ft])
-        share, trust = 1.0, min(positions.trust, soft_trust)
-    else:
-        force = recall(contacts.key, found.key, found.force, fill=0.0)
-        if own_scale and np.isnan(motion_trust):  # a guess knows no scale, and loads at another one are out of balance
-            force, factor = force / factor, 1.0
-        share, trust = found.share, found.trust
+        trust = worth * trust + (1.0 - worth) * min(positions.trust, soft_trust)
+        if own_scale:  # the stress along free walls follows from sliding, which overlaps do not show
+            force, factor = force * factor ** (worth - 1.0), factor**worth
+    elif own_scale and np.isnan(motion_trust):  # a guess knows no scale, and loads at another one are out of balance
+        force, factor = force / factor, 1.0
     return Mixture(
         force[:, 0],
         force[:, 1],
@@ -78,6 +81,11 @@ def mix_on(
         share,
         trust,
     )
+
+
+def worth_of_motion(overlap: float, moved: float) -> float:
+    """What motion is worth of soft grains, 1 of hard ones. overlap [m]: of a mean force; moved [m]: of neighbours."""
+    return 1.0 / (1.0 + (overlap / (PRESSED * moved)) ** 2) if moved > 0.0 else 0.0
 
 
 def offered_pairs(positions: FramePosterior) -> Contacts:

@@ -43,8 +43,10 @@ class MixedField:
     agreement: float  # correlation of both fields' f_n; NaN where either is constant
 
 
-def mix_fields(motion: ForceField, posterior: FramePosterior) -> MixedField:
+def mix_fields(motion: ForceField, posterior: FramePosterior, worth: float = 1.0) -> MixedField:
     """Mix a field from motion with a posterior of the same frame.
+
+    worth: of the motion beside what it would be for hard grains, 0 … 1: what grains are pressed hides how they slide.
 
     Both count over their sums of f_n. The sum of the mixture is motion's: the stress along walls without a load follows
     from sliding, which positions do not show. Errors: ValueError where either field is without any force.
@@ -55,8 +57,9 @@ def mix_fields(motion: ForceField, posterior: FramePosterior) -> MixedField:
         raise ValueError("a field without forces cannot be mixed")
     key, moved, placed = align(motion.key, motion.force / totals[0], posterior.contacts.key, geometry / totals[1])
     agreement = pearson(moved[:, 0], placed[:, 0])
-    motion_trust, posterior_trust = believe(motion.trust, min(posterior.trust, _known(posterior.agreement)), agreement)
-    share = share_of_posterior(motion_trust, posterior_trust)
+    claimed = min(posterior.trust, _known(posterior.agreement))
+    motion_trust, posterior_trust = believe(worth * motion.trust, claimed, agreement)
+    share = share_of_posterior(motion_trust, posterior_trust, worth)
     mixed = share * placed + (1.0 - share) * moved
     spread = np.std(moved[:, 0]), np.std(placed[:, 0])
     confirmed = _confirmed(motion_trust, posterior_trust, agreement)
@@ -78,9 +81,10 @@ def believe(motion_trust: float, posterior_trust: float, agreement: float) -> tu
     return float(np.clip(max(motion_trust, common), 0.0, MOST)), float(np.clip(claimed, 0.0, MOST))
 
 
-def share_of_posterior(motion_trust: float, posterior_trust: float) -> float:
+def share_of_posterior(motion_trust: float, posterior_trust: float, worth: float = 1.0) -> float:
     """Share of the posterior in the mixture, by weights T²/(1 − T²); a half where neither is believed."""
     motion, posterior = (trust**2 / (1.0 - trust**2) for trust in (motion_trust, posterior_trust))
+    motion *= worth
     return posterior / (posterior + motion) if posterior + motion > 0.0 else 0.5
 
 

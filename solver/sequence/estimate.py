@@ -13,14 +13,14 @@ from solver.contacts.contacts import Contacts, detect_contacts
 from solver.contacts.pairs import align, are_among
 from solver.detection.networks import NearPairs
 from solver.mixture.balancing import bring_into_balance
-from solver.mixture.mixing import Field, Mixture, mix_on
+from solver.mixture.mixing import Field, Mixture, mix_on, worth_of_motion
 from solver.nlgs.chain import ChainStep, advance_chain
 from solver.nlgs.warm_start import ForceMemory
 from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.demand import NO_DEMAND, Demand
 from solver.sequence.ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
 from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.judging.information import measure_information
+from solver.sequence.judging.information import measure_information, motion_scale
 from solver.sequence.judging.judgement import Evidence, is_suspect, trust
 from solver.sequence.state import SequenceState
 from solver.statistics.agreement import pearson
@@ -105,7 +105,8 @@ def _mix(problem: FrameProblem, estimate: Estimate, positions: FramePosterior, m
     assert estimate.spread_ft is not None
     field = Field(estimate.fn, estimate.ft, estimate.spread_fn, estimate.spread_ft)
     known, soft = problem.packing.scale_is_known, problem.settings.soft_trust if problem.settings.soft else None
-    mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft)
+    worth = worth_of_motion(positions.overlap, motion_scale(problem)) if problem.settings.overlap_seen else 0.0
+    mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft, worth=worth)
     balance = assemble_frame_balance(problem, contacts, estimate.step)
     convex = problem.settings.ensemble.convex
     polished = bring_into_balance(

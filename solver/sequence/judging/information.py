@@ -48,7 +48,7 @@ def measure_information(problem: FrameProblem, contacts: Contacts, fn: Array, wa
     snapshot, grains = problem.snapshot, problem.packing.grains
     bearing = fn > 0.0
     noise = snapshot.sigma
-    motion = _motion_scale(problem)
+    motion = motion_scale(problem)
     sliding = signal = np.nan
     if bearing.any():
         moving = problem.motion.grains
@@ -63,7 +63,8 @@ def measure_information(problem: FrameProblem, contacts: Contacts, fn: Array, wa
     )  # fmt: skip
 
 
-def _motion_scale(problem: FrameProblem) -> float:
+def motion_scale(problem: FrameProblem) -> float:
+    """How far neighbours moved past each other on the way to the frame [m], noise taken off; NaN of fewer than two."""
     moving, interval = problem.motion.grains, problem.motion.interval
     if moving.present.sum() < 2:
         return np.nan

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.contacts.contacts import Contacts
-from solver.mixture.mixing import OFFERED, Field, mix_on, offered_pairs
+from solver.mixture.mixing import OFFERED, PRESSED, Field, mix_on, offered_pairs, worth_of_motion
 from solver.posterior.frame_posterior import FramePosterior
 
 C = 300
@@ -70,12 +70,43 @@ def test_the_deviation_holds_what_the_two_differ_by(fields) -> None:
 def test_overlaps_of_soft_grains_speak_alone_and_in_their_own_unit(fields) -> None:
     _, one, two = fields
     positions = told_by_positions(3.0 * two)
-    found = mix_on(some_contacts(), told_by_motion(one), positions, 0.9, own_scale=True, soft_trust=0.6)
+    found = mix_on(some_contacts(), told_by_motion(one), positions, 0.9, own_scale=True, soft_trust=0.6, worth=0.0)
     assert found.fn == pytest.approx(3.0 * two)
     assert found.share == 1.0
     assert found.trust == 0.6
-    scaled = mix_on(some_contacts(), told_by_motion(one), positions, 0.9, own_scale=False, soft_trust=0.6)
+    scaled = mix_on(some_contacts(), told_by_motion(one), positions, 0.9, own_scale=False, soft_trust=0.6, worth=0.0)
     assert scaled.fn.sum() == pytest.approx(one.sum())
+
+
+@pytest.mark.unit
+def test_motion_of_grains_that_are_hardly_pressed_counts_as_of_hard_ones(fields) -> None:
+    _, one, two = fields
+    given = some_contacts(), told_by_motion(one), told_by_positions(3.0 * two), 0.9
+    hard = mix_on(*given, own_scale=True, soft_trust=None)
+    found = mix_on(*given, own_scale=True, soft_trust=0.6, worth=1.0)
+    np.testing.assert_allclose(found.fn, hard.fn)
+    np.testing.assert_allclose(found.spread_fn, hard.spread_fn)
+    assert found.trust == pytest.approx(hard.trust)
+
+
+@pytest.mark.unit
+def test_between_soft_and_hard_shares_and_scale_lie_between(fields) -> None:
+    _, one, two = fields
+    given = some_contacts(), told_by_motion(one), told_by_positions(3.0 * two), 0.9
+    found = [mix_on(*given, own_scale=True, soft_trust=0.6, worth=worth) for worth in (1.0, 0.5, 0.1, 0.0)]
+    assert np.all(np.diff([each.share for each in found]) > 0.0)
+    assert np.all(
+        np.diff([each.fn.sum() for each in found]) > 0.0
+    )  # from the motion's to the positions', three times it
+    guess = mix_on(*given[:3], np.nan, own_scale=True, soft_trust=0.6, worth=1.0)
+    np.testing.assert_allclose(guess.fn, 3.0 * two)  # no motion led there
+
+
+@pytest.mark.unit
+def test_motion_is_worth_half_where_overlap_hides_it() -> None:
+    assert worth_of_motion(PRESSED * 1e-4, 1e-4) == pytest.approx(0.5)
+    assert worth_of_motion(0.0, 1e-4) == 1.0
+    assert worth_of_motion(1e-6, 0.0) == worth_of_motion(1e-6, np.nan) == 0.0
 
 
 @pytest.mark.unit
