@@ -62,7 +62,8 @@ def find_grain_errors(
         raise ValueError("no gap with a known force, or nothing that could be wrong")
     unit = float(np.mean(force))
     gap = equations.measure(rows, unknowns).gap
-    matrix = sparse.hstack([_of_grains(equations, rows, unknowns)[:, free], force[:, None] / unit]).tocsr()
+    of_grains = _of_grains(equations, rows, unknowns)[:, free]
+    matrix = sparse.csr_matrix(sparse.hstack([of_grains, force[:, None] / unit]))
     penalty = np.append(prior[free] ** -2.0, 0.0)
     stated = _stated_noise(sequence, rows)
     factor, step = 1.0, _Step.of(matrix, gap, penalty, stated**-2.0)
