@@ -16,7 +16,7 @@ from solver.contacts.pairs import recall
 from solver.posterior.frame_posterior import FramePosterior
 from solver.posterior.mixing import ForceField, mix_fields
 
-PRESSED = 0.3  # overlap over what neighbours move by, at which motion is worth half of what it is for hard grains
+PRESSED = 0.6  # overlap over what neighbours move by, at which motion is worth half of what it is for hard grains
 OFFERED = 0.3  # P(bears) from which on a pair that the motion's network lacks is offered to it
 
 
