@@ -21,16 +21,17 @@ LOOSER = (0.3, 0.1, 0.03, 0.01, 0.003)  # of the price of an unbalance, tried on
 
 
 def bring_into_balance(
-    balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings, *, soft: bool = False
+    balance: Balance, fn: Array, ft: Array, fn_sd: Array, settings: ConvexSettings, *, hardness: float = 1.0
 ) -> ConvexForces:
     """The field nearest to the given one (c,) [N] in balance; where pairs are missing, under a lower price.
 
     fn_sd (c,) [N]: deviations of f_n. The price of an unbalance is then the highest that leaves the field its own, or
-    the lowest where none does. soft: whether the grains are.
+    the lowest where none does. hardness: 1 of hard grains, 0 of soft ones, which overlaps alone tell of.
     """
+    broken = hardness * BROKEN_HARD + (1.0 - hardness) * BROKEN_SOFT
     doubt = float(np.sqrt(np.mean(fn_sd**2))) if len(fn_sd) else 0.0
     found = polish(balance, fn, ft, settings)
-    if found.converged and _change(found.fn, fn) <= (BROKEN_SOFT if soft else BROKEN_HARD) * doubt:
+    if found.converged and _change(found.fn, fn) <= broken * doubt:
         return found
     for share in LOOSER:
         found = polish(balance, fn, ft, replace(settings, balance=share * settings.balance))

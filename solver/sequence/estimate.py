@@ -105,12 +105,15 @@ def _mix(problem: FrameProblem, estimate: Estimate, positions: FramePosterior, m
     assert estimate.spread_ft is not None
     field = Field(estimate.fn, estimate.ft, estimate.spread_fn, estimate.spread_ft)
     known, soft = problem.packing.scale_is_known, problem.settings.soft_trust if problem.settings.soft else None
-    worth = worth_of_motion(positions.overlap, motion_scale(problem)) if problem.settings.overlap_seen else 0.0
+    worth = 1.0
+    if problem.settings.soft:
+        seen = problem.settings.overlap_seen
+        worth = worth_of_motion(positions.overlap, motion_scale(problem)) if seen else 0.0
     mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft, worth=worth)
     balance = assemble_frame_balance(problem, contacts, estimate.step)
     convex = problem.settings.ensemble.convex
     polished = bring_into_balance(
-        balance, mixture.fn, mixture.ft, mixture.spread_fn, convex, soft=problem.settings.soft
+        balance, mixture.fn, mixture.ft, mixture.spread_fn, convex, hardness=worth
     )  # fmt: skip
     fn, ft = (polished.fn, polished.ft) if polished.converged else (mixture.fn, mixture.ft)
     members = estimate.members

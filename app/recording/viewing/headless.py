@@ -181,16 +181,19 @@ class HeadlessViewer:
         raise NoPictureError(f"the viewer did not answer within {START_SECONDS:g} s")
 
     def _open(self) -> None:
-        client = self._running()
-        for file in parts_of(self.recording.resolve()):
-            client.open(str(file))
-        end = time.monotonic() + ANSWER_SECONDS
+        for file in parts_of(self.recording.resolve()):  # one by one: a viewer that loads a long part hears nothing
+            self._running().open(str(file))
+            self._wait_until_loaded()
+        self._running().set_time(play_state="paused")  # a blueprint may start it playing
+
+    def _wait_until_loaded(self) -> None:
+        client, end = self._running(), time.monotonic() + ANSWER_SECONDS
         while True:
-            client.take_screenshot(max_size=64)  # views exist once they were drawn
-            state = client.get_state()
-            if not state.loading and state.active_recording is not None and state.views:
-                client.set_time(play_state="paused")  # a blueprint may start it playing
-                return
+            with suppress(TimeoutError):
+                client.take_screenshot(max_size=64)  # views exist once they were drawn
+                state = client.get_state()
+                if not state.loading and state.active_recording is not None and state.views:
+                    return
             if time.monotonic() > end:
                 raise NoPictureError(f"{self.recording} was not loaded within {ANSWER_SECONDS:g} s")
             time.sleep(0.1)

@@ -266,7 +266,8 @@ def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -
     tree, apart = KDTree(found[:, :2]), np.ones(len(x), dtype=np.bool_)
     for count in (1, min(8, len(found))):  # most overlap the nearest one already
         rows = np.flatnonzero(apart)
-        distance, index = tree.query(np.stack([x[rows], y[rows]], axis=1), k=[*range(1, count + 1)])
+        nearest = tree.query(np.stack([x[rows], y[rows]], axis=1), k=count)
+        distance, index = (np.reshape(each, (len(rows), count)) for each in nearest)
         size, other = radius[rows, None], found[index, 2]
         apart[rows] = (distance >= size + other - allowed * np.minimum(size, other)).all(axis=1)
     return apart

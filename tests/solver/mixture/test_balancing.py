@@ -70,7 +70,7 @@ def test_a_change_of_a_few_deviations_is_no_missing_pair():
     strict = polish(balance, fn, ft)
     fn_sd = np.full(len(fn), 1.2 * np.sqrt(np.mean((strict.fn - fn) ** 2)) / BROKEN_HARD)
     np.testing.assert_array_equal(bring_into_balance(balance, fn, ft, fn_sd, ConvexSettings()).fn, strict.fn)
-    loose = bring_into_balance(balance, fn, ft, fn_sd, ConvexSettings(), soft=True)
+    loose = bring_into_balance(balance, fn, ft, fn_sd, ConvexSettings(), hardness=0.0)
     assert change(loose, fn, fn_sd) < change(strict, fn, fn_sd)
 
 
