@@ -102,6 +102,7 @@ def test_a_run_that_is_not_possible_is_told_and_the_others_go_on(nominal):
     assert math.isnan(effect.r_fn)
 
 
+@pytest.mark.slow
 def test_the_command_ranks_what_it_varied(made_tracks, tmp_path, capsys):
     out = tmp_path / "out"
     factors = ("--factors", "friction=0.5:1.5", "kappa", "first_frame=1:1")

@@ -24,6 +24,7 @@ def mark(tab: Page, step: str) -> str:
     return tab.locator(f"#step-{step} .sign").get_attribute("title") or ""
 
 
+@pytest.mark.slow
 def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
     truth = load_experiment(made_photographs).config
     tab.get_by_text("Set up an experiment from these").click()

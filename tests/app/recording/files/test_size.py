@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.program import rodsight
 
 FEW = ("--set", "solver.sweeps=300", "--set", "solver.estimator=nlgs")
 
 
+@pytest.mark.slow
 def test_a_budget_is_kept_and_what_it_cost_is_said(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     common = ("record", str(tracked), "--out", str(out), "--sweeps", "all", *FEW)
