@@ -29,8 +29,8 @@ _HEAD = """# Robustness, counted
 
 The last runs of `pytest -m slow tests/fuzzing` counted this, the spoiled inputs in pieces (`python -m tests.fuzzing
 --pieces`); `python -m tests.fuzzing` prints it and writes this page. A full run is 10 000 spoiled inputs, 100 kills, 40
-refusals, 800 requests, 1000 photographs and a recording of 10 000 at least. What went wrong is mended after it was counted, and counted again
-by the next run. What strangers may try is in [threats](threats.md).
+refusals, 800 requests, 1000 photographs and a recording of 10 000 at least. What went wrong is mended after it was
+counted, and counted again by the next run. What strangers may try is in [threats](threats.md).
 
 """
 
