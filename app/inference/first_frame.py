@@ -45,8 +45,10 @@ def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) 
     None where that is no better: where calibration had nothing of each grain's own to correct, or too little is known.
     """
     calibration = sequence.calibration
+    if calibration is None or 0 in sequence.failed:
+        return None
     rows, force = _known_pairs(frames)
-    if calibration is None or 0 in sequence.failed or len(np.unique(rows.frame)) < FEWEST:
+    if len(np.unique(rows.frame)) < FEWEST:
         return None
     told, walls = _as_told(sequence.tracks, sequence.walls, calibration), sequence.walls
     evidence = _gather(sequence, told)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import SuperLU
 
 from solver.bodies.grains import Array
 from solver.calibration.equations import GapEquations
+from solver.calibration.gap_noise import GapNoise
+from solver.calibration.normal_equations import factor_normal
 from solver.calibration.priors import CalibrationPriors, Candidates, find_candidates, prior_vector, reduce_priors
 from solver.calibration.weights import FINAL_SCALE, weigh_gaps, weighting_bias
 
@@ -101,18 +102,9 @@ class _LinearStep:
         self._shift = weighting_bias(s[kept], candidates.position_noise[kept])
         residual = self._geometry.gap + overlap + self._shift
         self._target = self._matrix @ unknowns[self._free] - residual
-        weighted = self._matrix.multiply(self._precision[:, None]).tocsr()
-        normal = self._matrix.T @ weighted + sparse.diags_array(self._prior_sd[self._free] ** -2.0)
-        # Pairs of neighbours make an almost planar graph: a direct factorisation is cheap and exact.
         self._factor: SuperLU | None = None
-        if not np.any(self._free):
-            return
-        self._factor = splu(
-            sparse.csc_matrix(normal),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        if np.any(self._free):
+            self._factor = factor_normal(self._matrix, self._precision, self._prior_sd[self._free] ** -2.0)
 
     def solution(self) -> Array:
         unknowns = np.zeros(len(self._free))
@@ -134,20 +126,16 @@ class _LinearStep:
         Noise of a position enters all gaps of its grain in that frame, the overlap of a contact stays for
         several frames: the errors of the rows are drawn so, not one by one.
         """
-        sequence, rows, normal = self._equations.sequence, self._rows, self._geometry.normal
-        n, overlap = sequence.grain_count, self._candidates.overlap
-        k, i, grain = rows.frame, rows.i, rows.second_grain(n)
-        wall = rows.with_wall(n).astype(np.int64)
-        other = 1.0 - wall[:, None]
-        episode = rows.pair.astype(np.int64) * sequence.frame_count + k // OVERLAP_FRAMES
+        sequence, rows, overlap = self._equations.sequence, self._rows, self._candidates.overlap
+        wall = rows.with_wall(sequence.grain_count).astype(np.int64)
+        episode = rows.pair.astype(np.int64) * sequence.frame_count + rows.frame // OVERLAP_FRAMES
         block = np.unique(episode, return_inverse=True)[1]
         errors = np.zeros((count, len(self._free)))
         if self._factor is None:
             return errors
-        sigma = self._candidates.noise_factor * np.where(sequence.present, sequence.sigma, 0.0)[..., None]
+        noise = GapNoise(sequence, rows, self._geometry.normal, self._candidates.noise_factor)
         for row in errors:
-            noise = sigma * rng.standard_normal(sequence.position.shape)
-            error = np.einsum("mk,mk->m", normal, other * noise[k, grain] - noise[k, i])
+            error = noise.draw(rng)
             if surfaces:
                 error += overlap * rng.standard_normal(block.max(initial=-1) + 1)[block]
                 error += DOUBT * (overlap * rng.standard_normal(2)[wall] + self._shift * rng.standard_normal())

@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import SuperLU
 
 from solver.bodies.grains import Array
 from solver.calibration.equations import GapEquations
+from solver.calibration.gap_noise import GapNoise
 from solver.calibration.gaps import GapRows, MeasuredSequence
+from solver.calibration.normal_equations import factor_normal
 from solver.calibration.weights import FINAL_SCALE, NORMAL_MEDIAN
 
 ROUNDS = 6  # of weights and noise
@@ -72,7 +73,8 @@ def find_grain_errors(
         noise = factor * stated
         weight = (1.0 + (step.left / (2.0 * FINAL_SCALE * noise)) ** 2) ** -2.0  # a pair with a wrong force says little
         step = _Step.of(matrix, gap, penalty, weight / noise**2)
-    errors = step.draw(_draw_noise(sequence, equations, rows, factor, rng), rng)
+    noise_of_gaps = GapNoise(sequence, rows, equations.measure(rows, unknowns).normal, factor)
+    errors = step.draw(np.array([noise_of_gaps.draw(rng) for _ in range(DRAWS)]), rng)
     unknowns, draws = np.zeros(3 * n), np.zeros((DRAWS, 3 * n))
     unknowns[free], draws[:, free] = step.found[:-1], errors[:, :-1]
     return GrainErrors(unknowns[: 2 * n].reshape(n, 2), unknowns[2 * n :], float(step.found[-1]) / unit, draws)
@@ -91,12 +93,7 @@ class _Step:
 
     @classmethod
     def of(cls, matrix: sparse.csr_matrix, gap: Array, penalty: Array, precision: Array) -> _Step:
-        normal = matrix.T @ matrix.multiply(precision[:, None]).tocsr() + sparse.diags_array(penalty)
-        # The overlap is coupled with all grains: the ordering by degree leaves it to the end.
-        factor = splu(
-            sparse.csc_matrix(normal), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )  # fmt: skip
+        factor = factor_normal(matrix, precision, penalty)
         found = factor.solve(-matrix.T @ (precision * gap))
         return cls(matrix, penalty, precision, factor, found, gap + matrix @ found)
 
@@ -115,24 +112,6 @@ def _of_grains(equations: GapEquations, rows: GapRows, unknowns: Array) -> spars
 
 def _stated_noise(sequence: MeasuredSequence, rows: GapRows) -> Array:
     """Standard deviation of the gaps (m,) [m] by the noise of positions."""
-    second = np.where(rows.with_wall(sequence.grain_count), 0.0, sequence.sigma[rows.frame, _second(sequence, rows)])
+    n = sequence.grain_count
+    second = np.where(rows.with_wall(n), 0.0, sequence.sigma[rows.frame, rows.second_grain(n)])
     return np.hypot(sequence.sigma[rows.frame, rows.i], second)
-
-
-def _second(sequence: MeasuredSequence, rows: GapRows) -> NDArray[np.int32]:
-    return rows.second_grain(sequence.grain_count)
-
-
-def _draw_noise(
-    sequence: MeasuredSequence, equations: GapEquations, rows: GapRows, factor: float, rng: np.random.Generator
-) -> Array:
-    """Draw what the noise of positions does to the gaps (d, m) [m]: all gaps of a grain in a frame share it."""
-    normal = equations.measure(rows, np.zeros(equations.layout.count)).normal
-    k, i, grain = rows.frame, rows.i, _second(sequence, rows)
-    other = np.where(rows.with_wall(sequence.grain_count), 0.0, 1.0)[:, None]
-    sigma = factor * np.where(sequence.present, sequence.sigma, 0.0)[..., None]
-    drawn = np.empty((DRAWS, rows.count))
-    for row in drawn:
-        noise = sigma * rng.standard_normal(sequence.position.shape)
-        row[:] = np.einsum("mk,mk->m", normal, other * noise[k, grain] - noise[k, i])
-    return drawn

@@ -70,7 +70,6 @@ class EnsembleState:
 
 
 AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
-CHAINS = 2  # the first of MEMBERS
 MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programs
 CHAINS = 2  # of the MEMBERS, the first
 

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.experiment.experiment import load_experiment, read_tracks
-from rodsight.experiment.walls import read_walls
-from rodsight.inference.inference import CorrectedSequence, Inputs, correct_sequence, solve_all
-from rodsight.inference.settings import material_of, settings_of
-from rodsight.study.worlds.world_score import true_forces
+from rodsight.experiment.experiment import load_experiment
+from rodsight.inference.inference import CorrectedSequence
+from rodsight.progress import silent
+from rodsight.study.worlds.world_score import solve_world, true_forces
 
 from solver.statistics.agreement import compare_forces
 from tests.program import RODSIGHT
@@ -31,12 +30,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def score(folder: Path, positions: str) -> tuple[CorrectedSequence, np.ndarray]:
     """r of f_n and of f_t, and the scale, on average over the frames that a motion leads to."""
     experiment = load_experiment(folder, (f"solver.positions={positions}",))
-    tracks, config = read_tracks(experiment), experiment.config
-    walls = read_walls(experiment, tracks.frame_count)
-    assert walls is not None
-    sequence = correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config).without_sweeps()))
+    sequence, solved = solve_world(experiment, silent)
     true, seen = true_forces(experiment, sequence), []
-    for frame in [each.forces for each in solve_all(sequence)][1:]:
+    for frame in [each.forces for each in solved][1:]:
         found = compare_forces(frame.contacts.key, np.column_stack([frame.fn, frame.ft]), *true[frame.frame])
         seen.append((found.r_fn, found.r_ft, found.scale))
     return sequence, np.mean(seen, axis=0)

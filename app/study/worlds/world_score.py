@@ -104,13 +104,18 @@ def score_world(plan: WorldPlan, world: WorldName, seed: int, progress: Progress
 
 def solve_world(experiment: Experiment, progress: Progress) -> tuple[CorrectedSequence, list[SolvedFrame]]:
     """Solve an experiment as a run would, its sweeps not kept. Raises InputError."""
+    sequence = correct_world(experiment)
+    return sequence, solve_all(sequence, lambda done: progress("solving", done, sequence.tracks.frame_count))
+
+
+def correct_world(experiment: Experiment) -> CorrectedSequence:
+    """Read and correct an experiment as a run would, its sweeps not kept. Raises InputError."""
     tracks = read_tracks(experiment)
     walls = read_walls(experiment, tracks.frame_count)
     tracks = bound_tracks(experiment, tracks, walls)
     assert walls is not None
     config = experiment.config
-    sequence = correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config).without_sweeps()))
-    return sequence, solve_all(sequence, lambda done: progress("solving", done, tracks.frame_count))
+    return correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config).without_sweeps()))
 
 
 def true_forces(experiment: Experiment, sequence: CorrectedSequence) -> tuple[tuple[Keys, Array], ...]:

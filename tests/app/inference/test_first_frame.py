@@ -8,21 +8,17 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from rodsight.experiment.experiment import load_experiment, read_tracks
-from rodsight.experiment.walls import read_walls
+from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import inference
 from rodsight.inference.first_frame import ask_first_again
 from rodsight.inference.inference import (
     CorrectedSequence,
-    Inputs,
     SolvedFrame,
-    correct_sequence,
     renew_first,
     solve_all,
     solve_frames,
 )
-from rodsight.inference.settings import material_of, settings_of
-from rodsight.study.worlds.world_score import true_forces
+from rodsight.study.worlds.world_score import correct_world, true_forces
 from rodsight.synthetic.worlds.making import make_world
 from rodsight.synthetic.worlds.names import WorldName
 
@@ -37,11 +33,7 @@ RODS = 70
 def correct(folder: Path, world: WorldName, seed: int, rods: int = RODS) -> tuple[CorrectedSequence, tuple]:
     """A world as tracked and corrected, and its true forces."""
     experiment = load_experiment(make_world(folder, world, seed, grains=rods).folder, ())
-    tracks = read_tracks(experiment)
-    walls = read_walls(experiment, tracks.frame_count)
-    assert walls is not None
-    config = experiment.config
-    sequence = correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config).without_sweeps()))
+    sequence = correct_world(experiment)
     return sequence, true_forces(experiment, sequence)
 
 
