@@ -20,7 +20,7 @@ from solver.bodies.grains import Array
 
 from ..atomic import write_atomically
 from ..errors import InputError
-from ..experiment.input_files import ordinary
+from ..experiment.reading.input_files import ordinary
 from ..experiment.units import Scale
 from ..tracks import Tracks
 

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..tracks import Tracks, WallTracks
 from .config.input_sections import OUTER
 from .experiment import Experiment, rows_of
-from .tables import Table, check_unique
+from .reading.tables import Table, check_unique
 
 SIDES = ("at the top", "at the bottom", "at the right", "at the left")
 FACING_UP = 0.1  # cosine to gravity's opposite from which on a surface counts as one that weight keeps

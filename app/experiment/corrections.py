@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 
 from .experiment import Experiment, rows_of
-from .tables import Table, check_unique
+from .reading.tables import Table, check_unique
 
 LOST = "lost"
 

@@ -15,9 +15,9 @@ from solver.bodies.grains import Array
 from ..errors import InputError
 from ..tracks import Tracks, TrackStatus
 from .config.experiment_file import ExperimentFile, load_config
-from .input_files import InputFiles
 from .photographs import Channel, Look, Photographs
-from .tables import Table, check_frames, check_unique, read_table
+from .reading.input_files import InputFiles
+from .reading.tables import Table, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
 PLACE_COLUMNS = ("frame", "id", "x", "y")  # of a pose whose rotation may be unknown

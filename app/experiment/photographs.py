@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .image_header import claimed_size
-from .input_files import InputFiles
+from .reading.input_files import InputFiles
 
 Image = NDArray[np.float32]
 

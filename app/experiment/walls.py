@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..tracks import BAR, CORNER, NOT_TOLD, WallTracks
 from .config.input_sections import WallsSection
 from .experiment import CELL_COLUMNS, Experiment, arrange_cell
-from .tables import Table, check_frames, check_unique
+from .reading.tables import Table, check_frames, check_unique
 
 ENDS = {"bar": BAR, "corner": CORNER, "auto": NOT_TOLD}
 SIDES = {"in": IN, "out": OUT}

@@ -27,7 +27,7 @@ from ..experiment.experiment import (
     arrange_cell,
     arrange_tracks,
 )
-from ..experiment.tables import Table
+from ..experiment.reading.tables import Table
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
 from ..inference.inference import Inputs, correct_sequence, solve_all
 from ..inference.settings import material_of, settings_of

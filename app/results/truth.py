@@ -15,8 +15,8 @@ from solver.contacts.contacts import ContactSource
 from solver.statistics.agreement import Agreement, compare_forces
 
 from ..errors import InputError
-from ..experiment.input_files import InputFiles
-from ..experiment.tables import check_frames, check_unique, read_table
+from ..experiment.reading.input_files import InputFiles
+from ..experiment.reading.tables import check_frames, check_unique, read_table
 from ..tracks import Tracks
 from .results import Results, TruthContacts
 

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from ..atomic import replacing, write_atomically
 from ..errors import InputError
-from ..experiment.tables import write_table
+from ..experiment.reading.tables import write_table
 from .design import Case, Design
 from .factors import Factor
 from .indices import MainEffects, main_effects

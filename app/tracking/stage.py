@@ -19,8 +19,8 @@ from ..errors import InputError
 from ..experiment.corrections import read_corrections
 from ..experiment.experiment import Experiment, read_grain_guess, read_times
 from ..experiment.photographs import CHANNELS, FULL_SCALE, Image, Photographs
+from ..experiment.reading.tables import read_table, write_table
 from ..experiment.scaling import make_scale
-from ..experiment.tables import read_table, write_table
 from ..experiment.units import Scale
 from ..experiment.walls import read_walls
 from ..progress import Observer, Progress

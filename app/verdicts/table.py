@@ -6,8 +6,8 @@ import csv
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from ..experiment.input_files import ordinary
-from ..experiment.tables import Table, read_table, write_table
+from ..experiment.reading.input_files import ordinary
+from ..experiment.reading.tables import Table, read_table, write_table
 from .decisions import Bodies
 from .log import Entry, Origin, Pair, Verdict, VerdictLog, canonical
 

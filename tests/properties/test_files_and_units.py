@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rodsight.errors import InputError
 from rodsight.experiment.lens import BrownLens
-from rodsight.experiment.tables import check_frames, check_unique, read_table, write_table
+from rodsight.experiment.reading.tables import check_frames, check_unique, read_table, write_table
 from rodsight.experiment.units import Scale, pixel_size_between
 from rodsight.verdicts.log import Entry, Flag, Origin, Verdict, VerdictLog
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...experiment.experiment import CONFIG_NAME
-from ...experiment.tables import write_table
+from ...experiment.reading.tables import write_table
 from .observations import Arranged
 from .proposed_walls import Walls
 

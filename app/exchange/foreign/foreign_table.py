@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ...errors import InputError
-from ...experiment.input_files import ordinary
-from ...experiment.tables import Table
+from ...experiment.reading.input_files import ordinary
+from ...experiment.reading.tables import Table
 
 PARQUET = b"PAR1"
 COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")

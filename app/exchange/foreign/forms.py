@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ...errors import InputError
-from ...experiment.tables import Table
+from ...experiment.reading.tables import Table
 from ..dic_files import read_sequence
 from .columns import read_by_columns, read_rodtracker, read_trackpy
 from .lammps_dump import read_lammps

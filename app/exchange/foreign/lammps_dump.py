@@ -17,7 +17,7 @@ from jaxtyping import Float
 from solver.bodies.grains import Array
 
 from ...errors import InputError
-from ...experiment.tables import Table
+from ...experiment.reading.tables import Table
 from .foreign_table import read_text
 from .observations import Observations
 

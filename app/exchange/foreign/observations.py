@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 
 from ...errors import InputError
-from ...experiment.tables import Table
+from ...experiment.reading.tables import Table
 from ...tracks import Tracks, TrackStatus
 
 GREATEST_ID = 2**53

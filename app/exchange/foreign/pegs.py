@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 
 from ...errors import InputError
-from ...experiment.tables import Table
+from ...experiment.reading.tables import Table
 from .foreign_table import read_text
 from .observations import Arranged, Observations
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import InputError
-from ...experiment.tables import Table
+from ...experiment.reading.tables import Table
 from .columns import observe_table
 from .foreign_table import read_foreign, read_text
 from .observations import Observations

@@ -14,7 +14,7 @@ import numpy as np
 from solver.bodies.grains import Array
 
 from ...errors import InputError
-from ...experiment.tables import Table
+from ...experiment.reading.tables import Table
 from .foreign_table import read_text
 from .observations import Observations
 

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from ...errors import InputError
-from ..input_files import InputFiles
+from ..reading.input_files import InputFiles
 from .input_sections import BoundarySection, GivenTracks, PhotographsSection, WallsSection
 from .keys import find_key, nearest_key
 from .section import Section, key

@@ -26,7 +26,7 @@ from solver.statistics.agreement import compare_forces, pearson
 from solver.statistics.stress import love_weber_stress, principal_stresses
 
 from ...errors import InputError
-from ...experiment.tables import read_table
+from ...experiment.reading.tables import read_table
 from ...inference.snapshots import make_snapshots
 from ...results.results import Results, TruthContacts
 from ..baselines import packing_of

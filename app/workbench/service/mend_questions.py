@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...experiment.tables import read_table
+from ...experiment.reading.tables import read_table
 from ...results.hdf5.store import load_tracks
 from ...run_folder import TRACKS
 from ...tracks import Tracks, TrackStatus

@@ -10,7 +10,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
-from rodsight.experiment.tables import read_table
+from rodsight.experiment.reading.tables import read_table
 from rodsight.inference import inference
 from rodsight.run_folder import FAILURES
 

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from rodsight import pipeline
-from rodsight.experiment.input_files import InputFiles
+from rodsight.experiment.reading.input_files import InputFiles
 from rodsight.lock import LOCK, Holder, holding
 from rodsight.results.checkpoint import Checkpoint
 from rodsight.results.hdf5.store import load_results

@@ -11,7 +11,7 @@ import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.experiment import load_experiment
 from rodsight.experiment.photographs import Photographs
-from rodsight.experiment.tables import read_table
+from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.walls import read_walls
 from rodsight.recording.viewing.viewer import viewer_binary
 from rodsight.synthetic.speckle import SpeckleSettings, render_scene

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.errors import InputError, RunError
-from rodsight.experiment.input_files import InputFiles
 from rodsight.experiment.photographs import Look, Photographs, ReadAhead, read_photograph
+from rodsight.experiment.reading.input_files import InputFiles
 
 ROUNDING = 1e-3  # [grey] float32 arithmetic on values up to 255
 

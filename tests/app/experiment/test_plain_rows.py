@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rodsight.errors import InputError
-from rodsight.experiment import tables
-from rodsight.experiment.plain_rows import split_plain
+from rodsight.experiment.reading import tables
+from rodsight.experiment.reading.plain_rows import split_plain
 
 ROWS = b"frame,id,x\n0,1,2.5\n0, 2 ,3\r\n1,1,-1e3\n"
 PIECES = [",", "\n", "\r\n", "\r", '"', " ", "1", "2.5", "x", "é", "\0", "\ufeff", "id", "\u2028", "\x1f"]

@@ -95,7 +95,7 @@ def test_every_message_has_its_cure():
     ("source", "text"),
     [
         ("app/lock.py", "…: process … is at work in it; wait for it, or take another --out"),
-        ("app/experiment/tables.py", "stands twice in its frame"),
+        ("app/experiment/reading/tables.py", "stands twice in its frame"),
         ("app/experiment/config/input_sections.py", "give either interval or times"),
         ("solver/sequence/judging/judgement.py", "the mean stress jumped by … % (> … %)"),
         ("solver/sequence/judging/doubts.py", "photographs are …° of shear apart: take them every .25°"),

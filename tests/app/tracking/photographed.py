@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rodsight.cli.main import main
-from rodsight.experiment.tables import read_table
+from rodsight.experiment.reading.tables import read_table
 from rodsight.results.hdf5.store import load_tracks
 from rodsight.tracks import Tracks, WallTracks
 

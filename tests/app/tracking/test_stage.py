@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.experiment.lens import OpenCVLens
-from rodsight.experiment.tables import read_table
+from rodsight.experiment.reading.tables import read_table
 from rodsight.tracks import Tracks, TrackStatus
 
 from tests.app.experiment.tables import edit

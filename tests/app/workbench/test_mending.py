@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from rodsight.experiment.corrections import read_corrections
 from rodsight.experiment.experiment import load_experiment
+from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.scaling import make_scale
-from rodsight.experiment.tables import read_table
 from rodsight.workbench.mending.following import Tracked, follow_on
 from rodsight.workbench.mending.mender import Mender
 

@@ -11,8 +11,8 @@ from playwright.sync_api import Page, expect
 from rodsight import pipeline
 from rodsight.experiment.corrections import read_corrections
 from rodsight.experiment.experiment import load_experiment
+from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.scaling import make_scale
-from rodsight.experiment.tables import read_table
 from rodsight.results.hdf5.store import origin_of, save_tracks
 from rodsight.run_folder import TRACKS
 from rodsight.tracks import TrackStatus

@@ -6,8 +6,8 @@ import tomllib
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_grain_guess
+from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.scaling import make_scale
-from rodsight.experiment.tables import read_table
 from rodsight.experiment.walls import read_walls
 from rodsight.workbench.setup.draft import Draft
 

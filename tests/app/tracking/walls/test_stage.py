@@ -8,7 +8,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
-from rodsight.experiment.tables import read_table
+from rodsight.experiment.reading.tables import read_table
 
 from tests.app.tracking.photographed import Tracked, off_walls, track
 

@@ -7,7 +7,7 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import InputError, RunError
+from ...errors import InputError, RunError
 
 
 def ordinary(file: Path) -> Path:

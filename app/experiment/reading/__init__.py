@@ -1,0 +1,1 @@
+"""Tables and other input files as they are read."""
