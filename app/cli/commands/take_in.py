@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
 
 from ...errors import InputError
+from ...exchange.foreign.form_names import Form
 from ..arguments import Quiet
 from ..terminal import tell
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from ...exchange.foreign.experiment_folder import Surroundings
     from ...exchange.foreign.forms import Foreign
     from ...exchange.foreign.observations import Arranged, Convention
-
-Form = Literal["table", "trackpy", "trackmate", "rodtracker", "lammps", "yade", "pegs", "dic"]
 
 
 def import_(
@@ -117,16 +116,17 @@ def _surround(
     from ...exchange.foreign.pegs import true_contacts
     from ...exchange.foreign.proposed_walls import propose_box, read_foreign_walls
 
+    cell = None
     if walls is None:
         walls = "outer" if form == "pegs" else "none"
-        bars = foreign.walls
+        bars, cell = foreign.walls, foreign.cell
     elif walls == "box":
         bars = propose_box(arranged.tracks)
     else:
         bars = None if walls in ("none", "outer") else read_foreign_walls(Path(walls), arranged, convention)
     told = foreign.truth
     truth = None if told is None or not len(told.fn) else true_contacts(told, arranged)
-    return Surroundings(bars, pressure, outer_grains=walls == "outer", known=foreign.known, truth=truth)
+    return Surroundings(bars, pressure, outer_grains=walls == "outer", cell=cell, known=foreign.known, truth=truth)
 
 
 def _pressures(given: tuple[str, ...]) -> dict[str, float]:
@@ -149,11 +149,14 @@ def _say(console: Console, out: Path, arranged: Arranged, around: Surroundings) 
         tell(console, remark)
     if around.walls is not None:
         tell(console, f"Walls {', '.join(around.walls.name)}: {around.walls.remark}")
+    elif around.cell is not None:
+        tell(console, "The box is periodic both ways: [boundary] periodic, with its vectors in cell.csv.")
     elif around.outer_grains:
         tell(console, "The outermost grains are the boundary ([boundary] grains), for nothing is told of walls.")
     if around.truth is not None:
         tell(console, f"{len(around.truth['frame'])} forces are the truth: truth_contacts.csv.")  # type: ignore[arg-type]
-    add = "" if around.walls is not None or around.outer_grains else f"add [walls] to {out / 'experiment.toml'}, then "
+    bounded = around.walls is not None or around.cell is not None or around.outer_grains
+    add = "" if bounded else f"add [walls] to {out / 'experiment.toml'}, then "
     tell(
         console,
         f"{out}: {tracks.grain_count} grains in {tracks.frame_count} frames. Next: {add}rodsight check {out}, then "

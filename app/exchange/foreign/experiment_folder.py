@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from solver.bodies.grains import Array
+
 from ...errors import InputError
-from ...experiment.experiment import CONFIG_NAME
+from ...experiment.experiment import CELL_COLUMNS, CONFIG_NAME
 from ...experiment.reading.tables import write_table
 from .observations import Arranged
 from .proposed_walls import Walls
@@ -23,6 +25,7 @@ class Surroundings:
     walls: Walls | None = None
     pressure: Mapping[str, float] = field(default_factory=dict)  # [Pa] of walls by their names
     outer_grains: bool = False  # the outermost grains are the boundary
+    cell: Array | None = None  # (f, 2, 2) [m], vectors of a periodic cell, instead of either
     known: Mapping[str, str] = field(default_factory=dict)  # lines of sections by their names
     truth: Mapping[str, Sequence[object]] | None = None  # columns of truth_contacts.csv
 
@@ -61,6 +64,9 @@ def write_folder(folder: Path, arranged: Arranged, around: Surroundings, source:
         write_table(folder / "ids.csv", {"id": tracks.id.tolist(), "name": arranged.name})
     if around.walls is not None:
         _write_walls(folder / "walls.csv", around.walls)
+    if around.cell is not None:
+        vectors = around.cell.reshape(-1, 4).T.tolist()
+        write_table(folder / "cell.csv", dict(zip(CELL_COLUMNS, (range(len(around.cell)), *vectors), strict=True)))
     if around.truth is not None:
         write_table(folder / "truth_contacts.csv", around.truth)
     (folder / CONFIG_NAME).write_text(_describe(folder, arranged, around, source), encoding="utf-8")
@@ -93,6 +99,8 @@ def _describe(folder: Path, arranged: Arranged, around: Surroundings, source: st
         lines += ["", f"# {around.walls.remark}", "[walls]", 'file = "walls.csv"']
         for wall, pressure in around.pressure.items():
             lines += [f"[walls.{json.dumps(wall, ensure_ascii=False)}]", f"pressure = {pressure!r}"]
+    elif around.cell is not None:
+        lines += ["", "# The simulation's box is periodic both ways.", "[boundary]", 'periodic = "cell.csv"']
     elif around.outer_grains:
         lines += [
             "",

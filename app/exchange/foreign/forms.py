@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
+
+from solver.bodies.grains import Array
 
 from ...errors import InputError
 from ...experiment.reading.tables import Table
 from ..dic_files import read_sequence
 from .columns import read_by_columns, read_rodtracker, read_trackpy
+from .form_names import Form
 from .lammps_dump import read_lammps
 from .observations import Convention, Observations
 from .pegs import Side, read_pegs
-from .proposed_walls import Walls, bars_of_cell
+from .proposed_walls import Walls, bars_of_cell, periodic_cell
 from .trackmate import read_trackmate
 from .yade_text import read_yade
 
-Form = Literal["table", "trackpy", "trackmate", "rodtracker", "lammps", "yade", "pegs", "dic"]
 FORMS_IN_PIXELS = frozenset({"trackpy", "rodtracker", "dic", "pegs"})
 PIXEL = 1e-4  # [m], assumed of photoelastic tests that do not tell
 COARSE = 1e-3  # of a mean diameter: the precision of tracks of which nothing is told
@@ -40,6 +41,7 @@ class Foreign:
     convention: Convention
     truth: Side | None = None  # forces that go with it
     walls: Walls | None = None  # that the file itself tells
+    cell: Array | None = None  # (f, 2, 2) [m], vectors of the periodic cell that it tells
     precision: float | None = None  # in its unit; None: a share of the diameter
     share: float = COARSE
     known: Mapping[str, str] = field(default_factory=dict)  # lines of sections of experiment.toml
@@ -76,7 +78,8 @@ def read_form(
         return Foreign(spots.seen, replace(down, unit=own))
     if form == "lammps":
         dump = read_lammps(source, columns, convention.interval)
-        return Foreign(dump.seen, counted, walls=bars_of_cell(dump, counted.unit), share=FINE)
+        bars, cell = bars_of_cell(dump, counted.unit), periodic_cell(dump, counted.unit)
+        return Foreign(dump.seen, counted, walls=bars, cell=cell, share=FINE)
     if form == "yade":
         return Foreign(read_yade(source, columns), counted, share=FINE)
     if form == "dic":

@@ -36,7 +36,7 @@ class Dump:
 
     seen: Observations
     low: Float[Array, "f 2"]  # of the box, in the dump's unit
-    cell: Float[Array, "f 2 2"]  # its edges, the first along x
+    cell: Float[Array, "f 2 2"]  # its edges, along the first axis and along the second, if it is not tilted
     periodic: tuple[bool, bool]  # across x, across y
 
 
@@ -81,7 +81,8 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
         spin.append(find.numbers(SPINS[third]) if SPINS[third] in step.columns else np.full(len(step.rows), np.nan))
     joined = np.concatenate
     turned, how = joined(angle), []
-    if np.isnan(turned).all() and np.isfinite(joined(spin)).any():
+    summed = bool(np.isnan(turned).all() and np.isfinite(joined(spin)).any())
+    if summed:
         turned = _sum_up(
             [step.number for step in ordered], [_Finder(step).text("id") for step in ordered], spin, interval
         )
@@ -94,18 +95,27 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     spread = float(np.ptp(joined(depth)))
     if np.isfinite(known).any() and spread > FLAT * 2.0 * float(np.nanmean(known)):
         how.append(f"{third} goes over {spread:g}: this is no layer of rods, and {third} is left out.")
+    k = ["xyz".index(axis) for axis in axes]
+    periodic = (ordered[0].ends[k[0]] == "pp", ordered[0].ends[k[1]] == "pp")
+    if periodic[0] != periodic[1]:
+        how.append(
+            f"The box is periodic across {axes[0] if periodic[0] else axes[1]} alone, which no experiment can be: "
+            "contacts through these edges are lost, and grains that went through them jump."
+        )
     left = sorted(set(ordered[0].columns) & {"fx", "fy", "fz", "vx", "vy", "vz"})
     if left:
         how.append(f"Left out: {', '.join(left)}.")
     table = Table(ordered[0].file, {"id": names}, lines)
-    seen = Observations(table, "id", joined(frames), tuple(names), joined(place), turned, known, remarks=tuple(how))
-    k = ["xyz".index(axis) for axis in axes]
-    tilt = np.array([[step.tilt[0] if axes == ("x", "y") else 0.0, 0.0] for step in ordered])
-    size = np.array([[step.bounds[each, 1] - step.bounds[each, 0] for each in k] for step in ordered])
+    seen = Observations(
+        table, "id", joined(frames), tuple(names), joined(place), turned, known, remarks=tuple(how), counted=summed
+    )
+    later = int(k[1] > k[0])  # of the two axes: its edge is the tilted one
     cell = np.zeros((len(ordered), 2, 2))
-    cell[:, 0, 0], cell[:, 1, 0], cell[:, 1, 1] = size[:, 0], tilt[:, 0], size[:, 1]
+    for one, step in zip(cell, ordered, strict=True):
+        one[0, 0], one[1, 1] = (step.bounds[each, 1] - step.bounds[each, 0] for each in k)
+        one[later, 1 - later] = step.tilt[sum(k) - 1]
     low = np.array([[step.bounds[each, 0] for each in k] for step in ordered])
-    return Dump(seen, low, cell, (ordered[0].ends[k[0]] == "pp", ordered[0].ends[k[1]] == "pp"))
+    return Dump(seen, low, cell, periodic)
 
 
 class _Finder:

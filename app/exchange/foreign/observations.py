@@ -31,6 +31,7 @@ class Observations:
     radius: Float[Array, " m"]  # in its unit of length; NaN where unknown
     time: Float[Array, " m"] | None = None  # [s]; None: unknown
     remarks: tuple[str, ...] = ()  # what could not be carried over, a sentence each
+    counted: bool = False  # whole turns are in the angles already: they do not jump
 
     def with_remark(self, remark: str) -> Observations:
         return replace(self, remarks=(*self.remarks, remark))
@@ -91,7 +92,7 @@ def arrange(seen: Observations, convention: Convention, precision: float) -> Arr
     position[frame, row] = convention.unit * place
     rotation[frame, row] = angle
     radius[frame, row] = convention.unit * seen.radius
-    rotation, turned = _unwrap(rotation)
+    rotation, turned = (rotation, 0) if seen.counted else _unwrap(rotation)
     if turned:
         remarks.append(f"Angles of {turned} grains jumped by turns, and go on without.")
     told = np.isfinite(rotation).any(axis=0) if n else np.zeros(0, np.bool_)

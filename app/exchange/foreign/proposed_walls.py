@@ -57,6 +57,11 @@ def bars_of_cell(dump: Dump, unit: float) -> Walls | None:
     )
 
 
+def periodic_cell(dump: Dump, unit: float) -> Array | None:
+    """Vectors (f, 2, 2) [m] of a box that is periodic both ways; None of any other. unit [m] of the dump."""
+    return dump.cell * unit if all(dump.periodic) else None
+
+
 def read_foreign_walls(file: Path, arranged: Arranged, convention: Convention) -> Walls:
     """Read frame,wall,x1,y1,x2,y2 in the grains' own unit, axes and numbers of frames.
 

@@ -1,0 +1,74 @@
+"""Files that other programs wrote themselves; written/README.md says how."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rodsight.experiment.boundary import bound_tracks
+from rodsight.experiment.experiment import load_experiment, read_tracks
+
+from .command import take_in, tracks_in, walls_in
+
+WRITTEN = Path(__file__).parent / "written"
+STEP = 2e-5  # [s] of the simulations
+
+
+def test_a_periodic_cell_of_lammps_bounds_the_packing(tmp_path, capsys):
+    said = take_in(capsys, "lammps", WRITTEN / "sheared_cell.dump", tmp_path / "out", "--interval", STEP)
+    assert "periodic both ways" in said
+    tracks, walls = tracks_in(tmp_path / "out"), walls_in(tmp_path / "out")
+    assert walls is not None
+    assert walls.cell is not None
+    assert walls.endpoints.shape[1] == 0
+    # LAMMPS has made the last cell upright, by one vector: followed, it shears on by 30 % a second.
+    assert walls.cell[:, 1, 0] == pytest.approx(0.3 * tracks.time * walls.cell[0, 1, 1])
+    followed = bound_tracks(load_experiment(tmp_path / "out"), tracks, walls)
+    step = np.linalg.norm(np.diff(followed.position, axis=0), axis=2)
+    assert step.max() < 0.3 * walls.cell[0, 0, 0] < np.linalg.norm(np.diff(tracks.position, axis=0), axis=2).max()
+
+
+def test_a_box_of_lammps_with_fixed_faces_is_four_walls(tmp_path, capsys):
+    said = take_in(capsys, "lammps", WRITTEN / "box_with_floor.dump", tmp_path / "out", "--interval", STEP)
+    assert "Left out: vx, vy." in said
+    tracks, walls = tracks_in(tmp_path / "out"), walls_in(tmp_path / "out")
+    assert walls is not None
+    assert walls.name == ("bottom", "right", "top", "left")
+    assert tracks.radius == pytest.approx(np.full(16, 0.0075))
+    assert tracks.time.tolist() == pytest.approx([0.0, 0.2, 0.4])
+    assert (np.diff(tracks.position[:, :, 1].mean(axis=1)) < 0.0).all()  # they fall
+    assert tracks.position[:, :, 1].min() > 0.95 * 0.0075  # soft as they are
+
+
+def test_a_box_that_is_periodic_one_way_alone_is_said_to_lose_contacts(tmp_path, capsys):
+    text = (WRITTEN / "box_with_floor.dump").read_text().replace("ff ff pp", "pp ff pp")
+    (tmp_path / "half.dump").write_text(text)
+    said = take_in(capsys, "lammps", tmp_path / "half.dump", tmp_path / "out")
+    assert "periodic across x alone" in said
+    walls = walls_in(tmp_path / "out")
+    assert walls is not None
+    assert walls.name == ("bottom", "top")
+
+
+def test_whole_turns_of_rolling_discs_are_kept(tmp_path, capsys):
+    take_in(capsys, "lammps", WRITTEN / "box_with_floor.dump", tmp_path / "slow", "--interval", STEP)
+    take_in(capsys, "lammps", WRITTEN / "box_with_floor.dump", tmp_path / "fast", "--interval", 10 * STEP)
+    slow, fast = tracks_in(tmp_path / "slow").rotation, tracks_in(tmp_path / "fast").rotation
+    assert np.abs(fast).max() > 2.0 * np.pi
+    assert fast == pytest.approx(10.0 * slow)
+
+
+def test_what_trackpy_found_and_linked_comes_in(tmp_path, capsys):
+    take_in(
+        capsys, "trackpy", WRITTEN / "trackpy_discs.csv", tmp_path / "out", "--pixel-size", 1e-4, "--radius", 15,
+        "--walls", "box",
+    )  # fmt: skip
+    tracks = tracks_in(tmp_path / "out")
+    assert tracks.position.shape == (3, 9, 2)
+    moved = (tracks.position[2] - tracks.position[0]) / 1e-4
+    riser = np.flatnonzero(moved[:, 1] > 1.0)
+    assert len(riser) == 1
+    assert moved[riser[0]] == pytest.approx([0.0, 3.0], abs=0.2)
+    assert np.delete(moved, riser, axis=0) == pytest.approx(np.zeros((8, 2)), abs=0.05)
+    assert read_tracks(load_experiment(tmp_path / "out")).radius == pytest.approx(np.full(9, 1.5e-3))
