@@ -29,10 +29,10 @@ from ..tracks import Tracks, WallTracks
 from .snapshots import make_snapshots
 
 LOOKED_AT = 3  # photographs
-# ln(1 − r) = a + b ln(noise / motion) + c ln(step / .25°) where the step is larger, and its standard deviation; fitted
-# on simulated worlds, seeds 0, 1 and 3, with 10 to 100 µm of noise.
-EXPECTED = (-3.29, 0.235, 0.424)
-EXPECTED_SD = 0.45
+UNPROMISED = (
+    "What forces to expect is not told: that takes grains and walls that are seen in two photographs in a row, and no "
+    "periodic cell."
+)
 # Where the gaps of touching grains scatter by too much nobody can tell who touches, whatever the motion: scatter over
 # the mean diameter, and 1 − r as it was with simulated discs, with photoelastic discs, and with a ring of these.
 GAP_SCATTER = (0.009, 0.0125, 0.05)
@@ -49,6 +49,20 @@ AMBIGUOUS = (0.05, 0.95)  # P(touch) between which nobody can say
 TOUCHES = 0.5
 SLIDES = 3.0  # standard deviations of a sliding from which on it is seen
 SLIDING_SIGMAS = 2.8  # of a position: two grains that move and turn, two photographs
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """ln(1 − r) = a + b ln(noise / motion) + c ln(step / .25°) where the step is larger; its standard deviation."""
+
+    a: float
+    b: float
+    c: float
+    sd: float
+
+
+# Fitted on simulated worlds, seeds 0, 1 and 3, with 10 to 100 µm of noise.
+EXPECTED = Promise(-3.29, 0.235, 0.424, 0.45)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +88,18 @@ class DataBudget:
     @property
     def expected(self) -> tuple[float, float, float]:
         """r that such data led to on simulated worlds, and the interval that two of three lie in: r, low, high."""
-        a, b, c = EXPECTED
-        steps = math.log(max(self.shear / REFERENCE_STEP, 1.0))
-        error = a + b * math.log(float(np.clip(self.noise_share, *NOISE_SHARES))) + c * steps
+        noise, steps = self.witnesses
+        error = EXPECTED.a + EXPECTED.b * noise + EXPECTED.c * steps
         if self.coarse:
             error = max(error, self._error_of_gaps)
-        r, low, high = (max(1.0 - math.exp(error + k * EXPECTED_SD), 0.0) for k in (0.0, 1.0, -1.0))
+        r, low, high = (max(1.0 - math.exp(error + k * EXPECTED.sd), 0.0) for k in (0.0, 1.0, -1.0))
         return r, low, high
+
+    @property
+    def witnesses(self) -> tuple[float, float]:
+        """ln(noise / motion) and ln(step / .25°), within what counts."""
+        noise = math.log(float(np.clip(self.noise_share, *NOISE_SHARES)))
+        return noise, math.log(max(self.shear / REFERENCE_STEP, 1.0))
 
     @property
     def coarse(self) -> bool:

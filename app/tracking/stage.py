@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from solver.bodies.wall_shapes import STRAIGHT, reach_of_wall
 
 from ..atomic import replacing
 from ..errors import InputError
+from ..experiment.boundary import bound_tracks
 from ..experiment.corrections import read_corrections
 from ..experiment.experiment import Experiment, read_grain_guess, read_times
 from ..experiment.photographs import CHANNELS, FULL_SCALE, Image, Photographs
@@ -23,7 +25,7 @@ from ..experiment.reading.tables import read_table, write_table
 from ..experiment.scaling import make_scale
 from ..experiment.units import Scale
 from ..experiment.walls import read_walls
-from ..progress import Observer, Progress
+from ..progress import Observer, Progress, silent, unheard
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
 from . import DETECTIONS
@@ -104,6 +106,18 @@ def track_photographs(
     )  # fmt: skip
     reasons = ("; ".join(filter(None, (said, unfound.get(k)))) for k, said in enumerate(tracks.failed_reason or ()))
     return replace(tracks, failed_reason=tuple(reasons)), walls, tables
+
+
+def glimpse(
+    experiment: Experiment, count: int, progress: Progress = silent, tell: Callable[[str], None] = untold
+) -> tuple[Tracks, WallTracks | None]:
+    """Tracks of the first photographs, at most `count`, of which nothing is kept. Raises InputError."""
+    stop = min(count, len(experiment.photographs()))
+    with TemporaryDirectory() as folder:
+        tracks, walls, _ = track_photographs(
+            experiment, stop, lambda stage: Checkpoint(Path(folder) / stage, ""), progress, unheard, tell=tell
+        )
+    return bound_tracks(experiment, tracks, walls), walls
 
 
 def find_reference(experiment: Experiment) -> ReferenceGrains:

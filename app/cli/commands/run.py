@@ -115,34 +115,49 @@ def check(
     experiment: ExperimentPath,
     /,
     budget: Annotated[
-        bool, tyro.conf.arg(help="say what tracks of the first photographs promise of the forces")
+        bool, tyro.conf.arg(help="say what the first photographs, or their tracks, promise of the forces")
     ] = True,
     settings: Settings = (),
     quiet: Quiet = False,
 ) -> int:
-    """Validate an experiment without computing, and say from its first tracks what to expect of the forces.
+    """Validate an experiment, and say from its first three photographs or their tracks what to expect of the forces.
 
     Example: rodsight check sample_data/shear
     """
     from ... import pipeline
-    from ...inference.data_budget import measure_budget
+    from ...inference.data_budget import UNPROMISED, measure_budget
 
     request = Request(experiment, settings, quiet)
     with open_run(request, writes=False) as run:
         tracks, walls = pipeline.check(run)
-    promised = None if tracks is None or not budget else measure_budget(tracks, walls)
+        seen = None
+        if budget and not quiet:  # nobody would read it
+            seen = (tracks, walls) if tracks is not None else _glimpse(run)
+    promised = None if seen is None else measure_budget(*seen)
     config = run.experiment.config
     if tracks is not None:
         what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
     else:
         what = f"{len(run.experiment.photographs())} photographs"
+        what += f", {seen[0].grain_count} grains in the first" if seen is not None else ""
     what += f", {_bounds(tracks, walls)}"
     console = request.console
     console.print(f"{config.name}: the input is good: {what}.", highlight=False)
     _tell_notes(run, console)
-    for sentence in [] if promised is None else promised.describe():
+    if promised is not None:
+        sentences = promised.describe()
+    else:
+        sentences = [] if seen is None else [UNPROMISED]
+    for sentence in sentences:
         tell(console, sentence)
     return 0
+
+
+def _glimpse(run: Run) -> tuple[Tracks, WallTracks | None]:
+    from ...inference.data_budget import LOOKED_AT
+    from ...tracking.stage import glimpse
+
+    return glimpse(run.experiment, LOOKED_AT, run.progress, run.notes.append)
 
 
 def _bounds(tracks: Tracks | None, walls: WallTracks | None) -> str:

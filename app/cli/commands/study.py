@@ -41,6 +41,7 @@ def study(
             "numbers",
             "intervals",
             "report",
+            "budget",
             "real",
             "perturbation",
         ],
@@ -49,8 +50,8 @@ def study(
             help="the paper's claims; r against noise; trust and status refitted; coverage of error bars; what "
             "laboratories bring, as simulated worlds; every statistic against the truth's; what stated "
             "intervals of forces cover, by groups of contacts, and their constants fitted anew; all of that as one "
-            "page, and what does not hold; a run "
-            "against forces that were measured; how far forces move when next to nothing is changed"
+            "page, and what does not hold; what `check` promises from the first photographs beside what comes out; a "
+            "run against forces that were measured; how far forces move when next to nothing is changed"
         ),
     ],
     folder: Annotated[
@@ -71,7 +72,8 @@ def study(
     worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
     fit: Annotated[
-        tuple[int, ...], tyro.conf.arg(metavar="SEED", help="intervals, numbers: fit the constants on these seeds, too")
+        tuple[int, ...],
+        tyro.conf.arg(metavar="SEED", help="intervals, numbers, budget: fit constants on these, too"),
     ] = (),
     settings: Settings = (),
     out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
@@ -122,6 +124,8 @@ def study(
         return _study_numbers(asked, fit=fit)
     if subject == "intervals":
         return _study_intervals(asked, fit=fit)
+    if subject == "budget":
+        return _study_budget(asked, fit=fit)
     for option, given in (("--worlds", worlds), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
         if given:
             raise InputError("study", f"{option} with {subject}", "is for worlds only")
@@ -263,6 +267,20 @@ def _study_intervals(asked: _Asked, *, fit: tuple[int, ...]) -> int:
     intervals.print_intervals(
         console, "Share of contacts within one and two stated deviations, %", ContactErrors.joined(judged)
     )
+    return 0
+
+
+def _study_budget(asked: _Asked, *, fit: tuple[int, ...]) -> int:
+    from ...study.worlds import promises
+
+    console = table_console()
+    worlds = asked.worlds or promises.WORLDS
+    with progress_of(asked.quiet) as progress:
+        if fit:
+            found = promises.fit_promise(promises.study_promises(asked.plan, worlds, fit, progress))
+            console.print(f"Fitted on seeds {' '.join(map(str, fit))}: {found}", highlight=False)
+        kept = promises.study_promises(asked.plan, worlds, asked.seeds, progress)
+    promises.print_promises(console, kept)
     return 0
 
 

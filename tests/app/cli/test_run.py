@@ -190,6 +190,17 @@ def test_check_says_what_it_found_and_writes_nothing(tracked, capsys, monkeypatc
     assert not Path("runs").exists()
 
 
+def test_check_says_what_the_first_photographs_promise(made_photographs, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert rodsight("check", made_photographs) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "grains in the first, 4 walls" in told
+    assert "First 3 photographs: noise" in told
+    assert not list(tmp_path.iterdir())
+    assert rodsight("check", made_photographs, "--no-budget") == 0
+    assert "noise" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "command", ["run", "check", "track", "solve", "record", "view", "score", "synth", "study", "settings"]
 )
