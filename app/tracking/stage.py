@@ -108,7 +108,7 @@ def track_photographs(
     return replace(tracks, failed_reason=tuple(reasons)), walls, tables
 
 
-def glimpse(
+def track_first(
     experiment: Experiment, count: int, progress: Progress = silent, tell: Callable[[str], None] = untold
 ) -> tuple[Tracks, WallTracks | None]:
     """Tracks of the first photographs, at most `count`, of which nothing is kept. Raises InputError."""

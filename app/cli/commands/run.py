@@ -125,15 +125,14 @@ def check(
     Example: rodsight check sample_data/shear
     """
     from ... import pipeline
-    from ...inference.data_budget import UNPROMISED, measure_budget
+    from ...promise import describe_promise, glimpse
 
     request = Request(experiment, settings, quiet)
     with open_run(request, writes=False) as run:
         tracks, walls = pipeline.check(run)
         seen = None
         if budget and not quiet:  # nobody would read it
-            seen = (tracks, walls) if tracks is not None else _glimpse(run)
-    promised = None if seen is None else measure_budget(*seen)
+            seen = (tracks, walls) if tracks is not None else glimpse(run.experiment, run.progress, run.notes.append)
     config = run.experiment.config
     if tracks is not None:
         what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
@@ -144,20 +143,9 @@ def check(
     console = request.console
     console.print(f"{config.name}: the input is good: {what}.", highlight=False)
     _tell_notes(run, console)
-    if promised is not None:
-        sentences = promised.describe()
-    else:
-        sentences = [] if seen is None else [UNPROMISED]
-    for sentence in sentences:
+    for sentence in [] if seen is None else describe_promise(*seen)[0]:
         tell(console, sentence)
     return 0
-
-
-def _glimpse(run: Run) -> tuple[Tracks, WallTracks | None]:
-    from ...inference.data_budget import LOOKED_AT
-    from ...tracking.stage import glimpse
-
-    return glimpse(run.experiment, LOOKED_AT, run.progress, run.notes.append)
 
 
 def _bounds(tracks: Tracks | None, walls: WallTracks | None) -> str:

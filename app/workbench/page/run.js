@@ -4,14 +4,14 @@ import { ask, digits, fact, h, sign, tell } from "/page/dom.js";
 import { drawLegend, drawNetwork } from "/page/network.js";
 import { showLanes } from "/page/lanes.js";
 
-let source = null, told = null, facts = null, net = null, watching = null, following = true, alarmed = 0;
+let source = null, told = null, facts = null, net = null, watching = null, following = true, alarmed = 0, promised = null;
 
 export const run = {
   name: "run", title: "Run",
   dim: 0.75,
   mark: (app) => (app.project.run?.frames !== undefined ? "good" : app.project.run?.unfinished ? "doubtful" : "missing"),
   enter(app) { listen(app); },
-  leave() { source?.close(); source = null; watching = null; net = null; told = null; facts = null; },
+  leave() { source?.close(); source = null; watching = null; net = null; told = null; facts = null; promised = null; },
   moved(app) { following = facts ? app.frame >= facts.count - 1 : true; load(app); },
   panel(app) {
     const { project } = app, state = told?.state ?? "idle", busy = state === "running" || state === "pausing";
@@ -22,6 +22,8 @@ export const run = {
           ? [h("button", { id: "pause", disabled: state === "pausing", onclick: () => act(app, "run_pause") }, state === "pausing" ? "Pausing …" : "Pause"), h("button", { disabled: state === "pausing", onclick: () => act(app, "run_cancel") }, "Cancel")]
           : [h("button", { class: "primary", id: "run", disabled: !project.ready, onclick: () => act(app, "run_start") }, state === "paused" || project.run?.unfinished ? "Go on" : project.run?.frames !== undefined ? "Run again" : "Run"),
             h("button", { id: "follow", disabled: !project.ready, title: "Wait for further photographs in the folder, and solve them as they come", onclick: () => act(app, "run_start", { follow: true }) }, "Follow a running test")]),
+      busy ? null : h("div", { class: "row" }, h("button", { id: "promise", disabled: !project.ready, title: "Three photographs are tracked: their noise, their motion and who touches tell how good forces can become", onclick: () => expect(app) }, "What to expect")),
+      promised?.at === project.at ? h("div", { class: "says", id: "promised" }, promised.says.map((text) => h("p", {}, sign(promised.mark), text))) : null,
       told && state !== "idle" ? h("div", { class: "card" },
         h("div", { class: "fact" }, h("span", {}, "the run"), h("span", { id: "run-state" }, state)),
         told.stages.map((stage) => h("div", {}, h("div", { class: "fact" }, h("span", {}, stage.words), h("span", {}, `${stage.done} of ${stage.total}${stage.left !== null && stage.done < stage.total && busy ? ` · ${time(stage.left)} left` : ""}`)),
@@ -51,6 +53,8 @@ const quoted = (text) => (/[^\w./-]/.test(text) ? `"${text}"` : text);
 const time = (seconds) => (seconds < 90 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);
 
 function act(app, what, values = {}) { app.queue(async () => { told = await ask(what, { at: app.project.at, ...values }); app.paint(); }); }
+
+function expect(app) { app.queue(async () => { promised = { at: app.project.at, ...await ask("promise", { at: app.project.at }) }; app.paint(); }, "Looking at the first photographs …"); }
 
 function listen(app) {
   const { at } = app.project;

@@ -9,6 +9,7 @@ from pydantic import Field
 from ...errors import InputError
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
+from ...promise import describe_promise, glimpse
 from ..inspecting import found as inspecting
 from .bench import Bench
 from .project import Project
@@ -27,6 +28,17 @@ def run_start(bench: Bench, at: Text, follow: bool = False) -> dict[str, Any]:
         raise InputError("run", "", "cannot begin: " + " ".join([*lacks, *found.others]))
     opened.job.start(*(("--follow",) if follow else ()))
     return opened.job.told()
+
+
+@question
+def promise(bench: Bench, at: Text) -> dict[str, Any]:
+    """What the first photographs promise of the forces, as `rodsight check` says it."""
+    found = bench.project(at).understood()
+    if found.experiment is None or not found.ready:
+        raise InputError("check", "", "has nothing to look at yet: something is still missing")
+    notes: list[str] = []
+    sentences, good = describe_promise(*glimpse(found.experiment, tell=notes.append))
+    return {"says": [*notes, *sentences], "mark": "good" if good else "doubtful"}
 
 
 @question

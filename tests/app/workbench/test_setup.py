@@ -147,6 +147,7 @@ def test_the_whole_set_up_gives_what_check_accepts(begun, made_photographs, phot
     told = visitor.ask("detect_rods", at=at, radii=list(section.radii))
     true_rods = read_table(made_photographs / "grains.csv", ("x", "y"))
     assert len(told["rods"]["id"]) == len(true_rods)
+    assert "still missing" in visitor.refused("promise", at=at)
     told = visitor.ask("find_walls", at=at)
     told = visitor.ask("set_plate", at=at, name="top", pressure=5e4)
     told = visitor.ask("set_material", at=at, density=2700.0, length=0.06, friction="measured")
@@ -154,6 +155,9 @@ def test_the_whole_set_up_gives_what_check_accepts(begun, made_photographs, phot
     assert marks(told) == dict.fromkeys(("photographs", "scale", "walls", "rods", "material"), "good")
     folder = photographs_only / "my photographs"
     assert rodsight("check", str(folder), "--quiet") == 0
+    promised = visitor.ask("promise", at=at)
+    assert any("noise" in each and "neighbours move" in each for each in promised["says"])
+    assert promised["mark"] in ("good", "doubtful")
     made = load_experiment(folder)
     scale = make_scale(made.config.photographs, truth.photographs().shape[0])
     assert_on_lines(scale, read_walls(made, 4), read_walls(truth, 4))
