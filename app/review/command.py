@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import signal
 import webbrowser
 from functools import partial
@@ -16,6 +15,7 @@ from ..errors import InputError
 from ..experiment.photographs import Photographs
 from ..experiment.scaling import make_scale
 from ..signals import Stopped
+from ..verdicts.reviewer_name import account_name
 from ..verdicts.table import export_verdicts, import_verdicts
 from .judging.candidate_pairs import find_candidate_pairs
 from .reviewed_run import Reviewed, open_reviewed
@@ -43,7 +43,7 @@ def review(path: Path, *, port: int, browser: bool, reviewer: str | None) -> int
     reviewed = open_reviewed(path)
     session = open_session(reviewed)
     try:
-        server = ReviewServer(session, port, reviewer or _user())
+        server = ReviewServer(session, port, reviewer or account_name() or "reviewer")
     except (OSError, OverflowError) as error:
         raise InputError("--port", str(port), f"cannot be used ({error})") from None
     console = Console()
@@ -85,10 +85,3 @@ def export_table(path: Path, file: Path) -> int:
 
 def _grey(photographs: Photographs, first: int, frame: int) -> NDArray[np.uint8]:
     return np.clip(np.rint(photographs[first + frame]), 0, 255).astype(np.uint8)
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError):  # a machine without user names
-        return "reviewer"

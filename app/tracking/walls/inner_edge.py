@@ -51,7 +51,7 @@ def snap_to_edge(image: Image, line: Array, reach: float) -> tuple[Array, float]
         weighed = np.where(near, slope, 0.0)
         best = weighed.argmax(axis=1)
         strength = weighed.max(axis=1)
-        found = offset[best] + _peak(weighed, best) * STEP
+        found = offset[best] + peak_between(weighed, best) * STEP
         strong = strength > 0.3 * np.percentile(strength, 90)
         if strong.sum() < 4:
             return np.asarray(line, np.float64), 0.0
@@ -115,7 +115,7 @@ def _meet(angle: float, foot: Array, other_angle: float, other_foot: Array) -> A
     return foot + t[0] * a
 
 
-def _peak(slope: Array, at: NDArray[np.intp]) -> Array:
+def peak_between(slope: Array, at: NDArray[np.intp]) -> Array:
     """Where between the steps the greatest slope of every profile lies (p,), by the parabola through three."""
     rows = np.arange(len(at))
     middle = np.clip(at, 1, slope.shape[1] - 2)

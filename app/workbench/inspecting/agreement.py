@@ -18,7 +18,7 @@ MOST = 100  # pairs of a list
 
 
 def agreement(reviewed: Reviewed) -> dict[str, Any]:
-    """What the log of a run says of people and program; frames count from the run's first.
+    """What the log of a run says of people and program; frames are photographs.
 
     frames: of every frame with a verdict, and total: contacts that both see, that the program alone sees, that the eye
     alone sees, and that neither sees. precision, recall: of the program, None while the interval is too wide.
@@ -26,7 +26,7 @@ def agreement(reviewed: Reviewed) -> dict[str, Any]:
     score = score_verdicts(reviewed)
     told: dict[str, Any] = {"frames": [], "total": None, "precision": None, "recall": None, "disputed": []}
     if score is not None:
-        told["frames"] = [{**asdict(each), "frame": each.frame - reviewed.first_frame} for each in score.frames]
+        told["frames"] = [asdict(each) for each in score.frames]
         told["total"] = asdict(score.total)
         told |= {"precision": _shown(score.estimate.precision), "recall": _shown(score.estimate.recall)}
     log = reviewed.log
@@ -42,8 +42,7 @@ def agreement(reviewed: Reviewed) -> dict[str, Any]:
         for each in kappas
     ]  # fmt: skip
     told["disputed"] = [
-        {"frame": pair[0] - reviewed.first_frame, "i": pair[1], "j": pair[2], "said": said}
-        for pair, said in disputes(log)[:MOST]
+        {"frame": pair[0], "i": pair[1], "j": pair[2], "said": said} for pair, said in disputes(log)[:MOST]
     ]
     return told
 

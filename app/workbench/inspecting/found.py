@@ -18,7 +18,7 @@ from solver.statistics.frame_statistics import FrameStatistics
 from ...experiment.units import Scale
 from ...results.checkpoint import Checkpoint, flatten
 from ...results.hdf5.lazy import Lazily, Remembered
-from ...results.hdf5.store import load_results, load_tracks
+from ...results.hdf5.store import load_results, load_tracks, read_origin
 from ...results.results import Results
 from ...run_folder import RESULTS, TRACKS, UNFINISHED
 from ...tracks import Tracks, TrackStatus, WallTracks
@@ -38,6 +38,12 @@ class Found:
     results: Results | None  # None: of a run that goes on
     going_on: GoingOn | None = None
     told: dict[int, Facts] = field(default_factory=dict)  # of frames that were looked at
+    first: int = 0  # the photograph that its frame 0 shows
+
+    @property
+    def stop(self) -> int:
+        """The photograph after those that are solved."""
+        return self.first + len(self.frames)
 
     @property
     def provisional(self) -> bool:
@@ -81,7 +87,16 @@ def find_run(folder: Path, former: Found | None = None) -> Found | None:
     results = load_results(folder / RESULTS)
     stored = results.frames
     frames: Remembered[FrameForces] = Remembered(len(stored), lambda k: stored[k], _bytes_of, ROOM)
-    return Found(results.tracks, results.walls, frames, results.statistics, replace(results, frames=frames))
+    return Found(
+        results.tracks, results.walls, frames, results.statistics, replace(results, frames=frames),
+        first=first_photograph(folder / RESULTS),
+    )  # fmt: skip
+
+
+def first_photograph(file: Path) -> int:
+    """The photograph of a stored file's frame 0: runs of some photographs alone count from 0, too."""
+    origin = read_origin(file)
+    return 0 if origin is None else origin.frames[0]
 
 
 def run_stamp(folder: Path) -> tuple[Any, ...]:
@@ -116,7 +131,7 @@ def _unfinished(folder: Path, going_on: GoingOn | None) -> Found | None:
     solved.grow(count)
     seen, walls = load_tracks(tracks)
     frames, statistics = (Lazily(count, lambda k, at=at: solved[k][at]) for at in range(2))
-    return Found(seen, walls, frames, statistics, None, going_on, going_on.told)
+    return Found(seen, walls, frames, statistics, None, going_on, going_on.told, first_photograph(tracks))
 
 
 def _bytes_of(forces: FrameForces) -> int:
@@ -124,7 +139,7 @@ def _bytes_of(forces: FrameForces) -> int:
 
 
 def frame_facts(found: Found) -> dict[str, Any]:
-    """What is told of every frame, for the time line."""
+    """What is told of every photograph up to the last one that is solved, for the time line; None of those before."""
     tracks, count = found.tracks, len(found.frames)
     lost = np.isin(tracks.status, (TrackStatus.LOST, TrackStatus.OUT_OF_FRAME)).sum(axis=1)
     suspect = (tracks.status == TrackStatus.SUSPECT).sum(axis=1)
@@ -132,13 +147,14 @@ def frame_facts(found: Found) -> dict[str, Any]:
         if k not in found.told:
             found.told[k] = _facts_of(found.frames[k], found.statistics[k])
     facts = [found.told[k] for k in range(count)]
+    before: list[Any] = [None] * found.first
     return {
-        "count": count, "provisional": found.provisional, "rods": tracks.grain_count,
-        "status": [each.status for each in facts], "reason": [each.reason for each in facts],
-        "contacts": [each.contacts for each in facts],
-        **{name: plain([getattr(each, name) for each in facts]) for name in NUMBERS},
-        "lost": lost.tolist(), "suspect_poses": suspect.tolist(),
-        "time": tracks.time[:count].tolist(),
+        "first": found.first, "count": found.stop, "provisional": found.provisional, "rods": tracks.grain_count,
+        "status": before + [each.status for each in facts], "reason": before + [each.reason for each in facts],
+        "contacts": before + [each.contacts for each in facts],
+        **{name: before + plain([getattr(each, name) for each in facts]) for name in NUMBERS},
+        "lost": before + lost.tolist(), "suspect_poses": before + suspect.tolist(),
+        "time": before + tracks.time[:count].tolist(),
     }  # fmt: skip
 
 
@@ -150,9 +166,10 @@ def _facts_of(forces: FrameForces, statistics: FrameStatistics) -> Facts:
     )  # fmt: skip
 
 
-def network(found: Found, frame: int, scale: Scale) -> dict[str, Any]:
-    """Contacts and forces of a frame: places in pixels of the photograph, forces in newtons."""
-    forces, tracks = found.frames[frame], found.tracks
+def network(found: Found, photograph: int, scale: Scale) -> dict[str, Any]:
+    """Contacts and forces of a photograph's frame: places in pixels, forces in newtons."""
+    frame, tracks = photograph - found.first, found.tracks
+    forces = found.frames[frame]
     contacts = forces.contacts
     n = contacts.grain_count
     radius = np.full(n + contacts.wall_count, np.nan)
@@ -164,7 +181,7 @@ def network(found: Found, frame: int, scale: Scale) -> dict[str, Any]:
     ids = np.append(tracks.id, np.arange(len(tracks.id), n))
     names = list(found.walls.name) if found.walls is not None else []
     return {
-        "frame": frame, "status": forces.status.name.lower(), "trust": plain([forces.trust])[0],
+        "frame": photograph, "status": forces.status.name.lower(), "trust": plain([forces.trust])[0],
         "line": _pixels(scale, start, end), "point": np.round(scale.to_pixels(contacts.point), 2).tolist(),
         "i": ids[contacts.i].tolist(),
         "j": [int(ids[j]) if j < n else names[j - n] for j in contacts.j.tolist()],
@@ -191,8 +208,8 @@ def rods_of(tracks: Tracks, frame: int, scale: Scale) -> dict[str, Any]:
 
 
 def history(found: Found, i: int | str, j: int | str) -> dict[str, Any]:
-    """One contact in every frame, by the names of its bodies; None where it is not there."""
-    told: dict[str, list[Any]] = {key: [] for key in ("fn", "ft", "fn_sd", "gap", "probability")}
+    """One contact in every photograph, by the names of its bodies; None where it is not there."""
+    told: dict[str, list[Any]] = {key: [None] * found.first for key in ("fn", "ft", "fn_sd", "gap", "probability")}
     for forces in found.frames:
         row = _row(found, forces, i, j)
         for key in told:

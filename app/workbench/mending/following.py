@@ -33,11 +33,13 @@ class Followed:
 
 
 def follow_on(
-    mender: Mender, tracked: Tracked, name: int, since: tuple[int, Mended], by_hand: Callable[[int], bool]
-) -> Followed:
+    mender: Mender, tracked: Tracked, name: int, since: tuple[int, Mended], by_hand: Callable[[int], bool],
+    first: int = 0,
+) -> Followed:  # fmt: skip
     """Correlate a rod in photograph after photograph from where its neighbours lead it.
 
     since: the photograph in which it was mended, and how. by_hand: whether a photograph has a correction of it already.
+    first: the photograph of the tracks' frame 0.
     Ends where the track has the pose that is found, where nothing is found, and where a hand has been before.
     """
     frame, last = since
@@ -45,13 +47,13 @@ def follow_on(
     poses: dict[int, Mended] = {}
     for k in range(frame + 1, len(tracked.pose)):
         if by_hand(k):
-            return Followed(poses, f"photograph {k} has a correction of it already")
+            return Followed(poses, f"photograph {first + k} has a correction of it already")
         step = _led(tracked, row, k, last)
         found = mender.correlate(k, name, (last.x + step[0], last.y + step[1], last.angle))
         if not found.found:
-            return Followed(poses, f"it is not found in photograph {k}: drag it there, too")
+            return Followed(poses, f"it is not found in photograph {first + k}: drag it there, too")
         if _off(tracked.pose[k, row], found, mender.circle(name)[2]) < AGREE:
-            return Followed(poses, f"from photograph {k} on its track is right by itself")
+            return Followed(poses, f"from photograph {first + k} on its track is right by itself")
         poses[k] = last = found
     return Followed(poses, "to the last photograph")
 

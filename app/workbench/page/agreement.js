@@ -22,7 +22,7 @@ function body(told, go) {
     share("precision", told.precision), share("recall", told.recall),
     told.judges.length ? [h("h3", {}, "Agreement of judges"), table(["", "pairs", "agree", "κ"], told.judges.map((each) => [`${each.first} – ${each.second}`, String(each.count), each.observed === null ? "–" : `${Math.round(100 * each.observed)} %`, each.kappa === null ? "–" : `${digits(each.kappa, 2)} ± ${digits(each.standard_error, 1)}`]))] : null,
     told.disputed.length ? [h("h3", {}, "Disputed"), h("div", { class: "list", id: "disputed" }, told.disputed.map((each) => h("button", { onclick: () => go(each) },
-      h("span", { class: "two" }, h("span", {}, `frame ${each.frame} · ${typeof each.j === "number" ? "rods" : "rod"} ${each.i} – ${each.j}`), h("span", { class: "soft" }, Object.entries(each.said).map(([who, said]) => `${who}: ${said}`).join(" · "))))))] : null);
+      h("span", { class: "two" }, h("span", {}, `photograph ${each.frame} · ${typeof each.j === "number" ? "rods" : "rod"} ${each.i} – ${each.j}`), h("span", { class: "soft" }, Object.entries(each.said).map(([who, said]) => `${who}: ${said}`).join(" · "))))))] : null);
 }
 
 const table = (heads, rows) => h("table", { class: "numbers" }, h("thead", {}, h("tr", {}, heads.map((text) => h("th", {}, text)))), h("tbody", {}, rows.map((row) => h("tr", {}, row.map((text) => h("td", {}, text))))));

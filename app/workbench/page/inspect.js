@@ -11,6 +11,7 @@ const VERDICTS = { c: "contact", n: "no contact", u: "unsure" };
 const SAID = { contact: "#2fbf93", "no contact": "#d55e00", unsure: "#f0e442" };
 let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, by = "fn", blind = false, who = null, since = 0, frameOf = -1, without = null, recording = null, wanted = null;
 const judges = { open: false, told: null };
+let spoken = null; // what this reviewer has said, in every photograph
 
 export const inspect = {
   name: "inspect", title: "Inspect", digits: false,
@@ -18,10 +19,11 @@ export const inspect = {
   get dim() { return blind ? 1 : 0.72; },
   hint: (app) => (!facts ? "" : blind ? "Blind: judge by the photograph alone. C contact · N none · U unsure · Z undo" : chosen ? "C contact · N no contact · U unsure · Z undo · Space next at stake" : "Click a contact or a rod; Space goes to the pair on which most hangs"),
   keyHelp: [["C N U", "contact, no contact, unsure"], ["Z", "take the last verdict back"], ["Space", "the pair on which most hangs and nothing is said of"], ["W", "the forces without this contact"], ["B", "blind, or not"], ["V", "the recording, or the photograph"], ["J", "the next flagged frame"]],
-  enter(app) { facts = null; net = null; chosen = null; past = null; frameOf = -1; app.queue(async () => { who ??= (await ask("reviewer")).name; facts = (await ask("run_told", { at: app.project.at })).frames; await load(app); }); },
+  enter(app) { facts = null; net = null; chosen = null; past = null; frameOf = -1; app.queue(async () => { who ??= (await ask("reviewer")).name; facts = (await ask("run_told", { at: app.project.at })).frames; if (facts && app.frame < facts.first) app.frame = facts.first; await load(app); }); },
   leave() { closeRecording(); },
   rodsOfFrame: () => net.rods.x.flatMap((x, n) => [x, net.rods.y[n], net.rods.r[n]]), // for tests
-  moved(app) { recording?.show(app.frame); app.queue(() => load(app)); },
+  chosen: () => (chosen?.j === undefined ? null : { i: chosen.i, j: chosen.j }), // for tests
+  moved(app) { recording?.show(Math.max(app.frame - (facts?.first ?? 0), 0)); app.queue(() => load(app)); },
   tool: (app) => tool(app),
   panel(app) {
     if (!facts) return [h("p", {}, "There is nothing to inspect yet: forces are found when the experiment is run."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
@@ -29,11 +31,12 @@ export const inspect = {
     const judged = list ? list.filter((each) => each.verdict).length : 0;
     return [
       h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", disabled: blind, onchange: (event) => { by = event.target.value; app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === by }, how.words)))),
-      h("div", { class: "field" }, h("label", { htmlFor: "who" }, "reviewer"), h("input", { id: "who", value: who ?? "", onchange: (event) => { who = event.target.value.trim() || "reviewer"; app.queue(() => load(app, true)); } })),
+      h("div", { class: "field" }, h("label", { htmlFor: "who" }, "reviewer"), h("input", { id: "who", value: who ?? "", placeholder: "your name", onchange: (event) => { who = event.target.value.trim(); app.queue(() => load(app, true)); } })),
       h("div", { class: "row" }, h("button", { class: blind ? "on" : "", id: "blind", onclick: () => toggleBlind(app), title: "B" }, "Blind"), h("button", { class: recording ? "on" : "", id: "show-recording", disabled: blind, onclick: () => toggleRecording(app), title: blind ? "It shows what was found: not while you judge blind" : "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null, h("button", { class: "primary", id: "next", onclick: () => nextAtStake(app) }, "Next at stake"), h("span", { class: "soft" }, list ? `${judged} judged of ${list.length}` : "")),
       chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
       !blind && list && !chosen ? [h("h3", {}, "Most hangs on"), h("div", { class: "list" }, list.slice(0, 14).map((each) => h("button", { onclick: () => pick(app, each, true) }, h("span", { style: { flex: "1" } }, pairName(each)), h("span", { class: "soft" }, `P ${digits(each.probability, 2)} · ${digits(each.stake, 2)} N`), each.verdict ? h("span", { class: "swatch", style: { background: SAID[each.verdict] } }) : null)))] : null,
-      blind ? null : agreementSection(app, judges, (each) => { chosen = null; wanted = each; if (each.frame === app.frame) app.queue(() => load(app, true)); else app.show(each.frame); }),
+      blind || chosen ? null : judgedSection(app),
+      blind ? null : agreementSection(app, judges, (each) => show(app, each)),
     ];
   },
   draw(app, c, k) {
@@ -74,8 +77,8 @@ function toggleRecording(app) {
   if (recording) { closeRecording(); app.paint(); return; }
   if (!facts || facts.provisional || blind) return;
   const clicked = (x, y, what) => { if (net && list) choose(app, [x, y], what.startsWith("/contacts")); };
-  recording = new Recording(at("recording"), app.project.at, { frame: (frame) => app.show(frame), clicked });
-  recording.open(app.frame);
+  recording = new Recording(at("recording"), app.project.at, { frame: (frame) => app.show(frame + facts.first), clicked });
+  recording.open(Math.max(app.frame - facts.first, 0));
   app.recording = recording;
   app.paint();
 }
@@ -85,10 +88,10 @@ const named = (body) => (typeof body === "number" ? `rod ${body}` : `wall ${body
 const pairName = (pair) => (typeof pair.j === "number" ? `rods ${pair.i} – ${pair.j}` : `rod ${pair.i} – ${pair.j}`);
 
 async function load(app, again = false) {
-  if (!facts || facts.provisional || app.frame >= facts.count) { net = null; app.paint(); return; }
+  if (!facts || facts.provisional || app.frame >= facts.count || app.frame < facts.first) { net = null; list = null; chosen = null; frameOf = -1; app.paint(); return; }
   if (frameOf === app.frame && !again) return;
   const { at } = app.project, { frame } = app;
-  [net, list] = await Promise.all([ask("network", { at, frame }), ask("candidates", { at, frame, reviewer: who }).then((answer) => answer.pairs)]);
+  [net, list, spoken] = await Promise.all([ask("network", { at, frame }), ask("candidates", { at, frame, reviewer: who }).then((answer) => answer.pairs), ask("judged", { at, reviewer: who })]);
   frameOf = frame; without = null; since = performance.now();
   if (wanted?.frame === frame) { const named = wanted; wanted = null; const same = list.find((each) => each.i === named.i && each.j === named.j); if (same) { pick(app, same, true); return; } }
   if (chosen?.j !== undefined) { const same = list.find((each) => each.i === chosen.i && each.j === chosen.j); if (same) chosen = same; else chosen = past?.point[frame] ? { ...chosen, point: past.point[frame], verdict: null, fn: null } : null; }
@@ -146,10 +149,12 @@ function nextAtStake(app) {
 }
 
 function say(app, verdict) {
+  if (!who) { at("who").focus(); tell("Say who judges: verdicts are signed", true); return; }
   const pair = chosen, seconds = (performance.now() - since) / 1e3;
   app.queue(async () => {
     await ask("judge", { at: app.project.at, frame: app.frame, i: pair.i, j: pair.j, verdict, reviewer: who, seconds: Math.round(seconds * 10) / 10, blind });
     pair.verdict = verdict;
+    spoken = await ask("judged", { at: app.project.at, reviewer: who });
     if (judges.open) judges.told = await ask("agreement", { at: app.project.at });
     tell(`${pairName(pair)}: ${verdict}. The next run obeys it`);
     nextAtStake(app); app.paint();
@@ -168,6 +173,30 @@ function undo(app) {
   });
 }
 
+const force = (value) => (value === null ? "none" : `${digits(value, 3)} N`);
+
+/** What was said, and what the forces were when it was said and are now; a click shows the pair. */
+function judgedSection(app) {
+  if (!spoken?.pairs.length) return null;
+  return [h("h3", {}, "Judged"),
+    spoken.waiting ? h("div", { class: "says" }, h("p", { id: "verdicts-wait" }, h("span", { class: "sign doubtful" }, "!"), `${spoken.waiting === 1 ? "One verdict waits" : `${spoken.waiting} verdicts wait`} for the next run.`)) : null,
+    spoken.waiting ? h("button", { onclick: () => app.goTo("run") }, "To the run") : null,
+    h("div", { class: "list", id: "judged" }, spoken.pairs.slice(0, 40).map((each) => h("button", { onclick: () => show(app, each) },
+      h("span", { class: "two" }, h("span", {}, `photograph ${each.frame} · ${pairName(each)}`), h("span", { class: "soft" }, each.before ? `${each.verdict}: f_n ${force(each.before.fn)} → ${each.obeyed ? force(each.now.fn) : "the next run"}` : each.verdict)),
+      h("span", { class: "swatch", style: { background: SAID[each.verdict] } }))))];
+}
+
+function show(app, each) { chosen = null; wanted = each; if (each.frame === app.frame) app.queue(() => load(app, true)); else app.show(each.frame); }
+
+/** The forces of a pair that was judged: before the verdict, and since a run obeys it. */
+function beforeAfter(app) {
+  const word = spoken?.pairs.find((each) => each.frame === app.frame && each.i === chosen.i && each.j === chosen.j);
+  if (!word?.before) return null;
+  return h("div", { class: "card", id: "before-after" }, h("div", { class: "fact" }, h("span", {}, word.obeyed ? "the run obeyed: before → after" : "when it was judged"), word.obeyed ? h("span", { class: "sign good" }, "✓") : null),
+    word.obeyed ? [fact("f_n", `${force(word.before.fn)} → ${force(word.now.fn)}`), fact("f_t", `${force(word.before.ft)} → ${force(word.now.ft)}`)]
+      : [fact("f_n", force(word.before.fn)), h("p", {}, "The next run obeys it; what comes out is shown here.")]);
+}
+
 function pairCard(app) {
   const seen = past, k = app.frame, row = net ? net.i.findIndex((i, n) => i === chosen.i && net.j[n] === chosen.j) : -1;
   const with_ = (value, sd, unit, count = 3) => (value === null || value === undefined ? "–" : `${digits(value, count)}${sd !== null && sd !== undefined ? ` ± ${digits(sd, 2)}` : ""} ${unit}`);
@@ -175,6 +204,7 @@ function pairCard(app) {
     h("div", { class: "fact" }, h("b", {}, pairName(chosen)), chosen.verdict ? h("span", { class: "pill", style: { color: SAID[chosen.verdict], borderColor: "currentColor" } }, chosen.verdict) : null),
     past ? strip(app) : h("div", { class: "strip" }),
     h("div", { class: "verdicts" }, Object.entries(VERDICTS).map(([key, verdict]) => h("button", { class: chosen.verdict === verdict ? "on" : "", onclick: () => say(app, verdict) }, h("kbd", {}, key.toUpperCase()), ` ${verdict}`))),
+    blind ? null : beforeAfter(app),
     blind ? null : [
       row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], "N")), fact("f_t", with_(net.ft[row], net.ft_sd[row], "N")), fact("it is", `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: not taken for a contact"),
       past ? fact("gap", with_(past.gap[k] === null ? null : past.gap[k] * 1e6, past.gap_sd[k] * 1e6, "µm")) : null,

@@ -9,7 +9,7 @@ export function showLanes(app, facts) {
   at("time").classList.add("shown");
   const canvas = lane(app, count, "status · trust · friction angle");
   const status = facts?.status[app.frame];
-  const words = facts && app.frame < facts.count
+  const words = facts && app.frame >= facts.first && app.frame < facts.count
     ? [h("span", { style: { color: TONES[status] ?? "inherit", fontWeight: 650 } }, status), ` · T ${digits(facts.trust[app.frame], 2)} · φ ${digits(facts.friction_angle[app.frame], 3)}°`]
     : ["not solved yet"];
   at("time").replaceChildren(...arrows(app),
@@ -51,16 +51,16 @@ export function jump(app, facts) {
 
 function draw(app, canvas, facts, count) {
   const { c, step, height } = begin(canvas, count);
-  for (let k = 0; k < (facts?.count ?? 0); k += 1) {
+  for (let k = facts?.first ?? 0; k < (facts?.count ?? 0); k += 1) {
     c.fillStyle = TONES[facts.status[k]] ?? "#888"; c.fillRect(k * step + 0.5, 0, Math.max(step - 1, 1), 9);
     const trust = facts.trust[k];
     if (trust !== null) { c.globalAlpha = 0.5; c.fillStyle = colour("accent"); c.fillRect(k * step + 0.5, height - trust * (height - 13), Math.max(step - 1, 1), trust * (height - 13)); c.globalAlpha = 1; }
     if (facts.lost[k] > 0) { c.fillStyle = "#f0e442"; c.beginPath(); c.arc((k + 0.5) * step, 14, 3, 0, 7); c.fill(); }
   }
   if (facts?.count > 1) {
-    const angles = facts.friction_angle.filter((v) => v !== null), top = Math.max(...angles) * 1.1 || 1;
+    const angles = facts.friction_angle.filter((v) => v !== null), first = facts.friction_angle.findIndex((v) => v !== null), top = Math.max(...angles) * 1.1 || 1;
     c.strokeStyle = colour("ink"); c.lineWidth = 1.4; c.beginPath();
-    facts.friction_angle.forEach((v, k) => { if (v === null) return; const x = (k + 0.5) * step, y = height - 3 - v / top * (height - 18); if (k) c.lineTo(x, y); else c.moveTo(x, y); });
+    facts.friction_angle.forEach((v, k) => { if (v === null) return; const x = (k + 0.5) * step, y = height - 3 - v / top * (height - 18); if (k > first) c.lineTo(x, y); else c.moveTo(x, y); });
     c.stroke();
   }
   c.strokeStyle = colour("ink"); c.lineWidth = 2; c.strokeRect(app.frame * step + 1, 1, Math.max(step - 2, 2), height - 2);

@@ -9,11 +9,13 @@ let told = null, chosen = null, ghost = null, held = null, mended = null, patch 
 export const mend = {
   name: "mend", title: "Mend", frames: true,
   mark: (app) => (app.project.run?.lost ? "doubtful" : app.project.run?.frames !== undefined ? "good" : "missing"),
-  hint: (app) => (!told ? "" : app.frame === 0 ? "The first photograph is what all others are compared with: mend its rods in step 4" : chosen === null ? "Click a rod; yellow ones are doubtful or lost" : "Drag the rod, turn it by its handle; it is correlated again from there. Enter keeps it"),
+  hint: (app) => (!told ? "" : app.frame === told.first ? "The first photograph is what all others are compared with: mend its rods in step 4" : chosen === null ? "Click a rod; yellow ones are doubtful or lost" : "Drag the rod, turn it by its handle; it is correlated again from there. Enter keeps it"),
   keyHelp: [["Enter", "keep the mended pose"], ["Shift+Enter", "keep it, and follow the rod through the next photographs"], ["X", "say that the rod is not to be seen"], ["Q E", "turn it by 1°"], ["Shift+arrows", "move it by a pixel"], ["N", "the next doubtful rod, in the next photographs, too"], ["Esc", "let go"]],
   enter(app) { letGo(); told = null; jumping = 0; load(app); },
   moved(app) { ghost = null; mended = null; load(app); },
   taken(app) { load(app); },
+  chosen: () => chosen, // for tests, as are the next ones
+  ghost: () => (ghost ? [ghost.x, ghost.y, ghost.angle] : null),
   tool,
   panel(app) {
     if (app.project.run === null) return [h("p", {}, "There are no tracks yet: rods are followed when the experiment is run."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
@@ -54,7 +56,7 @@ export const mend = {
     if (!ghost) return false;
     if (event.key === "Escape") { letGo(); app.paint(); return true; }
     if (event.key === "Enter") { keep(app, event.shiftKey); return true; }
-    if (event.key === "x") { if (app.frame) settle(app, "mark_lost", { frame: app.frame, id: chosen }); return true; }
+    if (event.key === "x") { if (app.frame !== told.first) settle(app, "mark_lost", { frame: app.frame, id: chosen }); return true; }
     const by = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, -1, 0], ArrowDown: [0, 1, 0] }[event.shiftKey ? event.key : ""] ?? { q: [0, 0, -Math.PI / 180], e: [0, 0, Math.PI / 180] }[event.key];
     if (!by) return false;
     ghost = { ...ghost, x: ghost.x + by[0], y: ghost.y + by[1], angle: ghost.angle + by[2] };
@@ -101,7 +103,7 @@ function circle(c, k, x, y, r, angle, style, wide, dash = null) {
 }
 
 function card(app) {
-  const n = told.rods.id.indexOf(chosen), first = app.frame === 0;
+  const n = told.rods.id.indexOf(chosen), first = app.frame === told.first;
   return h("div", { class: "card here", id: "mending" },
     h("div", { class: "fact" }, h("b", {}, `Rod ${chosen}`), h("span", { class: "pill" }, n < 0 ? "lost" : told.rods.status[n])),
     mended ? [
@@ -182,7 +184,7 @@ async function show(app, [x, y]) {
 }
 
 function keep(app, following = false) {
-  if (ghost && mended && app.frame) settle(app, "mend", { frame: app.frame, id: chosen, x: ghost.x, y: ghost.y, angle: ghost.angle, following }, following ? "Following it through the photographs …" : "");
+  if (ghost && mended && app.frame !== told.first) settle(app, "mend", { frame: app.frame, id: chosen, x: ghost.x, y: ghost.y, angle: ghost.angle, following }, following ? "Following it through the photographs …" : "");
 }
 
 function settle(app, what, values, words = "") {

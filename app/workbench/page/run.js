@@ -30,8 +30,8 @@ export const run = {
           h("div", { class: "meter" }, h("i", { style: { width: `${100 * stage.done / Math.max(stage.total, 1)}%` } }))))) : null,
       told?.alarms.length ? h("div", { class: "says" }, told.alarms.slice(-5).map((each) => h("p", {}, h("span", { class: "sign doubtful" }, "!"), `Frame ${each.frame}: ${each.alarm}`))) : null,
       facts ? [h("h3", {}, facts.provisional ? "So far" : "Found"),
-        fact("frames", `${facts.count} of ${project.files.length}`),
-        app.frame < facts.count ? [fact("status", facts.status[app.frame]), fact("trust", digits(facts.trust[app.frame], 2)), fact("contacts", String(facts.contacts[app.frame])), fact("mean f_n", `${digits(facts.mean_fn[app.frame], 3)} N`), fact("friction angle", `${digits(facts.friction_angle[app.frame], 3)}°`), fact("rods lost", String(facts.lost[app.frame]))] : null] : null,
+        fact("frames", facts.first ? `photographs ${facts.first} to ${facts.count - 1} of ${project.files.length}` : `${facts.count} of ${project.files.length}`),
+        solved(app) ? [fact("status", facts.status[app.frame]), fact("trust", digits(facts.trust[app.frame], 2)), fact("contacts", String(facts.contacts[app.frame])), fact("mean f_n", `${digits(facts.mean_fn[app.frame], 3)} N`), fact("friction angle", `${digits(facts.friction_angle[app.frame], 3)}°`), fact("rods lost", String(facts.lost[app.frame]))] : null] : null,
       told?.said.length ? [h("h3", {}, "It says"), h("div", { class: "log", id: "log" }, told.said.slice(-40).join("\n"))] : null,
     ];
   },
@@ -49,6 +49,7 @@ const lacks = (app) => [
   ...app.project.others.map((text) => h("div", {}, sign("missing"), h("span", { class: "two" }, text))),
 ];
 
+const solved = (app) => facts !== null && app.frame >= facts.first && app.frame < facts.count;
 const quoted = (text) => (/[^\w./-]/.test(text) ? `"${text}"` : text);
 const time = (seconds) => (seconds < 90 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);
 
@@ -78,7 +79,7 @@ function finishedNow(app) { app.queue(async () => { const project = await ask("p
 
 /** The network of the frame that is shown; the newest while nobody has gone elsewhere. */
 function load(app) {
-  if (!facts || app.frame >= facts.count) return;
+  if (!solved(app)) return;
   const wanted = `${app.frame} ${facts.provisional}`;
   if (watching === wanted && net?.frame === app.frame) return;
   watching = wanted;

@@ -12,6 +12,7 @@ export const scale = {
     rods = []; drawn = null;
     if (told) { line = [told.start, told.end]; metres = told.metres; mode = "distance"; } else { line = null; metres = null; }
   },
+  drawn: () => line, // for tests
   tool: (app) => tools(app)[mode],
   panel(app) {
     const { project } = app, pixel = project.pixel;

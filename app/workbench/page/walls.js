@@ -6,6 +6,7 @@ import { label } from "/page/scale.js";
 const COLOURS = ["#56b4e9", "#e69f00", "#cc79a7", "#f0e442", "#2fbf93", "#d55e00"];
 let chosen = null, line = null, held = null, snap = true, round = null, points = []; // round: the circle that is dragged; points: of a new one, null while bars are drawn
 const drawing = { circle: false };
+const TURNED = 0.2; // [rad] by which an end of a bar is not mended any more
 
 export const walls = {
   name: "walls", title: "Walls",
@@ -19,10 +20,11 @@ export const walls = {
     return [
       h("p", {}, "The packing lies between bars. Give a pressure where a plate loads it; every other bar moves as it is seen."),
       h("div", { class: "chips", role: "group", "aria-label": "kind of wall" }, [["Straight bars", false], ["Circle", true]].map(([words, circle]) => h("button", { class: drawing.circle === circle ? "on" : "", id: circle ? "draw-circle" : "draw-bars", onclick: () => { letGo(); drawing.circle = circle; app.paint(); } }, words))),
-      drawing.circle ? h("div", { class: "row" }, h("button", { class: project.walls.length ? "" : "primary", id: "find-circle", disabled: !project.rods, title: project.rods ? "the least circle that holds them all" : "needs the rods: step 4", onclick: () => app.change("draw_circle", { name: project.walls.find((wall) => wall.name === chosen)?.circle ? chosen : null }, "", (told) => { chosen = told.wall; app.paint(); tell("The least circle around the rods"); }) }, "Around the rods"))
+      drawing.circle ? h("div", { class: "row" }, h("button", { class: project.walls.length ? "" : "primary", id: "find-circle", disabled: !project.rods, title: project.rods ? "the least circle that holds them all" : "needs the rods: step 4", onclick: () => app.change("draw_circle", { name: project.walls.find((wall) => wall.name === chosen)?.circle ? chosen : null }, "", (told) => { chosen = told.wall; app.paint(); tell("The least circle around the rods"); }) }, "Around the rods"),
+        snapButton(app))
         : h("div", { class: "row" },
         h("button", { class: project.walls.length ? "" : "primary", id: "find-walls", disabled: !project.rods, title: project.rods ? "" : "needs the rods: step 4", onclick: () => app.change("find_walls", {}, "Looking for the bars …", (told) => tell(`${told.walls.length} bars found`)) }, "Find the bars by the rods"),
-        h("button", { class: snap ? "on" : "", onclick: () => { snap = !snap; app.paint(); }, title: "S" }, "Snap to edges")),
+        snapButton(app)),
       project.walls.map((wall, k) => card(app, wall, k)),
     ];
   },
@@ -41,6 +43,7 @@ export const walls = {
   },
 };
 
+const snapButton = (app) => h("button", { class: snap ? "on" : "", onclick: () => { snap = !snap; app.paint(); }, title: "S" }, "Snap to edges");
 const letGo = () => { line = null; held = null; round = null; points = []; };
 
 function card(app, wall, k) {
@@ -78,6 +81,7 @@ function tool(app) {
       const found = near(p);
       if (!found && drawing.circle) return false; // the picture is moved, or a click is a point of the rim
       held = found ?? { name: null, end: 1 };
+      if (found && !found.part) held.old = app.project.walls.find((wall) => wall.name === found.name).line;
       if (held.part) round = { ...held.circle };
       else line = found ? app.project.walls.find((wall) => wall.name === found.name).line.map((end) => [...end]) : [p, p];
       if (found) chosen = found.name;
@@ -86,6 +90,7 @@ function tool(app) {
     drag: (p, event, from) => {
       if (held.part === "centre") round = { ...round, x: held.circle.x + p[0] - from[0], y: held.circle.y + p[1] - from[1] };
       else if (held.part) round = { ...round, radius: Math.hypot(p[0] - round.x, p[1] - round.y) };
+      else if (held.old && (held.name === null || turned(held.old, held.end, p))) { line = [held.old[held.end], p]; held.name = null; } // the next bar begins where this one ends
       else line = line.map((end, k) => (k === held.end ? p : end));
     },
     click: (p) => {
@@ -94,14 +99,14 @@ function tool(app) {
       if (points.length < 3) { app.paint(); return; }
       const through = points;
       points = [];
-      app.change("draw_circle", { points: through }, "", (told) => { chosen = told.wall; app.paint(); }).then(() => app.paint());
+      app.change("draw_circle", { points: through, snap }, "", (told) => { chosen = told.wall; app.paint(); unseen(told); }).then(() => app.paint());
     },
     up: (p, event, from, moved) => {
       const { name, part } = held;
       if (part) {
         const { x, y, radius, side } = round;
         if (!moved) { letGo(); app.paint(); return; }
-        app.change("draw_circle", { name, place: [x, y, radius], side }).then(() => { letGo(); app.paint(); });
+        app.change("draw_circle", { name, place: [x, y, radius], side, snap: snap && !event.shiftKey }, "", unseen).then(() => { letGo(); app.paint(); });
         return;
       }
       const drawn = line;
@@ -113,10 +118,19 @@ function tool(app) {
       }
       app.change("draw_wall", { line: drawn, name, snap: snap && !event.shiftKey }, "", (told) => {
         chosen = told.wall; letGo(); app.paint();
-        if (told.snapped !== null && told.snapped < 0.34) tell("No clear edge beside that line: it stays as it was drawn", true);
+        unseen(told);
       }).then(() => { letGo(); app.stage.redraw(); });
     },
   };
+}
+
+/** What was to snap and found no edge. */
+function unseen(told) { if (told.snapped !== null && told.snapped < 0.34) tell("No clear edge beside it: it stays as it was drawn", true); }
+
+/** Whether a bar would point elsewhere with its end there: whoever drags so far round draws another one. */
+function turned(old, end, p) {
+  const far = old[1 - end], a = [old[end][0] - far[0], old[end][1] - far[1]], b = [p[0] - far[0], p[1] - far[1]];
+  return Math.abs(Math.atan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])) > TURNED;
 }
 
 function nearest(app, p) {

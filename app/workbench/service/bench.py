@@ -26,6 +26,7 @@ class Bench:
         self._projects: dict[str, Project] = {}
         self._lock = threading.Lock()
         self.closed = False
+        self.reviewer = ""  # who judged last
 
     def project(self, at: str) -> Project:
         """An experiment by its path from the root. Raises InputError for what is none, or lies elsewhere."""

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import getpass
 from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints
 
 from ...errors import InputError
-from ...results.hdf5.store import read_origin
 from ...results.results import Results
 from ...review.reviewed_run import Reviewed
 from ...run_folder import RESULTS
 from ...verdicts.log import VERDICTS, Entry, Origin, Verdict, VerdictLog
+from ...verdicts.reviewer_name import account_name
 from ..inspecting import found as inspecting
 from ..inspecting import pairs
 from ..inspecting.agreement import agreement as compare_judges
+from ..inspecting.judged import force_of, keep_force, spoken_of
 from .bench import Bench
 from .project import Project
 from .questions import BadRequest, Number, Text, Whole, question
@@ -27,59 +27,61 @@ LONGEST = 300.0  # [s] of one judgement: beyond it the reviewer was away
 
 @question
 def reviewer(bench: Bench) -> dict[str, Any]:
-    """Who sits here, as the machine knows."""
-    try:
-        return {"name": getpass.getuser()}
-    except (OSError, KeyError):  # a machine without user names
-        return {"name": "reviewer"}
+    """Who sits here: who judged last, or whose account it is; empty: the page asks."""
+    return {"name": bench.reviewer or account_name()}
 
 
 @question
-def candidates(bench: Bench, at: Text, frame: Whole, reviewer: Reviewer) -> dict[str, Any]:
-    """The pairs of a frame, those first on which most hangs, and what this reviewer has said of them."""
+def candidates(bench: Bench, at: Text, frame: Whole, reviewer: Text) -> dict[str, Any]:
+    """The pairs of a photograph, those first on which most hangs, and what this reviewer has said of them."""
     opened = bench.project(at)
-    results = _results(opened, frame)
-    said = pairs.verdicts_of(_log(opened), frame + _first(opened), reviewer)
-    found = pairs.candidates_of(results, frame, _threshold(opened))
+    results, k = _frame(opened, frame)
+    said = pairs.verdicts_of(_log(opened), frame, reviewer)
+    found = pairs.candidates_of(results, k, _threshold(opened))
     return {"frame": frame, "pairs": pairs.told_candidates(results, found, scale_of(opened), said), "judged": len(said)}
 
 
 @question
 def pair(bench: Bench, at: Text, i: Name, j: Name) -> dict[str, Any]:
-    """One pair in every frame; places in pixels."""
+    """One pair in every photograph up to the last one that is solved; places in pixels."""
     opened = bench.project(at)
-    told = pairs.pair_history(_results(opened, 0), i, j)
+    told = pairs.pair_history(_results(opened), i, j)
     if told is None:
         raise BadRequest(f"there is no pair {i} {j}")
     scale = scale_of(opened)
     told["point"] = [None if p is None else scale.to_pixels(p).round(2).tolist() for p in told["point"]]
-    return told
+    before: list[Any] = [None] * _first(opened)
+    return {name: before + values for name, values in told.items()}
 
 
 @question
 def without(bench: Bench, at: Text, frame: Whole, i: Name, j: Name) -> dict[str, Any]:
-    """The nearest forces of a frame in which a contact is not there; nothing is written."""
-    told = pairs.without_pair(_results(bench.project(at), frame), frame, i, j)
+    """The nearest forces of a photograph in which a contact is not there; nothing is written."""
+    results, k = _frame(bench.project(at), frame)
+    told = pairs.without_pair(results, k, i, j)
     if told is None:
-        raise InputError(f"{i} - {j}", f"frame {frame}", "is no contact there")
+        raise InputError(f"{i} - {j}", f"photograph {frame}", "is no contact there")
     return told
 
 
 @question
 def rod(bench: Bench, at: Text, id: Whole) -> dict[str, Any]:
-    """One rod in every frame."""
+    """One rod in every photograph up to the last one that is solved."""
     opened = bench.project(at)
-    tracks = _results(opened, 0).tracks
+    results = _results(opened)
+    tracks = results.tracks
     rows = (tracks.id == id).nonzero()[0]
     if len(rows) != 1:
         raise BadRequest(f"there is no rod {id}")
     row = int(rows[0])
+    before: list[Any] = [None] * _first(opened)
     return {
-        "radius": float(tracks.radius[row]), "zncc": inspecting.plain(tracks.zncc[:, row]),
-        "sigma": inspecting.plain(tracks.sigma[:, row]), "rotation": inspecting.plain(tracks.rotation[:, row]),
-        "status": [inspecting.TrackStatus(each).name.lower() for each in tracks.status[:, row].tolist()],
-        "unbalance": inspecting.plain([
-            float("nan") if f.grain_unbalance is None else f.grain_unbalance[row] for f in _results(opened, 0).frames
+        "radius": float(tracks.radius[row]), "zncc": before + inspecting.plain(tracks.zncc[:, row]),
+        "sigma": before + inspecting.plain(tracks.sigma[:, row]),
+        "rotation": before + inspecting.plain(tracks.rotation[:, row]),
+        "status": before + [inspecting.TrackStatus(each).name.lower() for each in tracks.status[:, row].tolist()],
+        "unbalance": before + inspecting.plain([
+            float("nan") if f.grain_unbalance is None else f.grain_unbalance[row] for f in results.frames
         ]),
     }  # fmt: skip
 
@@ -88,7 +90,7 @@ def rod(bench: Bench, at: Text, id: Whole) -> dict[str, Any]:
 def agreement(bench: Bench, at: Text) -> dict[str, Any]:
     """How far people agree with one another and with the program, on what has been judged."""
     opened = bench.project(at)
-    results, experiment = _results(opened, 0), opened.understood().experiment
+    results, experiment = _results(opened), opened.understood().experiment
     if experiment is None:
         raise InputError(opened.draft.file, "", "cannot be read")
     return compare_judges(Reviewed(opened.results / RESULTS, results, experiment, _first(opened)))
@@ -101,9 +103,9 @@ def judge(
 ) -> dict[str, Any]:  # fmt: skip
     """Write a verdict down; the next run obeys it."""
     opened = bench.project(at)
-    results = _results(opened, frame)
+    results, k = _frame(opened, frame)
     told = pairs.pair_history(results, i, j)
-    if told is None or told["gap"][frame] is None:
+    if told is None or told["gap"][k] is None:
         raise BadRequest(f"there is no pair {i} {j} in frame {frame}")
     try:
         word = Verdict(verdict)
@@ -113,11 +115,21 @@ def judge(
     assert isinstance(a, int)
     if isinstance(b, int) and b < a:
         a, b = b, a
-    number = frame + _first(opened)
-    _log(opened).append(
-        Entry(number, reviewer, a, b, word, seconds=min(seconds, LONGEST), origin=Origin.CLICK, blind=blind)
+    bench.reviewer = reviewer
+    written = _log(opened).append(
+        Entry(frame, reviewer, a, b, word, seconds=min(seconds, LONGEST), origin=Origin.CLICK, blind=blind)
     )
+    keep_force(opened.results, written.line, force_of(results, k, a, b))
     return {"said": word.value}
+
+
+@question
+def judged(bench: Bench, at: Text, reviewer: Text) -> dict[str, Any]:
+    """What this reviewer has said, and what became of the forces: before, and in the results that are there."""
+    opened = bench.project(at)
+    first = _first(opened)
+    spoken = spoken_of(opened.results, _results(opened), _log(opened), reviewer, first)
+    return {"pairs": [each.told(first) for each in spoken], "waiting": sum(not each.obeyed for each in spoken)}
 
 
 @question
@@ -128,17 +140,23 @@ def unjudge(bench: Bench, at: Text, reviewer: Reviewer) -> dict[str, Any]:
     if entry is None or entry.pair is None:
         return {"undone": None}
     return {
-        "undone": entry.verdict, "frame": entry.frame - _first(opened), "i": entry.pair[1], "j": entry.pair[2],
+        "undone": entry.verdict, "frame": entry.frame, "i": entry.pair[1], "j": entry.pair[2],
     }  # fmt: skip
 
 
-def _results(opened: Project, frame: int) -> Results:
+def _results(opened: Project) -> Results:
     found = opened.found()
     if found is None or found.results is None:
         raise InputError(opened.results, "", "holds no finished results: let the run come to its end")
-    if frame >= len(found.frames):
-        raise InputError(opened.results, f"frame {frame}", f"is not there: {len(found.frames)} are")
     return found.results
+
+
+def _frame(opened: Project, photograph: int) -> tuple[Results, int]:
+    """The results, and which of their frames a photograph is."""
+    results, frame = _results(opened), photograph - _first(opened)
+    if not 0 <= frame < len(results.frames):
+        raise InputError(opened.results, f"photograph {photograph}", f"is not there: {len(results.frames)} are")
+    return results, frame
 
 
 def _log(opened: Project) -> VerdictLog:
@@ -146,9 +164,9 @@ def _log(opened: Project) -> VerdictLog:
 
 
 def _first(opened: Project) -> int:
-    """The run's first frame among the experiment's."""
-    origin = read_origin(opened.results / RESULTS)
-    return 0 if origin is None else origin.frames[0]
+    """The photograph of the run's frame 0."""
+    found = opened.found()
+    return 0 if found is None else found.first
 
 
 def _threshold(opened: Project) -> float | None:

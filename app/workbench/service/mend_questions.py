@@ -32,22 +32,26 @@ Pose = tuple[float, float, float]
 def poses(bench: Bench, at: Text, frame: Whole) -> dict[str, Any]:
     """The rods of a photograph as they were tracked, lost ones where they were seen last, and all corrections."""
     opened = bench.project(at)
-    tracks, scale = _tracks(opened), opened.given_scale()
-    if frame >= tracks.frame_count:
+    tracks, scale, first = _tracks(opened), opened.given_scale(), _first(opened)
+    k = frame - first
+    if not 0 <= k < tracks.frame_count:
         raise InputError(opened.results, f"photograph {frame}", f"is not tracked yet: {tracks.frame_count} are")
-    seen = inspecting.rods_of(tracks, frame, scale)
+    seen = inspecting.rods_of(tracks, k, scale)
     lost = []
-    for row in np.flatnonzero(~tracks.present[frame]):
-        before = np.flatnonzero(tracks.present[: frame + 1, row])
+    for row in np.flatnonzero(~tracks.present[k]):
+        before = np.flatnonzero(tracks.present[: k + 1, row])
         if len(before):
             last = inspecting.rods_of(tracks, int(before[-1]), scale)
-            k = last["id"].index(int(tracks.id[row]))
-            lost.append({"frame": int(before[-1]), **{key: last[key][k] for key in ("id", "x", "y", "r", "angle")}})
+            n = last["id"].index(int(tracks.id[row]))
+            lost.append(
+                {"frame": int(before[-1]) + first, **{key: last[key][n] for key in ("id", "x", "y", "r", "angle")}}
+            )
     weak = _doubtful(tracks)
     return {
         "frame": frame, "rods": seen, "lost": lost, "corrections": told_corrections(opened),
-        "doubtful": tracks.id[weak[frame] & tracks.present[frame]].tolist(),
-        "lost_count": (~tracks.present).sum(axis=1).tolist(), "doubtful_count": weak.sum(axis=1).tolist(),
+        "doubtful": tracks.id[weak[k] & tracks.present[k]].tolist(),
+        "first": first, "lost_count": [0] * first + (~tracks.present).sum(axis=1).tolist(),
+        "doubtful_count": [0] * first + weak.sum(axis=1).tolist(),
     }  # fmt: skip
 
 
@@ -55,7 +59,8 @@ def poses(bench: Bench, at: Text, frame: Whole) -> dict[str, Any]:
 def make_ready(bench: Bench, at: Text, frame: Whole) -> dict[str, Any]:
     """Prepare a photograph for rods to be correlated in it, so that the first one is answered at once."""
     opened = bench.project(at)
-    _mender(opened).prepare(frame)
+    _exists(opened, frame)
+    _mender(opened).prepare(frame - _first(opened))
     return {"ready": frame}
 
 
@@ -70,7 +75,7 @@ def correlate(bench: Bench, at: Text, frame: Whole, id: Whole, x: Number, y: Num
     _exists(opened, frame)
     found = _correlated(opened, id, frame, (x, y, angle))
     mender = _mender(opened)
-    pictures = mender.pictures(frame, id, [(x, y, angle), (found.x, found.y, found.angle)])
+    pictures = mender.pictures(frame - _first(opened), id, [(x, y, angle), (found.x, found.y, found.angle)])
     return _told(found) | {
         "first": mender.circle(id), "side": len(pictures[0]), "pictures": [_as_text(each) for each in pictures],
     }  # fmt: skip
@@ -86,13 +91,15 @@ def mend(
     """
     opened = bench.project(at)
     _exists(opened, frame)
-    _not_first(frame)
+    _not_first(opened, frame)
     found = _correlated(opened, id, frame, (x, y, angle))
     poses, ended = {frame: found}, ""
     if following:
-        by_hand = {each.frame for each in corrections.corrections_of(opened.understood()) if each.id == id}
-        followed = follow_on(_mender(opened), _tracked(opened), id, (frame, found), by_hand.__contains__)
-        poses, ended = poses | followed.poses, followed.ended
+        first = _first(opened)
+        by_hand = {each.frame - first for each in corrections.corrections_of(opened.understood()) if each.id == id}
+        followed = follow_on(_mender(opened), _tracked(opened), id, (frame - first, found), by_hand.__contains__, first)
+        poses |= {k + first: each for k, each in followed.poses.items()}
+        ended = followed.ended
     told = [corrections.Correction(k, id, _as_written(opened, each)) for k, each in poses.items()]
     corrections.correct(opened.draft, opened.understood(), told)
     return _settled(opened) | {"mended": _told(found), "count": len(told), "ended": ended}
@@ -103,7 +110,7 @@ def mark_lost(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]
     """Say that a rod is not to be seen in a photograph."""
     opened = bench.project(at)
     _exists(opened, frame)
-    _not_first(frame)
+    _not_first(opened, frame)
     corrections.correct(opened.draft, opened.understood(), [corrections.Correction(frame, id, None)])
     return _settled(opened)
 
@@ -118,21 +125,22 @@ def take_back(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]
 def told_corrections(opened: Project) -> list[dict[str, Any]]:
     """The corrections as plain values, angles of the picture; obeyed: the last run did what they say."""
     told: list[dict[str, Any]] = []
-    tracked = _tracked(opened) if (opened.results / TRACKS).is_file() else None
+    tracked, first = _tracked(opened) if (opened.results / TRACKS).is_file() else None, _first(opened)
     for each in corrections.corrections_of(opened.understood()):
         x, y, theta = each.pose if each.pose is not None else (None, None, None)
         told.append({
             "frame": each.frame, "id": each.id, "x": x, "y": y, "angle": None if theta is None else -theta,
-            "obeyed": _obeyed(tracked, each),
+            "obeyed": _obeyed(tracked, each, each.frame - first),
         })  # fmt: skip
     return told
 
 
-def _obeyed(tracked: Tracked | None, told: corrections.Correction) -> bool:
+def _obeyed(tracked: Tracked | None, told: corrections.Correction, k: int) -> bool:
+    """Whether frame k of the run does what a correction says."""
     rows = np.flatnonzero(tracked.id == told.id) if tracked is not None else ()
-    if tracked is None or len(rows) != 1 or told.frame >= len(tracked.pose):
+    if tracked is None or len(rows) != 1 or not 0 <= k < len(tracked.pose):
         return False
-    x, y = tracked.pose[told.frame, rows[0], :2]
+    x, y = tracked.pose[k, rows[0], :2]
     return bool(np.isnan(x)) if told.pose is None else bool(np.hypot(x - told.pose[0], y - told.pose[1]) < OBEYED)
 
 
@@ -142,18 +150,18 @@ def _settled(opened: Project) -> dict[str, Any]:
 
 def _exists(opened: Project, frame: int) -> None:
     count = opened.photograph_count()
-    if frame >= count:
+    if not _first(opened) <= frame < count:
         raise InputError(opened.draft.file, f"photograph {frame}", f"is not there: {count} are")
 
 
-def _not_first(frame: int) -> None:
-    if frame == 0:
-        raise InputError("photograph 0", "", "is the first photograph: mend its rods in step Rods")
+def _not_first(opened: Project, frame: int) -> None:
+    if frame == _first(opened):
+        raise InputError(f"photograph {frame}", "", "is the first photograph: mend its rods in step Rods")
 
 
 def _correlated(opened: Project, name: int, frame: int, pose: Pose) -> Mended:
     try:
-        return _mender(opened).correlate(frame, name, pose)
+        return _mender(opened).correlate(frame - _first(opened), name, pose)
     except KeyError:
         raise InputError("rods", f"id = {name}", "is not the id of a rod") from None
 
@@ -189,10 +197,16 @@ def _mender(opened: Project) -> Mender:
 def _make(opened: Project) -> Mender:
     table = read_table(opened.results / DETECTIONS, ("id", "x", "y", "radius"))
     circles = np.stack([table.numbers(name) for name in ("x", "y", "radius")], axis=1)
-    return Mender(table.integers("id"), circles, opened.photograph)
+    first = _first(opened)
+    return Mender(table.integers("id"), circles, lambda frame: opened.photograph(first + frame))
 
 
 def _tracks(opened: Project) -> Tracks:
     if not (opened.results / TRACKS).is_file():
         raise InputError(opened.results, "", "holds no tracks yet: run the experiment, at least to the end of tracking")
     return load_tracks(opened.results / TRACKS)[0]
+
+
+def _first(opened: Project) -> int:
+    """The photograph of the tracks' frame 0."""
+    return inspecting.first_photograph(opened.results / TRACKS)

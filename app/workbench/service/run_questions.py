@@ -76,15 +76,20 @@ def network(bench: Bench, at: Text, frame: Whole) -> dict[str, Any]:
 def contact(bench: Bench, at: Text, i: Name, j: Name) -> dict[str, Any]:
     """One contact over all frames."""
     opened = bench.project(at)
-    return inspecting.history(_found(opened, 0), i, j)
+    found = opened.found()
+    if found is None:
+        raise InputError(opened.results, "", "holds no frame yet: run the experiment first")
+    return inspecting.history(found, i, j)
 
 
 def _found(opened: Project, frame: int) -> inspecting.Found:
     found = opened.found()
     if found is None:
         raise InputError(opened.results, "", "holds no frame yet: run the experiment first")
-    if frame >= len(found.frames):
-        raise InputError(opened.results, f"frame {frame}", f"is not solved yet: {len(found.frames)} are")
+    if frame >= found.stop:
+        raise InputError(opened.results, f"photograph {frame}", f"is not solved yet: {len(found.frames)} are")
+    if frame < found.first:
+        raise InputError(opened.results, f"photograph {frame}", f"is before the run's first one, {found.first}")
     return found
 
 

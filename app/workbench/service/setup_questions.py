@@ -116,11 +116,11 @@ def find_walls(bench: Bench, at: Text) -> dict[str, Any]:
 @question
 def draw_circle(
     bench: Bench, at: Text, points: Three | None = None, place: Round | None = None, name: Text | None = None,
-    side: Literal["in", "out"] = "in",
+    side: Literal["in", "out"] = "in", snap: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Draw a circular wall, or the named one anew: through three points, by its place, or around the rods.
 
-    side: where the packing is. place: x, y and radius [px].
+    side: where the packing is. place: x, y and radius [px]. snap: onto the edge that is seen beside it.
     """
     opened = bench.project(at)
     found = _scaled(opened)
@@ -133,8 +133,11 @@ def draw_circle(
         circle = circles.circle_around(found, name)
     if not circle.radius > LEAST_CIRCLE:
         raise InputError("circle", f"radius {circle.radius:.3g} px", "is too small for a wall")
+    share = None
+    if snap:
+        circle, share = circles.snapped(opened.photograph(0), circle)
     circles.set_circles(opened.draft, found, circles.with_circle(circles.circles_of(found), circle), f"wall {name}")
-    return opened.describe() | {"wall": name}
+    return opened.describe() | {"wall": name, "snapped": share}
 
 
 @question

@@ -12,13 +12,16 @@ from solver.bodies.grains import Array
 from solver.bodies.wall_shapes import IN, STRAIGHT, circle_of
 
 from ...errors import InputError
+from ...experiment.photographs import Image
 from ...experiment.units import Scale
 from ...experiment.walls import ARC_COLUMNS
+from ...tracking.walls.round_edge import snap_to_rim
 from .draft import Draft, as_table
 from .steps import Understood
 
 ARCS = "arcs.csv"
 RIM = 24  # points of a rod's rim that a circle around the rods must hold
+SNAP = 0.06  # of its radius, how far beside a drawn circle its edge is looked for
 FLAT = 1e-3  # a triangle lower than this share of its longest side is a line
 
 
@@ -97,6 +100,13 @@ def circle_around(found: Understood, name: str) -> Circle:
     ], axis=-1)  # fmt: skip
     (x, y), radius = cv2.minEnclosingCircle(rim.reshape(-1, 1, 2).astype(np.float32))
     return Circle(name, float(x), float(y), float(radius))
+
+
+def snapped(image: Image, circle: Circle) -> tuple[Circle, float]:
+    """A circle on the edge beside it, and how much of the edge is seen; where that is too little, as it was drawn."""
+    reach = min(max(SNAP * circle.radius, 8.0), 40.0)
+    (x, y, radius), share = snap_to_rim(image, (circle.x, circle.y, circle.radius), reach, inside=circle.side == "in")
+    return replace(circle, x=x, y=y, radius=radius), share
 
 
 def with_circle(circles: Sequence[Circle], circle: Circle) -> list[Circle]:

@@ -1,5 +1,7 @@
 """Stored numbers are shown as they are stored, and verdicts go to the log that the solver obeys."""
 
+import os
+
 import numpy as np
 import pytest
 from rodsight.results.hdf5.store import load_results, read_origin
@@ -9,7 +11,9 @@ from rodsight.verdicts.log import VERDICTS, VerdictLog
 
 from tests.golden.stored import unpack
 
+FIRST = 2  # the photograph of the stored run's frame 0
 FRAME = 1
+SHOWN = FIRST + FRAME  # the photograph of that frame
 
 
 @pytest.fixture
@@ -25,7 +29,7 @@ def solved(visitor, photographs_only):
 
 def test_the_network_of_a_frame_is_what_is_stored(solved):
     visitor, at, results, _ = solved
-    told = visitor.ask("network", at=at, frame=FRAME)
+    told = visitor.ask("network", at=at, frame=SHOWN)
     forces = results.frames[FRAME]
     np.testing.assert_allclose(told["fn"], forces.fn, rtol=1e-4)
     np.testing.assert_allclose(np.array(told["ft"]), forces.ft, rtol=1e-4, atol=1e-9)
@@ -42,8 +46,8 @@ def test_the_network_of_a_frame_is_what_is_stored(solved):
 def test_frames_are_told_with_their_status_and_what_is_lost(solved):
     visitor, at, results, _ = solved
     told = visitor.ask("run_told", at=at)["frames"]
-    assert told["count"] == len(results.frames)
-    assert told["status"] == [frame.status.name.lower() for frame in results.frames]
+    assert (told["first"], told["count"]) == (FIRST, FIRST + len(results.frames))
+    assert told["status"] == [None] * FIRST + [frame.status.name.lower() for frame in results.frames]
     assert not told["provisional"]
 
 
@@ -52,15 +56,15 @@ def test_a_pair_is_told_over_all_frames(solved):
     contacts = results.frames[FRAME].contacts
     i, j = (int(results.tracks.id[row]) for row in (contacts.i[0], contacts.j[0]))
     told = visitor.ask("pair", at=at, i=i, j=j)
-    assert told["gap"][FRAME] == pytest.approx(contacts.gap[0], rel=1e-3, abs=1e-9)
-    assert told["fn"][FRAME] == pytest.approx(results.frames[FRAME].fn[0], rel=1e-4)
-    assert len(told["gap_sd"]) == len(results.frames)
+    assert told["gap"][SHOWN] == pytest.approx(contacts.gap[0], rel=1e-3, abs=1e-9)
+    assert told["fn"][SHOWN] == pytest.approx(results.frames[FRAME].fn[0], rel=1e-4)
+    assert len(told["gap_sd"]) == FIRST + len(results.frames)
     assert visitor.post("pair", {"at": at, "i": i, "j": "nowhere"}).status_code == 400
 
 
 def test_those_pairs_come_first_on_which_most_hangs(solved):
     visitor, at, _, _ = solved
-    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"]
+    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"]
     stake = [each["stake"] for each in told]
     assert stake == sorted(stake, reverse=True)
     first = told[0]
@@ -71,10 +75,10 @@ def test_those_pairs_come_first_on_which_most_hangs(solved):
 
 def test_a_verdict_reaches_the_solver_and_is_taken_back(solved):
     visitor, at, results, folder = solved
-    first = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"][0]
+    first = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"][0]
     i, j = first["i"], first["j"]
-    visitor.ask("judge", at=at, frame=FRAME, i=j, j=i, verdict="no contact", reviewer=" anna ", seconds=2.5)
-    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")
+    visitor.ask("judge", at=at, frame=SHOWN, i=j, j=i, verdict="no contact", reviewer=" anna ", seconds=2.5)
+    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")
     assert told["judged"] == 1
     assert [(each["i"], each["j"]) for each in told["pairs"] if each["verdict"] == "no contact"] == [(i, j)]
     bodies = Bodies.of(results.tracks, results.walls)
@@ -96,7 +100,7 @@ def test_what_is_no_pair_cannot_be_judged(solved):
     name = int(results.tracks.id[0])
     other = int(results.tracks.id[1])
     for i, j, verdict in ((name, name, "contact"), (name, 10**6, "contact"), (name, other, "maybe")):
-        values = {"at": at, "frame": FRAME, "i": i, "j": j, "verdict": verdict, "reviewer": "anna"}
+        values = {"at": at, "frame": SHOWN, "i": i, "j": j, "verdict": verdict, "reviewer": "anna"}
         assert visitor.post("judge", values).status_code == 400
     assert not (folder / VERDICTS).exists()
 
@@ -111,14 +115,14 @@ def test_a_crop_is_a_picture(solved):
 def test_forces_without_a_contact_differ_and_nothing_is_written(solved):
     visitor, at, results, folder = solved
     before = sorted(file.name for file in folder.iterdir())
-    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"]
+    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"]
     pair = max((each for each in told if each["fn"]), key=lambda each: each["fn"])
-    answer = visitor.ask("without", at=at, frame=FRAME, i=pair["i"], j=pair["j"])
+    answer = visitor.ask("without", at=at, frame=SHOWN, i=pair["i"], j=pair["j"])
     assert min(answer["fn"]) >= 0.0 or min(answer["fn"]) == min(results.frames[FRAME].fn)
     gone = np.flatnonzero(np.array(answer["fn"]) == 0.0)
     assert len(gone) >= 1
     assert sorted(file.name for file in folder.iterdir()) == before
-    assert "no contact" in visitor.refused("without", at=at, frame=FRAME, i=pair["i"], j=pair["i"])
+    assert "no contact" in visitor.refused("without", at=at, frame=SHOWN, i=pair["i"], j=pair["i"])
 
 
 def test_eyes_are_compared_with_one_another_and_with_the_program(solved):
@@ -126,12 +130,12 @@ def test_eyes_are_compared_with_one_another_and_with_the_program(solved):
     assert visitor.ask("agreement", at=at) == {
         "frames": [], "total": None, "precision": None, "recall": None, "disputed": [], "judges": [],
     }  # fmt: skip
-    told = visitor.ask("candidates", at=at, frame=FRAME, reviewer="anna")["pairs"]
+    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"]
     seen = [each for each in told if each["detected"]]
     unseen = [each for each in told if not each["detected"]]
 
     def say(who, pair, verdict):
-        visitor.ask("judge", at=at, frame=FRAME, i=pair["i"], j=pair["j"], verdict=verdict, reviewer=who)
+        visitor.ask("judge", at=at, frame=SHOWN, i=pair["i"], j=pair["j"], verdict=verdict, reviewer=who)
 
     for pair in seen[:4]:
         say("anna", pair, "contact")
@@ -140,7 +144,7 @@ def test_eyes_are_compared_with_one_another_and_with_the_program(solved):
     say("ben", unseen[0], "no contact")
     told = visitor.ask("agreement", at=at)
     (row,) = told["frames"]
-    assert row["frame"] == FRAME
+    assert row["frame"] == SHOWN
     assert (row["hits"], row["false"], row["missed"], row["rejected"]) == (3, 0, 0, 1)  # a draw is nobody's word
     assert told["precision"] is None  # five pairs say too little
     judges = {(each["first"], each["second"]): each for each in told["judges"]}
@@ -151,3 +155,45 @@ def test_eyes_are_compared_with_one_another_and_with_the_program(solved):
     (pair,) = told["disputed"]
     assert (pair["i"], pair["j"]) == (seen[0]["i"], seen[0]["j"])
     assert pair["said"] == {"anna": "contact", "ben": "no contact"}
+
+
+def test_a_run_of_some_photographs_is_shown_over_those(solved):
+    visitor, at, results, _ = solved
+    told = visitor.ask("network", at=at, frame=FIRST)
+    assert told["frame"] == FIRST
+    np.testing.assert_allclose(told["fn"], results.frames[0].fn, rtol=1e-4)
+    for photograph in (FIRST - 1, FIRST + len(results.frames)):
+        assert f"photograph {photograph}" in visitor.refused("network", at=at, frame=photograph)
+        assert "photograph" in visitor.refused("candidates", at=at, frame=photograph, reviewer="anna")
+    i, j = told["i"][0], told["j"][0]
+    past = visitor.ask("pair", at=at, i=i, j=j)
+    assert past["point"][: FIRST + 1] == [None] * FIRST + [pytest.approx(told["point"][0], abs=0.02)]
+    rod = visitor.ask("rod", at=at, id=i)
+    assert {len(rod[key]) for key in ("zncc", "sigma", "rotation", "status", "unbalance")} == {len(past["fn"])}
+
+
+def test_what_was_said_keeps_the_force_that_it_was_said_of(solved):
+    visitor, at, _, folder = solved
+    pair = next(each for each in visitor.ask("candidates", at=at, frame=SHOWN, reviewer="")["pairs"] if each["fn"])
+    visitor.ask("judge", at=at, frame=SHOWN, i=pair["i"], j=pair["j"], verdict="no contact", reviewer="anna")
+    told = visitor.ask("judged", at=at, reviewer="anna")
+    (word,) = told["pairs"]
+    assert told["waiting"] == 1
+    assert (word["frame"], word["i"], word["j"], word["obeyed"]) == (SHOWN, pair["i"], pair["j"], False)
+    assert word["before"]["fn"] == word["now"]["fn"] == pair["fn"]
+    assert visitor.ask("judged", at=at, reviewer="ben") == {"pairs": [], "waiting": 0}
+    os.utime(folder / RESULTS, (4e9, 4e9))  # a run after it that did not obey
+    assert visitor.ask("judged", at=at, reviewer="anna")["waiting"] == 1
+    forgotten = [each for each in visitor.ask("candidates", at=at, frame=SHOWN, reviewer="")["pairs"] if not each["fn"]]
+    visitor.ask("judge", at=at, frame=SHOWN, i=forgotten[0]["i"], j=forgotten[0]["j"], verdict="no contact",
+                reviewer="anna")  # fmt: skip
+    words = visitor.ask("judged", at=at, reviewer="anna")["pairs"]
+    assert [each["obeyed"] for each in words] == [True, False]  # it carries nothing, as was said
+    visitor.ask("unjudge", at=at, reviewer="anna")
+    assert len(visitor.ask("judged", at=at, reviewer="anna")["pairs"]) == 1
+
+
+def test_nobody_is_called_by_the_account_of_a_machine(visitor, monkeypatch):
+    for account, name in (("root", ""), ("anna", "anna")):
+        monkeypatch.setattr("getpass.getuser", lambda account=account: account)
+        assert visitor.ask("reviewer")["name"] == name
