@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,16 @@ class Correction:
     frame: int
     id: int
     pose: tuple[float, float, float | None] | None  # x, y [px]; theta [rad] counter-clockwise, None: to be found
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One row of the table, before and after; None: it was not there."""
+
+    frame: int
+    id: int
+    before: Correction | None
+    after: Correction | None
 
 
 def corrections_of(found: Understood) -> list[Correction]:
@@ -47,6 +57,14 @@ def take_back(draft: Draft, found: Understood, frame: int, name: int) -> None:
     """Remove a correction."""
     kept = [each for each in corrections_of(found) if (each.frame, each.id) != (frame, name)]
     _write(draft, found, kept, f"correction of rod {name} in photograph {frame} taken back")
+
+
+def differences(before: Iterable[Correction], after: Iterable[Correction]) -> list[Difference]:
+    """What has changed from one table to another, by photograph and rod."""
+    old = {(each.frame, each.id): each for each in before}
+    new = {(each.frame, each.id): each for each in after}
+    names = sorted(old.keys() | new.keys())
+    return [Difference(*name, old.get(name), new.get(name)) for name in names if old.get(name) != new.get(name)]
 
 
 def _write(draft: Draft, found: Understood, corrections: list[Correction], what: str) -> None:

@@ -206,7 +206,7 @@ function pairCard(app) {
     h("div", { class: "verdicts" }, Object.entries(VERDICTS).map(([key, verdict]) => h("button", { class: chosen.verdict === verdict ? "on" : "", onclick: () => say(app, verdict) }, h("kbd", {}, key.toUpperCase()), ` ${verdict}`))),
     blind ? null : beforeAfter(app),
     blind ? null : [
-      row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], "N")), fact("f_t", with_(net.ft[row], net.ft_sd[row], "N")), fact("it is", `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: not taken for a contact"),
+      row >= 0 ? [fact("f_n", with_(net.fn[row], net.fn_sd[row], "N")), fact("f_t", with_(net.ft[row], net.ft_sd[row], "N")), fact("it is", /reviewer/.test(net.source[row]) ? net.source[row] : `${net.state[row]}, ${net.age[row]} frames old`)] : fact("force", "none: not taken for a contact"),
       past ? fact("gap", with_(past.gap[k] === null ? null : past.gap[k] * 1e6, past.gap_sd[k] * 1e6, "µm")) : null,
       fact("P(touch)", digits(chosen.probability, 3)),
       past ? [h("span", { class: "soft" }, "normal force over the frames"), chart(58, (c, w, hh) => spark(app, c, w, hh, seen.fn, seen.fn_sd, true)), h("span", { class: "soft" }, "gap over the frames [µm]"), chart(58, (c, w, hh) => spark(app, c, w, hh, seen.gap.map((v) => (v === null ? null : v * 1e6)), seen.gap_sd.map((v) => v * 1e6), false))] : null,

@@ -13,7 +13,7 @@ export function showLanes(app, facts) {
     ? [h("span", { style: { color: TONES[status] ?? "inherit", fontWeight: 650 } }, status), ` · T ${digits(facts.trust[app.frame], 2)} · φ ${digits(facts.friction_angle[app.frame], 3)}°`]
     : ["not solved yet"];
   at("time").replaceChildren(...arrows(app),
-    h("div", { class: "frame" }, h("div", {}, `frame ${app.frame} of ${count - 1}`), h("div", { class: "soft", style: { fontSize: "12.5px" } }, words)),
+    h("div", { class: "frame" }, h("div", {}, `photograph ${app.frame} of ${count - 1}`), h("div", { class: "soft", style: { fontSize: "12.5px" } }, words)),
     canvas,
     h("button", { class: "quiet", title: "To the next frame in doubt (J)", onclick: () => jump(app, facts) }, "next flag ▸"));
   requestAnimationFrame(() => draw(app, canvas, facts, count));

@@ -5,6 +5,7 @@ import { showDoubts } from "/page/lanes.js";
 
 const KEPT = "#2fbf93", WEAK = "#f0e442", SEEN = "#56b4e980";
 let told = null, chosen = null, ghost = null, held = null, mended = null, patch = null, wanted = "", waiting = false, next = null, only = false, jumping = 0, lacking = "";
+const log = { open: false, told: null };
 
 export const mend = {
   name: "mend", title: "Mend", frames: true,
@@ -33,6 +34,7 @@ export const mend = {
         h("button", { class: "quiet", title: "Take it back", onclick: () => settle(app, "take_back", { frame: each.frame, id: each.id }) }, "undo")))) : h("p", {}, "None yet."),
       waits ? h("div", { class: "says" }, h("p", { id: "waits" }, h("span", { class: "sign doubtful" }, "!"), `${waits === 1 ? "One correction waits" : `${waits} corrections wait`} for the next run. What does not hang on ${waits === 1 ? "it" : "them"} is not computed again.`)) : null,
       waits ? h("button", { onclick: () => app.goTo("run") }, "To the run") : null,
+      logSection(app),
     ];
   },
   draw(app, c, k) {
@@ -65,6 +67,17 @@ export const mend = {
   },
   timeline(app) { if (app.project.run !== null) showDoubts(app, told); else at("time").classList.remove("shown"); },
 };
+
+/** What was changed in the table of corrections, when, before and after: asked for when it is opened. */
+function logSection(app) {
+  const words = (pose) => (pose === null ? "as tracked" : pose === "lost" ? "not to be seen" : `${digits(pose[0], 5)}, ${digits(pose[1], 5)} px`);
+  return h("details", { id: "corrections-log", open: log.open, ontoggle: (event) => { if (event.target.open !== log.open) { log.open = event.target.open; if (log.open) app.queue(async () => { await readLog(app); app.paint(); }); } } },
+    h("summary", {}, "What was changed, and when"),
+    log.open && log.told ? log.told.length ? h("div", { class: "list" }, log.told.slice(0, 200).map((each) => h("div", {}, h("span", { class: "two" },
+      h("span", {}, `photograph ${each.frame} · rod ${each.id} · ${each.how}`), h("span", { class: "soft" }, `${new Date(each.time).toLocaleString()}: ${words(each.before)} → ${words(each.after)}`))))) : h("p", {}, "Nothing yet.") : null);
+}
+
+async function readLog(app) { if (log.open) log.told = (await ask("corrections_log", { at: app.project.at })).changes; }
 
 const handle = (g) => [g.x + 1.45 * g.r * Math.cos(g.angle), g.y + 1.45 * g.r * Math.sin(g.angle)];
 const letGo = () => { chosen = null; ghost = null; mended = null; };
@@ -138,7 +151,7 @@ function load(app) {
   app.queue(async () => {
     const { frame } = app;
     if (app.step !== mend) return;
-    try { told = await ask("poses", { at: app.project.at, frame }); lacking = ""; } catch (error) { told = null; lacking = error.message; }
+    try { told = await ask("poses", { at: app.project.at, frame }); await readLog(app); lacking = ""; } catch (error) { told = null; lacking = error.message; }
     if (told && jumping) { jumping = 0; nextDoubtful(app, true); } else if (told && chosen !== null) pick(app, chosen);
     app.paint();
     if (told) ask("make_ready", { at: app.project.at, frame }).catch(() => {});

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from ...run_folder import TRACKS
 from ...tracks import Tracks, TrackStatus
 from ..inspecting import found as inspecting
 from ..mending import corrections
+from ..mending.correction_log import append_changes, read_changes
 from ..mending.following import Tracked, follow_on
 from ..mending.mender import Mended, Mender
 from .bench import Bench
@@ -101,7 +104,8 @@ def mend(
         poses |= {k + first: each for k, each in followed.poses.items()}
         ended = followed.ended
     told = [corrections.Correction(k, id, _as_written(opened, each)) for k, each in poses.items()]
-    corrections.correct(opened.draft, opened.understood(), told)
+    with logged(opened, "followed" if len(told) > 1 else "mended"):
+        corrections.correct(opened.draft, opened.understood(), told)
     return _settled(opened) | {"mended": _told(found), "count": len(told), "ended": ended}
 
 
@@ -111,15 +115,60 @@ def mark_lost(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]
     opened = bench.project(at)
     _exists(opened, frame)
     _not_first(opened, frame)
-    corrections.correct(opened.draft, opened.understood(), [corrections.Correction(frame, id, None)])
+    with logged(opened, "hidden"):
+        corrections.correct(opened.draft, opened.understood(), [corrections.Correction(frame, id, None)])
     return _settled(opened)
 
 
 @question
 def take_back(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
     opened = bench.project(at)
-    corrections.take_back(opened.draft, opened.understood(), frame, id)
+    with logged(opened, "taken back"):
+        corrections.take_back(opened.draft, opened.understood(), frame, id)
     return _settled(opened)
+
+
+@question
+def corrections_log(bench: Bench, at: Text) -> dict[str, Any]:
+    """What was changed in the table of corrections, the latest first."""
+    opened = bench.project(at)
+    return {"changes": read_changes(opened.folder)}
+
+
+@question
+def undo(bench: Bench, at: Text) -> dict[str, Any]:
+    """Take the last change of the experiment back, whatever it was."""
+    opened = bench.project(at)
+    with logged(opened, "undone"):
+        if opened.draft.undo() is None:
+            raise InputError("undo", "", "nothing is left to be undone")
+    return opened.describe()
+
+
+@question
+def redo(bench: Bench, at: Text) -> dict[str, Any]:
+    """Do again what was undone last."""
+    opened = bench.project(at)
+    with logged(opened, "done again"):
+        if opened.draft.redo() is None:
+            raise InputError("redo", "", "nothing was undone")
+    return opened.describe()
+
+
+@contextmanager
+def logged(opened: Project, how: str) -> Iterator[None]:
+    """Write down what happens to the table of corrections meanwhile."""
+    before = _readable(opened)
+    yield
+    append_changes(opened.folder, corrections.differences(before, _readable(opened)), how)
+
+
+def _readable(opened: Project) -> list[corrections.Correction]:
+    """The corrections; none where the table cannot be read, which is complained of elsewhere."""
+    try:
+        return corrections.corrections_of(opened.understood())
+    except InputError:
+        return []
 
 
 def told_corrections(opened: Project) -> list[dict[str, Any]]:

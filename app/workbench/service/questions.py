@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, validate_call
 
-from ...errors import InputError
 from .bench import Bench
 
 Question = Callable[..., Any]
@@ -68,19 +67,3 @@ def begin(bench: Bench, roll: Whole, name: Text) -> dict[str, Any]:
 @question
 def project(bench: Bench, at: Text) -> dict[str, Any]:
     return bench.project(at).describe()
-
-
-@question
-def undo(bench: Bench, at: Text) -> dict[str, Any]:
-    opened = bench.project(at)
-    if opened.draft.undo() is None:
-        raise InputError("undo", "", "nothing is left to be undone")
-    return opened.describe()
-
-
-@question
-def redo(bench: Bench, at: Text) -> dict[str, Any]:
-    opened = bench.project(at)
-    if opened.draft.redo() is None:
-        raise InputError("redo", "", "nothing was undone")
-    return opened.describe()

@@ -100,3 +100,28 @@ def test_a_rod_that_is_not_to_be_seen_is_a_correction_until_it_is_taken_back(vis
     told = visitor.ask("undo", at=at)
     assert len(read_corrections(load_experiment(photographs_only / "my photographs"), None, 4).id) == 2
     assert "step Rods" in visitor.refused("mark_lost", at=at, frame=0, id=5)
+
+
+def test_every_change_of_the_table_is_logged_with_what_was_before(visitor, photographs_only):
+    at = visitor.ask("begin", roll=0, name="mine")["at"]
+    visitor.ask("set_photographs", at=at, interval=30.0)
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    table = photographs_only / "my photographs" / "corrections.csv"
+    visitor.ask("mark_lost", at=at, frame=2, id=5)
+    table.write_text("frame,id,x,y,theta\n2,5,100.5,200.25,0.1\n")  # by another hand, which tells no log
+    visitor.ask("mark_lost", at=at, frame=2, id=5)
+    visitor.ask("undo", at=at)
+    visitor.ask("redo", at=at)
+    visitor.ask("take_back", at=at, frame=2, id=5)
+    visitor.ask("set_photographs", at=at, interval=31.0)
+    visitor.ask("undo", at=at)  # of something else
+    told = visitor.ask("corrections_log", at=at)["changes"]
+    pose = [100.5, 200.25, 0.1]
+    assert [(each["how"], each["before"], each["after"]) for each in reversed(told)] == [
+        ("hidden", None, "lost"), ("hidden", pose, "lost"), ("undone", "lost", pose), ("done again", pose, "lost"),
+        ("taken back", "lost", None),
+    ]  # fmt: skip
+    assert {(each["frame"], each["id"]) for each in told} == {(2, 5)}
+    log = photographs_only / "my photographs" / "corrections_log.jsonl"
+    log.write_text(log.read_text() + '{"torn')
+    assert visitor.ask("corrections_log", at=at)["changes"] == told
