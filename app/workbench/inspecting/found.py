@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -101,9 +102,19 @@ def first_photograph(file: Path) -> int:
 
 def run_stamp(folder: Path) -> tuple[Any, ...]:
     """By which it is seen whether anything has come."""
-    kept = sorted((folder / UNFINISHED / "solving").glob("*.piece"))
-    told = [folder / TRACKS, folder / RESULTS]
-    return len(kept), *(file.stat().st_mtime_ns if file.is_file() else 0 for file in told)
+    try:
+        kept = sum(name.endswith(".piece") for name in os.listdir(folder / UNFINISHED / "solving"))
+    except OSError:  # there is none, or a run takes it away while it is read
+        kept = 0
+    return kept, *(_changed(folder / name) for name in (TRACKS, RESULTS))
+
+
+def _changed(file: Path) -> int:
+    """When a file was changed [ns]; 0: there is none."""
+    try:
+        return file.stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 def _unfinished(folder: Path, going_on: GoingOn | None) -> Found | None:

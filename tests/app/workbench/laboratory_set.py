@@ -135,8 +135,8 @@ def _darken(picture: Picture, pose: NDArray[np.float64], radius: float) -> None:
 
 
 def _reflect(picture: Picture, pose: NDArray[np.float64], radius: float, frame: int) -> None:
-    """A lamp in the glaze: a good third of the face is white."""
+    """A lamp in the glaze: half of the face is white."""
     turn = 0.3 * frame
     x, y = pose[0] + 0.25 * radius * np.cos(turn), pose[1] + 0.25 * radius * np.sin(turn)
-    lit = _within(picture, x, y, 0.62 * radius) * _within(picture, pose[0], pose[1], radius - 1.0)
+    lit = _within(picture, x, y, 0.7 * radius) * _within(picture, pose[0], pose[1], radius - 1.0)
     picture += lit * (245.0 - picture)

@@ -1,13 +1,15 @@
 """Stored numbers are shown as they are stored, and verdicts go to the log that the solver obeys."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rodsight.results.hdf5.store import load_results, read_origin
-from rodsight.run_folder import RESULTS
+from rodsight.run_folder import RESULTS, UNFINISHED
 from rodsight.verdicts.decisions import Bodies, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
+from rodsight.workbench.inspecting.found import run_stamp
 
 from tests.golden.stored import unpack
 
@@ -197,3 +199,20 @@ def test_nobody_is_called_by_the_account_of_a_machine(visitor, monkeypatch):
     for account, name in (("root", ""), ("anna", "anna")):
         monkeypatch.setattr("getpass.getuser", lambda account=account: account)
         assert visitor.ask("reviewer")["name"] == name
+
+
+def test_a_run_that_takes_its_pieces_away_meanwhile_is_no_error(solved, monkeypatch):
+    visitor, at, results, folder = solved
+    pieces = folder / UNFINISHED / "solving"
+    pieces.mkdir(parents=True)
+    walk = os.scandir
+
+    def gone(place):
+        if Path(place) == pieces:
+            raise FileNotFoundError(place)
+        return walk(place)
+
+    monkeypatch.setattr(os, "scandir", gone)
+    monkeypatch.setattr(os, "listdir", gone)
+    assert run_stamp(folder)[0] == 0
+    assert visitor.ask("run_told", at=at)["frames"]["count"] == FIRST + len(results.frames)
