@@ -2,6 +2,7 @@
 
 --only: some of the tables. --tiles: packings that a whole run is timed on, a simulated periodic cell of 450 rods laid
 beside itself so often each way; beside them one of 1172 rods between walls. Both are simulated once, kept in --folder.
+--append: what was measured in several turns goes into tests/benchmarks/history.csv, and its picture is drawn anew.
 Everything runs in one thread but where it is said; processor times hold while other work goes on, those of the clock
 do not.
 """
@@ -21,10 +22,11 @@ from pathlib import Path
 import numpy as np
 from rodsight.synthetic.synthesis import synthesize
 
+from tests.benchmarks import history
 from tests.benchmarks.photograph_rows import detection_rows, tracking_rows
 from tests.benchmarks.solver_rows import load_rows, member_rows, sweep_rows
 from tests.benchmarks.tiled_packing import FRAMES, NOISE, tiled_packing
-from tests.benchmarks.timing import Row, Took, format_table, processor_name
+from tests.benchmarks.timing import Row, Took, format_table, in_processor_time, processor_name
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "sample_data" / "shear"
@@ -46,8 +48,8 @@ def start() -> Iterator[tuple[str, list[Row]]]:
     call = "from rodsight.cli.main import main; main()"
     ready = "import rodsight.pipeline, rodsight.inference.inference"
     rows = [
-        Row("`rodsight --help`", str(_of_process([sys.executable, "-c", call, "--help"])), "≤ .3 s"),
-        Row("loading all that solving tracks needs", str(_of_process([sys.executable, "-c", ready])), "≤ 1.5 s"),
+        in_processor_time("`rodsight --help`", _of_process("-c", call, "--help"), "≤ .3 s"),
+        in_processor_time("loading all that solving tracks needs", _of_process("-c", ready), "≤ 1.5 s"),
     ]
     yield "Start", rows
 
@@ -87,25 +89,26 @@ def sample() -> Iterator[tuple[str, list[Row]]]:
     found = _job(SAMPLE)
     rows = []
     for name, seconds in found["stages"].items():
-        rows.append(Row(f"{name}, {found['frames']} photographs of {found['rods']} rods", str(Took(*seconds))))
+        what = f"{name}, {found['frames']} photographs of {found['rods']} rods"
+        rows.append(in_processor_time(what, [Took(*seconds)]))
     rows.append(Row("peak of memory", f"{found['peak']:.0f} MB"))
     yield "The sample, from photographs to the recording", rows
 
 
-def _of_process(command: list[str], turns: int = 3) -> Took:
-    """The fastest of several starts; its processor time is the clock's where nothing else runs."""
+def _of_process(*words: str, turns: int = 3) -> list[Took]:
+    """Several starts of Python after a first one; the processor's time is the clock's where nothing else runs."""
     import resource
 
     def spent() -> float:
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         return used.ru_utime + used.ru_stime
 
-    best = Took(float("inf"), float("inf"))
+    found = []
     for _ in range(turns + 1):
         processor, clock = spent(), time.perf_counter()
-        subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
-        best = Took(min(best.processor, spent() - processor), min(best.clock, time.perf_counter() - clock))
-    return best
+        subprocess.run([sys.executable, *words], check=True, capture_output=True, cwd=ROOT)
+        found.append(Took(spent() - processor, time.perf_counter() - clock))
+    return found[1:]
 
 
 def _job(experiment: Path) -> dict:
@@ -128,15 +131,22 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=["ratios", "start", "photographs", "growth", "sample"])
     parser.add_argument("--tiles", nargs="+", type=int, default=TILES)
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "rodsight-benchmark")
+    parser.add_argument("--append", action="store_true")
     asked = parser.parse_args()
     parts = {
         "ratios": ratios, "start": start, "photographs": photographs,
         "growth": lambda: growth(asked.folder, tuple(asked.tiles)), "sample": sample,
     }  # fmt: skip
     print(f"{processor_name()}; {date.today().isoformat()}\n", flush=True)
+    measured: list[Row] = []
+    commit = history.present_commit() if asked.append else ""
     for name in asked.only or parts:
         for title, rows in parts[name]():
             print(format_table(title, rows), flush=True)
+            measured += rows
+    if asked.append:
+        print(f"{history.append(measured, commit)} figures added to {history.HISTORY.relative_to(ROOT)}")
+        history.draw(history.read())
 
 
 if __name__ == "__main__":

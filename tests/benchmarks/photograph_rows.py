@@ -10,7 +10,7 @@ from rodsight.tracking.tracker import Tracker
 
 from tests.app.tracking.detection.polydisperse import draw_discs, lay_discs
 from tests.app.tracking.speckled import Rods, grid_of_rods
-from tests.benchmarks.timing import Row, Took, fastest
+from tests.benchmarks.timing import Row, Took, fastest, in_processor_time, least, several
 
 PATCH_RADIUS = 20.0  # [px]
 RADIUS = PATCH_RADIUS / 0.85  # [px]
@@ -27,7 +27,8 @@ def tracking_rows() -> Iterator[Row]:
     large = grid_of_rods(34, 34, radius=58.0, pitch=127.0, margin=140.0, noise=2.0)
     tracker = Tracker(large.reference(), (large.x, large.y, large.radius), workers=1)
     took = follow(tracker, large.moved(1.8, -0.6, 0.01), 3)
-    yield Row(f"{large.count} rods in {large.width * large.height / 1e6:.0f} megapixels", str(took), "≤ .35 s")
+    what = f"{large.count} rods in {large.width * large.height / 1e6:.0f} megapixels"
+    yield in_processor_time(what, took, "≤ .35 s")
 
 
 def detection_rows() -> Iterator[Row]:
@@ -38,12 +39,13 @@ def detection_rows() -> Iterator[Row]:
     yield Row(f"detection of {len(x)} discs of 5 to 50 px, sizes not told", str(took), "≤ 3 s")
     rods = grid_of_rods(34, 34, radius=RADIUS, pitch=49.0, margin=60.0)
     image = rods.reference()
-    yield Row(f"detection of {rods.count} rods of 24 px", str(fastest(lambda: detect_grains(image), 2)))
+    yield in_processor_time(f"detection of {rods.count} rods of 24 px", several(lambda: detect_grains(image), 3))
 
 
-def follow(tracker: Tracker, image: np.ndarray, turns: int = 5) -> Took:
-    return fastest(lambda: tracker.follow(image, [tracker.first()]), turns)
+def follow(tracker: Tracker, image: np.ndarray, turns: int = 5) -> list[Took]:
+    return several(lambda: tracker.follow(image, [tracker.first()]), turns)
 
 
-def _grains(what: str, rods: Rods, took: Took, aim: str) -> Row:
-    return Row(what, f"**{rods.count / took.processor:.0f} grains/s** of one core", aim)
+def _grains(what: str, rods: Rods, took: list[Took], aim: str) -> Row:
+    rates = tuple(rods.count / each.processor for each in took)
+    return Row(what, f"**{rods.count / least(took).processor:.0f} grains/s** of one core", aim, rates, "grains/s")

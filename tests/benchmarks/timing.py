@@ -12,11 +12,13 @@ TURNS = 5
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of the table."""
+    """A line of the table; turns and their unit, where it goes into the history."""
 
     what: str
     found: str
     aim: str = ""
+    turns: tuple[float, ...] = ()
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +37,22 @@ class Took:
 
 def fastest(way: Callable[[], object], turns: int = TURNS) -> Took:
     """The least of several turns after a first one, processor and clock each by themselves."""
+    return least(several(way, turns))
+
+
+def several(way: Callable[[], object], turns: int = TURNS) -> list[Took]:
+    """Every turn after a first one."""
     way()
-    took = [once(way) for _ in range(turns)]
+    return [once(way) for _ in range(turns)]
+
+
+def least(took: list[Took]) -> Took:
     return Took(min(each.processor for each in took), min(each.clock for each in took))
+
+
+def in_processor_time(what: str, took: list[Took], aim: str = "") -> Row:
+    """A row of the fastest turn, with the processor's seconds of all of them."""
+    return Row(what, str(least(took)), aim, tuple(each.processor for each in took), "s")
 
 
 def once(way: Callable[[], object]) -> Took:
@@ -46,15 +61,20 @@ def once(way: Callable[[], object]) -> Took:
     return Took(time.process_time() - processor, time.perf_counter() - clock)
 
 
-def by_turns(ways: dict[str, Callable[[], object]], turns: int = TURNS) -> dict[str, float]:
-    """Processor seconds of the fastest turn of each; they take turns, so that what else runs weighs on all alike."""
-    best = dict.fromkeys(ways, float("inf"))
+def by_turns(ways: dict[str, Callable[[], object]], turns: int = TURNS) -> dict[str, list[float]]:
+    """Processor seconds of every turn of each; they take turns, so that what else runs weighs on all alike."""
     for way in ways.values():
         way()
+    found: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(turns):
         for name, way in ways.items():
-            best[name] = min(best[name], once(way).processor)
-    return best
+            found[name].append(once(way).processor)
+    return found
+
+
+def shares(ours: list[float], theirs: list[float]) -> tuple[float, ...]:
+    """Ours of theirs, turn by turn."""
+    return tuple(one / other for one, other in zip(ours, theirs, strict=True))
 
 
 def format_table(title: str, rows: list[Row]) -> str:
