@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any
 from .kernel_cache import find_room_for_kernels
 
 if TYPE_CHECKING:
+    __version__: str
     from .errors import InputError
     from .notebook.run import Run, run
     from .notebook.run import open_run as open
     from .notebook.solve import solve
 
 __all__ = ["InputError", "Run", "__version__", "open", "run", "solve"]
-
-__version__ = "0.1.0"
 
 
 def _load_own_solver() -> None:
@@ -53,10 +52,15 @@ _LAZY = {
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
+    if name == "__version__":
+        from .version import version_in_use
+
+        value = version_in_use()
+    elif name in _LAZY:
+        module, attribute = _LAZY[name]
+        value = getattr(import_module(f".{module}", __name__), attribute)
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, attribute = _LAZY[name]
-    value = getattr(import_module(f".{module}", __name__), attribute)
     globals()[name] = value
     return value
 

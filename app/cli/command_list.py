@@ -38,9 +38,10 @@ Exit status: 0 done, 1 failed, 2 bad input, 130 interrupted (143 terminated, 129
 Completion of commands and options: eval "$(rodsight --completion bash)" (or zsh, tcsh)."""
 
 
-def overview() -> str:
-    """What there is, in groups, a line each."""
-    lines = [f"Rodsight {__version__}: contact forces inside a granular packing, from photographs.", ""]
+def overview(title: str | None = None) -> str:
+    """What there is, in groups, a line each; title: by default the program's name and version."""
+    title = title or f"Rodsight {__version__}"
+    lines = [f"{title}: contact forces inside a granular packing, from photographs.", ""]
     lines += ["Usage: rodsight COMMAND …", "First: rodsight run sample_data/shear"]
     for group, commands in GROUPS.items():
         lines += ["", group]

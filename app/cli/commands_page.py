@@ -16,13 +16,14 @@ from .command_list import GROUPS, Command, command_line, name_of, overview
 
 PAGE = FOLDER / "commands.md"
 FIRST_LINE = "<!-- Generated: run `python -m rodsight.cli.commands_page` to write it anew. -->"
+TITLE = "Rodsight"  # without its version: the page is the same in all
 NAMES, WIDTH = 26, 100  # [columns] of names, and of a line
 ROW = re.compile(r"^(?:│ |  )(.*?) *│?$")  # of the tables of options, with their frames on a terminal
 
 
 def commands_page() -> str:
     """The whole page, Markdown."""
-    parts = [FIRST_LINE, "# Commands", f"```text\n{overview()}\n```"]
+    parts = [FIRST_LINE, "# Commands", f"```text\n{overview(TITLE)}\n```"]
     for group, commands in GROUPS.items():
         parts.append(f"## {group}")
         parts += [part for command in commands for part in _section(command)]
