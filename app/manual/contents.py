@@ -20,6 +20,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "accuracy.md": "How exact, how fast",
         "speed.md": "Speed, stage by stage",
         "gallery.md": "Gallery",
+        "paper.md": "In one page",
     },
     "Work with results": {
         "python.md": "Python and notebooks",

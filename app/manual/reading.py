@@ -18,6 +18,7 @@ from ..atomic import write_atomically
 from .contents import CONTENTS, FOLDER, pages
 
 # What mkdocstrings fills in: a name below this folder, and the name that users know it by.
+FRONT = re.compile(r"\A---\n.*?\n---\n", re.DOTALL)  # what a journal is told of a page
 MEMBER = re.compile(r'^::: app\.([\w.]+)\n +options:\n +heading: "([\w.]+)"$', re.MULTILINE)
 
 
@@ -41,6 +42,7 @@ def write_pages(folder: Path) -> Path:
 def page_text(name: str) -> str:
     """The Markdown of a page, with what the code says of itself in its place."""
     text = (FOLDER / name).read_text(encoding="utf-8")
+    text = FRONT.sub("", text)
     return MEMBER.sub(lambda found: _describe(found[1], found[2]), text)
 
 

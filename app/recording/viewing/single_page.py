@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ...atomic import write_atomically
 from ..look.texts import printable
+from ..parts import parts_of
 from .web_viewer import read_web_viewer
 
 TEMPLATE = "single_page.html"
@@ -37,10 +38,11 @@ def write_single_page(recordings: Sequence[Path], target: Path | str, *, title: 
 
 
 def single_page(recordings: Sequence[Path], *, title: str, cards: Sequence[str] = ()) -> str:
-    """The text of such a page."""
+    """The text of such a page; of a recording in parts all of them are in it, and open as one."""
     packed = [
-        f'<script type="application/gzip" id="recording-{k}">{_packed(Path(recording).read_bytes())}</script>'
+        f'<script type="application/gzip" id="recording-{k}-{number}">{_packed(part.read_bytes())}</script>'
         for k, recording in enumerate(recordings)
+        for number, part in enumerate(parts_of(Path(recording)))
     ]
     viewer = read_web_viewer()
     script = viewer.script.decode("utf-8").replace("</script", "<\\/script")

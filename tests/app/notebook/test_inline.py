@@ -34,10 +34,19 @@ def test_a_run_without_a_recording_says_so():
         rodsight.Run(make_results(2)).view()
 
 
+def test_all_parts_of_a_recording_are_in_the_cell_unless_it_is_too_large(notebook, tmp_path, monkeypatch):
+    written = write_recording(make_results(frame_count=4), tmp_path / "recording.rrd", part_frames=3)
+    assert written.parts == 2
+    shown = inline.show_recording(written.path)
+    assert [f"recording-0-{k}&quot;" in shown for k in range(3)] == [True, True, False]
+    monkeypatch.setattr(inline, "GREATEST", written.size - 1)
+    assert f"rodsight view {tmp_path}" in inline.show_recording(written.path)
+
+
 @pytest.mark.screen
 def test_the_recording_appears_in_a_frame_of_the_notebooks_page(notebook, page, tmp_path):
-    results = make_results(frame_count=4)
-    path = write_recording(results, tmp_path / "run.rrd", photograph=photograph, scale=Scale(PIXEL, SHAPE[0])).path
+    results, scale = make_results(frame_count=4), Scale(PIXEL, SHAPE[0])
+    path = write_recording(results, tmp_path / "run.rrd", photograph=photograph, scale=scale, part_frames=3).path
     shown = inline.show_recording(path)
     file = tmp_path / "notebook.html"
     shown = shown.replace("?? undefined", "?? &quot;webgl&quot;")  # the only renderer of a browser without a screen

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rodsight
 from rodsight.study.report.calibration_report import CalibrationStudy, TrustedFrames, broken, study_calibration
 from rodsight.study.report.report_page import report_page
 from rodsight.study.worlds.contact_errors import ContactErrors
@@ -47,7 +48,7 @@ def test_the_page_tells_version_seeds_and_the_hash_of_its_data(study):
     assert study.data_hash in page
     other = replace(study, errors=replace(study.errors, error=study.errors.error + 1e-9))
     assert other.data_hash != study.data_hash
-    for word in ("0.1.0", "shear", "seeds", "sliding_fraction", "All that is stated holds", "doubtful"):
+    for word in (rodsight.__version__, "shear", "seeds", "sliding_fraction", "All that is stated holds", "doubtful"):
         assert (word in page) == (word != "doubtful"), word  # no doubtful contacts, nothing said of them
     assert "http" not in page.replace("http://www.w3.org", "")  # it needs nothing else
 

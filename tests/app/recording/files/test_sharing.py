@@ -116,7 +116,7 @@ def test_a_folder_of_runs_is_one_page_with_a_card_for_each_and_one_viewer(tmp_pa
     assert not end.value.code
     assert "2 runs" in capsys.readouterr().out
     text = (tmp_path / "runs" / "runs-share.html").read_text()
-    assert [text.count(f'id="recording-{k}"') for k in range(3)] == [1, 1, 0]
+    assert [text.count(f'id="recording-{k}-0"') for k in range(3)] == [1, 1, 0]
     assert [text.count(f"<h2>{name}</h2>") for name in ("first", "second", "damaged")] == [1, 1, 0]
     assert text.count('id="module"') == 1
 
@@ -166,7 +166,9 @@ def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording, pag
     file = tmp_path / "run.html"
     write_single_page([recording.path], file, title="empty")
     text = file.read_text().replace("PATIENCE = 60000", "PATIENCE = 5000")  # it waits for what never comes
-    file.write_text(text.replace('handle.send_rrd_to_channel("recording", await unpack(`recording-${number}`));', ""))
+    sent = "handle.send_rrd_to_channel(channel, await unpack(`recording-${number}-${part}`));"
+    assert sent in text
+    file.write_text(text.replace(sent, ""))
     page.goto(f"file://{file}?renderer=webgl")
     page.wait_for_function("() => window.rodsight && seen.colours() > 20")  # the viewer has drawn itself
     wait_until_still(page)
