@@ -16,7 +16,7 @@ from .cases import FEW
 from .faults import ERRORS, KINDS, Refusing, forces_of, limit_files, refuse_from_now_on, refuse_stores
 from .table import FAULTS, note
 
-QUICK = 12
+QUICK = 8
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,8 +95,8 @@ def test_a_forbidden_contact_bears_no_force_and_an_added_one_exists(solved):
     assert (others.source == ContactSource.DETECTED).all()
 
 
-def test_taking_every_verdict_back_gives_the_former_results(solved):
-    out, again = solved
+def test_taking_every_verdict_back_gives_the_former_results(solved_by_default):
+    out, again = solved_by_default
     before = load_results(out / "results.h5")
     bodies = Bodies.of(before.tracks, before.walls)
     i, j = strongest(before, 2)

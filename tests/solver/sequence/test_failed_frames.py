@@ -1,6 +1,7 @@
 """One frame that shows nothing, or cannot be solved, costs no other."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,6 +29,12 @@ def infinite(snapshot):
     return replace(snapshot, position=np.where(np.arange(36)[:, None] == 5, np.inf, snapshot.position))
 
 
+@cache
+def sound_frames(settings):
+    """The frames of the heap when nothing is wrong."""
+    return [frame for frame, _ in run(*sheared_frames(COUNT), settings)]
+
+
 def assert_only_the_bad_one_failed(frames, sound):
     assert [frame.status is FrameStatus.FAILED for frame in frames] == [k == BAD for k in range(COUNT)]
     failed = frames[BAD]
@@ -46,9 +53,8 @@ def assert_only_the_bad_one_failed(frames, sound):
 @pytest.mark.parametrize("spoil", [blank, without_walls, infinite])
 def test_a_frame_that_shows_nothing_fails_alone(settings, spoil):
     packing, snapshots = sheared_frames(COUNT)
-    sound = [frame for frame, _ in run(packing, snapshots, settings)]
     snapshots[BAD] = spoil(snapshots[BAD])
-    assert_only_the_bad_one_failed([frame for frame, _ in run(packing, snapshots, settings)], sound)
+    assert_only_the_bad_one_failed([frame for frame, _ in run(packing, snapshots, settings)], sound_frames(settings))
 
 
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
@@ -73,7 +79,7 @@ def test_what_a_method_raises_fails_the_frame_and_is_told(monkeypatch):
             raise ZeroDivisionError("by an\nempty frame")
         return solve_frame(problem, state)
 
-    sound, heard = [frame for frame, _ in run(packing, snapshots)], []
+    sound, heard = sound_frames(SETTINGS), []
     monkeypatch.setattr(sequence, "solve_frame", solve)
     frames = [frame for frame, _ in run(packing, snapshots, observer=lambda *told: heard.append(told))]
     assert_only_the_bad_one_failed(frames, sound)
