@@ -1,7 +1,9 @@
 """Sweeps of which every one is measured, in little more than twice the time of silent ones.
 
 The natural map of a sweep is measured while the next one reads the same contacts: the velocities that the sweep ended
-with are kept for it. What the forces did is counted as they change. The forces are the bits of silent sweeps.
+with are kept for it. What the forces did is counted as they change. The forces are the bits of silent sweeps. The
+relaxation of a group is written out here as it is in `kernels`: as a function that both inline it is no longer turned
+into vector instructions, and either takes twice as long.
 """
 
 from __future__ import annotations

@@ -101,6 +101,7 @@ def test_the_catalogue_server_has_the_properties_as_columns_and_the_tabs_as_blue
         assert dataset.default_blueprint() is not None
 
 
+@pytest.mark.slow
 @pytest.mark.screen
 def test_recordings_open_together_in_a_browser(folder, page):
     server = RecordingServer(find_recordings(folder))

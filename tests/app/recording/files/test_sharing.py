@@ -161,6 +161,7 @@ def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_pa
     wait_for_forces(page)
 
 
+@pytest.mark.slow
 @pytest.mark.screen
 def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording, page):
     file = tmp_path / "run.html"

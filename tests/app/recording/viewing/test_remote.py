@@ -20,7 +20,7 @@ from rodsight.synthetic.synthesis import synthesize
 from tests.browser import open_when_served, wait_for_forces
 from tests.program import RODSIGHT
 
-pytestmark = pytest.mark.screen
+pytestmark = [pytest.mark.slow, pytest.mark.screen]  # a minute and more: two networks, a page drawn through ssh
 
 HERE, THERE, SSH_PORT = "10.231.87.1", "10.231.87.2", 2222
 CONNECTED = "connected"  # what the tunnel says once it is there
