@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.judging.doubts import doubt_friction
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics
 from solver.together import available_cores
@@ -242,7 +241,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     _refuse_nothing(run, frames)
     frames, statistics = _with_first_renewed(run, sequence, frames, statistics)
     check = sequence.find_friction(frames)
-    judged = Lazily(len(frames), lambda k: doubt_friction(frames[k], check))
+    judged = Lazily(len(frames), lambda k: sequence.doubt_friction(frames[k], check))
     results = replace(unsolved, frames=judged, statistics=statistics, friction_check=check)
     results = _store(run, results, origin)
     checkpoint.clear()

@@ -83,11 +83,16 @@ class CorrectedSequence:
     boundary: Boundary | None  # None: taken as it was told
     failed: Mapping[int, str]  # frames that show nothing, and why; their snapshots lie between their neighbours'
     wall_friction: WallFriction | None = None  # that was measured; None: told, or as between grains
+    friction_measured: bool = False
 
     def check_friction(self, frames: Sequence[FrameForces]) -> tuple[list[FrameForces], FrictionCheck | None]:
         """What the motion of all solved frames says of the friction that was given, and how far they hold after it."""
         check = self.find_friction(frames)
-        return [doubt_friction(frame, check) for frame in frames], check
+        return [self.doubt_friction(frame, check) for frame in frames], check
+
+    def doubt_friction(self, frame: FrameForces, check: FrictionCheck | None) -> FrameForces:
+        """The frame as it is to be believed after the check."""
+        return doubt_friction(frame, check, measured=self.friction_measured)
 
     def find_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
         """What the motion of all solved frames says of the friction that was given; they are looked at once."""
@@ -167,6 +172,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     return CorrectedSequence(
         packing, tracks, walls, snapshots if nothing_seen else bridge_frames(snapshots, failed),
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
+        inputs.material.friction_measured,
     )  # fmt: skip
 
 

@@ -51,7 +51,8 @@ def report_frame(
         frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen & problem.packing.grains.free
     )
     told = replace(frame, trust=lower_bound(evidence), doubt=tell_doubts(evidence), grain_unbalance=unbalance)
-    if estimate.spread_fn is not None and problem.motion.spans:  # of other fields no truth has told enough
+    first = problem.k == 0 and estimate.mixture is not None
+    if estimate.spread_fn is not None and (problem.motion.spans or first):  # of other fields no truth has told enough
         told = calibrate_deviations(told)
     return told, evidence
 

@@ -46,16 +46,16 @@ SERIES: tuple[Rgba, ...] = ((255, 202, 87, 255), (90, 133, 250, 255), (174, 252,
 
 # Lightness, chroma, hue [°] along the way: deep red, vermilion, orange, yellow, cream.
 _FORCE_WAY = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.87, 0.155, 92.0), (0.97, 0.06, 106.0))
-# Overlap blue, touching pale, open orange.
-_GAP_WAY = ((0.58, 0.150, 255.0), (0.74, 0.09, 240.0), (0.95, 0.0, 0.0), (0.76, 0.11, 60.0), (0.64, 0.17, 45.0))
+# What has a sign grows brighter all the way, so that less and more are told apart without any hue.
+# Overlap cream, touching orange, open a quiet blue.
+_GAP_WAY = ((0.97, 0.04, 106.0), (0.87, 0.12, 85.0), (0.72, 0.14, 55.0), (0.56, 0.09, 330.0), (0.42, 0.12, 265.0))
 # Quiet slate, violet, magenta, rose, pale: what is far from converged glows.
 _DOUBT_WAY = ((0.36, 0.045, 260.0), (0.46, 0.10, 285.0), (0.58, 0.19, 330.0), (0.74, 0.15, 5.0), (0.95, 0.03, 60.0))
 # Doubtful yellow to a quiet blue where two bodies surely touch, darker all the way: it holds in grey, too.
 _PROBABILITY_WAY = ((0.93, 0.13, 103.0), (0.81, 0.12, 70.0), (0.67, 0.05, 10.0), (0.47, 0.075, 240.0))
-# Less, in blue, over nothing to more, in orange.
+# Less, in deep blue, over nothing, in grey, to more, in bright yellow.
 _DIFFERENCE_WAY = (
-    (0.80, 0.10, 225.0), (0.62, 0.14, 250.0), (0.42, 0.05, 265.0), (0.40, 0.0, 0.0), (0.45, 0.06, 40.0),
-    (0.66, 0.17, 45.0), (0.86, 0.14, 85.0),
+    (0.41, 0.235, 264.0), (0.52, 0.12, 260.0), (0.62, 0.0, 0.0), (0.75, 0.08, 60.0), (0.905, 0.10, 88.0),
 )  # fmt: skip
 RAMP_LEVELS = 64
 

@@ -18,7 +18,7 @@ from ... import __version__
 from ...progress import Progress, silent
 from ...synthetic.worlds.names import WorldName
 from ..worlds.contact_errors import ContactErrors, measure_errors
-from ..worlds.intervals import GROUPS, covered
+from ..worlds.intervals import FIRST, GROUPS, covered
 from ..worlds.numbers import Compared, compare_numbers, number_rows, relative_bias
 from ..worlds.solved_world import SolvedWorld, solve_worlds
 from ..worlds.world_score import WorldPlan
@@ -103,6 +103,8 @@ def broken(study: CalibrationStudy) -> list[str]:
     """What does not hold any more, a sentence each."""
     found = []
     for name, shares in study.coverage.items():
+        if name == FIRST:  # of a few worlds, each with a force network of its own: told, but not held to
+            continue
         for share, (low, high), label in zip(
             shares, HOLDS * 2, ("one deviation of f_n", "two of f_n", "one deviation of f_t", "two of f_t"), strict=True
         ):

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.contacts.pairs import Keys, recall
 from solver.sequence.frame_forces import FrameForces
-from solver.sequence.judging.intervals import DOUBTED, SLIDES, doubt_of, formula_deviations, groups_of, witness_of
+from solver.sequence.judging.intervals import (
+    DOUBTED,
+    SLIDES,
+    counted_doubt,
+    formula_deviations,
+    friction_share,
+    groups_of,
+    witness_behind,
+)
 from solver.statistics.agreement import compare_forces
 from solver.statistics.force_statistics import mean_normal_force
 
@@ -23,7 +31,7 @@ WEAK = 1e-3  # of the mean force: contacts below it, inferred and true, have no 
 
 @dataclass(frozen=True, slots=True)
 class ContactErrors:
-    """Contacts of frames that a motion leads to; forces over the mean f_n of their frame, f_n and f_t in columns."""
+    """Contacts of frames; forces over the mean f_n of their frame, f_n and f_t in columns."""
 
     world: NDArray[np.str_]  # (c,)
     seed: NDArray[np.int64]  # (c,)
@@ -34,6 +42,7 @@ class ContactErrors:
     doubtful: NDArray[np.bool_]  # (c,)
     witness: NDArray[np.uint8]  # (c,) of Witness
     doubt: Array  # (c,) 1 − T, before the motion contradicted the friction
+    friction: Array  # (c,) as `friction_share` says
     force: Array  # (c, 2)
     error: Array  # (c, 2) stated less true
     deviation: Array  # (c, 2) stated
@@ -48,12 +57,12 @@ class ContactErrors:
 
 
 def measure_errors(solved: SolvedWorld) -> ContactErrors:
-    """Errors of all frames of a solved world from 1 on; where nothing tells a size, truth is brought to ours."""
+    """Errors of all frames of a solved world; where nothing tells a size, truth is brought to ours."""
     told = solved.checked
     parts = [
         _of_frame(solved, each.forces, told[k], *solved.true[k])
         for k, each in enumerate(solved.frames)
-        if k > 0 and (each.forces.fn > 0).any()
+        if (each.forces.fn > 0).any()
     ]
     return ContactErrors.joined(parts)
 
@@ -79,8 +88,9 @@ def _of_frame(
         wall=frame.contacts.with_wall[told],
         sliding=frame.sliding_probability[told] > SLIDES,
         doubtful=frame.bearing_probability[told] < DOUBTED,
-        witness=np.full(count, witness_of(frame.positions_share), np.uint8),
-        doubt=np.full(count, doubt_of(before.trust)),
+        witness=np.full(count, witness_behind(frame), np.uint8),
+        doubt=np.full(count, counted_doubt(before)),
+        friction=np.full(count, friction_share(before)),
         force=force[told] / mean,
         error=(force - exact)[told] / mean,
         deviation=np.column_stack([frame.fn_sd, frame.ft_sd])[told] / mean,

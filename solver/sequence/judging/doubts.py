@@ -11,7 +11,7 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
-from solver.convex.friction_check import FrictionCheck
+from solver.convex.friction_check import INTERVAL, FrictionCheck
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.judging.intervals import widen_for_friction
 from solver.sequence.judging.judgement import (
@@ -161,10 +161,15 @@ def _motion_share(evidence: Evidence) -> float:
     return 1.0 - evidence.positions_share
 
 
-def doubt_friction(frame: FrameForces, check: FrictionCheck | None) -> FrameForces:
-    """The frame as it is to be believed once the motion of all frames has contradicted the friction, if it has."""
-    if check is None or check.agrees or frame.status is FrameStatus.FAILED:
+def doubt_friction(frame: FrameForces, check: FrictionCheck | None, *, measured: bool = False) -> FrameForces:
+    """The frame as it is to be believed once the motion of all frames has contradicted the friction, if it has.
+
+    measured: the friction was not told, but read from the motion: how exactly, counts in the forces' deviations.
+    """
+    if check is None or frame.status is FrameStatus.FAILED:
         return frame
+    if check.agrees:
+        return widen_for_friction(frame, check.low, check.measured, 1.0 / INTERVAL) if measured else frame
     excess = math.log(check.measured / check.given)
     share = min(max(FRICTION_LOSS[0] * excess, -FRICTION_LOSS[1] * excess), 1.0) * (1.0 - frame.positions_share)
     words = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from rodsight.study.worlds.contact_errors import ContactErrors
-from rodsight.study.worlds.intervals import covered, fit_intervals
+from rodsight.study.worlds.intervals import covered, fit_intervals, interval_score
 
 from solver.sequence.judging.intervals import Group
 
@@ -20,7 +20,7 @@ def _errors(rng: np.random.Generator) -> ContactErrors:
     return ContactErrors(
         world=np.where(np.arange(COUNT) % 2 == 0, "shear", "biaxial"), seed=np.zeros(COUNT, np.int64),
         frame=np.ones(COUNT, np.int64), group=group, wall=no, sliding=no, doubtful=no,
-        witness=np.zeros(COUNT, np.uint8), doubt=doubt, force=np.ones((COUNT, 2)),
+        witness=np.zeros(COUNT, np.uint8), doubt=doubt, friction=np.ones(COUNT), force=np.ones((COUNT, 2)),
         error=size[:, None] * formula * rng.standard_normal((COUNT, 2)), deviation=formula, formula=formula,
     )  # fmt: skip
 
@@ -37,3 +37,9 @@ def test_fitted_intervals_cover_in_every_group_on_errors_that_were_not_fitted():
             assert one == pytest.approx(0.683, abs=0.04)
             assert two == pytest.approx(0.954, abs=0.02)
     assert covered(others.select(others.group == Group.WEAK))[0] < 0.4
+
+
+def test_the_score_is_least_for_the_narrowest_intervals_that_cover():
+    error = np.random.default_rng(3).standard_normal(COUNT)
+    scores = {width: interval_score(error, np.full(COUNT, width)) for width in (0.6, 0.98, 2.0)}
+    assert min(scores, key=lambda width: scores[width]) == 0.98

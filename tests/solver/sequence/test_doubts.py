@@ -20,7 +20,9 @@ from solver.sequence.judging.doubts import (
     tell_doubts,
 )
 from solver.sequence.judging.information import Information
+from solver.sequence.judging.intervals import FRICTION_ERROR
 from solver.sequence.judging.judgement import trust
+from tests.app.recording.fake_results import make_results
 from tests.solver.sequence.test_judgement import SOUND
 
 CLEAR = Information(
@@ -107,3 +109,11 @@ def test_a_friction_that_the_motion_contradicts_lowers_the_trust_most_where_it_i
         assert doubt_friction(frame, agrees) is frame
     failed = replace(frame, status=FrameStatus.FAILED)
     assert doubt_friction(failed, check(0.40, 0.34, 0.46)) is failed
+
+
+def test_a_friction_that_was_measured_is_as_exact_as_its_interval():
+    frame = make_results(1, 8, 7, sweeps=2).frames[0]
+    told = doubt_friction(frame, check(0.26, 0.22, 0.30), measured=True)
+    expected = FRICTION_ERROR[0] * 0.5 * math.log(0.26 / 0.22) * np.maximum(frame.fn, 0.0)
+    assert np.sqrt(told.fn_sd**2 - frame.fn_sd**2) == pytest.approx(expected, rel=1e-3, abs=1e-4)
+    assert told.trust == frame.trust

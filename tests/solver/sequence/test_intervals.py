@@ -7,12 +7,16 @@ import pytest
 
 from solver.sequence.judging.intervals import (
     FLOOR,
+    FRICTION_POWER,
+    NO_FRICTION,
     Group,
     Witness,
     calibrate_deviations,
     formula_deviations,
+    friction_share,
     groups_of,
     widen_for_friction,
+    witness_behind,
     witness_of,
 )
 from tests.app.recording.fake_results import make_results
@@ -24,7 +28,7 @@ def frame():
     c = one.contacts.count
     fn = np.linspace(0.0, 2.0, c) * 30.0
     return replace(
-        one, fn=fn, fn_sd=0.1 * fn, ft_sd=0.03 * fn, trust=0.9, positions_share=0.0,
+        one, frame=3, fn=fn, fn_sd=0.1 * fn, ft_sd=0.03 * fn, trust=0.9, positions_share=0.0,
         bearing_probability=np.where(np.arange(c) % 7 == 0, 0.5, 1.0), sliding_probability=np.zeros(c),
     )  # fmt: skip
 
@@ -63,6 +67,24 @@ def test_doubt_widens_where_motion_speaks_and_narrows_the_mean_of_both_witnesses
             calibrate_deviations(replace(frame, positions_share=share, trust=trust)).fn_sd[-1] for trust in (0.95, 0.7)
         )
         assert (doubted > sure) == grows
+
+
+def test_no_doubt_beyond_what_truths_told_widens_what_the_motion_says(frame):
+    trusts = (0.9, 0.6)  # rods that no photograph shows take trust away, not exactness where forces are shown
+    one, other = (calibrate_deviations(replace(frame, trust=trust)) for trust in trusts)
+    assert other.fn_sd == pytest.approx(one.fn_sd)
+
+
+def test_the_first_frame_is_the_less_exact_the_more_friction_it_bears(frame):
+    first = replace(frame, frame=0)
+    assert (witness_behind(first), witness_behind(frame)) == (Witness.FIRST, Witness.MOTION)
+    little, much = (calibrate_deviations(replace(first, ft=share * first.fn)) for share in (0.02, 0.1))
+    ratio = (0.1 + NO_FRICTION) / (0.02 + NO_FRICTION)
+    assert much.fn_sd[-1] / little.fn_sd[-1] == pytest.approx(ratio ** FRICTION_POWER[0])
+    assert much.ft_sd[-1] / little.ft_sd[-1] == pytest.approx(ratio ** FRICTION_POWER[1])
+    assert (formula_deviations(much)[-1] == pytest.approx(formula_deviations(little)[-1])) and friction_share(
+        frame
+    ) == 1
 
 
 def test_a_wrong_friction_widens_strong_contacts_most(frame):
