@@ -166,10 +166,11 @@ def test_the_page_draws_the_forces_in_a_browser_without_a_server(results, tmp_pa
 def test_the_page_without_its_recording_draws_no_forces(tmp_path, recording, page):
     file = tmp_path / "run.html"
     write_single_page([recording.path], file, title="empty")
-    text = file.read_text().replace("PATIENCE = 60000", "PATIENCE = 5000")  # it waits for what never comes
+    # It waits for what never comes.
+    text = file.read_text(encoding="utf-16").replace("PATIENCE = 60000", "PATIENCE = 5000")
     sent = "handle.send_rrd_to_channel(channel, await unpack(`recording-${number}-${part}`));"
     assert sent in text
-    file.write_text(text.replace(sent, ""))
+    file.write_text(text.replace(sent, ""), encoding="utf-16")
     page.goto(f"file://{file}?renderer=webgl")
     page.wait_for_function("() => window.rodsight && seen.colours() > 20")  # the viewer has drawn itself
     wait_until_still(page)
