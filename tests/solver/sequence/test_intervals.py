@@ -82,9 +82,8 @@ def test_the_first_frame_is_the_less_exact_the_more_friction_it_bears(frame):
     ratio = (0.1 + NO_FRICTION) / (0.02 + NO_FRICTION)
     assert much.fn_sd[-1] / little.fn_sd[-1] == pytest.approx(ratio ** FRICTION_POWER[0])
     assert much.ft_sd[-1] / little.ft_sd[-1] == pytest.approx(ratio ** FRICTION_POWER[1])
-    assert (formula_deviations(much)[-1] == pytest.approx(formula_deviations(little)[-1])) and friction_share(
-        frame
-    ) == 1
+    assert formula_deviations(much)[-1] == pytest.approx(formula_deviations(little)[-1])
+    assert friction_share(frame) == 1.0
 
 
 def test_a_wrong_friction_widens_strong_contacts_most(frame):
