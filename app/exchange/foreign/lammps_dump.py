@@ -45,8 +45,8 @@ class _Step:
     file: Path
     line: int  # of its first particle
     number: int
-    bounds: Array  # (3, 2)
-    tilt: tuple[float, float, float]  # xy, xz, yz
+    low: Array  # (3,) corner of the box
+    edges: Array  # (3, 3) from there, a row each
     ends: tuple[str, ...]  # (3,) what the faces are: pp, ff, …
     columns: list[str]
     rows: list[list[str]]
@@ -109,12 +109,8 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     seen = Observations(
         table, "id", joined(frames), tuple(names), joined(place), turned, known, remarks=tuple(how), counted=summed
     )
-    later = int(k[1] > k[0])  # of the two axes: its edge is the tilted one
-    cell = np.zeros((len(ordered), 2, 2))
-    for one, step in zip(cell, ordered, strict=True):
-        one[0, 0], one[1, 1] = (step.bounds[each, 1] - step.bounds[each, 0] for each in k)
-        one[later, 1 - later] = step.tilt[sum(k) - 1]
-    low = np.array([[step.bounds[each, 0] for each in k] for step in ordered])
+    low = np.array([step.low[k] for step in ordered])
+    cell = np.array([step.edges[np.ix_(k, k)] for step in ordered])
     return Dump(seen, low, cell, periodic)
 
 
@@ -151,11 +147,11 @@ class _Finder:
         values = self.numbers(name)
         if not name.endswith(SCALED):
             return values
-        if any(self._step.tilt):
+        if np.any(self._step.edges != np.diag(np.diag(self._step.edges))):
             where = f"step {self._step.number}"
             raise InputError(self._step.file, where, f"{name} is a share of a tilted box: dump x y z, or xu yu zu")
-        low, high = self._step.bounds["xyz".index(axis)]
-        return low + values * (high - low)
+        k = "xyz".index(axis)
+        return self._step.low[k] + values * self._step.edges[k, k]
 
     def radius(self) -> Array:
         if "radius" in self._step.columns:
@@ -189,7 +185,7 @@ def _is_dump(file: Path) -> bool:
 def _steps(file: Path) -> Iterator[_Step]:
     lines = read_text(file).splitlines()
     at, number, count = 0, None, None
-    bounds, tilt, ends = np.zeros((3, 2)), (0.0, 0.0, 0.0), ("ff", "ff", "ff")
+    low, edges, ends = np.zeros(3), np.zeros((3, 3)), ("ff", "ff", "ff")
     while at < len(lines):
         head = lines[at].split()
         if not head:
@@ -204,7 +200,7 @@ def _steps(file: Path) -> Iterator[_Step]:
             elif item == "NUMBER OF ATOMS":
                 count, at = int(lines[at + 1]), at + 2
             elif item.startswith("BOX BOUNDS"):
-                bounds, tilt = _box([lines[at + k].split() for k in (1, 2, 3)])
+                low, edges = _box([lines[at + k].split() for k in (1, 2, 3)], general="abc" in head)
                 ends = tuple(each for each in head[3:] if len(each) == 2 and set(each) <= set("pfsm")) or ends
                 at += 4
             elif item.startswith("ATOMS"):
@@ -216,7 +212,7 @@ def _steps(file: Path) -> Iterator[_Step]:
                 if short or len(rows) < count:
                     row = short[0] if short else len(rows)
                     raise InputError(file, f"row {first + row + 1}", f"is not the {len(columns)} cells of a particle")
-                yield _Step(file, first + 1, number, bounds, tilt, ends, columns, rows)
+                yield _Step(file, first + 1, number, low, edges, ends, columns, rows)
                 at = first + count
             else:  # UNITS, TIME, …
                 at += 2
@@ -224,14 +220,22 @@ def _steps(file: Path) -> Iterator[_Step]:
             raise InputError(file, f"row {at + 2}", f"does not follow from ITEM: {item}") from None
 
 
-def _box(rows: list[list[str]]) -> tuple[Array, tuple[float, float, float]]:
-    """Bounds (3, 2) and tilts; of a tilted box the file tells the bounds of what surrounds it."""
+def _box(rows: list[list[str]], *, general: bool) -> tuple[Array, Array]:
+    """Corner (3,) and edges (3, 3); of a tilted box LAMMPS tells the bounds of what surrounds it.
+
+    general: every row is an edge and a coordinate of the corner, as OVITO and later versions of LAMMPS write.
+    """
     values = [[float(cell) for cell in row] for row in rows]
+    if general:
+        told = np.array([row[:4] for row in values])
+        return told[:, 3], told[:, :3]
     bounds = np.array([row[:2] for row in values])
     xy, xz, yz = ((row[2] if len(row) > 2 else 0.0) for row in values)
     bounds[0] -= min(0.0, xy, xz, xy + xz), max(0.0, xy, xz, xy + xz)
     bounds[1] -= min(0.0, yz), max(0.0, yz)
-    return bounds, (xy, xz, yz)
+    edges = np.diag(bounds[:, 1] - bounds[:, 0])
+    edges[1, 0], edges[2, 0], edges[2, 1] = xy, xz, yz
+    return bounds[:, 0], edges
 
 
 def _sum_up(number: list[int], names: list[list[str]], spin: list[Array], interval: float) -> Array:

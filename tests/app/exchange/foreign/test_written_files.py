@@ -72,3 +72,37 @@ def test_what_trackpy_found_and_linked_comes_in(tmp_path, capsys):
     assert moved[riser[0]] == pytest.approx([0.0, 3.0], abs=0.2)
     assert np.delete(moved, riser, axis=0) == pytest.approx(np.zeros((8, 2)), abs=0.05)
     assert read_tracks(load_experiment(tmp_path / "out")).radius == pytest.approx(np.full(9, 1.5e-3))
+
+
+def test_edges_of_a_box_tell_what_bounds_and_tilts_do(tmp_path, capsys):
+    lines = (WRITTEN / "sheared_cell.dump").read_text().splitlines()
+    at = len(lines) - 36 - 4
+    assert lines[at - 1].startswith("ITEM: BOX BOUNDS xy xz yz")
+    lines[at - 1] = "ITEM: BOX BOUNDS abc origin pp pp pp"
+    lines[at : at + 3] = ["0.092544 0 0 0.001728", "-0.040704 0.092544 0 0.001728", "0 0 0.016 -0.008"]
+    (tmp_path / "edges.dump").write_text("\n".join(lines))
+    take_in(capsys, "lammps", tmp_path / "edges.dump", tmp_path / "edges", "--interval", STEP)
+    take_in(capsys, "lammps", WRITTEN / "sheared_cell.dump", tmp_path / "tilts", "--interval", STEP)
+    edges, tilts = walls_in(tmp_path / "edges"), walls_in(tmp_path / "tilts")
+    assert edges is not None
+    assert tilts is not None
+    assert edges.cell == pytest.approx(tilts.cell)
+
+
+def test_a_dump_that_ovito_exports_comes_in(tmp_path, capsys):
+    inside = pytest.importorskip("ovito.io", reason="the ovito package is not installed")
+    dump = tmp_path / "from_ovito.dump"
+    pipeline = inside.import_file(str(WRITTEN / "sheared_cell.dump"))
+    columns = ["Particle Identifier", "Position.X", "Position.Y", "Radius"]
+    inside.export_file(pipeline, str(dump), "lammps/dump", columns=columns, multiple_frames=True)
+    assert "abc origin" in dump.read_text()  # it writes edges where LAMMPS writes bounds and tilts
+    take_in(capsys, "lammps", dump, tmp_path / "ovito", "--interval", STEP)
+    take_in(capsys, "lammps", WRITTEN / "sheared_cell.dump", tmp_path / "lammps", "--interval", STEP)
+    ours, theirs = walls_in(tmp_path / "lammps"), walls_in(tmp_path / "ovito")
+    assert ours is not None
+    assert theirs is not None
+    assert theirs.cell == pytest.approx(ours.cell)
+    for name in ("position", "radius", "time"):
+        assert getattr(tracks_in(tmp_path / "ovito"), name) == pytest.approx(
+            getattr(tracks_in(tmp_path / "lammps"), name)
+        ), name
