@@ -110,10 +110,10 @@ def _draw_figure(panel: Axes, entries: list[Entry], commits: list[str], machines
         below = [entry.median - entry.least for entry in own]
         above = [entry.greatest - entry.median for entry in own]
         panel.errorbar(place, middle, [below, above], fmt="o-", color=COLOURS[k % len(COLOURS)], ms=3.0, capsize=2.0)
-    panel.set_title(f"{entries[0].figure}\n[{entries[0].unit}]", fontsize=8)
+    panel.set_title(f"{entries[0].figure.replace('`', '')}\n[{entries[0].unit}]", fontsize=8)
     panel.set_xticks(range(len(commits)), [commit[:7] for commit in commits], rotation=30 if len(commits) > 3 else 0)
     panel.set_xlim(-0.5, len(commits) - 0.5)
-    panel.set_ylim(bottom=0.0)
+    panel.set_ylim(0.0, 1.15 * max(entry.greatest for entry in entries))
     panel.grid(axis="y", lw=0.3)
 
 

@@ -20,9 +20,14 @@ def docs(
     text: Annotated[
         bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print the page here instead of opening it")
     ] = False,
+    find: Annotated[
+        str | None, tyro.conf.arg(metavar="WORDS", help="list the sections that hold these words, and open none")
+    ] = None,
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="write the pages there, and open none")] = None,
 ) -> int:
     """Open the documentation in the browser: the shipped pages, without a network.
+
+    Words instead of a page: rodsight docs --find "plot P(f)"
 
     Example: rodsight docs troubleshooting --text
     """
@@ -34,6 +39,8 @@ def docs(
     from ...recording.viewing.viewer import has_display
     from ..terminal import tell
 
+    if find is not None:
+        return _find(find)
     names = {file.removesuffix(".md"): file for file in pages()}
     name = (page or "index").removesuffix(".md").replace("-", "_")
     if name not in names:
@@ -51,4 +58,20 @@ def docs(
     if out is None and has_display():
         webbrowser.open(shown.resolve().as_uri())
     tell(console, f"{shown}; in this terminal: rodsight docs {name} --text")
+    return 0
+
+
+def _find(words: str) -> int:
+    """List the sections that hold the words, with the line that shows one of them."""
+    from rich.console import Console
+
+    from ...manual.finding import find_sections
+
+    sections = find_sections(words)
+    if not sections:
+        raise InputError("--find", repr(words), "stands in no section: try fewer words, or parts of them")
+    console = Console(highlight=False, markup=False)
+    for section in sections:
+        console.print(f"{section.title}: {section.heading}", style="bold")
+        console.print(f"  rodsight docs {section.page.removesuffix('.md')}")
     return 0

@@ -14,6 +14,7 @@ import pytest
 import rodsight
 from rodsight.cli import command_list, commands_page
 from rodsight.manual.contents import CONTENTS, FOLDER, pages
+from rodsight.manual.finding import find_sections
 from rodsight.manual.messages import find_messages
 from rodsight.manual.reading import write_pages
 from rodsight.manual.troubleshooting import topic_of, troubleshooting_page
@@ -154,6 +155,29 @@ def test_the_python_of_a_page_runs(page, folder, monkeypatch, capsys):
     for number, block in enumerate(blocks(TEXTS[page], "python")):
         exec(compile(block, f"{page}, block {number}", "exec"), {})
     capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("question", "page", "heading"),
+    [
+        ("how do I get walls?", "photographs.md", "How to get walls"),
+        ("what if I do not know μ?", "photographs.md", "What you may not know"),
+        ("may I believe frame 12?", "trust.md", "May I believe frame 12?"),
+        ("how do I plot P(f) for my paper?", "python.md", "P(f) for a paper"),
+        ("how do I run fifty experiments?", "campaigns.md", "Many experiments"),
+    ],
+)
+def test_a_question_of_a_newcomer_leads_to_its_answer(question, page, heading, capsys):
+    found = find_sections(question)[0]
+    assert (found.page, found.heading) == (page, heading)
+    assert command("docs", "--find", question) == 0
+    assert heading in capsys.readouterr().out.splitlines()[0]
+
+
+def test_words_that_stand_nowhere_are_said(capsys):
+    assert command("docs", "--find", "photosynthesis") == 2
+    assert "try fewer words" in capsys.readouterr().err
+    assert not find_sections("how do I")
 
 
 def test_the_command_writes_or_prints_the_pages(tmp_path, capsys):
