@@ -24,6 +24,15 @@ WIDE = (
     0.9  # [radii], at any angle, where nothing is found there: a rod that is dropped on its place is meant to be there
 )
 FITS = 0.6  # correlation from which on nothing else is searched
+WHOLE = 0.8  # correlation from which on nothing covers a rod
+KEPT_LEAST = 0.25  # share of a rod that must be seen where the rest is covered,
+AGREES = 0.9  # with which correlation,
+LEASH = 0.3  # [radii] no farther from where it was looked for
+LEAST_RESIDUAL = 2.0  # [grey] that noise alone leaves
+INNER = 0.9  # of the radius, within which the light is told by
+LEAST_GAIN = 0.15  # of the light: less is a cover, which has one grey
+LIGHTS = 300  # lines through two pixels,
+SAME = 9.0  # [grey] to which others agree
 SIDE = 88  # pixels of a picture of a rod
 SURE = 0.5  # correlation that a fit from a wide search must have: among many poses some correlate by accident
 
@@ -70,12 +79,40 @@ class Mender:
                     after = again
         hopeless = float(registration.patches.accidental_zncc[rows[0]])
         found = _good(after, hopeless)
+        if not _good(after, WHOLE):
+            hidden = self._partly_hidden(registration, rows, np.concatenate([after.pose, given]))
+            after, found = (after, found) if hidden is None else (hidden, True)
         chosen = after if found else before
         x, y, angle = (float(each) for each in (after.pose[0] if found else given[0]))
         return Mended(
             x, y, angle, float(chosen.zncc[0]), _deviation(chosen), float(before.zncc[0]), _deviation(before),
             float(after.sigma[0]) if found else float("nan"), found,
         )  # fmt: skip
+
+    def _partly_hidden(self, registration: Registration, rows: Rows, starts: Array) -> Fits | None:
+        """The fit from poses (m, 3) in which most of the rod agrees, where a part of it is covered; None: none is.
+
+        The tracker asks for more of the rod, and for the light of its neighbours: here a person says that it is there.
+        """
+        patches, best = registration.patches, None
+        norm, mean = patches.norm[rows], patches.mean[rows]
+        circle = self.circles[rows[0]]
+        first = _cut_out(self._photograph(0), (circle[0], circle[1], 0.0), circle[2])
+        disc = np.hypot(*_offsets(circle[2])) < INNER * circle[2]
+        for start in (each for each in starts for _ in range(2)):
+            if best is not None:
+                start = best.pose[0]  # the light is told better from where most agrees
+            x, y, angle = start.tolist()
+            here = _cut_out(registration.photograph.image, (x, y, angle), circle[2])
+            gain, offset = _light(first[disc], here[disc])
+            fits = registration.correlator.fit_robust(
+                registration.photograph, rows, start[None], np.full(1, LEASH * circle[2]), LEAST_RESIDUAL, gain * norm,
+                gain * mean + offset,
+            )  # fmt: skip
+            agrees = fits.converged[0] and fits.kept[0] > KEPT_LEAST and fits.zncc[0] > AGREES
+            if agrees and (best is None or fits.zncc[0] > best.zncc[0]):
+                best = fits
+        return best
 
     def prepare(self, frame: int) -> None:
         """Make a photograph ready to be correlated with."""
@@ -137,6 +174,20 @@ def _difference(here: Array, first: Array, disc: NDArray[np.bool_]) -> Array:
     left = np.zeros_like(here)
     left[disc] = max(gain, 0.0) * a - b
     return left
+
+
+def _light(first: Array, here: Array) -> tuple[float, float]:
+    """Gain and offset by which most pixels of a rod (p,) became what they are: of many lines through two, the best."""
+    rng = np.random.default_rng(0)
+    a, b = rng.integers(0, len(first), (2, LIGHTS))
+    apart = np.abs(first[a] - first[b]) > 4.0 * SAME
+    gain = (here[a] - here[b])[apart] / (first[a] - first[b])[apart]
+    offset = here[a][apart] - gain * first[a][apart]
+    some = rng.integers(0, len(first), min(len(first), 1500))
+    agree = (np.abs(here[some] - gain[:, None] * first[some] - offset[:, None]) < SAME).sum(axis=1)
+    agree[gain < LEAST_GAIN] = 0
+    best = int(agree.argmax()) if len(agree) else -1
+    return (float(gain[best]), float(offset[best])) if best >= 0 else (1.0, 0.0)
 
 
 def _searched(registration: Registration, rows: Rows, given: Array, within: tuple[float, float]) -> Fits:

@@ -15,14 +15,18 @@ import { share } from "/page/share.js";
 
 export const STEPS = [photographs, scale, walls, rods, material, run, mend, inspect, share];
 
-export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, tell };
+export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, looks: 0, tell };
 globalThis.bench = app; // for the curious, and for tests
 
-/** One action after the other; what goes wrong is said. */
-app.queue = (work, words = "") => {
+const waiting = new Set(); // what has been asked for and is not done: asked again meanwhile, it is a double click
+const PATIENCE = 250, LOOKS = 1000; // [ms]
+
+/** One action after the other; what goes wrong is said. once: names an action that is not to be done twice at a time. */
+app.queue = (work, words = "", once = null) => {
+  if (once !== null) { if (waiting.has(once)) return app.busy; waiting.add(once); }
   app.busy = app.busy.then(async () => {
-    const slow = setTimeout(() => { at("busy-text").textContent = words; at("busy").hidden = !words; }, 250);
-    try { await work(); } catch (error) { tell(error.message || String(error), true); app.paint(); } finally { clearTimeout(slow); at("busy").hidden = true; app.done += 1; }
+    const slow = setTimeout(() => { at("busy-text").textContent = words || "One moment …"; at("busy").hidden = false; }, words ? PATIENCE : 2 * PATIENCE);
+    try { await work(); } catch (error) { tell(error.message || String(error), true); app.paint(); } finally { clearTimeout(slow); at("busy").hidden = true; app.done += 1; waiting.delete(once); }
   });
   return app.busy;
 };
@@ -32,7 +36,21 @@ app.change = (question, values = {}, words = "", then = null) => app.queue(async
   const told = await ask(question, { at: app.project.at, ...values });
   app.take(told);
   then?.(told);
-}, words);
+}, words, question === "undo" || question === "redo" ? null : question + JSON.stringify(values));
+
+/** What another window, or another program, has changed: looked for while this one is seen, and nobody types. */
+async function lookAround() {
+  const { project } = app;
+  app.looks += 1;
+  if (!project || document.hidden || waiting.size || /^(INPUT|SELECT)$/.test(document.activeElement?.tagName ?? "")) return;
+  const done = app.done;
+  try {
+    const told = await ask("stamp", { at: project.at });
+    if (told.stamp === app.project?.stamp || app.project?.at !== project.at || app.done !== done) return;
+    app.queue(async () => { const fresh = await ask("project", { at: project.at }); if (app.project?.at === project.at) app.take(fresh); });
+  } catch { /* the server has gone, or is busy: the next look tells */ }
+}
+setInterval(lookAround, LOOKS);
 
 app.take = (project) => {
   app.project = project;

@@ -41,13 +41,13 @@ function experimentTile(app, each) {
 const TONE = { settled: "good", settling: "good", rearranging: "doubtful", suspect: "bad", failed: "bad", reset: "" };
 
 function rollTile(app, each) {
-  return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await ask("begin", { roll: each.roll, name: each.name })), "Reading photographs …") },
+  return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await ask("begin", { roll: each.roll, name: each.name })), "Reading photographs …", "begin") },
     h("img", { class: "picture", alt: "", src: `/glimpse?${new URLSearchParams({ roll: each.roll })}` }),
     h("span", { class: "words" }, h("b", {}, each.folder === "." ? each.name : each.folder), h("span", {}, `${each.count} photographs, ${each.first} … ${each.last}`), h("span", {}, "Set up an experiment from these")));
 }
 
 function sampleTile(app) {
-  return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await ask("sample")), "Copying the sample …") },
+  return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await ask("sample")), "Copying the sample …", "sample") },
     h("img", { class: "picture", alt: "", src: "/glimpse" }),
     h("span", { class: "words" }, h("b", {}, "The sample: simple shear"), h("span", {}, "250 rods, 24 photographs, with the true forces to compare with")));
 }

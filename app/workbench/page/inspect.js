@@ -24,6 +24,7 @@ export const inspect = {
   rodsOfFrame: () => net.rods.x.flatMap((x, n) => [x, net.rods.y[n], net.rods.r[n]]), // for tests
   chosen: () => (chosen?.j === undefined ? null : { i: chosen.i, j: chosen.j }), // for tests
   moved(app) { recording?.show(Math.max(app.frame - (facts?.first ?? 0), 0)); app.queue(() => load(app)); },
+  taken(app) { if (facts) app.queue(async () => { facts = (await ask("run_told", { at: app.project.at })).frames; await load(app, true); }); },
   tool: (app) => tool(app),
   panel(app) {
     if (!facts) return [h("p", {}, "There is nothing to inspect yet: forces are found when the experiment is run."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
@@ -158,7 +159,7 @@ function say(app, verdict) {
     if (judges.open) judges.told = await ask("agreement", { at: app.project.at });
     tell(`${pairName(pair)}: ${verdict}. The next run obeys it`);
     nextAtStake(app); app.paint();
-  });
+  }, "", `judge ${app.frame} ${pair.i} ${pair.j}`);
 }
 
 function undo(app) {

@@ -1,6 +1,6 @@
 // Step 7: rods that tracking lost or took for others: picked, dragged, turned, correlated again from there at once.
 
-import { ask, at, digits, fact, h, tell } from "/page/dom.js";
+import { ask, at, digits, fact, h, strokeCircles, tell } from "/page/dom.js";
 import { showDoubts } from "/page/lanes.js";
 
 const KEPT = "#2fbf93", WEAK = "#f0e442", SEEN = "#56b4e980";
@@ -16,6 +16,7 @@ export const mend = {
   moved(app) { ghost = null; mended = null; load(app); },
   taken(app) { load(app); },
   chosen: () => chosen, // for tests, as are the next ones
+  rods: () => told.rods,
   ghost: () => (ghost ? [ghost.x, ghost.y, ghost.angle] : null),
   tool,
   panel(app) {
@@ -40,10 +41,12 @@ export const mend = {
   draw(app, c, k) {
     if (!told || told.frame !== app.frame) return;
     const weak = new Set(told.doubtful), corrected = correctedHere(app);
+    const sure = [], doubtful = [];
     told.rods.id.forEach((id, n) => {
-      if ((id === chosen && ghost) || corrected.has(id) || (only && !weak.has(id))) return;
-      circle(c, k, told.rods.x[n], told.rods.y[n], told.rods.r[n], told.rods.angle[n], weak.has(id) ? WEAK : SEEN, weak.has(id) ? 2.2 : 1.3);
+      if ((id === chosen && ghost) || corrected.has(id) || (only && !weak.has(id)) || !app.stage.sees(told.rods.x[n], told.rods.y[n], told.rods.r[n])) return;
+      (weak.has(id) ? doubtful : sure).push([told.rods.x[n], told.rods.y[n], told.rods.r[n], told.rods.angle[n]]);
     });
+    strokeCircles(c, k, sure, SEEN, 1.3); strokeCircles(c, k, doubtful, WEAK, 2.2);
     for (const rod of told.lost) if (rod.id !== chosen && !corrected.has(rod.id)) circle(c, k, rod.x, rod.y, rod.r, rod.angle, WEAK, 2, [6, 5]);
     for (const [id, each] of corrected) {
       const rod = rodOf(id);
@@ -99,7 +102,7 @@ function drawGhost(c, k) {
   if (patch) {
     c.save(); c.beginPath(); c.arc(ghost.x, ghost.y, ghost.r, 0, 7); c.clip();
     c.globalAlpha = held ? 0.85 : 0.55; c.translate(ghost.x, ghost.y); c.rotate(ghost.angle);
-    c.drawImage(patch.image, -patch.x, -patch.y, patch.width, patch.height); c.restore(); c.globalAlpha = 1;
+    c.drawImage(patch.image, -patch.width / 2, -patch.width / 2, patch.width, patch.width); c.restore(); c.globalAlpha = 1;
   }
   circle(c, k, ghost.x, ghost.y, ghost.r, ghost.angle, "#ffffff", 2.6);
   const [hx, hy] = handle(ghost);
@@ -107,13 +110,7 @@ function drawGhost(c, k) {
   c.fillStyle = "#fff"; c.beginPath(); c.arc(hx, hy, 6 / k, 0, 7); c.fill();
 }
 
-function circle(c, k, x, y, r, angle, style, wide, dash = null) {
-  c.beginPath(); c.arc(x, y, r, 0, 2 * Math.PI);
-  c.setLineDash(dash ? dash.map((each) => each / k) : []);
-  c.strokeStyle = "#0009"; c.lineWidth = (wide + 1.6) / k; c.stroke();
-  c.strokeStyle = style; c.lineWidth = wide / k; c.stroke(); c.setLineDash([]);
-  if (angle !== null && angle !== undefined) { c.beginPath(); c.moveTo(x + 0.78 * r * Math.cos(angle), y + 0.78 * r * Math.sin(angle)); c.lineTo(x + r * Math.cos(angle), y + r * Math.sin(angle)); c.stroke(); }
-}
+const circle = (c, k, x, y, r, angle, style, wide, dash = null) => strokeCircles(c, k, [[x, y, r, angle]], style, wide, { dash });
 
 function card(app) {
   const n = told.rods.id.indexOf(chosen), first = app.frame === told.first;
@@ -190,10 +187,12 @@ function correlate(app) {
 }
 
 /** The rod as the first photograph shows it, to be turned and laid over the present one. */
-async function show(app, [x, y]) {
-  const url = `/photograph?${new URLSearchParams({ at: app.project.at, frame: 0, size: 20000 })}`;
-  if (wanted !== url) { wanted = url; const answer = await fetch(url); patch = { image: await createImageBitmap(await answer.blob()), width: app.project.width, height: app.project.height }; }
-  if (patch) { patch.x = x + 0.5; patch.y = y + 0.5; }
+async function show(app, [x, y, r]) {
+  const width = Math.max(Math.ceil(2.2 * r), 4), url = `/crop?${new URLSearchParams({ at: app.project.at, frame: told.first, x: Math.max(0, Math.round(x * 100)), y: Math.max(0, Math.round(y * 100)), width })}`;
+  if (wanted === url) return;
+  wanted = url; patch = null;
+  const answer = await fetch(url);
+  if (answer.ok && wanted === url) patch = { image: await createImageBitmap(await answer.blob()), width };
 }
 
 function keep(app, following = false) {
@@ -206,7 +205,7 @@ function settle(app, what, values, words = "") {
     told.corrections = answer.corrections; if (what !== "take_back") letGo();
     app.take(answer.project);
     tell(what === "take_back" ? "Taken back" : answer.ended ? `Kept in ${answer.count === 1 ? "this photograph" : `${answer.count} photographs`}: ${answer.ended}` : "Kept: the next run obeys it");
-  }, words);
+  }, words, what + JSON.stringify(values));
 }
 
 /** The next doubtful rod here; where there is none, in the next photograph that has one. */

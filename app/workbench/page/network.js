@@ -5,6 +5,8 @@ import { digits } from "/page/dom.js";
 // Perceptually even, dark to bright, told apart without red and green (cividis, viridis by ear).
 const RAMP = ["#2c3e78", "#3f5b9e", "#4f86b5", "#5fb0a8", "#9ccb6b", "#e6d04a", "#ffef9a"];
 
+const SHADES = 48; // of a ramp: the eye tells fewer apart
+
 const hex = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
 export function ramp(t) {
   const at = Math.min(Math.max(t, 0), 1) * (RAMP.length - 1), k = Math.min(Math.floor(at), RAMP.length - 2), part = at - k;
@@ -34,17 +36,22 @@ export function drawNetwork(c, k, net, { by = "fn", chosen = null, range = null,
   const size = net.rods.r.length ? net.rods.r.reduce((a, b) => a + b, 0) / net.rods.r.length : 30;
   const order = [...net.fn.keys()].sort((a, b) => net.fn[a] - net.fn[b]);
   c.lineCap = "round";
-  for (const pass of [0, 1]) for (const n of order) {
-    const fn = net.fn[n] ?? 0, [x1, y1, x2, y2] = net.line[n];
+  const groups = new Map(); // lines that look alike are one stroke
+  for (const n of order) {
+    const fn = net.fn[n] ?? 0;
     const wide = Math.min(Math.max(0.16 * size * Math.max(fn, 0) / mean, 0), 0.8 * size);
     if (wide * k < 0.35 && n !== chosen) continue;
-    c.beginPath(); c.moveTo(x1, y1); c.lineTo(x2, y2);
-    if (pass === 0) { c.strokeStyle = "#000a"; c.lineWidth = wide + 2 / k; c.stroke(); continue; }
-    const value = how.of(net, n);
-    c.globalAlpha = faint ? 0.45 : 1;
-    c.strokeStyle = value === null ? "#8a8f9a" : ramp((value - low) / (high - low || 1)); c.lineWidth = wide; c.stroke();
-    c.globalAlpha = 1;
+    const value = how.of(net, n), shade = value === null ? -1 : Math.round(SHADES * Math.min(Math.max((value - low) / (high - low || 1), 0), 1)), step = Math.max(1, Math.round(wide * k * 2));
+    const name = step * 1000 + shade;
+    if (!groups.has(name)) groups.set(name, { path: new Path2D(), wide: step / 2 / k, style: shade < 0 ? "#8a8f9a" : ramp(shade / SHADES) });
+    const [x1, y1, x2, y2] = net.line[n], { path } = groups.get(name);
+    path.moveTo(x1, y1); path.lineTo(x2, y2);
   }
+  c.strokeStyle = "#000a";
+  for (const { path, wide } of groups.values()) { c.lineWidth = wide + 2 / k; c.stroke(path); }
+  c.globalAlpha = faint ? 0.45 : 1;
+  for (const { path, wide, style } of groups.values()) { c.strokeStyle = style; c.lineWidth = wide; c.stroke(path); }
+  c.globalAlpha = 1;
   c.lineCap = "butt";
   if (chosen !== null && net.line[chosen]) {
     const [x, y] = net.point[chosen];

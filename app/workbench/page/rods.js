@@ -1,6 +1,6 @@
 // Step 4: the rods of the first photograph: looked for, added, deleted, moved, resized; their radii in classes.
 
-import { ask, chart, colour, digits, fact, h, parse, tell } from "/page/dom.js";
+import { ask, chart, colour, digits, fact, h, parse, strokeCircles, tell } from "/page/dom.js";
 
 export const CLASS_COLOURS = ["#56b4e9", "#e69f00", "#2fbf93", "#cc79a7", "#f0e442", "#d55e00", "#0072b2", "#999999"];
 let chosen = null, held = null, quality = null, told = null, proposed = null;
@@ -21,7 +21,7 @@ export const rods = {
       h("button", { class: found ? "" : "primary", id: "detect", disabled: Boolean(told) && !project.pixel, onclick: () => app.queue(async () => {
         const answer = await ask("detect_rods", { at: project.at, radii: radii() });
         quality = answer.quality; chosen = null; proposed = null; app.take(answer); tell(`${answer.rods?.id.length ?? 0} rods found`);
-      }, "Looking for rods …") }, found ? "Look for them again" : "Look for rods"),
+      }, "Looking for rods …", "detect") }, found ? "Look for them again" : "Look for rods"),
       found ? [
         h("div", { class: "fact" }, h("span", {}, "rods"), h("span", { class: "big" }, String(found.id.length))),
         chart(96, (c, width, height) => histogram(app, c, width, height)),
@@ -36,14 +36,15 @@ export const rods = {
   draw(app, c, k) {
     const found = app.project.rods;
     if (!found) return;
-    const classes = classesOf(app.project);
+    const classes = classesOf(app.project), groups = new Map();
     found.id.forEach((id, n) => {
       const at = held && held.id === id && held.pose ? held.pose : [found.x[n], found.y[n], found.r[n]];
-      const here = id === chosen, weak = quality && quality.length === found.id.length && quality[n] < 0.45;
-      c.beginPath(); c.arc(at[0], at[1], at[2], 0, 2 * Math.PI);
-      c.lineWidth = (here ? 4.5 : 3.2) / k; c.strokeStyle = "#000a"; c.stroke();
-      c.lineWidth = (here ? 3 : 1.6) / k; c.strokeStyle = here ? "#ffffff" : classes(found.r[n]); c.setLineDash(weak ? [5 / k, 4 / k] : []); c.stroke(); c.setLineDash([]);
+      if (!app.stage.sees(...at)) return;
+      const weak = quality && quality.length === found.id.length && quality[n] < 0.45, style = id === chosen ? "#ffffff" : classes(found.r[n]), name = `${style} ${Boolean(weak)}`;
+      if (!groups.has(name)) groups.set(name, { style, weak, circles: [] });
+      groups.get(name).circles.push(at);
     });
+    for (const { style, weak, circles } of groups.values()) strokeCircles(c, k, circles, style, style === "#ffffff" ? 3 : 1.6, { dash: weak ? [5, 4] : null, under: "#000a" });
     if (held?.adding) { c.beginPath(); c.arc(held.p[0], held.p[1], held.r, 0, 2 * Math.PI); c.lineWidth = 2 / k; c.strokeStyle = "#fff"; c.stroke(); }
   },
   key(app, event) {
@@ -54,7 +55,9 @@ export const rods = {
     if (event.key === "Delete" || event.key === "Backspace") { const id = chosen; chosen = null; app.change("delete_rods", { ids: [id] }); return true; }
     const by = { ArrowLeft: [-0.25, 0, 0], ArrowRight: [0.25, 0, 0], ArrowUp: [0, -0.25, 0], ArrowDown: [0, 0.25, 0] }[event.shiftKey ? event.key : ""] ?? { "[": [0, 0, -0.25], "]": [0, 0, 0.25] }[event.key];
     if (!by) return false;
-    app.change("move_rod", { id: chosen, x: found.x[n] + by[0], y: found.y[n] + by[1], radius: found.r[n] + by[2] });
+    found.x[n] += by[0]; found.y[n] += by[1]; found.r[n] += by[2]; // at once: the next press begins there, however slow the answer
+    app.change("move_rod", { id: chosen, x: found.x[n], y: found.y[n], radius: found.r[n] });
+    app.stage.redraw();
     return true;
   },
 };
@@ -121,14 +124,16 @@ function tool(app) {
         app.take(await ask("add_rod", { at: app.project.at, x: p[0], y: p[1], radius: sizes[sizes.length >> 1] }));
         chosen = app.project.rods.id.find((id) => !before.has(id)) ?? null;
         app.paint();
-      }, "Looking for its rim …");
+      }, "Looking for its rim …", `add ${p.map((each) => Math.round(each / 3))}`);
     },
     wheel: (p, event) => {
       if (!event.shiftKey || chosen === null) return false;
       const found = app.project.rods, n = found.id.indexOf(chosen);
       if (n < 0) return false;
       const by = (event.deltaY || event.deltaX) > 0 ? -0.25 : 0.25;
-      app.change("move_rod", { id: chosen, x: found.x[n], y: found.y[n], radius: found.r[n] + by });
+      found.r[n] += by;
+      app.change("move_rod", { id: chosen, x: found.x[n], y: found.y[n], radius: found.r[n] });
+      app.stage.redraw();
       return true;
     },
   };

@@ -53,7 +53,7 @@ const solved = (app) => facts !== null && app.frame >= facts.first && app.frame 
 const quoted = (text) => (/[^\w./-]/.test(text) ? `"${text}"` : text);
 const time = (seconds) => (seconds < 90 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);
 
-function act(app, what, values = {}) { app.queue(async () => { told = await ask(what, { at: app.project.at, ...values }); app.paint(); }); }
+function act(app, what, values = {}) { app.queue(async () => { told = await ask(what, { at: app.project.at, ...values }); app.paint(); }, "", what); }
 
 function expect(app) { app.queue(async () => { promised = { at: app.project.at, ...await ask("promise", { at: app.project.at }) }; app.paint(); }, "Looking at the first photographs …"); }
 

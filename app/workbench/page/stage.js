@@ -3,35 +3,47 @@
 import { at } from "/page/dom.js";
 
 const LOUPE = 172, MAGNIFIED = 6;
+const SMALL = 1400, ENOUGH = 1.2; // [px] of the small picture; how far it is enlarged before all pixels are asked for
+
+async function fetchPicture(url, size) {
+  const answer = await fetch(`${url}&size=${size}`);
+  return answer.ok ? createImageBitmap(await answer.blob()) : null;
+}
 
 export class Stage {
   constructor() {
     this.canvas = at("canvas");
     this.context = this.canvas.getContext("2d");
     this.view = { x: 0, y: 0, k: 1 };
-    this.image = null; this.wanted = ""; this.width = 0; this.height = 0;
+    this.image = null; this.sharp = null; this.asked = false; this.wanted = ""; this.width = 0; this.height = 0;
     this.draw = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
     this.pending = false; this.drawn = 0; this.fitted = "";
     new ResizeObserver(() => { this.resize(); }).observe(this.canvas.parentElement);
     this.listen();
   }
 
-  /** Show a picture: first a small one, at once, then all of its pixels. */
+  /** Show a picture: a small one at once, all of its pixels once they are looked at. */
   async show(url, width, height) {
     if (width && height) { this.width = width; this.height = height; }
     if (url === this.wanted) { this.redraw(); return; }
-    this.wanted = url;
+    this.wanted = url; this.sharp = null; this.asked = false;
     if (!url) { this.image = null; this.redraw(); return; }
-    for (const size of [1000, 20000]) {
-      const answer = await fetch(`${url}&size=${size}`);
-      if (!answer.ok || this.wanted !== url) return;
-      const image = await createImageBitmap(await answer.blob());
-      if (this.wanted !== url) return;
-      this.image = image;
-      if (this.fitted !== `${this.width}x${this.height}`) this.fit();
-      this.redraw();
-      if (image.width >= this.width) return;
-    }
+    const image = await fetchPicture(url, SMALL);
+    if (!image || this.wanted !== url) return;
+    this.image = image;
+    if (this.fitted !== `${this.width}x${this.height}`) this.fit();
+    this.redraw();
+  }
+
+  /** All pixels, where the small picture shows fewer than the screen could. */
+  async sharpen() {
+    const { wanted: url, image } = this;
+    if (this.asked || !url || !image || image.width >= this.width) return;
+    const k = this.loupe && this.mouse ? Math.max(this.view.k * MAGNIFIED, 6) : this.view.k;
+    if (k * (devicePixelRatio || 1) * this.width <= ENOUGH * image.width) return;
+    this.asked = true;
+    const sharp = await fetchPicture(url, 20000);
+    if (sharp && this.wanted === url) { this.sharp = sharp; this.redraw(); }
   }
 
   resize() {
@@ -82,16 +94,18 @@ export class Stage {
     c.setTransform(dense, 0, 0, dense, 0, 0);
     if (this.loupe && this.mouse && this.image) this.paintLoupe(c, dense);
     this.drawn += 1;
+    this.sharpen();
   }
 
   scene(c, view) {
     c.save();
     c.scale(view.k, view.k); c.translate(-view.x, -view.y);
     if (this.image) {
-      c.imageSmoothingEnabled = view.k * this.width / this.image.width < 3;
-      c.imageSmoothingQuality = "high";
+      const fine = this.sharp && view.k * (devicePixelRatio || 1) * this.width > ENOUGH * this.image.width, image = fine ? this.sharp : this.image;
+      c.imageSmoothingEnabled = view.k * this.width / image.width < 3;
+      c.imageSmoothingQuality = "medium";
       c.globalAlpha = this.dim ?? 1;
-      c.drawImage(this.image, -0.5, -0.5, this.width, this.height);
+      c.drawImage(image, -0.5, -0.5, this.width, this.height);
       c.globalAlpha = 1;
     }
     this.draw(c, view.k);
@@ -111,6 +125,12 @@ export class Stage {
     c.moveTo(0, LOUPE / 2); c.lineTo(LOUPE / 2 - 6, LOUPE / 2); c.moveTo(LOUPE / 2 + 6, LOUPE / 2); c.lineTo(LOUPE, LOUPE / 2); c.stroke();
     c.restore();
     c.strokeStyle = "#ffffff90"; c.lineWidth = 1.5; c.beginPath(); c.roundRect(left, 14, LOUPE, LOUPE, 12); c.stroke();
+  }
+
+  /** Whether a circle of the photograph can be seen now. */
+  sees(x, y, r) {
+    const { view } = this;
+    return x + r > view.x && y + r > view.y && x - r < view.x + this.boxWidth / view.k && y - r < view.y + this.boxHeight / view.k;
   }
 
   use(tool) { this.tool = tool ?? {}; this.canvas.classList.toggle("tool", Boolean(this.tool.cross)); this.loupe = Boolean(this.tool.loupe); this.redraw(); }

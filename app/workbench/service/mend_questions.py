@@ -22,7 +22,7 @@ from ..mending.following import Tracked, follow_on
 from ..mending.mender import Mended, Mender
 from .bench import Bench
 from .project import Project
-from .questions import Number, Text, Whole, question
+from .questions import Number, Text, Whole, edit, question
 
 DETECTIONS = "detections.csv"
 WEAK = 0.75  # correlation below which a rod is shown as doubtful
@@ -84,7 +84,7 @@ def correlate(bench: Bench, at: Text, frame: Whole, id: Whole, x: Number, y: Num
     }  # fmt: skip
 
 
-@question
+@edit
 def mend(
     bench: Bench, at: Text, frame: Whole, id: Whole, x: Number, y: Number, angle: Number, following: bool = False
 ) -> dict[str, Any]:
@@ -109,7 +109,7 @@ def mend(
     return _settled(opened) | {"mended": _told(found), "count": len(told), "ended": ended}
 
 
-@question
+@edit
 def mark_lost(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
     """Say that a rod is not to be seen in a photograph."""
     opened = bench.project(at)
@@ -120,7 +120,7 @@ def mark_lost(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]
     return _settled(opened)
 
 
-@question
+@edit
 def take_back(bench: Bench, at: Text, frame: Whole, id: Whole) -> dict[str, Any]:
     opened = bench.project(at)
     with logged(opened, "taken back"):
@@ -135,7 +135,7 @@ def corrections_log(bench: Bench, at: Text) -> dict[str, Any]:
     return {"changes": read_changes(opened.folder)}
 
 
-@question
+@edit
 def undo(bench: Bench, at: Text) -> dict[str, Any]:
     """Take the last change of the experiment back, whatever it was."""
     opened = bench.project(at)
@@ -145,7 +145,7 @@ def undo(bench: Bench, at: Text) -> dict[str, Any]:
     return opened.describe()
 
 
-@question
+@edit
 def redo(bench: Bench, at: Text) -> dict[str, Any]:
     """Do again what was undone last."""
     opened = bench.project(at)

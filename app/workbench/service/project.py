@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import zlib
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict
@@ -15,11 +16,13 @@ import numpy as np
 from ...errors import InputError
 from ...experiment.photographs import Image, read_photograph
 from ...experiment.units import Scale
+from ...run_folder import SUMMARY
+from ...verdicts.log import VERDICTS
 from ..inspecting.found import Found, find_run, run_stamp
 from ..mending.mender import Mender
 from ..running.job import Job
 from ..setup.circles import circles_of
-from ..setup.draft import Draft
+from ..setup.draft import Draft, stamp_of
 from ..setup.folder import run_facts, run_folder
 from ..setup.steps import Understood, judge
 
@@ -43,6 +46,7 @@ class Project:
         self.root, self.folder = root, folder
         self.draft = Draft(folder)
         self.lock = threading.RLock()
+        self.editing = threading.RLock()  # held from what an edit reads to what it writes
         self._photographs: OrderedDict[tuple[Path, int, str], Image] = OrderedDict()
         self._stamp: Any = None
         self._understood: Understood | None = None
@@ -144,6 +148,13 @@ class Project:
             raise InputError(self.draft.file, "key photographs.pixel_size", "is missing: set the scale first")
         return scale
 
+    def stamp(self) -> str:
+        """Another text wherever anything of it has changed, whoever changed it."""
+        data = self.draft.data()
+        told = (self.results / name for name in (VERDICTS, SUMMARY))
+        seen = self.draft.stamps(_tables(data)), self._pattern_stamp(data), run_stamp(self.results)[1:]
+        return f"{zlib.crc32(repr((seen, [stamp_of(file) for file in told])).encode()):08x}"
+
     def close(self) -> None:
         """Pause what runs."""
         if self._job is not None:
@@ -167,7 +178,7 @@ class Project:
         section = found.data.get("photographs", {})
         height, width = found.shape or (0, 0)
         return {
-            "at": self.key, "name": self.name, "folder": str(self.folder), "ready": found.ready,
+            "at": self.key, "stamp": self.stamp(), "name": self.name, "folder": str(self.folder), "ready": found.ready,
             "steps": [{"name": s.name, "mark": s.mark.value, "says": s.says} for s in found.steps.values()],
             "others": found.others, "tracked": found.tracked, "width": width, "height": height,
             "files": [file.name for file in found.files], "photographs": section,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, validate_call
@@ -18,6 +19,7 @@ Line = Annotated[list[Point], Field(min_length=2, max_length=2)]
 Numbers = Annotated[list[Number], Field(max_length=1000)]
 
 QUESTIONS: dict[str, Question] = {}
+EDITS: set[str] = set()  # those that change the files of an experiment: one at a time, from however many windows
 _RULES = ConfigDict(arbitrary_types_allowed=True, strict=True)
 
 
@@ -37,12 +39,21 @@ def question(function: Question) -> Question:
     return function
 
 
+def edit(function: Question) -> Question:
+    """Likewise; what it reads of the experiment nobody else changes until it has written."""
+    EDITS.add(function.__name__)
+    return question(function)
+
+
 def answer(bench: Bench, name: str, values: dict[str, Any]) -> Any:
     """Answer one question. Raises BadRequest, and InputError as the commands do."""
     if name not in QUESTIONS or "bench" in values:
         raise BadRequest(f"there is no question {name}")
+    at = values.get("at")
+    one_at_a_time = bench.project(at).editing if name in EDITS and isinstance(at, str) else nullcontext()
     try:
-        return QUESTIONS[name](bench, **values)
+        with one_at_a_time:
+            return QUESTIONS[name](bench, **values)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
@@ -62,6 +73,12 @@ def sample(bench: Bench) -> dict[str, Any]:
 @question
 def begin(bench: Bench, roll: Whole, name: Text) -> dict[str, Any]:
     return bench.begin(roll, name).describe()
+
+
+@question
+def stamp(bench: Bench, at: Text) -> dict[str, Any]:
+    """By which a page sees that another window, or another program, has changed something."""
+    return {"stamp": bench.project(at).stamp()}
 
 
 @question

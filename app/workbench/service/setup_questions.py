@@ -14,7 +14,7 @@ from ..setup import circles, edits
 from ..setup.steps import Understood
 from .bench import Bench
 from .project import Project
-from .questions import Line, Number, Numbers, Point, Shape, Text, Whole, question
+from .questions import Line, Number, Numbers, Point, Shape, Text, Whole, edit, question
 
 Pressure = Annotated[float, Field(ge=1e-3, le=1e11)]
 Three = Annotated[list[Point], Field(min_length=3, max_length=3)]
@@ -23,7 +23,7 @@ LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
 Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
 
 
-@question
+@edit
 def set_photographs(
     bench: Bench, at: Text, name: Text | None = None, interval: Number | None = None,
     channel: Literal["grey", "red", "green", "blue"] | None = None, region: Region | Literal["all"] | None = None,
@@ -50,7 +50,7 @@ class Measured(Shape):
     pixels: Number
 
 
-@question
+@edit
 def set_scale(
     bench: Bench, at: Text, pixel_size: Number | None = None, line: Line | None = None, metres: Number | None = None,
     rods: list[Measured] | None = None,
@@ -81,7 +81,7 @@ def measure_rod(bench: Bench, at: Text, x: Number, y: Number, radius: Number) ->
     return {"x": x, "y": y, "r": radius}
 
 
-@question
+@edit
 def draw_wall(bench: Bench, at: Text, line: Line, name: Text | None = None, snap: bool = True) -> dict[str, Any]:
     """Draw a new wall, or draw the named one anew."""
     opened = bench.project(at)
@@ -102,7 +102,7 @@ def draw_wall(bench: Bench, at: Text, line: Line, name: Text | None = None, snap
     return opened.describe() | {"snapped": share if snap else None, "wall": name}
 
 
-@question
+@edit
 def find_walls(bench: Bench, at: Text) -> dict[str, Any]:
     """Find the bars around the rods."""
     opened = bench.project(at)
@@ -113,7 +113,7 @@ def find_walls(bench: Bench, at: Text) -> dict[str, Any]:
     return opened.describe()
 
 
-@question
+@edit
 def draw_circle(
     bench: Bench, at: Text, points: Three | None = None, place: Round | None = None, name: Text | None = None,
     side: Literal["in", "out"] = "in", snap: bool = False,
@@ -140,7 +140,7 @@ def draw_circle(
     return opened.describe() | {"wall": name, "snapped": share}
 
 
-@question
+@edit
 def delete_wall(bench: Bench, at: Text, name: Text) -> dict[str, Any]:
     opened = bench.project(at)
     found = _scaled(opened)
@@ -152,14 +152,14 @@ def delete_wall(bench: Bench, at: Text, name: Text) -> dict[str, Any]:
     return opened.describe()
 
 
-@question
+@edit
 def rename_wall(bench: Bench, at: Text, name: Text, to: Text) -> dict[str, Any]:
     opened = bench.project(at)
     edits.rename_wall(opened.draft, opened.understood(), name, to)
     return opened.describe()
 
 
-@question
+@edit
 def set_plate(
     bench: Bench, at: Text, name: Text, pressure: Pressure | None = None,
     ends: Literal["auto", "bar", "corner"] = "auto",
@@ -171,7 +171,7 @@ def set_plate(
     return opened.describe()
 
 
-@question
+@edit
 def detect_rods(bench: Bench, at: Text, radii: Numbers) -> dict[str, Any]:
     """Look for the rods of the first photograph; radii [m]: the classes, none where they are not known."""
     opened = bench.project(at)
@@ -180,7 +180,7 @@ def detect_rods(bench: Bench, at: Text, radii: Numbers) -> dict[str, Any]:
     return opened.describe() | {"quality": np.round(detection.quality, 3).tolist()}
 
 
-@question
+@edit
 def add_rod(bench: Bench, at: Text, x: Number, y: Number, radius: Number) -> dict[str, Any]:
     """Add a rod at a click; its circle is fitted to the rim that is seen there."""
     opened = bench.project(at)
@@ -190,7 +190,7 @@ def add_rod(bench: Bench, at: Text, x: Number, y: Number, radius: Number) -> dic
     return opened.describe()
 
 
-@question
+@edit
 def move_rod(bench: Bench, at: Text, id: Whole, x: Number, y: Number, radius: Number) -> dict[str, Any]:
     opened = bench.project(at)
     rods = edits.with_rod(opened.understood().rods, id, (x, y, max(radius, 1.0)))
@@ -198,7 +198,7 @@ def move_rod(bench: Bench, at: Text, id: Whole, x: Number, y: Number, radius: Nu
     return opened.describe()
 
 
-@question
+@edit
 def delete_rods(bench: Bench, at: Text, ids: list[Whole]) -> dict[str, Any]:
     opened = bench.project(at)
     rods = opened.understood().rods
@@ -220,7 +220,7 @@ def classes(bench: Bench, at: Text) -> dict[str, Any]:
     return {"radii": [float(f"{each:.4g}") for each in (edits.find_classes(found.rods.radius) * pixel).tolist()]}
 
 
-@question
+@edit
 def set_classes(bench: Bench, at: Text, radii: Numbers) -> dict[str, Any]:
     """Give every rod the nearest of these radii [m]."""
     opened = bench.project(at)
@@ -236,7 +236,7 @@ def materials(bench: Bench) -> dict[str, Any]:
     return edits.MATERIALS
 
 
-@question
+@edit
 def set_material(
     bench: Bench, at: Text, density: Number | None = None, length: Number | None = None,
     friction: Number | Literal["measured"] | None = None, wall_friction: Number | Literal["same"] | None = None,

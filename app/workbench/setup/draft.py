@@ -105,7 +105,7 @@ class Draft:
 
     def stamps(self, names: Iterable[str]) -> tuple[tuple[str, int, int], ...]:
         """By which it is seen whether files have changed, whoever changed them."""
-        return tuple(_stamp(self.folder / name) for name in (CONFIG_NAME, *names))
+        return tuple(stamp_of(self.folder / name) for name in (CONFIG_NAME, *names))
 
     def _swap(self, source: list[Change], target: list[Change]) -> str | None:
         with self.lock:
@@ -144,7 +144,8 @@ def as_table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     return stream.getvalue().encode()
 
 
-def _stamp(file: Path) -> tuple[str, int, int]:
+def stamp_of(file: Path) -> tuple[str, int, int]:
+    """Name, time of the last change and size of a file; −1 where there is none."""
     try:
         told = file.stat()
     except OSError:

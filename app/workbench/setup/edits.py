@@ -25,6 +25,7 @@ from .steps import Understood, judge
 
 GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
+AROUND = 3.0  # radii about a clicked rod in which its rim is looked for
 SEEN = 0.34  # share of a line's profiles that must show the edge for it to be snapped
 NAMES = ("bottom", "right", "top", "left")
 # Densities of what rods are made of [kg/m³], and friction of dry, clean rods as textbooks have it: to begin with.
@@ -181,6 +182,20 @@ def fit_rod(image: Image, found: Understood, x: float, y: float, radius: float) 
     """Centre and radius [px] of a rod clicked at x, y: on its rim where that is seen, else as it was clicked."""
     section = found.data.get("photographs", {})
     classes: list[float] = section.get("radii") or []
+    largest = max([radius, *(each / found.scale.mean_size for each in classes if found.scale is not None)])
+    left, top = (max(int(each - AROUND * largest), 0) for each in (x, y))
+    image = image[top : int(y + AROUND * largest) + 1, left : int(x + AROUND * largest) + 1]
+    if min(image.shape) < 2:
+        return x, y, radius
+    fitted = _fit_here(image, found, classes, (x - left, y - top, radius))
+    return fitted[0] + left, fitted[1] + top, fitted[2]
+
+
+def _fit_here(
+    image: Image, found: Understood, classes: Sequence[float], circle: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """The same in a part of the photograph."""
+    x, y, radius = circle
     if classes and found.scale is not None:
         sizes = np.array(classes) / found.scale.mean_size
         tried = [refine_grains(image, np.array([x]), np.array([y]), np.array([size])) for size in sizes]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from copy import deepcopy
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -178,8 +179,8 @@ def _look_at_photographs(found: Understood, experiment: Experiment) -> bool:
         found.files = tuple(experiment.photographs().files)
         section = experiment.config.photographs
         assert section is not None
-        first = read_photograph(found.files[0], max_pixels=section.max_pixels, channel=section.channel)
-        found.shape = (first.shape[0], first.shape[1])
+        told = found.files[0].stat()
+        found.shape = _shape_of(found.files[0], told.st_mtime_ns, told.st_size, section.max_pixels, section.channel)
         experiment.photographs().check_region(found.shape)
         for k, file in enumerate(found.files):
             with file.open("rb") as stream:
@@ -199,6 +200,13 @@ def _look_at_photographs(found: Understood, experiment: Experiment) -> bool:
     if len(found.files) < 2:
         step.doubt("There is one photograph: forces are found from how rods move between photographs.")
     return True
+
+
+@lru_cache(maxsize=16)
+def _shape_of(file: Path, _changed: int, _size: int, most: int, channel: str) -> tuple[int, int]:
+    """Rows and columns of a photograph, which is read once as long as it stays the same."""
+    image = read_photograph(file, max_pixels=most, channel=channel)
+    return image.shape[0], image.shape[1]
 
 
 def _look_at_rods(found: Understood, experiment: Experiment) -> None:

@@ -36,6 +36,11 @@ class Journey:
     log: list[str] = field(default_factory=list)
     judged: int = 0  # the photograph in which a pair was judged
 
+    @property
+    def seconds(self) -> float:
+        """Since it began."""
+        return time.monotonic() - self.began
+
     def step(self, name: str, work: Callable[[], str | None]) -> None:
         since = time.monotonic()
         told = work()

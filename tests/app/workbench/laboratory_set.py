@@ -19,6 +19,9 @@ RULER = 0.15  # [m]
 DIM = 0.22  # of the light: what reaches two of the rods
 HIDDEN = 7  # the photograph in which a reflection hides a rod, and
 STILL = 2  # in how many after it
+LIT = 0.6  # [radii], radius of the reflection
+CLEAR = 0.45  # of the light comes through its veil of so many
+VEIL = 150.0  # [grey]
 GREY = 257  # of 16 bits, for one of 8
 BOLT = 22  # [px], radius of its head
 FIRST = 9991  # number of the first photograph: names sort otherwise than numbers
@@ -135,8 +138,9 @@ def _darken(picture: Picture, pose: NDArray[np.float64], radius: float) -> None:
 
 
 def _reflect(picture: Picture, pose: NDArray[np.float64], radius: float, frame: int) -> None:
-    """A lamp in the glaze: half of the face is white."""
+    """A lamp in the glaze: a third of the face is white, and a veil lies over the rest."""
     turn = 0.3 * frame
     x, y = pose[0] + 0.25 * radius * np.cos(turn), pose[1] + 0.25 * radius * np.sin(turn)
-    lit = _within(picture, x, y, 0.7 * radius) * _within(picture, pose[0], pose[1], radius - 1.0)
-    picture += lit * (245.0 - picture)
+    face = _within(picture, pose[0], pose[1], radius - 1.0)
+    picture += face * (1.0 - CLEAR) * (VEIL - picture)
+    picture += face * _within(picture, x, y, LIT * radius) * (245.0 - picture)

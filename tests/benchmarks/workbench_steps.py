@@ -1,0 +1,198 @@
+"""How long the workbench lets a person wait: every interaction in a real Chromium, and every request that it makes.
+
+    python -m tests.benchmarks.workbench_steps FOLDER     # one with an experiment of photographs and its finished run
+
+The folder is copied, and nothing in it is touched. An interaction ends when the page has drawn what came of it, with
+nothing on its way; on a machine that others use, too, the least of the rounds is nearest to a quiet one.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Page, expect, sync_playwright
+
+from tests.app.workbench.hand import on_screen, opened
+from tests.browser import FLAGS, SECONDS, find_chromium
+
+ROUNDS = 3
+STEPS = ("photographs", "scale", "walls", "rods", "material", "run", "mend", "inspect", "share")
+WANTED = 300.0  # [ms]
+WATCH = """(() => {
+  const ask = globalThis.fetch;
+  globalThis.waits = { open: 0, took: [] };
+  globalThis.fetch = async (address, ...rest) => {
+    const since = performance.now(), name = String(address).split("?")[0] + (String(address).includes("size=20000") ? " (all pixels)" : "");
+    waits.open += 1;
+    try { const answer = await ask(address, ...rest); const bytes = await answer.clone().arrayBuffer(); waits.took.push([name, performance.now() - since, bytes.byteLength]); return answer; }
+    finally { waits.open -= 1; }
+  };
+  const drawn = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  globalThis.settled = async () => {
+    for (;;) {
+      await bench.busy; await drawn();
+      if (!waits.open && !bench.stage.pending && [...document.images].every((each) => each.complete)) { await drawn(); if (!waits.open) return; }
+    }
+  };
+})()"""  # noqa: E501  a page's script
+
+
+class Clock:
+    """Interactions by name, how long each took [ms]."""
+
+    def __init__(self, tab: Page) -> None:
+        self.tab = tab
+        self.took: dict[str, list[float]] = defaultdict(list)
+
+    def time(self, name: str, work: Callable[[], object]) -> None:
+        self.tab.evaluate("settled()")
+        since = time.perf_counter()
+        work()
+        self.tab.evaluate("settled()")
+        self.took[name].append(1e3 * (time.perf_counter() - since))
+
+    def press(self, name: str, key: str) -> None:
+        self.time(name, lambda: self.tab.keyboard.press(key))
+
+    def click(self, name: str, selector: str) -> None:
+        self.time(name, lambda: self.tab.locator(selector).first.click())
+
+
+def go_through(clock: Clock) -> None:
+    """Every step once."""
+    tab = clock.tab
+    clock.time("the first page", lambda: tab.click("#brand"))
+    clock.time("open the experiment", lambda: tab.locator(".tile").first.click())
+    for key, step in enumerate(STEPS, 1):
+        clock.press(f"to step {step}", str(key))
+    tab.keyboard.press("1")
+    clock.press("photographs: the next one", "ArrowRight")
+    clock.time("zoom by the wheel", lambda: zoom(tab))
+    clock.press("the whole picture", "f")
+    set_up(clock)
+    mend(clock)
+    inspect(clock)
+
+
+def zoom(tab: Page) -> None:
+    tab.mouse.move(500, 350)
+    tab.mouse.wheel(0, -300)
+
+
+def set_up(clock: Clock) -> None:
+    tab = clock.tab
+    tab.keyboard.press("2")
+    tab.get_by_role("button", name="The number").click()
+    size = 1e3 * tab.evaluate("bench.project.pixel")
+    tab.fill("#field-pixel-size", f"{size * 1.001:.7g}")
+    clock.time("scale: a number", lambda: tab.locator("#field-pixel-size").press("Enter"))
+    clock.press("undo", "Control+z")
+    tab.locator("#canvas").focus()
+    tab.keyboard.press("3")
+    tab.fill("#field-pressure-top", "51")
+    clock.time("walls: a pressure", lambda: tab.locator("#field-pressure-top").press("Enter"))
+    line = tab.evaluate("bench.project.walls[0].line")
+    clock.time("walls: drag an end", lambda: pull(tab, line[1], (-9.0, 2.0)))
+    tab.locator("#canvas").focus()
+    tab.keyboard.press("4")
+    x, y = tab.evaluate("[bench.project.rods.x[600], bench.project.rods.y[600]]")
+    clock.time("rods: choose one", lambda: tab.mouse.click(*on_screen(tab, (x, y))))
+    clock.press("rods: move it", "Shift+ArrowRight")
+    clock.press("rods: make it larger", "]")
+    clock.press("rods: delete it", "Delete")
+    clock.time("rods: add one", lambda: tab.mouse.click(*on_screen(tab, (x, y))))
+    tab.keyboard.press("5")
+    clock.time("material: a preset", lambda: tab.get_by_role("button", name="brass").click())
+
+
+def pull(tab: Page, start: list[float], by: tuple[float, float]) -> None:
+    tab.mouse.move(*on_screen(tab, (start[0], start[1])))
+    tab.mouse.down()
+    tab.mouse.move(*on_screen(tab, (start[0] + by[0], start[1] + by[1])), steps=3)
+    tab.mouse.up()
+
+
+def mend(clock: Clock) -> None:
+    tab = clock.tab
+    tab.keyboard.press("7")
+    expect(tab.locator("#next-doubtful")).to_be_visible()
+    tab.evaluate("bench.show(3)")
+    tab.evaluate("settled()")
+    clock.press("mend: the next photograph", "ArrowRight")
+    rods = tab.evaluate("bench.step.rods()")
+    place = rods["x"][500], rods["y"][500]
+    clock.time("mend: choose a rod", lambda: tab.mouse.click(*on_screen(tab, place)))
+    clock.press("mend: move it, correlated again", "Shift+ArrowRight")
+    clock.press("mend: keep", "Enter")
+    clock.press("mend: undo", "Control+z")
+
+
+def inspect(clock: Clock) -> None:
+    tab = clock.tab
+    tab.keyboard.press("8")
+    tab.wait_for_selector("#next")
+    tab.evaluate("bench.show(4)")
+    tab.evaluate("settled()")
+    clock.press("inspect: the next photograph", "ArrowRight")
+    clock.press("inspect: the one before, again", "ArrowLeft")
+    tab.fill("#who", "anna")
+    tab.locator("#who").press("Enter")
+    tab.locator("#canvas").focus()
+    clock.press("inspect: next at stake", "Space")
+    clock.press("inspect: without it", "w")
+    clock.press("inspect: a verdict", "n")
+    clock.press("inspect: taken back", "z")
+    clock.press("inspect: blind", "b")
+    clock.press("inspect: not blind", "b")
+    clock.time("inspect: colour by", lambda: tab.select_option("#colour-by", "ft"))
+    tab.locator("#canvas").focus()
+    tab.keyboard.press("Escape")
+    tab.keyboard.press("f")
+    clock.time("inspect: click a rod", lambda: tab.mouse.click(*on_screen(tab, middle(tab))))
+
+
+def middle(tab: Page) -> tuple[float, float]:
+    rods = tab.evaluate("bench.step.rodsOfFrame()")
+    return rods[3 * 500], rods[3 * 500 + 1]
+
+
+def table(rows: dict[str, list[float]], title: str) -> str:
+    lines = [f"{title:<40} median   least [ms]"]
+    for name, took in rows.items():
+        mark = "" if min(took) <= WANTED else f"   over {WANTED:g}"
+        lines.append(f"{name:<40} {np.median(took):6.0f}  {min(took):6.0f}{mark}")
+    return "\n".join(lines)
+
+
+def measure(folder: Path) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
+    """Interactions and requests of some rounds; of the first one only what is slow once is missing."""
+    with sync_playwright() as driver, tempfile.TemporaryDirectory() as place:
+        copy = Path(shutil.copytree(folder, Path(place) / "lab"))
+        browser = driver.chromium.launch(executable_path=find_chromium(), args=FLAGS, chromium_sandbox=False)
+        expect.set_options(timeout=1e3 * SECONDS)
+        page = browser.new_context(color_scheme="dark").new_page()
+        page.add_init_script(WATCH)
+        page.set_default_timeout(1e3 * SECONDS)
+        with opened(page, copy) as tab:
+            clock = Clock(tab)
+            for _ in range(ROUNDS):
+                go_through(clock)
+            requests: dict[str, list[float]] = defaultdict(list)
+            for name, took, size in tab.evaluate("waits.took"):
+                requests[f"{name} ({size / 1e3:.0f} kB)" if name == "/ask/network" else name].append(took)
+        browser.close()
+    return clock.took, requests
+
+
+if __name__ == "__main__":
+    interactions, asked = measure(Path(sys.argv[1]))
+    print(table(interactions, "interaction"))
+    print()
+    print(table(dict(sorted(asked.items())), "request"))
