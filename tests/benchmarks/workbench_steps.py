@@ -20,9 +20,10 @@ import numpy as np
 from playwright.sync_api import Page, expect, sync_playwright
 
 from tests.app.workbench.hand import on_screen, opened
-from tests.browser import FLAGS, SECONDS, find_chromium
+from tests.browser import SECONDS, find_chromium
 
 ROUNDS = 3
+FLAGS = ("--disable-gpu", "--disable-dev-shm-usage")  # drawn by the processor: a machine without a graphics card
 STEPS = ("photographs", "scale", "walls", "rods", "material", "run", "mend", "inspect", "share")
 WANTED = 300.0  # [ms]
 WATCH = """(() => {

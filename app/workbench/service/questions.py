@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, validate_call
@@ -49,15 +49,21 @@ def answer(bench: Bench, name: str, values: dict[str, Any]) -> Any:
     """Answer one question. Raises BadRequest, and InputError as the commands do."""
     if name not in QUESTIONS or "bench" in values:
         raise BadRequest(f"there is no question {name}")
-    at = values.get("at")
-    one_at_a_time = bench.project(at).editing if name in EDITS and isinstance(at, str) else nullcontext()
     try:
-        with one_at_a_time:
+        with _alone(bench, values.get("at")) if name in EDITS else nullcontext():
             return QUESTIONS[name](bench, **values)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
         raise BadRequest(f"{name}: {where}: {first['msg']}") from None
+
+
+def _alone(bench: Bench, at: Any) -> AbstractContextManager[Any]:
+    """What one edit of an experiment holds; of what is none, the question itself complains."""
+    try:
+        return bench.project(at).editing if isinstance(at, str) else nullcontext()
+    except InputError:
+        return nullcontext()
 
 
 @question
