@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, validate_call
 
+from ...errors import InputError
 from .bench import Bench
 
 Question = Callable[..., Any]
