@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import pytest
 from rodsight.manual.contents import FOLDER
+from rodsight.synthetic.synthesis import synthesize
 
 from tests.program import ROOT
 
 SECONDS = 600  # for a cell, kernels compiled
 
 NOTEBOOKS = sorted((FOLDER / "notebooks").glob("*.ipynb"))
+FIRST_FIRST = sorted(NOTEBOOKS, key=lambda file: file.stem != "from_photographs_to_forces")  # others use its run
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +25,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where they are started; what the first has run the second finds."""
     folder = tmp_path_factory.mktemp("notebooks")
     (folder / "sample_data").symlink_to(ROOT / "sample_data", target_is_directory=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an experiment in the place of the sample: as many photographs as are asked for, fewer rods."""
+    folder = tmp_path_factory.mktemp("small")
+    synthesize(folder / "sample_data" / "shear", grains=40, frames=12, seed=2)
     return folder
 
 
@@ -34,10 +47,23 @@ def test_there_are_three_without_outputs_and_the_page_names_them():
         assert not any(cell.get("outputs") for cell in book.cells)
 
 
+@pytest.mark.screen  # many seconds
+@pytest.mark.parametrize("file", FIRST_FIRST, ids=lambda file: file.stem)
+def test_the_cells_of_a_notebook_run_on_a_small_experiment(file, small, monkeypatch, capsys):
+    monkeypatch.chdir(small)
+    mpl.use("agg")
+    shown: list[object] = []
+    names = {"display": shown.append}
+    for number, cell in enumerate(json.loads(file.read_text(encoding="utf-8"))["cells"]):
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), f"{file.name}, cell {number}", "exec"), names)
+    plt.close("all")
+    capsys.readouterr()
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")  # of the kernel and its channels
-@pytest.mark.parametrize("file", sorted(NOTEBOOKS, key=lambda file: file.stem != "from_photographs_to_forces"),
-                         ids=lambda file: file.stem)  # fmt: skip
+@pytest.mark.parametrize("file", FIRST_FIRST, ids=lambda file: file.stem)
 def test_a_notebook_runs(file, folder, monkeypatch):
     nbclient = pytest.importorskip("nbclient", reason="needs the extra notebooks")
     nbformat = pytest.importorskip("nbformat", reason="needs the extra notebooks")
