@@ -17,13 +17,14 @@ from ..look.texts import printable
 from ..look.values import log_scalar, log_scalars
 from .convergence import power_of_ten
 
+# Apart in every vision; in grey what is settled is dark, and what asks for a look is bright.
 STATUS_COLOURS: dict[FrameStatus, Rgba] = {
-    FrameStatus.RESET: (142, 118, 214, 255),
-    FrameStatus.SUSPECT: (226, 92, 82, 255),
-    FrameStatus.REARRANGING: (222, 158, 62, 255),
-    FrameStatus.SETTLING: (74, 134, 196, 255),
-    FrameStatus.SETTLED: (62, 150, 104, 255),
-    FrameStatus.FAILED: (158, 32, 74, 255),
+    FrameStatus.RESET: (188, 180, 244, 255),
+    FrameStatus.SUSPECT: (229, 109, 122, 255),
+    FrameStatus.REARRANGING: (249, 221, 115, 255),
+    FrameStatus.SETTLING: (51, 119, 190, 255),
+    FrameStatus.SETTLED: (15, 106, 49, 255),
+    FrameStatus.FAILED: (82, 16, 44, 255),
 }
 DOUBTED = 0.9  # T below which its reasons are told
 # The lane of tracking: the first of them that holds of a frame is shown.
@@ -32,8 +33,8 @@ ALL_TRACKED = "all tracked"
 TRACKING_COLOURS: dict[str, Rgba] = {
     ALL_TRACKED: (58, 84, 108, 255),
     SOME_INFERRED: INFERRED,
-    SOME_CUT: (142, 118, 214, 255),
-    SOME_LOST: (226, 92, 82, 255),
+    SOME_CUT: (249, 221, 115, 255),
+    SOME_LOST: (229, 109, 122, 255),
 }
 
 _LEVELS = {

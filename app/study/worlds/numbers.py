@@ -169,7 +169,9 @@ def _cells(rows: Sequence[Compared]) -> list[str]:
         f"{100.0 * np.mean(np.abs(_raw(rows)[known]) <= t * sigma[known]):.0f}" if known.any() else "–" for t in (1, 2)
     ]
     mean = np.degrees(np.nanmean(true)) if name in DEGREES else np.nanmean(true)
-    flag = "biased" if name not in DEGREES and name not in SHAPES and abs(bias) > BIASED else ""
+    flag = ""
+    if name not in DEGREES and name not in SHAPES and abs(bias) > BIASED:
+        flag = "biased, interval told" if known.any() else "biased"
     return [
         "–" if name in SHAPES else f"{mean:.3g}", _told(bias, name), worst, _told(by_world[worst], name),
         _told(float(np.nanstd(error)), name), *covered, flag,

@@ -5,6 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from rodsight.figures.page import COLOURS
+from rodsight.recording.curve_layers.settling import STATUS_COLOURS, TRACKING_COLOURS
 from rodsight.recording.look.colours import (
     ADDED,
     DIFFERENCE_RAMP,
@@ -18,11 +19,15 @@ from rodsight.recording.look.colours import (
     SERIES,
 )
 
+from solver.sequence.frame_forces import FrameStatus
 from tests.app.recording.look.colour_vision import VISIONS, cie76
 
 APART = 25.0
+BESIDE_ITS_NAME = 20.0  # in grey, where a word says the same
 GROUPS = {
     "curves": SERIES,
+    "status": tuple(STATUS_COLOURS.values()),
+    "tracking": tuple(TRACKING_COLOURS.values()),
     "changes and verdicts": (GAINED, LOST, ADDED, FORBIDDEN),
     "figures": tuple(tuple(int(text[k : k + 2], 16) for k in (1, 3, 5)) for text in COLOURS),
 }
@@ -58,6 +63,11 @@ def test_nothing_is_grey_between_less_and_more():
 @pytest.mark.parametrize("pair", [(SERIES[0], SERIES[1]), (SERIES[2], SERIES[3]), (GAINED, LOST)])
 def test_the_commonest_pairs_are_apart_in_grey(pair):
     assert cie76(*pair, "grey") >= APART
+
+
+@pytest.mark.parametrize("status", [FrameStatus.SUSPECT, FrameStatus.REARRANGING, FrameStatus.FAILED])
+def test_a_settled_frame_is_told_from_a_doubtful_one_in_grey(status):
+    assert cie76(STATUS_COLOURS[status], STATUS_COLOURS[FrameStatus.SETTLED], "grey") >= BESIDE_ITS_NAME
 
 
 def test_the_measure_knows_black_from_white_and_what_deuteranopes_confuse():
