@@ -8,6 +8,7 @@ nothing on its way; on a machine that others use, too, the least of the rounds i
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import tempfile
@@ -194,6 +195,7 @@ def measure(folder: Path) -> tuple[dict[str, list[float]], dict[str, list[float]
 
 if __name__ == "__main__":
     interactions, asked = measure(Path(sys.argv[1]))
+    print(f"{os.cpu_count()} cores, {os.getloadavg()[0]:.1f} processes at work\n")
     print(table(interactions, "interaction"))
     print()
     print(table(dict(sorted(asked.items())), "request"))

@@ -242,7 +242,18 @@ def _row(found: Found, forces: FrameForces, i: int | str, j: int | str) -> int |
 
 def plain(values: Any) -> list[float | None]:
     """Numbers with five digits that count; None for those that are none."""
-    return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, np.float64).tolist()]
+    given = np.asarray(values, np.float64).ravel()
+    finite = np.isfinite(given)
+    number = np.where(finite, given, 0.0)
+    size = np.floor(np.log10(np.where(number == 0.0, 1.0, np.abs(number))))
+    up, down = (
+        10.0 ** np.clip(4.0 - size, 0.0, None),
+        10.0 ** np.clip(size - 4.0, 0.0, None),
+    )  # whole, so both are exact
+    told: list[float | None] = (np.round(number * up / down) * down / up).tolist()
+    for k in np.flatnonzero(~finite).tolist():
+        told[k] = None
+    return told
 
 
 def _pixels(scale: Scale, start: Array, end: Array) -> list[list[float]]:

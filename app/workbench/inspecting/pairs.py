@@ -45,11 +45,12 @@ def told_candidates(
     forces = results.frames[candidates.frame]
     carried = recall(candidates.key, forces.contacts.key, forces.fn, fill=np.nan)
     told = []
+    at_risk, probable, borne = plain(stake), plain(candidates.probability), plain(carried)
     for k in np.argsort(-np.nan_to_num(stake), kind="stable")[:MOST].tolist():
         a, b = bodies.name(int(contacts.i[k])), bodies.name(int(contacts.j[k]))
         told.append({
-            "i": a, "j": b, "point": place[k].tolist(), "stake": plain(stake[k : k + 1])[0],
-            "probability": plain(candidates.probability[k : k + 1])[0], "fn": plain(carried[k : k + 1])[0],
+            "i": a, "j": b, "point": place[k].tolist(), "stake": at_risk[k],
+            "probability": probable[k], "fn": borne[k],
             "detected": bool(candidates.detected[k]), "verdict": said.get(_ordered(a, b)),
         })  # fmt: skip
     return told

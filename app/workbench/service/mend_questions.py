@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -253,7 +255,14 @@ def _make(opened: Project) -> Mender:
 def _tracks(opened: Project) -> Tracks:
     if not (opened.results / TRACKS).is_file():
         raise InputError(opened.results, "", "holds no tracks yet: run the experiment, at least to the end of tracking")
-    return load_tracks(opened.results / TRACKS)[0]
+    file = opened.results / TRACKS
+    return _read(file, file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=4)
+def _read(file: Path, _changed: int) -> Tracks:
+    """Tracks, read once as long as their file stays the same."""
+    return load_tracks(file)[0]
 
 
 def _first(opened: Project) -> int:

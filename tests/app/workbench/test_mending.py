@@ -47,6 +47,23 @@ def test_where_nothing_correlates_the_hand_is_taken_at_its_word(mended):
     assert (found.x, found.y, found.angle) == given
 
 
+@pytest.mark.parametrize("clear", [1.0, 0.45])
+def test_a_rod_that_is_half_covered_is_found_to_parts_of_a_pixel(made_photographs, mended, clear):
+    mender, pose = mended
+    photographs = load_experiment(made_photographs).photographs()
+    shown = photographs[2].copy()
+    rows, columns = np.ogrid[: shown.shape[0], : shown.shape[1]]
+    x, y, radius = *pose[7, :2], mender.circles[7, 2]
+    face = np.hypot(columns - x, rows - y) < radius
+    shown[face] = clear * shown[face] + (1.0 - clear) * 150.0  # a veil, and a reflection in it
+    shown[np.hypot(columns - x - 0.25 * radius, rows - y) < 0.55 * radius] = 245.0
+    covered = Mender(mender.ids, mender.circles, lambda frame: shown if frame == 2 else photographs[frame])
+    found = covered.correlate(2, 7, tuple(pose[7] + np.array([1.0, -1.0, 0.02])))
+    assert found.found
+    np.testing.assert_allclose([found.x, found.y], pose[7, :2], atol=0.1)
+    assert found.zncc > 0.9
+
+
 def test_an_unknown_rod_is_refused(mended):
     with pytest.raises(KeyError):
         mended[0].correlate(2, 999, (50.0, 50.0, 0.0))

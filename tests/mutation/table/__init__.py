@@ -15,6 +15,7 @@ from tests.mutation.table import (
     results,
     sequence,
     statistics,
+    workbench,
 )
 
 MUTANTS: tuple[Mutant, ...] = tuple(
@@ -33,6 +34,7 @@ MUTANTS: tuple[Mutant, ...] = tuple(
         results,
         baselines,
         exchange,
+        workbench,
     )
     for mutant in part.MUTANTS
 )
