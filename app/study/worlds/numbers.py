@@ -72,7 +72,7 @@ class Compared:
 
 
 def compare_numbers(solved: SolvedWorld) -> list[Compared]:
-    """Compare every statistic of a solved world."""
+    """Compare every statistic of a solved world, sizes of forces only where something tells them."""
     world, seed, sequence, frames, true = solved.world, solved.seed, solved.sequence, solved.frames, solved.true
     pairs = [(each.statistics, _statistics_of_truth(sequence, each, *true[k])) for k, each in enumerate(frames)]
     late = pairs[SETTLED:]
@@ -81,6 +81,7 @@ def compare_numbers(solved: SolvedWorld) -> list[Compared]:
     return [
         _compared(world, seed, name, values, doubt, witness)
         for name in compared_names()
+        if is_compared(world, name)
         if (values := [_values(name, stated, exact) for stated, exact in late])
     ]
 
@@ -95,6 +96,11 @@ def _compared(
 ) -> Compared:
     stated, true, deviation = (np.array(column) for column in zip(*values, strict=True))
     return Compared(world, seed, name, stated, true, deviation, doubt, witness)
+
+
+def is_compared(world: WorldName, name: str) -> bool:
+    """Whether a world tells a statistic: where nothing tells the size of forces, none is stated."""
+    return name not in SIZED or WORLDS_OF[world].scale_known
 
 
 def compared_names() -> list[str]:
@@ -121,16 +127,15 @@ def print_numbers(console: Console, found: Sequence[Compared]) -> None:
 
 def number_rows(found: Sequence[Compared]) -> list[list[str]]:
     """A row of cells under HEADINGS for every statistic."""
-    return [[name, *_cells([each for each in found if each.name == name])] for name in compared_names()]
+    by_name = {name: [each for each in found if each.name == name] for name in compared_names()}
+    return [[name, *_cells(rows)] for name, rows in by_name.items() if rows]
 
 
 def fit_deviations(found: Sequence[Compared]) -> dict[str, tuple[float, ...]]:
     """Constants of `solver.sequence.judging.statistic_intervals`, by what they were read from; NaN of no frame."""
     fitted = {}
     for name in DEVIATION:
-        rows = [
-            each for each in found if each.name == name and (name not in SIZED or WORLDS_OF[each.world].scale_known)
-        ]
+        rows = [each for each in found if each.name == name and is_compared(each.world, name)]
         error, doubt = np.abs(_raw(rows)), np.concatenate([each.doubt for each in rows])
         size = np.array([size_of(name, float(value)) for each in rows for value in each.stated])
         ratio = error / (size * np.sqrt(np.maximum(doubt, LEAST_DOUBT)))
