@@ -115,7 +115,7 @@ def test_a_folder_of_runs_is_one_page_with_a_card_for_each_and_one_viewer(tmp_pa
         main(["share", str(tmp_path / "runs"), "--html"])
     assert not end.value.code
     assert "2 runs" in capsys.readouterr().out
-    text = (tmp_path / "runs" / "runs-share.html").read_text()
+    text = (tmp_path / "runs" / "runs-share.html").read_text(encoding="utf-16")
     assert [text.count(f'id="recording-{k}-0"') for k in range(3)] == [1, 1, 0]
     assert [text.count(f"<h2>{name}</h2>") for name in ("first", "second", "damaged")] == [1, 1, 0]
     assert text.count('id="module"') == 1
