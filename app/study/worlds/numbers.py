@@ -39,6 +39,7 @@ FIT_WORLDS: tuple[WorldName, ...] = (
     *INTERVAL_WORLDS,
     *(world for world in JUDGE_WORLDS if not world.startswith("mu_")),
 )
+FITTED = (Witness.MOTION, Witness.BOTH, Witness.POSITIONS)  # statistics of a first frame have no deviation
 BIASED = 0.05  # of the true value: more is a bias to be told
 CONE = 0.999  # quantile of |f_t| / f_n of true contacts that is their friction, for a fifth of them are on the cone
 IN_PI = ("principal_direction",)  # directions: the same after half a turn
@@ -140,7 +141,7 @@ def fit_deviations(found: Sequence[Compared]) -> dict[str, tuple[float, ...]]:
         size = np.array([size_of(name, float(value)) for each in rows for value in each.stated])
         ratio = error / (size * np.sqrt(np.maximum(doubt, LEAST_DOUBT)))
         witness = np.concatenate([each.witness for each in rows])
-        fitted[name] = tuple(_scale(ratio[(witness == each) & np.isfinite(ratio)]) for each in Witness)
+        fitted[name] = tuple(_scale(ratio[(witness == each) & np.isfinite(ratio)]) for each in FITTED)
     return fitted
 
 
