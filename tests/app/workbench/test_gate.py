@@ -123,6 +123,15 @@ def test_no_path_leads_out_of_the_folder(visitor):
         assert visitor.client.get(f"/page/{name}").status_code == 404
 
 
+def test_an_experiment_beside_the_folder_is_none(tmp_path):
+    for name in ("opened", "beside"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "experiment.toml").write_text('name = "x"\n')
+    visitor = Visitor(Bench(tmp_path / "opened")).enter()
+    assert visitor.post("project", {"at": "."}).status_code == 200
+    assert "is no experiment" in visitor.refused("project", at="../beside")
+
+
 @pytest.mark.parametrize(
     ("question", "values"),
     [("nothing", {}), ("project", {}), ("project", {"at": 3}), ("begin", {"roll": -1, "name": "x"}),

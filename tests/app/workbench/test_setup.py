@@ -119,6 +119,18 @@ def test_a_circle_is_a_wall_beside_bars_and_check_reads_it(begun, photographs_on
     assert "walls" not in load_toml(photographs_only / "my photographs")
 
 
+def test_what_was_told_of_a_circle_goes_with_it_and_bars_stay(begun, photographs_only):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    visitor.ask("draw_wall", at=at, line=[[60.0, 300.0], [300.0, 310.0]], snap=False, name=None)
+    visitor.ask("draw_circle", at=at, place=[240.0, 260.0, 200.0])
+    visitor.ask("set_plate", at=at, name="circle", pressure=5e4)
+    told = visitor.ask("delete_wall", at=at, name="circle")
+    assert [wall["circle"] for wall in told["walls"]] == [None]
+    assert load_toml(photographs_only / "my photographs")["walls"].keys() == {"file"}
+
+
 def test_the_least_circle_holds_all_rods(begun, made_photographs, photographs_only):
     visitor, told = begun
     at = told["at"]
