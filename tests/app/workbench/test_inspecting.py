@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.results.hdf5.store import load_results, read_origin
-from rodsight.run_folder import RESULTS, UNFINISHED
+from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
+from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
 from rodsight.verdicts.decisions import Bodies, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
 from rodsight.workbench.inspecting.found import run_stamp
@@ -216,3 +216,18 @@ def test_a_run_that_takes_its_pieces_away_meanwhile_is_no_error(solved, monkeypa
     monkeypatch.setattr(os, "listdir", gone)
     assert run_stamp(folder)[0] == 0
     assert visitor.ask("run_told", at=at)["frames"]["count"] == FIRST + len(results.frames)
+
+
+def test_rods_of_a_run_of_some_photographs_are_mended_in_those(solved):
+    visitor, at, results, folder = solved
+    origin = read_origin(folder / RESULTS)
+    assert origin is not None
+    save_tracks(folder / TRACKS, "mine", results.tracks, results.walls, origin)
+    told = visitor.ask("poses", at=at, frame=SHOWN)
+    present = results.tracks.present
+    assert told["rods"]["id"] == results.tracks.id[present[FRAME]].tolist()
+    assert told["lost_count"] == [0] * FIRST + (~present).sum(axis=1).tolist()
+    assert "not tracked" in visitor.refused("poses", at=at, frame=FIRST - 1)
+    name = int(results.tracks.id[0])
+    assert "step Rods" in visitor.refused("mark_lost", at=at, frame=FIRST, id=name)
+    assert "is not there" in visitor.refused("mark_lost", at=at, frame=FIRST - 1, id=name)
