@@ -52,6 +52,14 @@ def test_a_page_elsewhere_may_ask_nothing(visitor, headers):
     assert visitor.post("home", {}, **headers).status_code == 403
 
 
+@pytest.mark.parametrize("name", ["Host", "Origin"])
+def test_a_header_that_stands_twice_is_refused(visitor, name):
+    right = {"Host": HOST.removeprefix("http://"), "Origin": HOST}[name]
+    answer = visitor.client.get("/page/app.js", headers=[(name, right), (name, right)])
+    assert answer.status_code == 400
+    assert "twice" in answer.text
+
+
 def test_a_question_needs_an_origin(visitor):
     assert visitor.client.post("/ask/home", json={}).status_code == 403
 
