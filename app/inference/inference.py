@@ -149,7 +149,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         else:
             tracks, walls, calibration = calibrate_tracks(*told_motion)
     if settings.infer_unseen:
-        tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius))
+        tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius), settings.sequence.overlap_seen)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
     material, inferred = inputs.material, 0 if tracks.inferred is None else int(tracks.inferred.sum())
     packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)

@@ -27,7 +27,7 @@ def find_softness(
         return settings
     pressure = walls.usual_pressure(material.length)
     packing = material.pack(tracks.radius, pressure, boundary=tracks.boundary)
-    seen = find_overlap(packing, bridge_frames(make_snapshots(tracks, walls), failed)) > 0.0
+    seen = find_overlap(packing, bridge_frames(make_snapshots(tracks, walls), failed))
     # Who tells a stiffness, or to estimate it, knows that grains are soft: where all radii are read too small no gap
     # shows it.
     if not seen and material.stiffness is None:

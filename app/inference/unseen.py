@@ -13,11 +13,16 @@ from solver.inferred.unseen_rods import infer_unseen
 from ..tracks import Tracks, TrackStatus, WallTracks
 
 
-def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None) -> Tracks:
-    """The tracks with the rods that were inferred after the others; sizes (q,) [m]: the known radii, None: any."""
+def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: float = 0.0) -> Tracks:
+    """The tracks with the rods that were inferred after the others.
+
+    sizes (q,) [m]: the known radii, None: any; overlap [m]: the mean one of touching grains where they are soft.
+    """
     present = tracks.present
     noise = float(np.sqrt(np.mean(tracks.position_sigma**2)))
-    found = infer_unseen(tracks.radius, tracks.position, present, walls.endpoints, noise, sizes, walls.side)
+    found = infer_unseen(
+        tracks.radius, tracks.position, present, walls.endpoints, noise, sizes, walls.side, overlap=overlap
+    )
     if not found.count:
         return replace(tracks, inferred=np.zeros(tracks.grain_count, bool))
     f, u = tracks.frame_count, found.count

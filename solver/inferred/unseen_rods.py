@@ -19,7 +19,8 @@ from solver.inferred.surroundings import Surroundings
 
 MISFIT = 5.0  # standard deviations of a gap within which a body touches the rod …
 COARSE = 0.3  # of a radius: beyond it nothing tells a rod that touches from one that does not
-SURFACE = 1e-3  # … and the share of its radius
+SURFACE = 1e-3  # … the share of its radius …
+OVERLAPS = 2.0  # … and, where grains are soft, their mean overlaps: they are distributed nearly as exp(−δ / ⟨δ⟩)
 TOUCHES_FREE = 2  # bodies that any rod can be made to touch
 LEAST_HELD = 0.45  # mean number of touches beyond those, over photographs, that is no chance …
 LEAST_TOUCHES = 5.0  # … and the least number in all photographs together
@@ -62,12 +63,15 @@ def infer_unseen(
     noise: float,
     sizes: Array | None = None,
     side: Sides = None,
+    *,
+    overlap: float = 0.0,
 ) -> UnseenRods:
     """Infer the rods of a packing that were never seen.
 
     radius (n,) [m]; position (f, n, 2) [m]; present (f, n); endpoints (f, w, 2, 2) [m]; noise [m]: standard deviation
     of a position component; sizes (q,) [m]: the radii that rods have, None: any; side (w,): which walls are
-    circles. Grains that are missing in some photographs only leave no hole that lasts.
+    circles; overlap [m]: mean overlap of touching grains where they are soft. Grains that are missing in some
+    photographs only leave no hole that lasts.
     """
     shown = present.sum(axis=1) >= FEWEST_GRAINS  # a photograph that failed tells nothing
     position, present, endpoints = position[shown], present[shown], endpoints[shown]
@@ -75,7 +79,9 @@ def infer_unseen(
     rods: list[_Rod] = []
     if sizes is None:
         sizes = np.quantile(radius, np.linspace(0.0, 1.0, TRIED))
-    tolerance = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
+    tolerance = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean()) + OVERLAPS * overlap
+    # Soft rods are looked for as if all were smaller by what they overlap on average: their gaps scatter about nothing.
+    radius, sizes, noise = radius - 0.5 * overlap, sizes - 0.5 * overlap, float(np.hypot(noise, overlap / np.sqrt(2.0)))
     if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance < COARSE * float(np.min(sizes)):
         near: Array | None = None
         for _ in range(PASSES):
@@ -90,7 +96,8 @@ def infer_unseen(
     place, sigma = np.full((len(shown), len(rods), 2), np.nan), np.full((len(shown), len(rods)), np.nan)
     place[shown] = np.stack([each.position for each in rods], axis=1)
     sigma[shown] = np.stack([each.sigma for each in rods], axis=1)
-    return UnseenRods(np.array([each.radius for each in rods]), place, sigma, np.array([each.held for each in rods]))
+    found = np.array([each.radius for each in rods]) + 0.5 * overlap
+    return UnseenRods(found, place, sigma, np.array([each.held for each in rods]))
 
 
 def _with(

@@ -30,7 +30,7 @@ class SequenceSettings:
     positions: Literal["needed", "always", "never"] = "needed"  # ensemble: ask positions alone where motion says little
     posterior: PosteriorSettings = field(default_factory=PosteriorSettings)
     soft: bool = False  # grains overlap by more than noise and errors: positions are asked of every frame
-    overlap_seen: bool = False  # the gaps show that grains are soft: how far they overlap is known
+    overlap_seen: float = 0.0  # [m] mean overlap of soft grains by their gaps; 0: these do not show it
     soft_trust: float = SEEN_AT_MOST  # the most that their overlaps are believed
     keep_members: bool = False  # ensemble: keep the field of every member
     measure_precision: bool = True  # from the gaps, where they contradict what is stated

@@ -21,12 +21,13 @@ def poses() -> dict[str, np.ndarray]:
         return {name.removeprefix("poses/"): stored[name] for name in stored.files if name.startswith("poses/")}
 
 
-def infer(poses: dict[str, np.ndarray], gone: tuple[int, ...], sizes: Array | None) -> UnseenRods:
+def infer(poses: dict[str, np.ndarray], gone: tuple[int, ...], sizes: Array | None, overlap: float = 0.0) -> UnseenRods:
     seen = np.setdiff1d(np.arange(len(poses["radius"])), gone)
     position = poses["position"][:, seen]
     return infer_unseen(
-        poses["radius"][seen], position, np.isfinite(position).all(axis=2), poses["endpoints"], NOISE, sizes
-    )
+        poses["radius"][seen], position, np.isfinite(position).all(axis=2), poses["endpoints"], NOISE, sizes,
+        overlap=overlap,
+    )  # fmt: skip
 
 
 def test_rods_that_were_taken_out_are_put_back(poses) -> None:
@@ -38,6 +39,21 @@ def test_rods_that_were_taken_out_are_put_back(poses) -> None:
         assert away[best] < 0.05 * poses["radius"][rod]
         assert found.radius[best] == pytest.approx(poses["radius"][rod], rel=0.01)
         assert np.all(found.sigma[:, best] < 4 * NOISE)
+
+
+def test_rods_that_overlap_by_a_per_cent_are_put_back_where_that_is_known(poses) -> None:
+    overlap = 2e-4
+    soft = poses | {"radius": poses["radius"] + 0.5 * overlap}
+    sizes = np.unique(soft["radius"])
+    found = infer(soft, GONE, sizes, overlap)
+    true = poses["position"][:, list(GONE)]
+    for q, rod in enumerate(GONE):
+        away = np.linalg.norm(found.position - true[:, None, q], axis=2).max(axis=0)
+        best = int(np.argmin(away))
+        assert away[best] < 0.05 * soft["radius"][rod]
+        assert found.radius[best] == pytest.approx(soft["radius"][rod], rel=0.01)
+    assert infer(soft, GONE, sizes).count < len(GONE)
+    assert infer(soft, (), sizes, overlap).count == 0
 
 
 def test_no_rod_is_invented_where_none_is_missing(poses) -> None:
