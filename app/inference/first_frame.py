@@ -12,28 +12,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.bodies.bridging import bridge_frames
-from solver.bodies.grains import Array
 from solver.calibration.calibrate import Calibration
 from solver.calibration.equations import rotate_offsets
-from solver.calibration.gaps import GapRows
 from solver.calibration.known_forces import find_grain_errors
-from solver.contacts.contacts import Contacts
 from solver.contacts.verdicts import NO_VERDICTS
 from solver.mixture.positions import draws_of
 from solver.posterior.frame_posterior import FramePosterior, infer_frame
-from solver.posterior.sequence_evidence import SequenceEvidence, gather_evidence
+from solver.posterior.sequence_evidence import SequenceEvidence
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 
 from ..tracks import Tracks, WallTracks
-from .snapshots import make_snapshots, measure_sequence
+from .known_pairs import gather_evidence_of, known_pairs, rows_of
+from .snapshots import measure_sequence
 
 if TYPE_CHECKING:
     from .inference import CorrectedSequence
 
 FRAMES = 16  # after the first that tell of the errors: later, other contacts bear
 FEWEST = 2  # below which nothing is asked again
-BEARS = 0.8  # P(bears) from which on a pair's gap is known by its force
 WORTH = 0.5  # scatter of errors over the noise of a position below which there is nothing to gain
 SEED = 1  # of the draws behind the deviations that are left
 UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
@@ -47,11 +43,11 @@ def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) 
     calibration = sequence.calibration
     if calibration is None or 0 in sequence.failed:
         return None
-    rows, force = _known_pairs(frames)
+    rows, force = known_pairs([each for each in frames[1 : FRAMES + 1] if each.status not in UNSOUND])
     if len(np.unique(rows.frame)) < FEWEST:
         return None
     told, walls = _as_told(sequence.tracks, sequence.walls, calibration), sequence.walls
-    evidence = _gather(sequence, told)
+    evidence = gather_evidence_of(sequence, told)
     centre, radius = _errors_beforehand(evidence)
     if centre == radius == 0.0:
         return None
@@ -64,37 +60,12 @@ def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) 
         radius=told.radius + found.radius,
         position=told.position + rotate_offsets(measured, found.offset),
     )
-    evidence = _gather(sequence, better)
+    evidence = gather_evidence_of(sequence, better)
     first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS))
     if first.contacts.count == 0:
         return None
-    first = replace(first, gap_deviation=found.gap_deviation(measured, _rows_of(0, first.contacts)))
+    first = replace(first, gap_deviation=found.gap_deviation(measured, rows_of(0, first.contacts)))
     return infer_frame(first, evidence.settings.alone(), draws_of(0), sequence.settings.workers)
-
-
-def _known_pairs(frames: Sequence[FrameForces]) -> tuple[GapRows, Array]:
-    """Pairs that surely bear in the frames after the first, and their normal forces (m,) [N]."""
-    rows, forces = [], []
-    for frame in frames[1 : FRAMES + 1]:
-        if frame.status in UNSOUND or frame.bearing_probability is None:
-            continue
-        known = (frame.bearing_probability > BEARS) & (frame.fn > 0.0)
-        rows.append(_rows_of(frame.frame, frame.contacts.select(known)))
-        forces.append(frame.fn[known])
-    if not rows:
-        none = np.empty(0, np.int32)
-        return GapRows(none, none, none, none), np.empty(0)
-    return (
-        GapRows(*(np.concatenate([getattr(each, name) for each in rows]) for name in ("frame", "i", "j", "pair"))),
-        np.concatenate(forces),
-    )
-
-
-def _rows_of(frame: int, contacts: Contacts) -> GapRows:
-    numbers = np.arange(contacts.count, dtype=np.int32)  # of pairs: nobody asks which are the same
-    return GapRows(
-        np.full(contacts.count, frame, np.int32), contacts.i.astype(np.int32), contacts.j.astype(np.int32), numbers
-    )
 
 
 def _as_told(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:
@@ -105,12 +76,6 @@ def _as_told(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tra
         radius=tracks.radius - (calibration.radius - calibration.radius_offset),
         position=tracks.position - own,
     )
-
-
-def _gather(sequence: CorrectedSequence, tracks: Tracks) -> SequenceEvidence:
-    snapshots = bridge_frames(make_snapshots(tracks, sequence.walls), sequence.failed)
-    packing = replace(sequence.packing, grains=replace(sequence.packing.grains, radius=tracks.radius))
-    return gather_evidence(packing, snapshots, sequence.settings.posterior)
 
 
 def _errors_beforehand(evidence: SequenceEvidence) -> tuple[float, float]:

@@ -40,6 +40,7 @@ from .friction_and_radii import friction_of, measure_friction, measure_friction_
 from .radii import calibrate_with_radii
 from .settings import InferenceSettings
 from .snapshots import make_snapshots
+from .soft_errors import correct_soft
 from .softness import find_softness
 from .unseen import add_unseen
 
@@ -132,7 +133,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     else:  # walls that no photograph shows are between those of its neighbours
         walls = replace(walls, endpoints=np.stack([each.endpoints for each in bridge_frames(told, failed)]))
-    overlap = settings.overlap_of(tracks.radius)
+    overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
     if settings.boundary is not None:
         if settings.sequence.measure_precision:
@@ -169,11 +170,12 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         if of_walls is not None:
             material = replace(material, wall_friction=of_walls.measured)
             packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
-    return CorrectedSequence(
+    corrected = CorrectedSequence(
         packing, tracks, walls, snapshots if nothing_seen else bridge_frames(snapshots, failed),
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
         inputs.material.friction_measured,
     )  # fmt: skip
+    return corrected if as_given or nothing_seen or tuning is not None else correct_soft(corrected)
 
 
 def solve_frames(

@@ -55,23 +55,24 @@ class Surroundings:
         centre, rim = self._bodies(place, k, 2.0 * size)
         return np.linalg.norm(centre - place, axis=1) - rim - size
 
-    def find_places(self, k: int, size: float, tolerance: float, near: Array | None) -> Array:
+    def find_places(self, k: int, size: float, apart: float, deep: float, near: Array | None) -> Array:
         """Places (p, 2) in photograph k where a rod of this size touches three bodies or more and overlaps none.
 
-        Those with most touches first, and none twice; near (q, 2): only around these places, None: everywhere.
+        Those with most touches first, and none twice. A body touches that is no farther apart and overlaps no
+        deeper [m]; near (q, 2): only around these places, None: everywhere.
         """
         crossing = self._crossings(k, size, near)
         if not len(crossing):
             return crossing
         rows = self._rows[k]
         _, nearest = self._tree[k].query(crossing, k=min(NEAR_ROOM, len(rows)))
-        apart = np.linalg.norm(crossing[:, None] - self.position[k][rows[nearest]], axis=2)
+        distance = np.linalg.norm(crossing[:, None] - self.position[k][rows[nearest]], axis=2)
         gap = np.column_stack([
-            apart - self.radius[rows[nearest]] - size,
+            distance - self.radius[rows[nearest]] - size,
             self._reach(k, crossing)[0] - size,
         ])  # fmt: skip
-        touches = np.count_nonzero(np.abs(gap) < tolerance, axis=1)
-        fits = (gap.min(axis=1) > -tolerance) & (touches > 2)
+        touches = np.count_nonzero(gap < apart, axis=1)
+        fits = (gap.min(axis=1) > -deep) & (touches > 2)
         crossing, touches = crossing[fits], touches[fits]
         places: list[Array] = []
         for q in np.argsort(-touches, kind="stable"):

@@ -20,7 +20,8 @@ from solver.inferred.surroundings import Surroundings
 MISFIT = 5.0  # standard deviations of a gap within which a body touches the rod …
 COARSE = 0.3  # of a radius: beyond it nothing tells a rod that touches from one that does not
 SURFACE = 1e-3  # … the share of its radius …
-OVERLAPS = 2.0  # … and, where grains are soft, their mean overlaps: they are distributed nearly as exp(−δ / ⟨δ⟩)
+OVERLAPS = 2.0  # … and, where grains are soft, their mean overlaps: they are distributed nearly as exp(−δ / ⟨δ⟩) …
+DEEPEST = 5.0  # … up to so many of them, in the strongest contacts
 TOUCHES_FREE = 2  # bodies that any rod can be made to touch
 LEAST_HELD = 0.45  # mean number of touches beyond those, over photographs, that is no chance …
 LEAST_TOUCHES = 5.0  # … and the least number in all photographs together
@@ -44,6 +45,14 @@ class UnseenRods:
     @property
     def count(self) -> int:
         return len(self.radius)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tolerance:
+    """Gaps [m] within which a body touches a rod."""
+
+    apart: float
+    deep: float  # overlapping
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +88,11 @@ def infer_unseen(
     rods: list[_Rod] = []
     if sizes is None:
         sizes = np.quantile(radius, np.linspace(0.0, 1.0, TRIED))
-    tolerance = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean()) + OVERLAPS * overlap
+    exact = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
+    tolerance = _Tolerance(exact + OVERLAPS * overlap, exact + DEEPEST * overlap)
     # Soft rods are looked for as if all were smaller by what they overlap on average: their gaps scatter about nothing.
     radius, sizes, noise = radius - 0.5 * overlap, sizes - 0.5 * overlap, float(np.hypot(noise, overlap / np.sqrt(2.0)))
-    if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance < COARSE * float(np.min(sizes)):
+    if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance.apart < COARSE * float(np.min(sizes)):
         near: Array | None = None
         for _ in range(PASSES):
             around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side)
@@ -112,12 +122,14 @@ def _with(
     )
 
 
-def _propose(around: Surroundings, sizes: Array, near: Array | None, tolerance: float) -> list[_Rod]:
+def _propose(around: Surroundings, sizes: Array, near: Array | None, tolerance: _Tolerance) -> list[_Rod]:
     """Every rod that would be held somewhere, followed through all photographs; near (f, q, 2): only around these."""
     proposed: list[_Rod] = []
     for k in np.unique(np.linspace(0, around.frame_count - 1, STARTS).round().astype(int)).tolist():
         for size in sizes.tolist():
-            for place in around.find_places(k, size, tolerance, None if near is None else near[k]):
+            for place in around.find_places(
+                k, size, tolerance.apart, tolerance.deep, None if near is None else near[k]
+            ):
                 if not any(_is_at(each, k, place, size) for each in proposed):
                     proposed.append(_follow(around, place, k, size, tolerance))
     return proposed
@@ -128,7 +140,7 @@ def _is_at(rod: _Rod, k: int, place: Array, size: float) -> bool:
     return rod.radius == size and float(np.hypot(*(rod.position[k] - place))) < 0.02 * size
 
 
-def _follow(around: Surroundings, place: Array, k: int, size: float, tolerance: float) -> _Rod:
+def _follow(around: Surroundings, place: Array, k: int, size: float, tolerance: _Tolerance) -> _Rod:
     """Follow a rod from its place in photograph k to all others."""
     frames = around.frame_count
     position, sigma = np.empty((frames, 2)), np.empty(frames)
@@ -138,12 +150,12 @@ def _follow(around: Surroundings, place: Array, k: int, size: float, tolerance: 
         position[to], sigma[to] = around.hold(around.carry(position[since], since, to), to, size)
     for f in range(frames):
         gap = around.gaps(position[f], f, size)
-        held[f] = np.count_nonzero(np.abs(gap) < tolerance) - TOUCHES_FREE
-        overlaps[f] = gap.min(initial=np.inf) < -tolerance
+        held[f] = np.count_nonzero((gap < tolerance.apart) & (gap > -tolerance.deep)) - TOUCHES_FREE
+        overlaps[f] = gap.min(initial=np.inf) < -tolerance.deep
     return _Rod(size, position, sigma, float(np.maximum(held, 0.0).mean()), float(overlaps.mean()))
 
 
-def _surest(proposed: list[_Rod], tolerance: float) -> list[_Rod]:
+def _surest(proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
     """Those that are held, none of which overlaps a surer one."""
     chosen: list[_Rod] = []
     least = max(LEAST_HELD, LEAST_TOUCHES / len(proposed[0].position)) if proposed else 0.0
@@ -152,7 +164,7 @@ def _surest(proposed: list[_Rod], tolerance: float) -> list[_Rod]:
         free = True
         for other in chosen:
             apart = np.linalg.norm(rod.position - other.position, axis=1)
-            together = apart < rod.radius + other.radius - tolerance
+            together = apart < rod.radius + other.radius - tolerance.deep
             free &= together.mean() <= TOLERATED
         if free:
             chosen.append(rod)

@@ -57,6 +57,7 @@ class World:
 
 
 SHEAR = Course(shear, 0.25, plates=("top",))
+SOFT = Course(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=1.6e6))
 HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
 DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
 
@@ -80,8 +81,11 @@ WORLDS: dict[WorldName, World] = {
     ),
     "soft": World(
         "simple shear of soft rods that overlap by about .25 % of a diameter",
-        Course(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=1.6e6)),
+        SOFT,
     ),
+    "soft_radii_03": World("soft; radii are wrong by .3 % at random, as much as rods overlap", SOFT,
+                           scatter_radii(0.003)),
+    "soft_unseen": World("soft; 3 % of the rods were never seen", SOFT, hide_rods),
     "softer": World(
         "simple shear of very soft rods that overlap by about 1.1 % of a diameter",
         Course(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=3e5)),

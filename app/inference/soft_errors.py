@@ -1,0 +1,101 @@
+"""Errors of soft rods: told from overlap once forces are known.
+
+Where rods are soft nothing is calibrated, for an overlap is a force and must not be explained away. But where centres
+and radii are wrong by as much as rods overlap, errors pass for forces. The motion tells forces whatever the gaps say:
+the first photographs are solved, with their forces each gap is error, noise and overlap in proportion, what is found of
+the errors is taken off, and with better forces it is found again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.bodies.bridging import bridge_frames
+from solver.calibration.equations import rotate_offsets
+from solver.calibration.known_forces import GrainErrors, find_grain_errors
+from solver.sequence.frame_forces import FrameForces, FrameStatus
+from solver.sequence.frames import solve_sequence
+
+from ..tracks import Tracks
+from .known_pairs import gather_evidence_of, known_pairs
+from .snapshots import make_snapshots, measure_sequence
+
+if TYPE_CHECKING:
+    from .inference import CorrectedSequence
+
+FRAMES = 8  # that are solved beforehand: enough for each rod to be pressed from several sides
+FEWEST = 3
+PASSES = 2
+WORTH = 0.8  # scatter of errors over the noise of a position below which there is nothing to gain
+TOLD = 1.0  # errors that are found over what is not known of them: below it rods are as they were told; there .4 to .6
+STANDS_OUT = 2.5  # mean overlap over that noise below which overlap is no witness
+TRUST_AT_MOST = 0.9  # where errors were worth it: what is left of them shares its gaps with forces; r .87 to .98
+SEED = 1  # of the draws behind deviations, of which none is asked here
+
+
+def correct_soft(sequence: CorrectedSequence) -> CorrectedSequence:
+    """The sequence with the errors that the forces of its soft rods tell; as it is where none can be told."""
+    if not sequence.settings.soft or not sequence.settings.asks_positions or sequence.packing.grains.count == 0:
+        return sequence
+    try:
+        evidence = gather_evidence_of(sequence, sequence.tracks)
+    except ValueError:  # no two bodies are near
+        return sequence
+    noise = evidence.noise.sigma
+    error = float(np.sqrt(max(float(np.median(evidence.centre_deviation)) ** 2 - noise**2, 0.0)))
+    if error < WORTH * noise:
+        return sequence
+    better = sequence
+    for _ in range(PASSES):
+        found = _find_errors(sequence, _solve_first(better), error, STANDS_OUT * noise)
+        if found is None:
+            break
+        better = _without(sequence, found)
+    return better
+
+
+def _solve_first(sequence: CorrectedSequence) -> list[FrameForces]:
+    settings = replace(sequence.settings, chain=replace(sequence.settings.chain, keep="none"))
+    solved = solve_sequence(
+        sequence.packing, sequence.snapshots[:FRAMES], settings,
+        verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
+    )  # fmt: skip
+    return [forces for forces, _ in solved]
+
+
+def _find_errors(
+    sequence: CorrectedSequence, frames: list[FrameForces], error: float, least: float
+) -> GrainErrors | None:
+    """Errors of this size [m] of the sequence's own tracks; None where rods overlap by less than `least` [m]."""
+    # No motion leads to the first one: its forces rest on the very gaps that are asked about.
+    rows, force = known_pairs(each for each in frames[1:] if each.status is not FrameStatus.FAILED)
+    if len(np.unique(rows.frame)) < FEWEST:
+        return None
+    measured = measure_sequence(sequence.tracks, sequence.walls)
+    found = find_grain_errors(
+        measured, rows, force, centre=error, radius=error, rng=np.random.default_rng(SEED)
+    )  # fmt: skip
+    return found if found.overlap * float(force.mean()) > least and _is_told(found) else None
+
+
+def _is_told(found: GrainErrors) -> bool:
+    n = len(found.radius)
+    left = found.draws.std(axis=0)
+    kinds = ((found.offset, left[: 2 * n]), (found.radius - found.radius.mean(), left[2 * n :]))
+    return any(float(np.sqrt(np.mean(error**2) / np.mean(unknown**2))) > TOLD for error, unknown in kinds)
+
+
+def _without(sequence: CorrectedSequence, found: GrainErrors) -> CorrectedSequence:
+    tracks: Tracks = sequence.tracks
+    measured = measure_sequence(tracks, sequence.walls)
+    tracks = replace(
+        tracks, radius=tracks.radius + found.radius,
+        position=tracks.position + rotate_offsets(measured, found.offset),
+    )  # fmt: skip
+    snapshots = bridge_frames(make_snapshots(tracks, sequence.walls), sequence.failed)
+    packing = replace(sequence.packing, grains=replace(sequence.packing.grains, radius=tracks.radius))
+    cautious = replace(sequence.settings, soft_trust=min(sequence.settings.soft_trust, TRUST_AT_MOST))
+    return replace(sequence, tracks=tracks, packing=packing, snapshots=snapshots, settings=cautious)
