@@ -35,12 +35,12 @@ from ..progress import Observer, unheard
 from ..tracks import Tracks, WallTracks
 from .boundary import measure_noise, mend
 from .calibration import calibrate_tracks, known_radii
-from .first_frame import ask_first_again
 from .friction_and_radii import friction_of, measure_friction, measure_friction_of_walls, tuned_radii
+from .known_forces.first_frame import ask_first_again
+from .known_forces.soft_errors import correct_soft
 from .radii import calibrate_with_radii
 from .settings import InferenceSettings
 from .snapshots import make_snapshots
-from .soft_errors import correct_soft
 from .softness import find_softness
 from .unseen import add_unseen
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import inference
-from rodsight.inference.first_frame import ask_first_again
 from rodsight.inference.inference import (
     CorrectedSequence,
     SolvedFrame,
@@ -18,6 +17,7 @@ from rodsight.inference.inference import (
     solve_all,
     solve_frames,
 )
+from rodsight.inference.known_forces.first_frame import ask_first_again
 from rodsight.study.worlds.world_score import correct_world, true_forces
 from rodsight.synthetic.worlds.making import make_world
 from rodsight.synthetic.worlds.names import WorldName

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.inference.inference import CorrectedSequence, solve_all
-from rodsight.inference.soft_errors import TRUST_AT_MOST, correct_soft
+from rodsight.inference.known_forces.soft_errors import TRUST_AT_MOST, correct_soft
 from rodsight.study.worlds.world_score import correct_world, true_forces
 from rodsight.synthetic.worlds.making import make_world
 from rodsight.synthetic.worlds.names import WorldName

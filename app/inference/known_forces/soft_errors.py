@@ -19,12 +19,12 @@ from solver.calibration.known_forces import GrainErrors, find_grain_errors
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_sequence
 
-from ..tracks import Tracks
+from ...tracks import Tracks
+from ..snapshots import make_snapshots, measure_sequence
 from .known_pairs import gather_evidence_of, known_pairs
-from .snapshots import make_snapshots, measure_sequence
 
 if TYPE_CHECKING:
-    from .inference import CorrectedSequence
+    from ..inference import CorrectedSequence
 
 FRAMES = 8  # that are solved beforehand: enough for each rod to be pressed from several sides
 FEWEST = 3

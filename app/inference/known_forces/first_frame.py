@@ -21,12 +21,12 @@ from solver.posterior.frame_posterior import FramePosterior, infer_frame
 from solver.posterior.sequence_evidence import SequenceEvidence
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 
-from ..tracks import Tracks, WallTracks
+from ...tracks import Tracks, WallTracks
+from ..snapshots import measure_sequence
 from .known_pairs import gather_evidence_of, known_pairs, rows_of
-from .snapshots import measure_sequence
 
 if TYPE_CHECKING:
-    from .inference import CorrectedSequence
+    from ..inference import CorrectedSequence
 
 FRAMES = 16  # after the first that tell of the errors: later, other contacts bear
 FEWEST = 2  # below which nothing is asked again

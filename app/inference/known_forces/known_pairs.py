@@ -15,11 +15,11 @@ from solver.contacts.contacts import Contacts
 from solver.posterior.sequence_evidence import SequenceEvidence, gather_evidence
 from solver.sequence.frame_forces import FrameForces
 
-from ..tracks import Tracks
-from .snapshots import make_snapshots
+from ...tracks import Tracks
+from ..snapshots import make_snapshots
 
 if TYPE_CHECKING:
-    from .inference import CorrectedSequence
+    from ..inference import CorrectedSequence
 
 BEARS = 0.8  # P(bears) from which on a pair's gap is known by its force
 
