@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,6 +26,14 @@ settings.register_profile(
 # A mutant need only be noticed: nobody asks for the least example of it.
 settings.register_profile("mutants", settings.get_profile("rodsight"), phases=[Phase.explicit, Phase.generate])
 settings.load_profile("rodsight")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def signals_are_heard() -> None:
+    """Children answer signals even where the tests were begun with these ignored: in the background, under nohup."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session")

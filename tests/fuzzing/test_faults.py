@@ -98,7 +98,7 @@ def wrongs(faults: list[Fault], originals, work: Path) -> tuple[int, list[str]]:
 def test_some_refusals_are_one_line_and_lose_nothing(originals, tmp_path):
     met, wrong = wrongs(list(all_faults())[:: len(list(all_faults())) // QUICK], originals, tmp_path / "work")
     assert wrong == []
-    assert met > QUICK // 2
+    assert met >= QUICK // 2
 
 
 @pytest.mark.slow

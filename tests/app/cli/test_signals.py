@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 
 import pytest
 from rodsight.signals import Stopped, answering, stopping
@@ -38,13 +37,6 @@ if __name__ == "__main__":
     from tests.app.cli.test_signals import wait_for_ever
     list(run_all(wait_for_ever, None, [0, 1], workers=2))
 """
-
-
-@pytest.fixture(autouse=True)
-def heard() -> Iterator[None]:
-    """Children hear of a terminal that is gone, even where the tests themselves were told to outlive theirs (nohup)."""
-    with answering(signal.SIGHUP, signal.SIG_DFL):
-        yield
 
 
 def wait_for_ever(common: None, item: int) -> None:
