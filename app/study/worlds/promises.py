@@ -68,7 +68,8 @@ def fit_promise(kept: Sequence[KeptPromise]) -> Promise:
     found, _, rank, _ = np.linalg.lstsq(rows, error, rcond=None)
     freedom = max(len(known) - int(rank), 1)
     deviation = math.sqrt(float(np.sum((rows @ found - error) ** 2)) / freedom)
-    return Promise(*(float(value) for value in found), deviation)
+    a, b, c = found.tolist()
+    return Promise(a, b, c, deviation)
 
 
 def print_promises(console: Console, kept: Sequence[KeptPromise]) -> None:

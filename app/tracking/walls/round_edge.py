@@ -61,7 +61,7 @@ def snap_to_rim(
     return (x + float(fit[1]), y + float(fit[2]), radius + float(fit[0])), share
 
 
-def _consensus(model: Array, found: Array) -> NDArray[np.float64]:
+def _consensus(model: Array, found: Array) -> NDArray:
     """The circle that most edges lie on, of many through three of them."""
     rng = np.random.default_rng(0)
     best, most = np.zeros(3), -1

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...experiment.config.experiment_file import ExperimentFile, find_complaints
 from ...experiment.experiment import Experiment, GrainGuess, read_grain_guess, read_times, read_tracks
 from ...experiment.image_header import claimed_size
-from ...experiment.photographs import read_photograph
+from ...experiment.photographs import Channel, read_photograph
 from ...experiment.plausibility import check_inside, check_radii, doubtful_loads, open_sides, rods_beyond_ends
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
@@ -203,7 +203,7 @@ def _look_at_photographs(found: Understood, experiment: Experiment) -> bool:
 
 
 @lru_cache(maxsize=16)
-def _shape_of(file: Path, _changed: int, _size: int, most: int, channel: str) -> tuple[int, int]:
+def _shape_of(file: Path, _changed: int, _size: int, most: int, channel: Channel) -> tuple[int, int]:
     """Rows and columns of a photograph, which is read once as long as it stays the same."""
     image = read_photograph(file, max_pixels=most, channel=channel)
     return image.shape[0], image.shape[1]
