@@ -41,8 +41,7 @@ class InferenceSettings:
 
     def without_sweeps(self) -> InferenceSettings:
         """The same where only the final forces are wanted: no sweep keeps its own."""
-        sequence = self.sequence
-        return replace(self, sequence=replace(sequence, chain=replace(sequence.chain, keep="none")))
+        return replace(self, sequence=self.sequence.without_sweeps())
 
 
 def material_of(config: InferenceSections) -> RodMaterial:

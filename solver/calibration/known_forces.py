@@ -62,7 +62,8 @@ def find_grain_errors(
     if rows.count == 0 or not free.any():
         raise ValueError("no gap with a known force, or nothing that could be wrong")
     unit = float(np.mean(force))
-    gap = equations.measure(rows, unknowns).gap
+    geometry = equations.measure(rows, unknowns)
+    gap = geometry.gap
     of_grains = _of_grains(equations, rows, unknowns)[:, free]
     matrix = sparse.csr_matrix(sparse.hstack([of_grains, force[:, None] / unit]))
     penalty = np.append(prior[free] ** -2.0, 0.0)
@@ -73,7 +74,7 @@ def find_grain_errors(
         noise = factor * stated
         weight = (1.0 + (step.left / (2.0 * FINAL_SCALE * noise)) ** 2) ** -2.0  # a pair with a wrong force says little
         step = _Step.of(matrix, gap, penalty, weight / noise**2)
-    noise_of_gaps = GapNoise(sequence, rows, equations.measure(rows, unknowns).normal, factor)
+    noise_of_gaps = GapNoise(sequence, rows, geometry.normal, factor)
     errors = step.draw(np.array([noise_of_gaps.draw(rng) for _ in range(DRAWS)]), rng)
     unknowns, draws = np.zeros(3 * n), np.zeros((DRAWS, 3 * n))
     unknowns[free], draws[:, free] = step.found[:-1], errors[:, :-1]

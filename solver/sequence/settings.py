@@ -48,6 +48,10 @@ class SequenceSettings:
         """Whether positions alone may be asked of forces and radii."""
         return self.estimator == "ensemble" and self.positions != "never"
 
+    def without_sweeps(self) -> SequenceSettings:
+        """The same where only the final forces are wanted: no sweep keeps its own."""
+        return replace(self, chain=replace(self.chain, keep="none"))
+
     def for_radii(self, radius: Array) -> SequenceSettings:
         """The same for grains of these radii (n,) [m], their overlap told to all that ask for it."""
         overlap = typical_overlap(radius) if self.overlap is None else self.overlap

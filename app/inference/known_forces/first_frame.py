@@ -23,7 +23,7 @@ from solver.sequence.frame_forces import FrameForces, FrameStatus
 
 from ...tracks import Tracks, WallTracks
 from ..snapshots import measure_sequence
-from .known_pairs import gather_evidence_of, known_pairs, rows_of
+from .known_pairs import gather_evidence_of, known_pairs, rows_of, without_errors
 
 if TYPE_CHECKING:
     from ..inference import CorrectedSequence
@@ -55,12 +55,7 @@ def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) 
     found = find_grain_errors(
         measured, rows, force, centre=centre, radius=radius, rng=np.random.default_rng(SEED)
     )  # fmt: skip
-    better = replace(
-        told,
-        radius=told.radius + found.radius,
-        position=told.position + rotate_offsets(measured, found.offset),
-    )
-    evidence = gather_evidence_of(sequence, better)
+    evidence = gather_evidence_of(sequence, without_errors(told, measured, found))
     first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS))
     if first.contacts.count == 0:
         return None

@@ -10,7 +10,9 @@ import numpy as np
 
 from solver.bodies.bridging import bridge_frames
 from solver.bodies.grains import Array
-from solver.calibration.gaps import GapRows
+from solver.calibration.equations import rotate_offsets
+from solver.calibration.gaps import GapRows, MeasuredSequence
+from solver.calibration.known_forces import GrainErrors
 from solver.contacts.contacts import Contacts
 from solver.posterior.sequence_evidence import SequenceEvidence, gather_evidence
 from solver.sequence.frame_forces import FrameForces
@@ -52,6 +54,18 @@ def rows_of(frame: int, contacts: Contacts) -> GapRows:
 
 def gather_evidence_of(sequence: CorrectedSequence, tracks: Tracks) -> SequenceEvidence:
     """What the positions of these tracks tell, everything else being as in the sequence."""
+    other = with_tracks(sequence, tracks)
+    return gather_evidence(other.packing, other.snapshots, sequence.settings.posterior)
+
+
+def with_tracks(sequence: CorrectedSequence, tracks: Tracks) -> CorrectedSequence:
+    """The sequence of the same rods in other places, of other radii."""
     snapshots = bridge_frames(make_snapshots(tracks, sequence.walls), sequence.failed)
     packing = replace(sequence.packing, grains=replace(sequence.packing.grains, radius=tracks.radius))
-    return gather_evidence(packing, snapshots, sequence.settings.posterior)
+    return replace(sequence, tracks=tracks, packing=packing, snapshots=snapshots)
+
+
+def without_errors(tracks: Tracks, measured: MeasuredSequence, found: GrainErrors) -> Tracks:
+    """The tracks with these errors taken off; measured: the same as calibration reads them."""
+    position = tracks.position + rotate_offsets(measured, found.offset)
+    return replace(tracks, radius=tracks.radius + found.radius, position=position)

@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.bodies.bridging import bridge_frames
-from solver.calibration.equations import rotate_offsets
+from solver.calibration.gaps import MeasuredSequence
 from solver.calibration.known_forces import GrainErrors, find_grain_errors
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_sequence
 
-from ...tracks import Tracks
-from ..snapshots import make_snapshots, measure_sequence
-from .known_pairs import gather_evidence_of, known_pairs
+from ..snapshots import measure_sequence
+from .known_pairs import gather_evidence_of, known_pairs, with_tracks, without_errors
 
 if TYPE_CHECKING:
     from ..inference import CorrectedSequence
@@ -48,33 +46,34 @@ def correct_soft(sequence: CorrectedSequence) -> CorrectedSequence:
     error = float(np.sqrt(max(float(np.median(evidence.centre_deviation)) ** 2 - noise**2, 0.0)))
     if error < WORTH * noise:
         return sequence
+    measured = measure_sequence(sequence.tracks, sequence.walls)
+    cautious = replace(sequence.settings, soft_trust=min(sequence.settings.soft_trust, TRUST_AT_MOST))
     better = sequence
     for _ in range(PASSES):
-        found = _find_errors(sequence, _solve_first(better), error, STANDS_OUT * noise)
+        found = _find_errors(measured, _solve_first(better), error, STANDS_OUT * noise)
         if found is None:
             break
-        better = _without(sequence, found)
+        better = with_tracks(sequence, without_errors(sequence.tracks, measured, found))
+        better = replace(better, settings=cautious)
     return better
 
 
 def _solve_first(sequence: CorrectedSequence) -> list[FrameForces]:
-    settings = replace(sequence.settings, chain=replace(sequence.settings.chain, keep="none"))
     solved = solve_sequence(
-        sequence.packing, sequence.snapshots[:FRAMES], settings,
+        sequence.packing, sequence.snapshots[:FRAMES], sequence.settings.without_sweeps(),
         verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
     )  # fmt: skip
     return [forces for forces, _ in solved]
 
 
 def _find_errors(
-    sequence: CorrectedSequence, frames: list[FrameForces], error: float, least: float
+    measured: MeasuredSequence, frames: list[FrameForces], error: float, least: float
 ) -> GrainErrors | None:
-    """Errors of this size [m] of the sequence's own tracks; None where rods overlap by less than `least` [m]."""
+    """Errors of this size [m] of what was measured; None where rods overlap by less than `least` [m]."""
     # No motion leads to the first one: its forces rest on the very gaps that are asked about.
     rows, force = known_pairs(each for each in frames[1:] if each.status is not FrameStatus.FAILED)
     if len(np.unique(rows.frame)) < FEWEST:
         return None
-    measured = measure_sequence(sequence.tracks, sequence.walls)
     found = find_grain_errors(
         measured, rows, force, centre=error, radius=error, rng=np.random.default_rng(SEED)
     )  # fmt: skip
@@ -86,16 +85,3 @@ def _is_told(found: GrainErrors) -> bool:
     left = found.draws.std(axis=0)
     kinds = ((found.offset, left[: 2 * n]), (found.radius - found.radius.mean(), left[2 * n :]))
     return any(float(np.sqrt(np.mean(error**2) / np.mean(unknown**2))) > TOLD for error, unknown in kinds)
-
-
-def _without(sequence: CorrectedSequence, found: GrainErrors) -> CorrectedSequence:
-    tracks: Tracks = sequence.tracks
-    measured = measure_sequence(tracks, sequence.walls)
-    tracks = replace(
-        tracks, radius=tracks.radius + found.radius,
-        position=tracks.position + rotate_offsets(measured, found.offset),
-    )  # fmt: skip
-    snapshots = bridge_frames(make_snapshots(tracks, sequence.walls), sequence.failed)
-    packing = replace(sequence.packing, grains=replace(sequence.packing.grains, radius=tracks.radius))
-    cautious = replace(sequence.settings, soft_trust=min(sequence.settings.soft_trust, TRUST_AT_MOST))
-    return replace(sequence, tracks=tracks, packing=packing, snapshots=snapshots, settings=cautious)

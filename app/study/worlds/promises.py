@@ -13,14 +13,12 @@ from rich.console import Console
 from rich.table import Table
 
 from ...errors import InputError
-from ...experiment.boundary import bound_tracks
-from ...experiment.experiment import load_experiment, read_tracks
-from ...experiment.walls import read_walls
+from ...experiment.experiment import load_experiment
 from ...inference.data_budget import REFERENCE_STEP, DataBudget, Promise, measure_budget
 from ...progress import Progress, silent
 from ...synthetic.worlds.making import make_world
 from ...synthetic.worlds.names import WorldName
-from .world_score import WorldPlan, WorldScore
+from .world_score import WorldPlan, WorldScore, read_world
 from .world_table import study_worlds, tell_seeds
 
 WORLDS: tuple[WorldName, ...] = (
@@ -94,9 +92,7 @@ def _budget(plan: WorldPlan, world: WorldName, seed: int) -> DataBudget | None:
         made = make_world(Path(folder), world, seed, grains=plan.grains, kept=plan.folder / "kept")
         experiment = load_experiment(made.folder, plan.settings)
         try:
-            tracks = read_tracks(experiment)
-            walls = read_walls(experiment, tracks.frame_count)
-            tracks = bound_tracks(experiment, tracks, walls)
+            tracks, walls = read_world(experiment)
         except InputError:
             return None
     return measure_budget(tracks, walls)

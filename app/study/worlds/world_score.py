@@ -28,6 +28,7 @@ from ...results.truth import names_of_told, read_truth, true_ids
 from ...synthetic.worlds.making import make_world
 from ...synthetic.worlds.names import WorldName
 from ...synthetic.worlds.table import WORLDS
+from ...tracks import Tracks, WallTracks
 from ..baselines import baseline_lists, compare_baselines
 
 SETTLED = 3  # the frame from which on r counts as that of a sequence under way
@@ -110,12 +111,17 @@ def solve_world(experiment: Experiment, progress: Progress) -> tuple[CorrectedSe
 
 def correct_world(experiment: Experiment) -> CorrectedSequence:
     """Read and correct an experiment as a run would, its sweeps not kept. Raises InputError."""
-    tracks = read_tracks(experiment)
-    walls = read_walls(experiment, tracks.frame_count)
-    tracks = bound_tracks(experiment, tracks, walls)
+    tracks, walls = read_world(experiment)
     assert walls is not None
     config = experiment.config
     return correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config).without_sweeps()))
+
+
+def read_world(experiment: Experiment) -> tuple[Tracks, WallTracks | None]:
+    """What an experiment tells of rods, boundary and walls. Raises InputError."""
+    tracks = read_tracks(experiment)
+    walls = read_walls(experiment, tracks.frame_count)
+    return bound_tracks(experiment, tracks, walls), walls
 
 
 def true_forces(experiment: Experiment, sequence: CorrectedSequence) -> tuple[tuple[Keys, Array], ...]:
