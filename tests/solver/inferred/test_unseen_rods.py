@@ -41,11 +41,12 @@ def test_rods_that_were_taken_out_are_put_back(poses) -> None:
         assert np.all(found.sigma[:, best] < 4 * NOISE)
 
 
-def test_rods_that_overlap_by_a_per_cent_are_put_back_where_that_is_known(poses) -> None:
+@pytest.mark.parametrize("mean", [2e-4, 1e-4], ids=["all alike", "twice the mean"])
+def test_rods_that_overlap_by_a_per_cent_are_put_back_where_that_is_known(poses, mean) -> None:
     overlap = 2e-4
     soft = poses | {"radius": poses["radius"] + 0.5 * overlap}
     sizes = np.unique(soft["radius"])
-    found = infer(soft, GONE, sizes, overlap)
+    found = infer(soft, GONE, sizes, mean)
     true = poses["position"][:, list(GONE)]
     for q, rod in enumerate(GONE):
         away = np.linalg.norm(found.position - true[:, None, q], axis=2).max(axis=0)
@@ -53,7 +54,7 @@ def test_rods_that_overlap_by_a_per_cent_are_put_back_where_that_is_known(poses)
         assert away[best] < 0.05 * soft["radius"][rod]
         assert found.radius[best] == pytest.approx(soft["radius"][rod], rel=0.01)
     assert infer(soft, GONE, sizes).count < len(GONE)
-    assert infer(soft, (), sizes, overlap).count == 0
+    assert infer(soft, (), sizes, mean).count == 0
 
 
 def test_no_rod_is_invented_where_none_is_missing(poses) -> None:
