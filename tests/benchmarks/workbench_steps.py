@@ -27,6 +27,7 @@ ROUNDS = 3
 FLAGS = ("--disable-gpu", "--disable-dev-shm-usage")  # drawn by the processor: a machine without a graphics card
 STEPS = ("photographs", "scale", "walls", "rods", "material", "run", "mend", "inspect", "share")
 WANTED = 300.0  # [ms]
+LOOKS = 0.7  # [s] of a person at what is shown before the next interaction
 WATCH = """(() => {
   const ask = globalThis.fetch;
   globalThis.waits = { open: 0, took: [] };
@@ -54,6 +55,8 @@ class Clock:
         self.took: dict[str, list[float]] = defaultdict(list)
 
     def time(self, name: str, work: Callable[[], object]) -> None:
+        self.tab.evaluate("settled()")
+        time.sleep(LOOKS)
         self.tab.evaluate("settled()")
         since = time.perf_counter()
         work()
@@ -104,6 +107,10 @@ def set_up(clock: Clock) -> None:
     clock.time("walls: drag an end", lambda: pull(tab, line[1], (-9.0, 2.0)))
     tab.locator("#canvas").focus()
     tab.keyboard.press("4")
+    if not tab.evaluate("Boolean(bench.project.rods)"):
+        clock.click("rods: look for them (its bar shows it)", "#detect")
+        tab.wait_for_function("Boolean(bench.project.rods)")
+        tab.evaluate("settled()")
     x, y = tab.evaluate("[bench.project.rods.x[600], bench.project.rods.y[600]]")
     clock.time("rods: choose one", lambda: tab.mouse.click(*on_screen(tab, (x, y))))
     clock.press("rods: move it", "Shift+ArrowRight")

@@ -124,7 +124,8 @@ app.paint = () => {
   app.hint(step.hint?.(app) ?? "");
   app.stage.draw = (c, k) => step.draw?.(app, c, k);
   app.stage.dim = step.dim ?? 1;
-  app.stage.show(app.photograph(app.frame), project.width, project.height);
+  const beside = app.step.frames || app.step.timeline ? [app.frame + 1, app.frame - 1].filter((each) => project.files[each]) : [];
+  app.stage.show(app.photograph(app.frame), project.width, project.height, beside.map(app.photograph));
   app.timeline();
 };
 

@@ -22,6 +22,7 @@ export const inspect = {
   enter(app) { facts = null; net = null; chosen = null; past = null; frameOf = -1; app.queue(async () => { who ??= (await ask("reviewer")).name; facts = (await ask("run_told", { at: app.project.at })).frames; if (facts && app.frame < facts.first) app.frame = facts.first; await load(app); }); },
   leave() { closeRecording(); },
   rodsOfFrame: () => net.rods.x.flatMap((x, n) => [x, net.rods.y[n], net.rods.r[n]]), // for tests
+  names: () => net.rods.id, // for tests
   chosen: () => (chosen?.j === undefined ? null : { i: chosen.i, j: chosen.j }), // for tests
   moved(app) { recording?.show(Math.max(app.frame - (facts?.first ?? 0), 0)); app.queue(() => load(app)); },
   taken(app) { if (facts) app.queue(async () => { facts = (await ask("run_told", { at: app.project.at })).frames; await load(app, true); }); },

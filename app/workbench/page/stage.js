@@ -3,6 +3,7 @@
 import { at } from "/page/dom.js";
 
 const LOUPE = 172, MAGNIFIED = 6;
+const IDLE = 150; // [ms] of a picture being looked at before its neighbours are asked for
 const SMALL = 1400, ENOUGH = 1.2; // [px] of the small picture; how far it is enlarged before all pixels are asked for
 
 async function fetchPicture(url, size) {
@@ -18,18 +19,23 @@ export class Stage {
     this.image = null; this.sharp = null; this.asked = false; this.wanted = ""; this.width = 0; this.height = 0;
     this.draw = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
     this.pending = false; this.drawn = 0; this.fitted = "";
+    this.foreseen = new Map(); this.idle = 0;
     new ResizeObserver(() => { this.resize(); }).observe(this.canvas.parentElement);
     this.listen();
   }
 
-  /** Show a picture: a small one at once, all of its pixels once they are looked at. */
-  async show(url, width, height) {
+  /** Show a picture: a small one at once, all of its pixels once they are looked at. Those beside it are likely next. */
+  async show(url, width, height, beside = []) {
     if (width && height) { this.width = width; this.height = height; }
     if (url === this.wanted) { this.redraw(); return; }
     this.wanted = url; this.sharp = null; this.asked = false;
+    clearTimeout(this.idle);
     if (!url) { this.image = null; this.redraw(); return; }
-    const image = await fetchPicture(url, SMALL);
+    const image = (await this.foreseen.get(url)) ?? (await fetchPicture(url, SMALL)); // none where it could not be foreseen
     if (!image || this.wanted !== url) return;
+    // Each is used once: a file that changes is read anew when one comes back to it.
+    this.idle = setTimeout(() => { this.foreseen = new Map(beside.map((each) => [each, this.foreseen.get(each) ?? fetchPicture(each, SMALL).catch(() => null)])); }, IDLE);
+    this.foreseen.delete(url);
     this.image = image;
     if (this.fitted !== `${this.width}x${this.height}`) this.fit();
     this.redraw();

@@ -41,7 +41,8 @@ def recording(bench: Bench, at: Text) -> dict[str, Any]:
     files += [each.name for each in parts_of(opened.results / RECORDING)[1:]]
     if RECORDING not in files:
         raise InputError(opened.results, "", "holds no recording: let the run come to its end")
-    folder = f"{PATH}{bench.key}/{quote(opened.key)}/"
+    inner = f"{quote(opened.key)}/" if opened.key != "." else ""  # a browser would leave out "./"
+    folder = f"{PATH}{bench.key}/{inner}"
     size = sum((opened.results / name).stat().st_size for name in files)
     return {"addresses": [folder + name for name in files], "bytes": size, "shrink": _shrink(opened)}
 
@@ -139,7 +140,7 @@ def answer_recording(bench: Bench, request: Request) -> Response:
     if name not in FILES and not LATER.fullmatch(name):
         return PlainTextResponse("there is nothing here", 404)
     try:
-        file = bench.project(request.path_params["at"]).results / name
+        file = bench.project(request.path_params.get("at", ".")).results / name
     except InputError as error:
         return PlainTextResponse(str(error), 422)
     if not file.is_file():

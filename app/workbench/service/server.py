@@ -140,7 +140,10 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
         Route("/events", events, methods=["GET"]),
         Route("/viewer/{name}", lambda request: answer_viewer(viewer, request), methods=["GET"]),
         Route("/shared", lambda request: _answered(lambda: answer_shared(bench, request)), methods=["GET"]),
-        Route(f"{PATH}{bench.key}/{{at:path}}/{{name}}", lambda request: answer_recording(bench, request)),
+        *(
+            Route(f"{PATH}{bench.key}/{place}{{name}}", lambda request: answer_recording(bench, request))
+            for place in ("{at:path}/", "")  # the root itself may be the experiment
+        ),
         Route("/ask/{name}", ask, methods=["POST"]),
     ]
     return Guard(Starlette(routes=routes), gate, bench.key)

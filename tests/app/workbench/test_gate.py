@@ -4,6 +4,7 @@ import os
 
 import pytest
 from rodsight.workbench.service.bench import Bench
+from rodsight.workbench.setup.draft import Draft
 from starlette.testclient import TestClient
 
 from .conftest import HOST, Visitor
@@ -70,6 +71,17 @@ def test_every_answer_carries_the_policy(visitor):
         assert "default-src 'none'" in headers["Content-Security-Policy"]
         assert headers["Cache-Control"] == "no-store"
         assert headers["X-Frame-Options"] == "DENY"
+
+
+def test_the_root_itself_may_be_the_experiment(photographs_only):
+    folder = photographs_only / "my photographs"
+    Draft(folder).set_keys("all", {"name": "mine", "photographs.files": "pictures/*.jpg"})
+    visitor = Visitor(Bench(folder)).enter()
+    (folder / "runs" / "mine").mkdir(parents=True)
+    (folder / "runs" / "mine" / "recording.rrd").write_bytes(b"what was recorded")
+    (address,) = visitor.ask("recording", at=".")["addresses"]
+    assert "/./" not in address  # a browser asks without it
+    assert visitor.client.get(address).content == b"what was recorded"
 
 
 def test_a_recording_is_given_under_its_secret_name_alone(visitor, stranger_to, photographs_only):

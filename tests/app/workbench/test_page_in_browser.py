@@ -1,8 +1,10 @@
 """The workbench in a real headless Chromium: from a folder of photographs to forces, by mouse and keyboard."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 from rodsight.experiment.experiment import load_experiment
@@ -12,6 +14,7 @@ from tests.app.workbench.hand import drag, fill, go, idle, on_screen, opened
 from tests.program import rodsight
 
 pytestmark = pytest.mark.screen
+WATCHED = 1500.0  # [ms] that a viewer drawn by the processor may need for one picture
 
 
 @pytest.fixture
@@ -109,9 +112,44 @@ def show_the_recording(tab: Page) -> None:
     frame = tab.evaluate("bench.frame")
     tab.keyboard.press("v")
     tab.wait_for_function("(frame) => bench.recording?.opened && bench.recording.heard === frame", arg=frame)
+    click_in_the_viewer(tab)
     tab.click("#step-photographs")
     idle(tab)
     expect(tab.locator("#recording")).to_be_hidden()
+
+
+def click_in_the_viewer(tab: Page) -> None:
+    """Somewhere in the network of the recording: the card beside it is that of what was clicked."""
+    tab.keyboard.press("Escape")
+    tab.evaluate("""() => {
+        const told = bench.recording.told, clicked = told.clicked;
+        globalThis.clicks = [];
+        told.clicked = (...what) => { clicks.push(what); clicked(...what); };
+    }""")
+    box = tab.locator("#viewer").bounding_box()
+    assert box is not None
+    left, heard = box["x"] + 0.28 * box["width"], []
+    for top in box["y"] + box["height"] * np.linspace(0.25, 0.75, 11):  # where nothing is drawn, nothing is told
+        before = tab.evaluate("clicks.length")
+        tab.mouse.move(left - 3, top - 3)
+        tab.mouse.move(left, top)
+        tab.wait_for_timeout(WATCHED)  # the viewer picks what it painted under the mouse
+        tab.mouse.click(left, top)
+        tab.wait_for_timeout(WATCHED)
+        if tab.evaluate("clicks.length") > before:
+            heard.append((top, *tab.evaluate("clicks.at(-1).slice(0, 2)")))
+        if len(heard) == 3:
+            break
+    screen, x, y = np.transpose(heard)
+    steps = np.diff(y) / np.diff(screen)  # straight down on the screen is straight down on the photograph
+    assert np.ptp(x) < 2.0
+    assert (steps > 0.0).all()
+    assert np.ptp(steps) < 0.05 * steps.mean()
+    said = tab.locator("#card .fact").first.text_content() or ""
+    rods = np.reshape(tab.evaluate("bench.step.rodsOfFrame()"), (-1, 3))
+    names = tab.evaluate("bench.step.names()")
+    near = np.hypot(rods[:, 0] - x[-1], rods[:, 1] - y[-1]) < 1.4 * rods[:, 2]
+    assert any(str(names[k]) in re.findall(r"\d+", said) for k in np.flatnonzero(near)), said
 
 
 def test_what_is_missing_is_a_click_away(tab):
