@@ -108,20 +108,27 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         assert tracks is not None
         start, stop = run.frame_range(tracks.frame_count)
         return tracks.frames(start, stop), walls.frames(start, stop) if walls is not None else None
-    origin = run.origin(("photographs", "tracking", "walls", "boundary"))
+    sections = ("photographs", "tracking", "walls", "boundary")
+    origin = run.origin(sections)
     if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
         run.forget("tracking", "walls")
         return load_tracks(run.file(TRACKS))
+    from .tracking.corrected_frames import keep_frames_before
     from .tracking.stage import track_photographs, write_found_tables  # not where rods are tracked already
 
     check(run)
     since = time.perf_counter()
     start, stop = run.frame_range(len(experiment.photographs()))
-    kept: list[Checkpoint] = []
+    uncorrected = run.origin(sections, corrected=False).fingerprint
+    kept: list[str] = []
 
     def keep(stage: str) -> Checkpoint:
-        kept.append(run.checkpoint(stage, origin.fingerprint))
-        return kept[-1]
+        run.take_up(stage)
+        checkpoint = run.checkpoint(stage, uncorrected)
+        if stage == "tracking":  # walls are followed by themselves, whatever is told of rods
+            keep_frames_before(checkpoint, read_corrections(experiment, None, len(experiment.photographs())))
+        kept.append(stage)
+        return checkpoint
 
     tracks, walls, tables = track_photographs(
         experiment, stop, keep, run.progress, run.note_failure, tell=run.notes.append
@@ -136,8 +143,8 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     run.tell_manifest()
     for name in (DETECTIONS, TRACKS):
         run.manifest.add(name, origin.fingerprint)
-    for checkpoint in kept:
-        checkpoint.clear()
+    for stage in kept:
+        run.set_aside(stage)
     run.timings.add("tracking", since)
     return tracks, walls
 

@@ -43,7 +43,9 @@ OWN = (
     "tracked_walls.csv",
 )  # fmt: skip
 UNFINISHED = ".unfinished"  # folder of checkpoints
+TRACKED = ".tracked"  # folder of the frames of a finished tracking, for the next one, which obeys other corrections
 ERROR_BARS = {"solver": {"ensemble_size", "workers"}}  # settings that leave the forces as they are
+BY_HAND = {"photographs": {"corrections"}}  # what changes some frames of the tracks alone
 
 
 @dataclass(slots=True)
@@ -99,10 +101,14 @@ class Run:
             log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {stage}, frame {frame}\n")
             log.write("".join(traceback.format_exception(error)) + "\n")
 
-    def origin(self, sections: tuple[str, ...], log: VerdictLog | None = None) -> Provenance:
-        """What a result is made from: these sections of the configuration, all input files, and people's verdicts."""
-        config = self.experiment.config.model_dump(mode="json", include=set(sections), exclude=ERROR_BARS)
-        sums = checksums(self.experiment)
+    def origin(self, sections: tuple[str, ...], log: VerdictLog | None = None, *, corrected: bool = True) -> Provenance:
+        """What a result is made from: these sections of the configuration, all input files, and people's verdicts.
+
+        corrected=False: the same whatever poses are told by hand.
+        """
+        without = ERROR_BARS if corrected else ERROR_BARS | BY_HAND
+        config = self.experiment.config.model_dump(mode="json", include=set(sections), exclude=without)
+        sums = checksums(self.experiment, corrected=corrected)
         told = json.dumps([__version__, config, sums, self.frames], sort_keys=True)
         digest = hashlib.sha256(told.encode()).hexdigest()
         verdicts = fingerprint(log) if log is not None else ""
@@ -147,6 +153,22 @@ class Run:
             shutil.rmtree(self.folder / UNFINISHED / stage, ignore_errors=True)
         with suppress(OSError):  # not empty, or not there
             (self.folder / UNFINISHED).rmdir()
+
+    def take_up(self, stage: str) -> None:
+        """Begin a stage with the frames that were set aside when it was finished, unless it has begun already."""
+        aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
+        if aside.is_dir() and not place.exists():
+            place.parent.mkdir(exist_ok=True)
+            aside.rename(place)
+
+    def set_aside(self, stage: str) -> None:
+        """Keep the frames of a stage that is finished, for it is to be done again where somebody corrects it."""
+        aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
+        shutil.rmtree(aside, ignore_errors=True)
+        aside.parent.mkdir(exist_ok=True)
+        if place.is_dir():
+            place.rename(aside)
+        self.forget(stage)
 
     def checkpoint(self, stage: str, fingerprint: str) -> Checkpoint:
         """Finished frames of an unfinished stage that is made from this."""

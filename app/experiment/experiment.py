@@ -87,10 +87,16 @@ def load_experiment(path: Path, settings: Sequence[str] = ()) -> Experiment:
     return Experiment(file, load_config(file, tuple(settings), inputs), inputs)
 
 
-def checksums(experiment: Experiment) -> dict[str, str]:
-    """SHA-256 of every input file as it was read, by its path in the experiment; of one elsewhere, by its name."""
-    result = {}
+def checksums(experiment: Experiment, *, corrected: bool = True) -> dict[str, str]:
+    """SHA-256 of every input file as it was read, by its path in the experiment; of one elsewhere, by its name.
+
+    corrected=False: without the table of poses told by hand.
+    """
+    result, photographs = {}, experiment.config.photographs
+    by_hand = None if corrected or photographs is None else photographs.corrections
     for file in experiment.input_files():
+        if by_hand is not None and file == experiment.folder / by_hand:
+            continue
         try:
             result[_relative(file, experiment.folder)] = experiment.inputs.checksum(file)
         except OSError as error:

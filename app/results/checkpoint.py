@@ -76,6 +76,12 @@ class Checkpoint:
         load = lru_cache(MOST_KEPT)(lambda frame: self.load(frame, *kinds))
         return tuple(Lazily(count, lambda frame, at=at: load(frame)[at]) for at in range(len(kinds)))
 
+    def drop(self, first: int) -> None:
+        """Remove the frames from this one on."""
+        for piece in sorted(self.folder.glob("*.piece"), reverse=True):  # the last first: what is left has no hole
+            if int(piece.stem) >= first:
+                piece.unlink()
+
     def clear(self) -> None:
         """Remove the frames, and the folder above once no stage is left in it."""
         shutil.rmtree(self.folder, ignore_errors=True)
