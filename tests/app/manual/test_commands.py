@@ -1,0 +1,216 @@
+"""Every command that a page tells is done on a tiny experiment: twenty rods, four photographs.
+
+The same commands on the sample itself are a slow test. What differs from what stands in the pages is in three tables
+here, each entry with its reason: LEFT_OUT, SMALLER and ADDED.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import signal
+import threading
+import urllib.request
+import webbrowser
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import cv2
+import pandas as pd
+import pytest
+from rodsight.recording.viewing import recording_server
+from rodsight.synthetic.synthesis import synthesize
+
+from tests.app.manual.test_pages import README, TEXTS, commands
+from tests.program import ROOT, rodsight
+
+WRITTEN = ROOT / "tests/app/exchange/foreign/written"
+PIXEL = 2.5e-4  # m, of the tiny photographs
+FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+MENTIONED = re.compile(r"`rodsight\s([^`>]+\s[^`>]+)`")  # a command in a sentence
+PLACE = re.compile(r"[A-Z]{3}|…|^(share --html|export pictures)$")  # what the reader fills in, or knows from before
+
+# Commands that are not done here: their beginning, and why.
+LEFT_OUT = {
+    "study accuracy": "simulates three packings of 1172 rods",
+    "study budget": "simulates packings of hundreds of rods",
+    "study intervals": "simulates packings of 300 rods",
+    "study numbers": "simulates packings of 450 rods",
+    "study paper": "simulates packings of 450 rods",
+    "study report": "simulates packings of 250 rods, four of each world",
+    "study uncertainty": "simulates packings of 450 rods",
+    "study worlds --seeds": "simulates every world",
+    "study worlds --worlds shear mu_low": "simulates packings of 450 rods",
+    "study worlds --worlds mu_low": "simulates packings of 450 rods",
+    "study real": "wants photoelastic experiments, which belong to their authors",
+    "solve test": "wants a photoelastic experiment, which belongs to its authors",
+}
+# Words that stand for less here.
+SMALLER = {
+    "--idle 600": ("--idle 1", "nothing arrives any more"),
+    "--frames 0:12": ("--frames 0:3", "there are four photographs"),
+    "--frame 11": ("--frame 3", "there are four photographs"),
+    "--preset small --seed": ("--preset small --grains 20 --frames 3 --seed", "250 rods take half a minute"),
+    "--preset paper --seed 1": ("--preset paper --seed 1 --grains 20", "1172 rods take minutes"),
+    "--preset shear --no-photographs": ("--preset shear --no-photographs --grains 60", "450 rods take a minute"),
+    "--grains 150": ("--grains 60", "simulated anew"),
+    "--ensemble 8": ("--ensemble 2", "each is solved again"),
+}
+# Options that a command gets besides, all of that name or one alone; what, and why.
+ADDED = {
+    "sensitivity": ("--workers 1", "a process of their own for so little takes longer than the work"),
+    "sensitivity my_test": ("--factors friction=0.7:1.3", "of a dozen factors each is solved several times"),
+    "sensitivity sample_data/shear": ("--factors friction=0.7:1.3", "of a dozen factors each is solved several times"),
+    "campaign": ("--no-recordings", "each is in a process of its own"),
+    "campaign sample_data/campaign.csv": ("--dry", "with --workers 2 it is done"),
+}
+MADE_BY = {"synth": 1, "init": 1, "import": 3}  # the word that names the folder which a command makes
+DRAWN = {("export", "pictures"), ("export", "video")}  # by a viewer, without a screen
+
+
+def told() -> Iterator[tuple[str, ...]]:
+    """What is typed after `rodsight`, in blocks and in sentences, once each."""
+    for text in (README, *TEXTS.values()):
+        sentences = (" ".join(found.split()) for found in MENTIONED.findall(FENCED.sub("", text)))
+        mentioned = (shlex.split(each) for each in sentences if not PLACE.search(each))
+        for words in chain(commands(text), mentioned):
+            if words and not words[0].startswith("-"):
+                yield tuple(words)
+
+
+def left_out(command: str) -> bool:
+    return any(command.startswith(each) for each in LEFT_OUT)
+
+
+TOLD = list(dict.fromkeys(told()))
+DONE = [words for words in TOLD if not left_out(shlex.join(words))]
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the pages' files are: experiments, runs, what other programs wrote."""
+    folder = tmp_path_factory.mktemp("pages")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        shear = folder / "sample_data/shear"
+        synthesize(shear, grains=20, frames=4, seed=12, pixel_size=PIXEL)
+        table = pd.read_csv(ROOT / "sample_data/campaign.csv").assign(frames="0:2")
+        table.tail(2).to_csv(folder / "sample_data/campaign.csv", index=False)
+        for name in ("my_test", "my_photographs"):
+            shutil.copytree(shear, folder / name)
+            config = folder / name / "experiment.toml"
+            config.write_text(config.read_text().replace('name = "shear"', f'name = "{name}"'))
+            for file in sorted((shear / "photos").iterdir()):  # as the pages tell: PNG, of a finer scale
+                picture = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+                assert picture is not None
+                finer = cv2.resize(picture, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC)
+                cv2.imwrite(str(folder / name / "photos" / file.with_suffix(".png").name), finer)
+        for name, out in (("shear", "shear"), ("shear", "stiffer"), ("my_test", "my_test")):
+            source = "my_test" if name == "my_test" else f"sample_data/{name}"
+            setting = ("--set", "solver.kappa=0.1") if out == "stiffer" else ()
+            assert rodsight("run", source, "--out", f"runs/{out}", *setting) == 0
+        for name in ("big", "try"):
+            shutil.copytree(shear, folder / name)
+        shutil.copytree("runs/shear", "runs/campaign/shear")  # as a campaign leaves it
+        _write_foreign_files(folder)
+    return folder
+
+
+def _write_foreign_files(folder: Path) -> None:
+    """Files that the pages take in, under the names that they have there."""
+    tracks = pd.read_csv(folder / "sample_data/shear/truth_tracks.csv")
+    named = tracks.rename(columns={"frame": "t", "id": "rod"}).assign(r=0.008)
+    named[["t", "rod", "x", "y", "r"]].to_csv(folder / "spots.csv", index=False)
+    shutil.copy(WRITTEN / "trackpy_discs.csv", folder / "trajectories.csv")
+    spots = tracks.assign(FRAME=tracks.frame, TRACK_ID=tracks.id, RADIUS=8.0, POSITION_X=1e3 * tracks.x)
+    spots = spots.assign(POSITION_Y=1e3 * (tracks.y.max() - tracks.y)).drop(columns=tracks.columns)
+    units = ",".join("(mm)" if each in ("RADIUS", "POSITION_X", "POSITION_Y") else "" for each in spots)
+    header, rows = spots.to_csv(index=False).split("\n", 1)
+    (folder / "allspots.csv").write_text("\n".join([header, header.title(), header.title(), units, rows]))
+    shutil.copy(WRITTEN / "rodtracker_rods.csv", folder / "rods.csv")
+    shutil.copy(WRITTEN / "box_with_floor.dump", folder / "dump.txt")
+    frame = tracks[tracks.frame == 0]
+    balls = "".join(f"{x}\t{y}\t0\t0.008\n" for x, y in zip(frame.x, frame.y, strict=True))
+    (folder / "spheres.txt").write_text(f"#format x_y_z_r\n{balls}")
+    assert rodsight("export", "dic", "runs/shear", "--out", "folder") == 0
+    assert rodsight("synth", "solved", "--preset", "photoelastic", "--no-photographs") == 0
+
+
+@pytest.fixture
+def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The command's surroundings: no screen; a browser that looks at the page once, whereupon Ctrl-C is pressed."""
+
+    def look_and_stop(address: str) -> bool:
+        def look() -> None:
+            browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+            with browser.open(address, timeout=30) as page:
+                assert b"<html" in page.read()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=look, daemon=True).start()
+        return True
+
+    def serve_here(files: list[Path]) -> str:  # it would outlive the command
+        servers.append(recording_server.RecordingServer(files))
+        return servers[-1].address
+
+    servers: list[recording_server.RecordingServer] = []
+    monkeypatch.chdir(here)
+    monkeypatch.setattr(webbrowser, "open", look_and_stop)
+    monkeypatch.setattr(recording_server, "serve_apart", serve_here)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    yield
+    for server in servers:
+        server.close()
+
+
+def typed(words: tuple[str, ...]) -> list[str]:
+    """The command as it is done here."""
+    line = shlex.join(words)
+    for more, (less, _) in SMALLER.items():
+        line = line.replace(more, less)
+    besides = [options for which, (options, _) in ADDED.items() if which in (words[0], shlex.join(words))]
+    return [*shlex.split(line), *(word for options in besides for word in options.split())]
+
+
+@pytest.mark.usefixtures("at_work")
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param(words, id=shlex.join(words), marks=[pytest.mark.screen] if words[:2] in DRAWN else [])
+        for words in DONE
+    ],
+)
+def test_it_ends_well(words, tmp_path, monkeypatch, capsys):
+    made = Path(words[MADE_BY[words[0]]]) if words[0] in MADE_BY else None
+    if made is not None and made.exists():
+        made.rename(tmp_path / "aside")
+        if words[0] == "init":  # into the folder of the photographs
+            shutil.copytree(tmp_path / "aside/photos", made / "photos")
+    if words[0] == "view" and "--web" in words:
+        monkeypatch.setenv("DISPLAY", ":0")  # then it opens the browser by itself
+    try:
+        status = rodsight(*typed(words))
+        assert status == 0, capsys.readouterr().err
+        if made is not None:
+            assert (made / "experiment.toml").is_file()
+    finally:
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
+            if (tmp_path / "aside").exists():
+                (tmp_path / "aside").rename(made)
+
+
+def test_no_exception_is_kept_that_no_page_needs():
+    lines = [shlex.join(words) for words in TOLD]
+    for start in LEFT_OUT:
+        assert any(line.startswith(start) for line in lines), start
+    for which in ADDED:
+        assert any(which in (line, line.split()[0]) for line in lines), which
+    for more in SMALLER:
+        assert any(more in line for line in lines), more
+    assert len(DONE) > 50
