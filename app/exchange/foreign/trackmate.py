@@ -48,7 +48,7 @@ def read_trackmate(file: Path, columns: Mapping[str, str]) -> Spots:
     body = table.select([row >= extra for row in range(len(table))])
     if not len(body):
         raise InputError(file, "", "has a header but no spots")
-    return Spots(observe_table(body, chosen), METRES.get(units))
+    return Spots(_unbranched(file, observe_table(body, chosen)), METRES.get(units))
 
 
 def _read_xml(file: Path, text: str, chosen: dict[str, str]) -> Spots:
@@ -104,4 +104,18 @@ def _observe(file: Path, rows: Iterable[Mapping[str, str]], chosen: dict[str, st
             raise InputError(file, f"spot {number}", f"has no {lacking[0]}")
     columns = {name: [row.get(name, "") for row in rows] for name in chosen.values()}
     table = Table(file, columns, list(range(1, len(rows) + 1)), of="spot")
-    return observe_table(table, chosen)
+    return _unbranched(file, observe_table(table, chosen))
+
+
+def _unbranched(file: Path, seen: Observations) -> Observations:
+    """The same; raises InputError where a track has two spots in a frame, as those of cells that divide have."""
+    known: set[tuple[int, str]] = set()
+    for frame, name in zip(seen.frame.tolist(), seen.name, strict=True):
+        if (frame, name) in known:
+            raise InputError(
+                file, f"track {name}",
+                f"has two spots in frame {frame}: it splits or merges, which rods do not. Track again without, or "
+                "unlink them in TrackScheme",
+            )  # fmt: skip
+        known.add((frame, name))
+    return seen

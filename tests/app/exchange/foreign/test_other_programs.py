@@ -94,6 +94,32 @@ def test_trackmate_session_and_simple_tracks(tmp_path, capsys):
     assert "is not XML" in refuse(capsys, "trackmate", tmp_path / "bad.xml", tmp_path / "three")
 
 
+def test_a_track_that_splits_as_cells_do_is_named(tmp_path, capsys):
+    (tmp_path / "spots.csv").write_text(SPOTS.replace("ID15,15,,", "ID15,15,1,"))
+    (tmp_path / "session.xml").write_text(
+        SESSION.replace('TARGET_ID="14" />', 'TARGET_ID="14" /><Edge SPOT_SOURCE_ID="12" SPOT_TARGET_ID="15" />')
+    )
+    for name in ("spots.csv", "session.xml"):
+        said = refuse(capsys, "trackmate", tmp_path / name, tmp_path / "out")
+        assert "track 1: has two spots in frame 1: it splits or merges" in said
+        assert not (tmp_path / "out").exists()
+
+
+def test_trackmate_table_of_results_as_imagej_saves_it(tmp_path, capsys):
+    """Before version 7: numbered rows, tabs, None for a spot without a track, one row of header and no units."""
+    (tmp_path / "Spots in tracks statistics.txt").write_text(
+        " \tLabel\tID\tTRACK_ID\tPOSITION_X\tPOSITION_Y\tFRAME\tRADIUS\n"
+        "1\tID1\t1\t0\t10.000\t45.000\t0\t5.000\n2\tID2\t2\t1\t20.000\t45.000\t0\t5.000\n"
+        "3\tID3\t3\t0\t10.000\t45.000\t1\t5.000\n4\tID4\t4\t1\t20.000\t43.000\t1\t5.000\n"
+        "5\tID5\t5\tNone\t90.000\t90.000\t1\t5.000\n"
+    )
+    arguments = ("trackmate", tmp_path / "Spots in tracks statistics.txt", tmp_path / "out")
+    assert "--pixel-size" in refuse(capsys, *arguments)
+    said = take_in(capsys, *arguments, "--pixel-size", PIXEL)
+    expect_pair(tmp_path / "out", np.array([10.0, 0.0, 2.0]) * PIXEL, 5 * PIXEL)
+    assert "1 rows belong to no grain" in said
+
+
 def test_rodtracker_ends_of_the_first_camera(tmp_path, capsys):
     (tmp_path / "rods.csv").write_text(
         "x1,y1,z1,x2,y2,z2,x1_gp3,y1_gp3,x2_gp3,y2_gp3,x1_gp4,y1_gp4,frame,seen_gp3,seen_gp4,color,particle\n"

@@ -74,6 +74,24 @@ def test_what_trackpy_found_and_linked_comes_in(tmp_path, capsys):
     assert read_tracks(load_experiment(tmp_path / "out")).radius == pytest.approx(np.full(9, 1.5e-3))
 
 
+def test_what_rodtracker_saves_comes_in(tmp_path, capsys):
+    said = take_in(
+        capsys, "rodtracker", WRITTEN / "rodtracker_rods.csv", tmp_path / "out", "--pixel-size", 1e-4, "--radius", 15,
+        "--walls", "box",
+    )  # fmt: skip
+    assert "Camera gp3" in said
+    assert "1 rows tell no place of a rod" in said
+    assert "500 … 502" in said
+    tracks = tracks_in(tmp_path / "out")
+    place = tracks.position / 1e-4
+    assert place.shape == (3, 5, 2)
+    assert place[0, 1:3] - place[0, 0] == pytest.approx(np.array([[30.0, 0.0], [60.0, 0.0]]))
+    assert place[0, 3] - place[0, 0] == pytest.approx([15.0, 26.0])  # further up, where y of a picture is less
+    assert place[1, 4] - place[0, 4] == pytest.approx([0.0, 1.5])
+    assert np.isnan(place[2, 4]).all()  # hidden
+    assert tracks.rotation[:, 0] == pytest.approx(np.full(3, np.arctan2(-2.0, 3.0)))
+
+
 def test_edges_of_a_box_tell_what_bounds_and_tilts_do(tmp_path, capsys):
     lines = (WRITTEN / "sheared_cell.dump").read_text().splitlines()
     at = len(lines) - 36 - 4
