@@ -278,7 +278,7 @@ def _maps(layout: Layout) -> rrb.Container:
 
 def _rods(layout: Layout) -> rrb.View:
     x, y, size = _middle(layout.canvas)
-    eye = (x + 0.36 * size, y - 0.16 * size, 0.97 * size)
+    eye = (x + 0.4 * size, y - 0.18 * size, 1.09 * size)
     return solid_view(Tab.RODS, "/rods", eye, (x, y, -0.3 * layout.rod_length))
 
 
