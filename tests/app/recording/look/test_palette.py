@@ -18,6 +18,8 @@ from rodsight.recording.look.colours import (
     PROBABILITY_RAMP,
     SERIES,
 )
+from rodsight.recording.look.force_style import ForceRange
+from rodsight.recording.packing_layers.rods_in_3d import ALUMINIUM
 
 from solver.sequence.frame_forces import FrameStatus
 from tests.app.recording.look.colour_vision import VISIONS, cie76
@@ -53,6 +55,13 @@ def test_the_middle_of_a_ramp_is_apart_from_its_ends(ramp, vision):
     assert cie76(low, middle, vision) >= APART
     assert cie76(middle, high, vision) >= APART
     assert cie76(low, high, vision) >= APART
+
+
+@pytest.mark.parametrize("vision", VISIONS)
+def test_forces_are_apart_from_the_rods_that_they_lie_on(vision):
+    force = ForceRange(mean=1.0, top=4.0)
+    weakest = FORCE_RAMP[int((1.0 - force.weak) / (force.top - force.weak) * (len(FORCE_RAMP) - 1))]
+    assert cie76(ALUMINIUM, tuple(weakest.tolist()), vision) >= APART
 
 
 def test_nothing_is_grey_between_less_and_more():
