@@ -15,7 +15,7 @@ from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, LOST, SUSPECT, packed_one
 from ..look.scene import Scene
 
-ALUMINIUM = (46, 52, 62, 255)  # dark: forces before the rods stand out in grey, too
+ALUMINIUM = (34, 39, 48, 255)  # dark: forces before the rods stand out in grey, too
 CHAIN_RADIUS_SHARE = 0.55  # of the grain's, for a chain at the top of the range
 
 
