@@ -95,6 +95,10 @@ class CorrectedSequence:
         """The frame as it is to be believed after the check."""
         return doubt_friction(frame, check, measured=self.friction_measured)
 
+    def restate(self, statistics: FrameStatistics, judged: FrameForces, check: FrictionCheck | None) -> FrameStatistics:
+        """The statistics of a frame after the check: of another friction other contacts slide."""
+        return statistics if check is None or check.agrees else _summarize(self, judged)
+
     def find_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
         """What the motion of all solved frames says of the friction that was given; they are looked at once."""
         probability = self.settings.for_radii(self.packing.grains.radius).ensemble.probability

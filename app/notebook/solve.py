@@ -98,7 +98,7 @@ def solve(
         boundary=sequence.boundary,
     )  # fmt: skip
     frames, check = sequence.check_friction(frames)
-    statistics = [each.statistics for each in solved]
+    statistics = [sequence.restate(each.statistics, frame, check) for each, frame in zip(solved, frames, strict=True)]
     return Run(replace(unsolved, frames=frames, statistics=statistics, friction_check=check))
 
 

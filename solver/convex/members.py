@@ -14,6 +14,16 @@ from solver.convex.program import SLIP_SIGMAS, Balance, ConvexForces, ConvexSett
 from solver.detection.displacement import contact_displacement, displacement_scale
 from solver.nlgs.warm_start import ForceMemory
 
+EXACT = 1e-12  # [m] standard deviation of a sliding that counts as no noise at all
+
+
+@dataclass(frozen=True, slots=True)
+class SeenSlip:
+    """Measured sliding (c,), zero where a grain is missing."""
+
+    over_noise: Array  # u_t over its standard deviation
+    over_scale: Array  # |u_t| over what neighbours move by, or over its standard deviation where that is more
+
 
 @dataclass(frozen=True, slots=True)
 class Slip:
@@ -21,6 +31,7 @@ class Slip:
 
     value: Array  # (c,) û_t, zero where nothing is known
     worth: float  # s² / (s² + noise²), from 0 (noise alone) to 1
+    seen: SeenSlip | None = None  # what it was read from; None: from what two intervals have in common
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +94,12 @@ def read_slip(
         (interval[0].cell, interval[1].cell),
     )  # fmt: skip
     noise = float(np.mean(deviation**2)) if contacts.count else 0.0
-    return Slip(soft_slip(ut, scale, deviation / SLIP_SIGMAS, settings), scale**2 / (scale**2 + noise))
+    seen = np.nan_to_num(np.asarray(ut, dtype=np.float64), nan=0.0)
+    sure = np.maximum(deviation, EXACT)
+    return Slip(
+        soft_slip(ut, scale, deviation / SLIP_SIGMAS, settings), scale**2 / (scale**2 + noise),
+        SeenSlip(seen / sure, np.abs(seen) / np.maximum(scale, sure)),
+    )  # fmt: skip
 
 
 def steady_slip(before: Slip, after: Slip) -> Slip:

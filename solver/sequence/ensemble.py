@@ -20,7 +20,7 @@ from solver.bodies.motion import Snapshot
 from solver.contacts.contacts import Contacts, measure_pairs
 from solver.contacts.pairs import are_among, are_there, join_keys, recall
 from solver.contacts.verdicts import apply_verdicts
-from solver.convex.members import RefinedMotion, Slip, advance_member, read_slip, steady_slip
+from solver.convex.members import RefinedMotion, SeenSlip, Slip, advance_member, read_slip, steady_slip
 from solver.convex.program import Balance, assemble_balance, polish
 from solver.detection.displacement import find_reversals, member_intervals
 from solver.detection.networks import PairProbability, ProbablePairs
@@ -32,7 +32,7 @@ from solver.sequence.demand import NO_DEMAND, ROUNDS, WINS, Demand, find_demand
 from solver.sequence.frame_problem import FrameProblem
 from solver.sequence.judging.judgement import SETTLED_DIFFERENCE
 from solver.statistics.agreement import relative_change
-from solver.statistics.bearing import cone_share
+from solver.statistics.sliding import cone_share
 from solver.together import work_together
 
 
@@ -92,6 +92,7 @@ class EnsembleForces:
     forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
     demand: Demand  # pairs among those of `step` that were not detected but demanded by the balance
+    seen_slip: SeenSlip  # around the frame where that is known, else before it or after
 
     @property
     def member_force(self) -> Array:
@@ -151,7 +152,7 @@ def solve_ensemble(
         np.array(members.place),
         EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing),
         chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
-        touching.forbidden_probability, demand.only(touching.contacts.key),
+        touching.forbidden_probability, demand.only(touching.contacts.key), members.seen_slip,
     )  # fmt: skip
 
 
@@ -209,6 +210,7 @@ class _Members:
     place: list[int]  # (m,) in MEMBERS
     memories: list[ForceMemory | None]  # of the five convex members; None: it had nothing to read
     remarks: list[str]
+    seen_slip: SeenSlip
 
     @property
     def convex(self) -> list[Array]:
@@ -332,7 +334,7 @@ def _advance_members(
         else:
             remarks.append(f"a convex member was left out ({forces.ending})")
         memories.append(renewed)
-    return _Members(np.stack(fields), worth, place, memories, remarks)
+    return _Members(np.stack(fields), worth, place, memories, remarks, _seen_slip(slips))
 
 
 def _average(problem: FrameProblem, balance: Balance, members: _Members) -> tuple[Array, Array, list[str]]:
@@ -363,6 +365,14 @@ def _slips(problem: FrameProblem, contacts: Contacts) -> tuple[Slip | None, ...]
     slips = [None if interval is None else slip(interval) for interval in _intervals(snapshots, problem.k)]
     before, after = slips[:2]
     return (*slips, None if before is None or after is None else steady_slip(before, after))
+
+
+def _seen_slip(slips: Sequence[Slip | None]) -> SeenSlip:
+    """Of the intervals around the frame, before and after it the first that there is."""
+    before, after, around = slips[:3]
+    seen = next(slip.seen for slip in (around, before, after) if slip is not None)
+    assert seen is not None
+    return seen
 
 
 def _intervals(snapshots: Sequence[Snapshot], k: int) -> tuple[tuple[int, int] | None, ...]:

@@ -11,6 +11,7 @@ from solver.bodies.holes import find_holes
 from solver.bodies.motion import shear_over
 from solver.contacts.contacts import Contacts, detect_contacts
 from solver.contacts.pairs import align, are_among
+from solver.convex.members import SeenSlip
 from solver.detection.networks import NearPairs
 from solver.mixture.balancing import bring_into_balance
 from solver.mixture.mixing import Field, Mixture, mix_on, worth_of_motion
@@ -50,6 +51,7 @@ class Estimate:
     cone_share: Array | None = (
         None  # (c, 2) of the convex members and of the chains on the Coulomb cone; None: no members
     )
+    seen_slip: SeenSlip | None = None  # None: no members
     disagreement: float = np.nan  # D
     start_difference: float = np.nan  # H
     motion: Field | None = None  # what the motion alone says, where it was mixed
@@ -228,5 +230,5 @@ def _estimate_by_ensemble(
     return Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
         found.remark, found.spread_fn, found.spread_ft, found.member_force if problem.settings.keep_members else None,
-        found.cone_share(friction), found.disagreement, found.start_difference, demand=found.demand,
+        found.cone_share(friction), found.seen_slip, found.disagreement, found.start_difference, demand=found.demand,
     )  # fmt: skip

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.bodies.packing import Material
 from solver.bodies.quantity import columns
 from solver.bodies.strain import displacement_gradient, logarithmic_strain, shear_of
 from solver.contacts.contacts import Contacts, ContactSource, ContactState
@@ -30,10 +29,9 @@ from solver.sequence.judging.judgement import (
 )
 from solver.sequence.state import SequenceState
 from solver.statistics.balance import grain_unbalance
-from solver.statistics.bearing import bearing_probability, sliding_probability
-from solver.statistics.force_statistics import mobilisation
-
-EVEN = 0.5  # P(slides) above which a contact counts as sliding
+from solver.statistics.bearing import bearing_probability
+from solver.statistics.force_statistics import mean_normal_force, mobilisation
+from solver.statistics.sliding import SlidingSigns, contact_state, sliding_probability
 
 
 def report_frame(
@@ -62,20 +60,35 @@ def find_ages(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
     return recall(contacts.key, state.age_key, state.age, fill=-1) + np.int32(1)
 
 
-def contact_state(fn: Array, slides: Array) -> NDArray[np.uint8]:
-    """ContactState of forces fn (c,) [N] that slide with a probability (c,)."""
-    state = np.where(slides > EVEN, ContactState.SLIDING, ContactState.STICKING).astype(np.uint8)
-    state[fn <= 0] = ContactState.OPEN
-    return state
-
-
-def _odds(material: Material, estimate: Estimate) -> tuple[Array, Array]:
+def _odds(problem: FrameProblem, estimate: Estimate) -> tuple[Array, Array]:
     """P(bears force) and P(slides, if it does) of the contacts (c,)."""
     contacts, fn, ft = estimate.contacts, estimate.fn, estimate.ft
     people_saw = estimate.probability == 0.0  # detected is only what has more
     bears = bearing_probability(fn, np.where(people_saw, 1.0, estimate.probability))
-    used = mobilisation(fn, ft, material.friction_at(contacts.with_wall))
-    return bears, sliding_probability(used, estimate.cone_share)
+    friction = problem.packing.material.friction_at(contacts.with_wall)
+    return bears, sliding_probability(mobilisation(fn, ft, friction), _signs(problem, estimate, friction))
+
+
+def _signs(problem: FrameProblem, estimate: Estimate, friction: Array) -> SlidingSigns | None:
+    """What tells whether contacts slide; friction (c,)."""
+    if estimate.cone_share is None or estimate.seen_slip is None:
+        return None
+    fn, ft, mean = estimate.fn, estimate.ft, mean_normal_force(estimate.fn)
+    weight = _heavier(estimate.contacts, problem.packing.weight)
+    limit = float(friction @ np.maximum(fn, 0.0))
+    borne = float(np.abs(ft).sum()) / limit if limit > 0 else 0.0
+    return SlidingSigns(
+        estimate.cone_share, -estimate.seen_slip.over_noise * np.sign(ft), estimate.seen_slip.over_scale,
+        weight / mean if mean > 0 else np.zeros_like(fn),
+        0.0 if estimate.mixture is None else estimate.mixture.share, problem.settings.soft,
+        borne if problem.k == 0 else None,
+    )  # fmt: skip
+
+
+def _heavier(contacts: Contacts, weight: Array) -> Array:
+    """Weight of the heavier grain of every contact (c,) [N]; weight (n, 2) [N]."""
+    size = np.append(np.linalg.norm(weight, axis=1), 0.0)
+    return np.maximum(size[contacts.i], size[np.minimum(contacts.j, len(weight))])
 
 
 def _describe(
@@ -86,7 +99,7 @@ def _describe(
     fn, ft = estimate.fn, estimate.ft
     un, ut = _measured_motion(problem, contacts, estimate)
     starts = measure_starts(step)
-    bears, slides = _odds(material, estimate)
+    bears, slides = _odds(problem, estimate)
     strain = _strain_since_start(problem)
     reason = (estimate.remark, standing.reason, step.solution.stop.value)
     return FrameForces(

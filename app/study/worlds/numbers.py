@@ -74,7 +74,7 @@ class Compared:
 
 def compare_numbers(solved: SolvedWorld) -> list[Compared]:
     """Compare every statistic of a solved world, sizes of forces only where something tells them."""
-    world, seed, sequence, frames, true = solved.world, solved.seed, solved.sequence, solved.frames, solved.true
+    world, seed, sequence, frames, true = solved.world, solved.seed, solved.sequence, solved.stated, solved.true
     pairs = [(each.statistics, _statistics_of_truth(sequence, each, *true[k])) for k, each in enumerate(frames)]
     late = pairs[SETTLED:]
     doubt = np.array([float(doubt_of(each.forces.trust)) for each in frames[SETTLED:]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -32,7 +32,16 @@ class SolvedWorld:
     @property
     def checked(self) -> list[FrameForces]:
         """The forces as a run states them, once the motion of all frames has been asked for the friction."""
-        return self.sequence.check_friction([each.forces for each in self.frames])[0]
+        return [each.forces for each in self.stated]
+
+    @property
+    def stated(self) -> list[SolvedFrame]:
+        """The frames as a run states them, their statistics included."""
+        judged, check = self.sequence.check_friction([each.forces for each in self.frames])
+        return [
+            replace(each, forces=frame, statistics=self.sequence.restate(each.statistics, frame, check))
+            for each, frame in zip(self.frames, judged, strict=True)
+        ]
 
 
 def solve_one(plan: WorldPlan, world: WorldName, seed: int, progress: Progress = silent) -> SolvedWorld:

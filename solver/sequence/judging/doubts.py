@@ -24,6 +24,7 @@ from solver.sequence.judging.judgement import (
     trust,
 )
 from solver.sequence.settings import SURFACE
+from solver.statistics.sliding import contact_state, slides_at
 
 SUSPECT_TRUST = 0.6  # T of a suspect frame at most
 STILL = (0.8, 0.25)  # rms sliding over its noise below which the motion tells less, and what is lost without any
@@ -177,4 +178,7 @@ def doubt_friction(frame: FrameForces, check: FrictionCheck | None, *, measured:
         f'{check.given:g}; measure it, or set friction = "measured"'
     )
     told = replace(frame, trust=frame.trust * (1.0 - share), doubt="; ".join(filter(None, (words, frame.doubt))))
+    if frame.sliding_probability is not None:
+        slides = slides_at(frame.sliding_probability, check.given, check.measured)
+        told = replace(told, sliding_probability=slides, state=contact_state(frame.fn, slides))
     return widen_for_friction(told, check.given, check.measured)

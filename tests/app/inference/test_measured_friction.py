@@ -8,14 +8,16 @@ from typing import cast
 import numpy as np
 import pytest
 from rodsight.errors import UndeterminedError
-from rodsight.inference import friction_and_radii
+from rodsight.inference import friction_and_radii, inference
 from rodsight.inference.friction_and_radii import measure_friction
-from rodsight.inference.inference import Inputs
+from rodsight.inference.inference import CorrectedSequence, Inputs
 from rodsight.tracks import Tracks, WallTracks
 
 from solver.bodies.rods import RodMaterial
 from solver.convex.friction_check import FrictionCheck
 from solver.detection.touch_probability import ContactProbabilitySettings
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.frame_statistics import FrameStatistics
 from tests.solver.sequence.test_frames import sheared_frames
 
 TRUE = 0.21
@@ -67,3 +69,17 @@ def test_sequences_solved_again_take_the_friction_that_was_found() -> None:
     assert asked.with_friction(TRUE).material == RodMaterial(friction=TRUE)
     told = Inputs(tracks, walls, RodMaterial(friction=0.3))
     assert told.with_friction(TRUE) is told
+
+
+def test_statistics_are_told_anew_where_the_motion_contradicts_the_friction(monkeypatch) -> None:
+    monkeypatch.setattr(inference, "_summarize", lambda sequence, frame: ("anew", frame))
+    asked = cast(CorrectedSequence, None)
+
+    def told(check: FrictionCheck | None) -> object:
+        return CorrectedSequence.restate(asked, cast(FrameStatistics, "before"), cast(FrameForces, "judged"), check)
+
+    def check(measured: float) -> FrictionCheck:
+        return FrictionCheck(0.25, measured, measured - 0.03, measured + 0.03, 1, 3, True, np.ones(3), np.ones(3))
+
+    assert told(None) == told(check(0.26)) == "before"
+    assert told(check(0.4)) == ("anew", "judged")

@@ -50,7 +50,6 @@ MUTANTS = [
         FRAMES,
         ("NEGLIGIBLE_KAPPA = 1e-5", "NEGLIGIBLE_KAPPA = 1e5"),
         ("state.age, fill=-1) + np.int32(1)", "state.age, fill=0) + np.int32(1)"),
-        ("np.where(slides > EVEN,", "np.where(slides > 0.0,"),
         ("np.where(people_saw, 1.0, estimate.probability)", "estimate.probability"),
         ("step.solution.mean_unbalance / step.kappa", "step.solution.unbalance / step.kappa"),
     ),

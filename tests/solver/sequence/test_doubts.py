@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver.contacts.contacts import ContactState
 from solver.convex.friction_check import FrictionCheck
 from solver.sequence.failure import failed_frame
 from solver.sequence.frame_forces import FrameStatus
@@ -109,6 +110,20 @@ def test_a_friction_that_the_motion_contradicts_lowers_the_trust_most_where_it_i
         assert doubt_friction(frame, agrees) is frame
     failed = replace(frame, status=FrameStatus.FAILED)
     assert doubt_friction(failed, check(0.40, 0.34, 0.46)) is failed
+
+
+def test_what_slides_is_what_slides_at_the_friction_that_the_motion_shows():
+    frame = make_results(1, 8, 7, sweeps=2).frames[0]
+    c = len(frame.fn)
+    before = np.linspace(0.0, 1.0, c)
+    frame = replace(frame, fn=np.ones(c), sliding_probability=before)
+    for mu, more in ((0.40, False), (0.16, True)):
+        told = doubt_friction(frame, check(mu, mu - 0.02, mu + 0.02))
+        slides = told.sliding_probability
+        assert slides is not None
+        assert ((slides > before)[1:-1] == more).all()
+        assert slides[[0, -1]] == pytest.approx([0.0, 1.0], abs=1e-6)
+        assert ((told.state == ContactState.SLIDING) == (slides > 0.5)).all()
 
 
 def test_a_friction_that_was_measured_is_as_exact_as_its_interval():
