@@ -38,6 +38,7 @@ class Dump:
     low: Float[Array, "f 2"]  # of the box, in the dump's unit
     cell: Float[Array, "f 2 2"]  # its edges, along the first axis and along the second, if it is not tilted
     periodic: tuple[bool, bool]  # across x, across y
+    shrinking: bool = False  # some faces follow the outermost grains (s, m): nothing stands there
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,8 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     )
     low = np.array([step.low[k] for step in ordered])
     cell = np.array([step.edges[np.ix_(k, k)] for step in ordered])
-    return Dump(seen, low, cell, periodic)
+    shrinking = any(set(ordered[0].ends[each]) & {"s", "m"} for each in k)
+    return Dump(seen, low, cell, periodic, shrinking)
 
 
 class _Finder:

@@ -52,9 +52,10 @@ def bars_of_cell(dump: Dump, unit: float) -> Walls | None:
     kept = [k for k, side in enumerate(SIDES) if not (across_y if side in ("bottom", "top") else across_x)]
     if not kept:
         return None
-    return Walls(
-        tuple(SIDES[k] for k in kept), ends[:, kept], "The faces of the simulation's box that are not periodic."
-    )
+    remark = "The faces of the simulation's box that are not periodic."
+    if dump.shrinking:
+        remark = f"PROPOSED, NOT MEASURED: {remark[0].lower()}{remark[1:-1]}, some of which follow the grains (m, s)."
+    return Walls(tuple(SIDES[k] for k in kept), ends[:, kept], remark)
 
 
 def periodic_cell(dump: Dump, unit: float) -> Array | None:

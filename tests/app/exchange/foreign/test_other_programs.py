@@ -156,8 +156,22 @@ def test_liggghts_dump_with_spins_and_a_fixed_box(tmp_path, capsys):
     assert tracks.time.tolist() == [0.0, 1.0]
     assert walls is not None
     assert walls.endpoints[1, walls.name.index("right")] == pytest.approx(np.array([[6.0, 0.0], [6.0, 4.0]]))
+    assert "PROPOSED" not in said
     assert "omegaz summed up" in said
     assert "Left out: fx" in said
+
+
+def test_a_box_that_shrinks_with_the_grains_is_no_wall_and_an_empty_step_no_frame(tmp_path, capsys):
+    """As LIGGGHTS writes a box of meshes, before the first grain is poured in and after."""
+    folder = tmp_path / "post"
+    folder.mkdir()
+    for step, y in ((0, None), (800, 1.0), (1600, 1.4)):
+        rows = [] if y is None else ["1 1 1 1 0 1 0 7", f"2 1 3 {y} 0 1 0 7"]
+        (folder / f"dump{step}.liggghts").write_text(dump(step, rows, box="mm mm mm"))
+    said = take_in(capsys, "lammps", folder, tmp_path / "out")
+    expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
+    assert "PROPOSED, NOT MEASURED: the faces of the simulation's box" in said
+    assert "PROPOSED, NOT MEASURED" in (tmp_path / "out" / "experiment.toml").read_text()
 
 
 def test_lammps_dumps_of_a_folder_with_shares_of_the_box_and_quaternions(tmp_path, capsys):
