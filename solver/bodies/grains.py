@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from solver.bodies.quantity import Quantity
 
-Array = NDArray[np.float64]
+# Spelt out: since numpy 2.5 NDArray is an alias, in which jaxtyping sees no array.
+Array = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +22,7 @@ class Grains:
     radius: Annotated[Float[Array, " n"], Quantity("radius as it was used", "m", "grain", essential=True)]
     mass: Annotated[Float[Array, " n"], Quantity("mass", "kg", "grain", essential=True)]
     boundary: Annotated[
-        Bool[NDArray[np.bool_], " n"] | None,
+        Bool[np.ndarray, " n"] | None,
         Quantity("whether the grain is the packing's boundary: its motion is imposed", dims="grain", since=2),
     ] = None  # none is
 
@@ -70,7 +71,7 @@ class GrainMotion:
     position: Float[Array, "n 2"]  # [m]
     velocity: Float[Array, "n 2"]  # [m/s], the mean over the interval that ends here
     spin: Float[Array, " n"]  # [rad/s], counter-clockwise
-    present: Bool[NDArray[np.bool_], " n"]  # False: lost or never seen; takes no part
+    present: Bool[np.ndarray, " n"]  # False: lost or never seen; takes no part
 
     def __post_init__(self) -> None:
         n = len(self.present)

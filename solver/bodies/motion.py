@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int8
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from solver.bodies.cell import Cell
@@ -25,10 +24,10 @@ class Snapshot:
     time: float  # [s]
     position: Float[Array, "n 2"]  # [m]
     rotation: Float[Array, " n"]  # [rad]
-    present: Bool[NDArray[np.bool_], " n"]
+    present: Bool[np.ndarray, " n"]
     endpoints: Float[Array, "w 2 2"]  # [m]
     sigma: float  # [m] standard deviation of a position component, error of the centre included
-    side: Int8[NDArray[np.int8], " w"] | None = None  # which walls are circles, as of Walls; None: none
+    side: Int8[np.ndarray, " w"] | None = None  # which walls are circles, as of Walls; None: none
     load: Float[Array, " w"] | None = None  # [N] measured on walls, NaN where none was; None: on none
     cell: Float[Array, "2 2"] | None = None  # [m] vectors of the periodic cell, in place of walls
 
@@ -70,7 +69,7 @@ class FrameMotion:
     wall_velocity: Float[Array, "w 2 2"]  # [m/s]
     spans: bool  # True: the interval ends here, so that earlier instants of it exist
     sigma: float  # [m]
-    side: Int8[NDArray[np.int8], " w"] | None = None  # which walls are circles; None: none
+    side: Int8[np.ndarray, " w"] | None = None  # which walls are circles; None: none
     load: Float[Array, " w"] | None = None  # [N] measured on walls at the frame, NaN: none
     cell: Cell | None = None
 

@@ -27,10 +27,10 @@ FEWEST = 4  # grains that a triangulation needs
 class FreeSurface:
     """The grains at the free surfaces of a packing, and how these lie."""
 
-    outer: Bool[NDArray[np.bool_], " n"]  # which grains
+    outer: Bool[np.ndarray, " n"]  # which grains
     place: Float[Array, "s 2"]  # [m] where the disc rests between two of them
     outward: Float[Array, "s 2"]  # unit vectors from the surface to the disc
-    inner: Bool[NDArray[np.bool_], " s"]  # whether that is in a hole
+    inner: Bool[np.ndarray, " s"]  # whether that is in a hole
 
 
 def find_outer(radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls) -> FreeSurface:

@@ -67,6 +67,9 @@ def _dtype(hint: Any) -> np.dtype:
     if hasattr(hint, "array_type"):  # of jaxtyping, Float[Array, "n 2"]: the widest of the kind that it names
         widest = [name for name in ("float64", "int64") if name in hint.dtypes]
         return np.dtype((widest or hint.dtypes)[0])
+    alias = getattr(get_origin(hint), "__value__", None)
+    if alias is not None:  # NDArray[number] since numpy 2.5, a name for what it was
+        return _dtype(alias[get_args(hint)])
     parts = [part for part in get_args(hint) if part is not type(None)]
     if get_origin(hint) is np.ndarray:  # ndarray[shape, dtype[number]]
         return np.dtype(get_args(parts[1])[0])

@@ -30,7 +30,7 @@ class Walls:
     endpoints: Float[Array, "w 2 2"]  # [m], wall, end, (x, y)
     velocity: Float[Array, "w 2 2"]  # [m/s], of the endpoints
     load: Float[Array, " w"]  # [N], NaN where the normal motion is imposed
-    side: Int8[NDArray[np.int8], " w"] | None = None  # STRAIGHT, or a circle's: IN, OUT; None: all straight
+    side: Int8[np.ndarray, " w"] | None = None  # STRAIGHT, or a circle's: IN, OUT; None: all straight
     cell: Cell | None = None  # the packing goes on beyond its edges; there are no walls then
 
     def __post_init__(self) -> None:

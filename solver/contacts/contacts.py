@@ -26,9 +26,9 @@ class Contacts:
     Body `i` is always a grain; `j` is a grain (j > i) or wall `j − n`. The normal points from i to j.
     """
 
-    i: Annotated[Int32[NDArray[np.int32], " c"], Quantity("row of a grain", dims="contact", essential=True)]
+    i: Annotated[Int32[np.ndarray, " c"], Quantity("row of a grain", dims="contact", essential=True)]
     j: Annotated[
-        Int32[NDArray[np.int32], " c"],
+        Int32[np.ndarray, " c"],
         Quantity("row of a grain, j > i, or grain count + row of a wall", dims="contact", essential=True),
     ]
     gap: Annotated[

@@ -24,7 +24,7 @@ def price_pairs(
     balance: Balance,
     forces: Sequence[Float[Array, "c 2"]],
     walls: Walls,
-    balanced: Bool[NDArray[np.bool_], " n"],
+    balanced: Bool[np.ndarray, " n"],
     settings: ConvexSettings | None = None,
 ) -> Float[Array, " p"]:
     """Give how fast every pair (p,) closes by the mean multipliers of members, in their displacement scale.

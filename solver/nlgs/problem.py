@@ -35,17 +35,17 @@ class ContactProblem(NamedTuple):
 
     body: Float[Array, "n 4"]  # free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Float[Array, "w 2"]  # free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
-    pair_body: Int32[NDArray[np.int32], "blocks 2 L"]  # grains i, j
+    pair_body: Int32[np.ndarray, "blocks 2 L"]  # grains i, j
     # nx, ny, 1/W_nn, and what is added to u_n [m/s]: gap to close and motion of the cell between both; to u_t: where
     # there is a cell
     pair: Float[Array, "blocks rows L"]
     grouped: int  # a multiple of L, at most p
-    wall_body: Int32[NDArray[np.int32], "q 2"]  # grain, wall
+    wall_body: Int32[np.ndarray, "q 2"]  # grain, wall
     # nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
     wall: Float[Array, "q 6"]
     friction: Float[Array, "2"]  # between grains, with walls
     external: Float[Array, "n 2"]  # [N] weight of the grains
-    rows: Int64[NDArray[np.int64], " c"]  # c = p + q: record → row of Contacts
+    rows: Int64[np.ndarray, " c"]  # c = p + q: record → row of Contacts
 
 
 def kinematic_impedance(

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
@@ -22,10 +21,10 @@ class FrameEvidence:
     radius: Float[Array, " n"]  # [m]
     centre_deviation: Float[Array, " n"]  # [m] standard deviation of an error of a centre's coordinate
     radius_deviation: Float[Array, " n"]  # [m] of an error of a radius; 0: exact
-    balanced: Bool[NDArray[np.bool_], " n"]  # all that pushes the grain is among the pairs; else its ΣF is free
+    balanced: Bool[np.ndarray, " n"]  # all that pushes the grain is among the pairs; else its ΣF is free
     known: KnownForces
     # At the packing's edge, what pushes them from outside is not among the pairs, but is of the size of what is.
-    edge: Bool[NDArray[np.bool_], " n"] | None = None  # None: no grain
+    edge: Bool[np.ndarray, " n"] | None = None  # None: no grain
     gap_deviation: Float[Array, " c"] | None = None  # [m] of an error that a gap has for itself; None: none has
 
     @property
@@ -40,7 +39,7 @@ class KnownForces:
 
     unit: float  # [N] near the mean normal force
     weight: Float[Array, "n 2"]  # [N]
-    group: Int[NDArray[np.int64], " c"]  # sum that a pair's normal force is part of, −1: none
+    group: Int[np.ndarray, " c"]  # sum that a pair's normal force is part of, −1: none
     total: Float[Array, " g"]  # [N] these sums: loads of plates, or of all walls together
 
     @property

@@ -29,7 +29,7 @@ class Removal:
 
     fn: Float[Array, " c"]  # [N]; 0 of the contact that is taken away
     ft: Float[Array, " c"]  # [N]
-    free: Bool[NDArray[np.bool_], " c"]  # contacts whose force might change
+    free: Bool[np.ndarray, " c"]  # contacts whose force might change
     unbalance: float  # worst resultant that is left over, over the mean normal force: large where nothing can stand in
 
 

@@ -24,7 +24,7 @@ class Observations:
 
     rows: Table  # where they stand, for complaints; the column `id`
     id_column: str
-    frame: Int[NDArray[np.int64], " m"]
+    frame: Int[np.ndarray, " m"]
     name: tuple[str, ...]  # (m,) of the grain, as it is written
     place: Float[Array, "m 2"]  # in its unit of length
     angle: Float[Array, " m"]  # [rad] in its axes; NaN where unknown
@@ -53,7 +53,7 @@ class Arranged:
     """Tracks, and how to find in them what the other program named otherwise."""
 
     tracks: Tracks
-    number: Int[NDArray[np.int64], " f"]  # of the frames, as the other program counts
+    number: Int[np.ndarray, " f"]  # of the frames, as the other program counts
     name: tuple[str, ...]  # (n,) of the grains, as the other program writes them
     floor: float  # the other program's y that is 0 here, in its unit
     remarks: tuple[str, ...] = field(default=())

@@ -38,9 +38,9 @@ Bonds = tuple[NDArray[np.integer], NDArray[np.integer], Array, Array]  # (b,) te
 class Side:
     """Forces of contacts as one of their two discs tells them; one row per contact and telling disc."""
 
-    frame: Int[NDArray[np.int64], " s"]
-    teller: Int[NDArray[np.int64], " s"]  # id of the disc whose fringes were read
-    other: Int[NDArray[np.int64], " s"]
+    frame: Int[np.ndarray, " s"]
+    teller: Int[np.ndarray, " s"]  # id of the disc whose fringes were read
+    other: Int[np.ndarray, " s"]
     fn: Float[Array, " s"]  # [N]
     ft: Float[Array, " s"]  # [N], of a sign that only the program knows
 
