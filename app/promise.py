@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .experiment.experiment import Experiment
+import numpy as np
+
+from .experiment.experiment import Experiment, read_grain_guess
 from .inference.data_budget import LOOKED_AT, UNPROMISED, measure_budget
 from .progress import Progress, silent
 from .tracks import Tracks, WallTracks
@@ -17,6 +19,20 @@ def glimpse(
     from .tracking.stage import track_first  # not where rods are tracked already
 
     return track_first(experiment, LOOKED_AT, progress, tell)
+
+
+def describe_photographs(experiment: Experiment) -> list[str]:
+    """Light, noise and pattern of the photographs in a few sentences. Raises InputError."""
+    from .tracking.picture_quality import measure_pictures
+
+    rods = read_grain_guess(experiment)
+    centre = None if rods is None else np.stack([rods.x, rods.y], axis=1)
+    section = experiment.config.photographs
+    measured = measure_pictures(
+        experiment.photographs(), centre, None if rods is None else rods.radius,
+        patterned=section is None or section.follow != "outline",
+    )  # fmt: skip
+    return [*measured.facts(), *measured.faults()]
 
 
 def describe_promise(tracks: Tracks, walls: WallTracks | None) -> tuple[list[str], bool]:

@@ -125,14 +125,15 @@ def check(
     Example: rodsight check sample_data/shear
     """
     from ... import pipeline
-    from ...promise import describe_promise, glimpse
+    from ...promise import describe_photographs, describe_promise, glimpse
 
     request = Request(experiment, settings, quiet)
     with open_run(request, writes=False) as run:
         tracks, walls = pipeline.check(run)
-        seen = None
+        seen, pictured = None, []
         if budget and not quiet:  # nobody would read it
             seen = (tracks, walls) if tracks is not None else glimpse(run.experiment, run.progress, run.notes.append)
+            pictured = [] if tracks is not None else describe_photographs(run.experiment)
     config = run.experiment.config
     if tracks is not None:
         what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
@@ -143,7 +144,7 @@ def check(
     console = request.console
     console.print(f"{config.name}: the input is good: {what}.", highlight=False)
     _tell_notes(run, console)
-    for sentence in [] if seen is None else describe_promise(*seen)[0]:
+    for sentence in [*pictured, *([] if seen is None else describe_promise(*seen)[0])]:
         tell(console, sentence)
     return 0
 

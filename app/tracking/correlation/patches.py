@@ -100,6 +100,11 @@ class Patches:
         return np.diff(self.start)
 
     @property
+    def sigma_per_noise(self) -> Array:
+        """Standard deviation of a component of a disc's place [px] for each grey level of a pixel's noise (n,)."""
+        return np.sqrt(0.5 * (self.hessian_inverse[:, 0, 0] + self.hessian_inverse[:, 1, 1])) / self.norm
+
+    @property
     def accidental_zncc(self) -> Array:
         """Greatest correlation that a wrong place reaches by accident (n,).
 

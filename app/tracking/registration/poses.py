@@ -50,8 +50,7 @@ def reference_poses(patches: Patches, noise: float, reference: NDArray[np.int32]
     x, y = patches.centre[:, 0], patches.centre[:, 1]
     cut = _leave_photograph(patches, patches.centre)
     status = np.where(good, TrackStatus.OK, np.where(cut, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST))
-    inverse = patches.hessian_inverse
-    sigma = noise / patches.norm * np.sqrt(0.5 * (inverse[:, 0, 0] + inverse[:, 1, 1]))
+    sigma = noise * patches.sigma_per_noise
     return FramePoses(
         np.where(good, x, np.nan), np.where(good, y, np.nan), np.where(good, np.zeros(n), np.nan),
         np.where(good, sigma, np.nan), np.where(good, 1.0, np.nan), np.full(n, np.nan), status.astype(np.uint8),

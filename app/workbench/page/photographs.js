@@ -1,12 +1,14 @@
 // Step 1: which photographs, in which order, when, and what of them is looked at.
 
-import { colour, digits, fact, h, numberField, parse, tell } from "/page/dom.js";
+import { ask, chart, colour, digits, fact, h, numberField, parse, sign, tell } from "/page/dom.js";
 
-let cutting = null;
+let cutting = null, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
 
 export const photographs = {
   name: "photographs", title: "Photographs", frames: true,
   hint: () => (cutting ? "Drag over the part that is to be looked at" : ""),
+  enter: (app) => { measured = null; measure(app); },
+  taken: (app) => { measure(app); },
   leave: () => { cutting = null; },
   panel(app) {
     const { project } = app, told = project.photographs;
@@ -23,6 +25,7 @@ export const photographs = {
       h("div", { class: "row" },
         h("button", { class: cutting ? "on" : "", id: "cut", onclick: () => { cutting = cutting ? null : []; app.tool(cutting ? cutTool(app) : null); app.paint(); } }, told.region ? "Change the region" : "Cut to a region"),
         told.region ? h("button", { onclick: () => app.change("set_photographs", { region: "all" }) }, "Use all of it") : null),
+      project.files.length ? [h("h3", {}, "What they are good for"), quality(app)] : null,
       h("h3", {}, "Order"),
       h("div", { class: "list" }, project.files.slice(0, 400).map((name, k) => h("button", { class: k === app.frame ? "here" : "", onclick: () => app.show(k) },
         h("span", { class: "soft" }, String(k)), h("span", { style: { flex: "1" } }, name), h("span", { class: "soft" }, told.interval ? `${digits(k * told.interval, 4)} s` : "")))),
@@ -37,6 +40,39 @@ export const photographs = {
     c.strokeStyle = colour("accent"); c.lineWidth = 2 / k; c.strokeRect(x0, y0, x1 - x0, y1 - y0);
   },
 };
+
+/** Light, noise and pattern are measured beside everything else: nobody waits for them. */
+async function measure(app) {
+  const { project } = app;
+  if (!project.files.length) return;
+  try {
+    const answer = await ask("quality", { at: project.at });
+    if (app.project?.at === project.at && app.step === photographs) { measured = { at: project.at, ...answer }; app.paint(); }
+  } catch { measured = null; } // what is wrong with the photographs, the step itself says
+}
+
+function quality(app) {
+  if (measured?.at !== app.project.at) return h("p", { id: "measuring", role: "status" }, "Looking at light and pattern …");
+  return [
+    h("div", { class: "says", id: "quality" }, [["good", measured.facts], ["doubtful", measured.faults]].flatMap(([mark, says]) => says.map((text) => h("p", {}, sign(mark), text)))),
+    measured.frame.length > 1 ? [h("span", { class: "soft" }, "light (line) and contrast (dashed) over the photographs [of 255]"), chart(64, (c, width, height) => curves(app, c, width, height))] : null,
+  ];
+}
+
+/** Mean grey level and contrast of the photographs that were looked at; a bar marks the one that is shown. */
+function curves(app, c, width, height) {
+  const { frame, light, contrast } = measured, pad = 30, last = Math.max(app.project.files.length - 1, 1);
+  const high = 1.08 * Math.max(...light, ...contrast, 1), x = (k) => pad + k / last * (width - pad - 8), y = (v) => height - 6 - v / high * (height - 14);
+  c.fillStyle = colour("accent"); c.globalAlpha = 0.18; c.fillRect(x(app.frame) - 3, 2, 6, height - 4); c.globalAlpha = 1;
+  for (const [values, dash] of [[light, []], [contrast, [4, 3]]]) {
+    c.strokeStyle = c.fillStyle = colour("ink"); c.lineWidth = 1.5; c.setLineDash(dash); c.beginPath();
+    values.forEach((v, k) => { if (k) c.lineTo(x(frame[k]), y(v)); else c.moveTo(x(frame[k]), y(v)); });
+    c.stroke(); c.setLineDash([]);
+    values.forEach((v, k) => { c.beginPath(); c.arc(x(frame[k]), y(v), 2, 0, 7); c.fill(); });
+  }
+  c.fillStyle = colour("soft"); c.font = "10.5px system-ui, sans-serif"; c.textAlign = "left";
+  c.fillText(digits(high / 1.08, 3), 3, 13); c.fillText("0", 3, height - 4);
+}
 
 function cutTool(app) {
   const box = (a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])];

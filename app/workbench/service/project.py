@@ -17,6 +17,7 @@ from ...errors import InputError
 from ...experiment.photographs import Image, read_photograph
 from ...experiment.units import Scale
 from ...run_folder import SUMMARY
+from ...tracking.picture_quality import PictureQuality, measure_pictures
 from ...verdicts.log import VERDICTS
 from ..inspecting.found import Found, find_run, run_stamp
 from ..mending.mender import Mender
@@ -54,6 +55,8 @@ class Project:
         self._found: tuple[Any, Found | None] = (None, None)
         self._mender: tuple[Any, Mender] | None = None
         self._mending = threading.Lock()
+        self._quality: tuple[Any, PictureQuality] | None = None
+        self._measuring = threading.Lock()
 
     @property
     def key(self) -> str:
@@ -68,6 +71,31 @@ class Project:
             if self._understood is None or stamp != self._stamp:
                 self._stamp, self._understood = stamp, judge(self.draft)
             return self._understood
+
+    def quality(self) -> PictureQuality:
+        """What the photographs are good for; measured again only where photographs, region, channel or rods change."""
+        found = self.understood()
+        if found.experiment is None or found.shape is None:
+            raise InputError(self.draft.file, "key photographs", "names nothing that can be looked at yet")
+        section, rods = found.data.get("photographs", {}), found.rods
+        centre = None if rods is None else np.stack([rods.x, rods.y], axis=1)
+        told = (
+            section.get("channel"),
+            section.get("region"),
+            section.get("follow"),
+            None if centre is None else centre.tobytes(),
+        )
+        stamp = found.files, self._pattern_stamp(found.data), told
+        with self._measuring:  # not the other lock: pictures are answered meanwhile
+            if self._quality is None or self._quality[0] != stamp:
+                radius = None if rods is None else rods.radius
+                self._quality = (
+                    stamp,
+                    measure_pictures(
+                        found.experiment.photographs(), centre, radius, patterned=section.get("follow") != "outline"
+                    ),
+                )
+            return self._quality[1]
 
     def photograph(self, frame: int) -> Image:
         """One photograph, grey; those looked at last are kept."""

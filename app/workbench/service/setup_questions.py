@@ -43,6 +43,16 @@ def set_photographs(
     return opened.describe()
 
 
+@question
+def quality(bench: Bench, at: Text) -> dict[str, Any]:
+    """What the photographs are good for, as `rodsight check` says it, and the light of some of them."""
+    measured = bench.project(at).quality()
+    return {
+        "facts": measured.facts(), "faults": measured.faults(), "frame": measured.frame.tolist(),
+        "light": measured.light.tolist(), "contrast": measured.contrast.tolist(),
+    }  # fmt: skip
+
+
 class Measured(Shape):
     """A rod whose outline was seen, and its radius [m]."""
 

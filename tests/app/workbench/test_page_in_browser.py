@@ -34,6 +34,7 @@ def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
     idle(tab)
     fill(tab, "interval", "30")
     assert mark(tab, "photographs") == "good"
+    expect(tab.locator("#quality")).to_contain_text("px wide")
     go(tab, "scale")
     drag(tab, (100.0, 200.0), (300.0, 200.0))
     length = tab.evaluate("(() => { const d = bench.project.photographs.distance; return d ?? null; })()")

@@ -9,6 +9,7 @@ from rodsight.experiment.experiment import load_experiment, read_grain_guess
 from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.scaling import make_scale
 from rodsight.experiment.walls import read_walls
+from rodsight.workbench.service import project
 from rodsight.workbench.setup.draft import Draft
 
 from tests.program import rodsight
@@ -34,6 +35,27 @@ def test_photographs_of_no_experiment_become_one(begun, photographs_only):
     assert marks(told) == {
         "photographs": "missing", "scale": "missing", "walls": "missing", "rods": "doubtful", "material": "doubtful",
     }  # fmt: skip
+
+
+def test_what_photographs_are_good_for_is_told_and_measured_once(begun, monkeypatch):
+    visitor, told = begun
+    measured: list[bool] = []
+    plain = project.measure_pictures
+    monkeypatch.setattr(
+        project, "measure_pictures", lambda *what, **more: (measured.append(what[1] is None), plain(*what, **more))[1]
+    )
+    answer = visitor.ask("quality", at=told["at"])
+    assert answer["frame"] == [0, 1, 2, 3]
+    assert "px wide" in answer["facts"][1]
+    assert answer["faults"] == []
+    visitor.ask("set_photographs", at=told["at"], interval=30.0)  # changes nothing that is seen
+    assert visitor.ask("quality", at=told["at"]) == answer
+    assert measured == [True]
+    visitor.ask("set_photographs", at=told["at"], region=[0, 0, 200, 200])
+    visitor.ask("quality", at=told["at"])
+    visitor.ask("detect_rods", at=told["at"], radii=[])
+    assert "where a rod is" in visitor.ask("quality", at=told["at"])["facts"][1]
+    assert measured == [True, True, False]
 
 
 def test_every_step_is_undone_and_done_again(begun):
