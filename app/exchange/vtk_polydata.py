@@ -3,7 +3,8 @@
 packing.pvd is all of them as one animation with its times; grains.pvd and contacts.pvd are parts of it. The single
 numbers of a frame are field data of grains and contacts.
 
-Format: The VTK User's Guide, "VTK File Formats". Lengths in metres, forces in newtons, stresses in pascals, z = 0.
+Format: The VTK User's Guide, "VTK File Formats". Lengths in metres, forces in newtons, stresses in pascals; z = 0, and
+the largest radius for contacts.
 """
 
 from __future__ import annotations
@@ -76,7 +77,10 @@ def _grains(results: Results, frame: int) -> str:
 
 
 def _contacts(results: Results, frame: int) -> str:
-    """Lines from centre to centre, or from centre to contact point on a wall."""
+    """Lines from centre to centre, or from centre to contact point on a wall, in front of the spheres of rods.
+
+    Forces are those of a line and of its ends, too: a tube is as thick as numbers of points say.
+    """
     forces, position = results.frames[frame], results.tracks.position[frame]
     contacts = forces.contacts
     far = contacts.point.copy()
@@ -93,7 +97,11 @@ def _contacts(results: Results, frame: int) -> str:
         **({} if np.isnan(force).any() else {"force": force}),
         **columns(forces, "contact", slice(None)),
     }
-    return polydata(points, "Lines", lines, cell_data=data, field_data=_numbers(results, frame))
+    ends = {name: np.tile(data[name], 2) for name in ("fn", "ft") if name in data}
+    return polydata(
+        points, "Lines", lines, point_data=ends, cell_data=data, field_data=_numbers(results, frame),
+        height=float(results.tracks.radius.max()),
+    )  # fmt: skip
 
 
 def _walls(results: Results, frame: int) -> str:

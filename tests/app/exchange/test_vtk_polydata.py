@@ -40,6 +40,18 @@ def test_contacts_read_back_with_every_digit(results, tmp_path):
         assert np.all(along > 0.0)
 
 
+def test_tubes_of_forces_lie_in_front_of_the_spheres_of_rods_and_have_a_thickness(results, tmp_path):
+    """Glyph and Tube as the page tells: what lies within a sphere is not seen, and Tube reads numbers of points."""
+    write_polydata(results, tmp_path)
+    file = tmp_path / "contacts_0003.vtp"
+    place, fn = arrays(file, "Points")["points"], arrays(file, "PointData")["fn"]
+    lines = arrays(file, "Lines")["connectivity"].astype(int).reshape(-1, 2)
+    assert np.array_equal(fn[lines], np.repeat(results.frames[3].fn[:, None], 2, axis=1))
+    grains = tmp_path / "grains_0003.vtp"
+    top = arrays(grains, "Points")["points"][:, 2] + arrays(grains, "PointData")["radius"]
+    assert place[:, 2].min() >= top.max()
+
+
 def test_grains_that_are_lost_are_not_drawn(with_a_loss, tmp_path):
     write_polydata(with_a_loss, tmp_path)
     ids = arrays(tmp_path / "grains_0002.vtp", "PointData")["id"]

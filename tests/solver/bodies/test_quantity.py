@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, TypeVar
 
 import numpy as np
 from typing_extensions import TypeAliasType
 
-import solver
 from solver.bodies.quantity import Quantity, quantities
+from tests.program import ROOT
 
 Number = TypeVar("Number", bound=np.generic)
 Named = TypeAliasType(  # as numpy's NDArray since 2.5
@@ -31,8 +30,7 @@ def test_the_numbers_of_an_array_that_an_alias_names_are_known():
 
 def test_shapes_are_told_of_arrays_and_not_of_an_alias():
     """Float[NDArray[...], "n 2"] is refused by jaxtyping where NDArray is an alias: with Python 3.12 and later."""
-    root = Path(solver.__file__).parents[1]
-    files = [*(root / "solver").rglob("*.py"), *(root / "app").rglob("*.py")]
+    files = [*(ROOT / "solver").rglob("*.py"), *(ROOT / "app").rglob("*.py")]
     assert len(files) > 300
     told = re.compile(r"\b(?:Float|Int|Bool|UInt|Shaped|Num)\d*\[NDArray\b|^Array\b.*NDArray", re.MULTILINE)
     assert not [file.name for file in files if told.search(file.read_text(encoding="utf-8"))]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.contacts.contacts import ContactState
-from solver.statistics.sliding import SlidingSigns, cone_share, contact_state, sliding_probability, slides_at
+from solver.statistics.sliding import SlidingSigns, cone_share, contact_state, slides_at, sliding_probability
 
 
 def _signs(count: int, **how) -> SlidingSigns:
