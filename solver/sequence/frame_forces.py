@@ -114,6 +114,7 @@ class FrameForces:
         float, Quantity("overlap of soft grains per mean force, where positions were asked", "m", since=2)
     ] = NAN
     positions_share: Annotated[float, Quantity("what positions alone count in the reported field", since=2)] = 0.0
+    soft: Annotated[int, Quantity("1: grains are soft, their overlaps told forces; 0: hard", since=2)] = 0
     doubt: Annotated[str, Quantity("what lowers the trust and what to do about it, the worst first", since=2)] = ""
     error_budget: Annotated[
         Array | None,

@@ -142,6 +142,7 @@ def _describe(
         sliding_probability=slides,
         overlap=estimate.overlap,
         positions_share=0.0 if estimate.mixture is None else estimate.mixture.share,
+        soft=int(problem.settings.soft),
     )
 
 

@@ -34,7 +34,7 @@ from .contact_errors import ContactErrors
 
 FIT_WORLDS: tuple[WorldName, ...] = (
     "shear", "biaxial", "gravity", "isotropic", "radii_03", "step_05", "soft", "softer", "loads", "circle",
-    "nearly_jammed", "sheared",
+    "nearly_jammed", "sheared", "soft_radii_03",
 )  # fmt: skip
 JUDGE_WORLDS: tuple[WorldName, ...] = (
     "step_1", "periodic", "radii_1", "centres", "unseen", "corners", "ten_frames", "mu_low", "mu_high",

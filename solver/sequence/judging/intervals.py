@@ -40,6 +40,7 @@ class Witness(IntEnum):
     BOTH = 1  # motion and positions, mixed
     POSITIONS = 2
     FIRST = 3  # positions, of a frame that no motion leads to
+    SOFT = 4  # overlaps of soft grains, with or without motion
 
 
 WEAK, STRONG = 0.5, 1.5  # of the mean f_n
@@ -47,24 +48,28 @@ SLIDES = 0.5  # P(slides) from which on
 DOUBTED = 0.9  # P(bears force) below which
 BOTH = (0.02, 0.98)  # share of the positions between which both count
 # σ/⟨f⟩ = factor of witness and group · exp(slope (1 − T)) · TYPICAL (s / TYPICAL)^(1 + power), where s² adds up the
-# squares of the formula's σ/⟨f⟩ and of FLOOR; of the first frame times a power of its friction. Last axis: f_n, f_t.
+# squares of the formula's σ/⟨f⟩, of FLOOR, of what a contact that may bear nothing errs by, √(1 − P(bears)) f, and of
+# the first frame of FIRST_SCALE f; of the first frame times a power of its friction. Last axis: f_n, f_t.
 FLOOR = np.array([0.02, 0.006])  # members that agree on nothing being there are wrong by this now and then
+FIRST_SCALE = 0.15  # stresses that positions tell without any motion err by so much, all forces together
 TYPICAL = np.array([0.2, 0.06])
 FACTOR = np.array([
-    [[0.61, 0.55], [0.63, 0.66], [0.58, 0.68], [0.62, 0.60], [0.62, 0.66], [0.53, 0.40]],
-    [[0.61, 0.50], [0.67, 0.56], [0.87, 0.70], [0.71, 0.53], [0.79, 0.71], [0.56, 0.53]],
-    [[0.33, 0.61], [0.33, 0.57], [0.44, 0.56], [0.31, 0.50], [0.38, 0.72], [0.28, 0.58]],
-    [[0.72, 0.49]] * len(Group),
+    [[0.57, 0.58], [0.55, 0.65], [0.52, 0.68], [0.57, 0.56], [0.56, 0.64], [0.52, 0.42]],
+    [[0.54, 0.41], [0.55, 0.43], [0.60, 0.51], [0.64, 0.46], [0.61, 0.51], [0.45, 0.41]],
+    [[0.63, 0.42]] * len(Group),  # of hard grains hardly ever: as of the first frame
+    [[0.63, 0.42]] * len(Group),
+    [[0.30, 0.34], [0.30, 0.32], [0.36, 0.34], [0.31, 0.37], [0.31, 0.38], [0.30, 0.49]],
 ])  # fmt: skip
-TRUST_SLOPE = np.array([[6.48, 5.83], [-0.05, 0.12], [-0.24, -0.12], [0.0, 0.0]])  # by witness
-POWER = np.array([[-0.17, -0.31], [-0.30, -0.21], [-0.86, -0.45], [-0.29, -0.33]])  # by witness
-FRICTION_POWER = np.array([1.05, 1.29])  # of the first frame
+TRUST_SLOPE = np.array([[6.35, 5.47], [-0.15, 0.19], [0.0, 0.0], [0.0, 0.0], [12.75, 6.81]])  # by witness
+POWER = np.array([[-0.10, -0.24], [0.0, -0.01], [-0.17, -0.19], [-0.17, -0.19], [-0.15, -0.02]])  # by witness
+FRICTION_POWER = np.array([1.00, 1.32])  # of the first frame
 MOST_DOUBT = 0.4  # 1 − T beyond which truths told nothing more
 # The same for contact forces: what lowers the trust of a motion further is what it hides, not what it shows.
-MOST_DOUBT_BY_WITNESS = (0.1, MOST_DOUBT, MOST_DOUBT, 0.0)
+MOST_DOUBT_BY_WITNESS = (0.1, MOST_DOUBT, MOST_DOUBT, 0.0, 0.1)
 USUAL_FRICTION, NO_FRICTION = 0.04, 0.0125  # share of f_t in f_n, all contacts together; less is not told from nothing
-# Error of f_n over f_n, and of f_t over μ f_n, for every e-fold by which the friction was told wrong.
-FRICTION_ERROR = (0.9, 1.05)
+# For every e-fold by which the friction was told wrong: error of f_n over f_n and over ⟨f⟩; of f_t over μ times these.
+# Contacts that a wrong friction leaves without force are wrong most of all.
+FRICTION_ERROR = ((0.5, 0.4), (0.6, 0.4))
 
 
 def groups_of(frame: FrameForces) -> NDArray[np.uint8]:
@@ -95,7 +100,9 @@ def doubt_of(trust: float | Array) -> Array:
 
 def witness_behind(frame: FrameForces) -> Witness:
     """What the frame's field was read from; the first frame of all has no motion that leads to it."""
-    return Witness.FIRST if frame.frame == 0 else witness_of(frame.positions_share)
+    if frame.frame == 0:
+        return Witness.FIRST
+    return Witness.SOFT if frame.soft else witness_of(frame.positions_share)
 
 
 def counted_doubt(frame: FrameForces) -> float:
@@ -118,14 +125,21 @@ def calibrate_deviations(frame: FrameForces) -> FrameForces:
     if not mean > 0:
         return frame
     formula = np.column_stack([frame.fn_sd, frame.ft_sd]) / mean
-    size = np.hypot(formula, FLOOR) / TYPICAL
+    size = np.sqrt(formula**2 + FLOOR**2 + _errors_with_force(frame, mean) ** 2) / TYPICAL
     told = mean * TYPICAL * interval_factors(frame) * size ** (1.0 + POWER[witness_behind(frame)])
     told[formula == 0] = 0.0
     return replace(frame, fn_sd=told[:, 0], ft_sd=told[:, 1])
 
 
+def _errors_with_force(frame: FrameForces, mean: float) -> Array:
+    """What errs as the force does (c, 2): of contacts that may bear none, and of all contacts of the first frame."""
+    nothing = np.zeros_like(frame.fn) if frame.bearing_probability is None else 1.0 - frame.bearing_probability
+    scale = FIRST_SCALE if witness_behind(frame) is Witness.FIRST else 0.0
+    return np.sqrt(nothing + scale**2)[:, None] * np.abs(np.column_stack([frame.fn, frame.ft])) / mean
+
+
 def formula_deviations(frame: FrameForces) -> Array:
-    """What `calibrate_deviations` was given, over the mean f_n and with the floor (c, 2)."""
+    """What `calibrate_deviations` was given, over the mean f_n, with the floor and what errs as the force (c, 2)."""
     told = np.column_stack([frame.fn_sd, frame.ft_sd]) / (mean_normal_force(frame.fn) * TYPICAL)
     return TYPICAL * (told / interval_factors(frame)) ** (1.0 / (1.0 + POWER[witness_behind(frame)]))
 
@@ -141,8 +155,9 @@ def widen_for_friction(frame: FrameForces, given: float, measured: float, share:
     """The frame with the error of its friction in its deviations: a share of what lies between two frictions."""
     if not (given > 0 and measured > 0):
         return frame
-    excess = share * abs(math.log(measured / given)) * np.maximum(frame.fn, 0.0)
-    normal, tangent = FRICTION_ERROR
-    return replace(
-        frame, fn_sd=np.hypot(frame.fn_sd, normal * excess), ft_sd=np.hypot(frame.ft_sd, tangent * measured * excess)
+    excess = share * abs(math.log(measured / given))
+    mean = np.where(frame.fn_sd > 0, np.nan_to_num(mean_normal_force(frame.fn)), 0.0)  # what has no deviation gets none
+    normal, tangent = (
+        excess * np.hypot(of_force * np.maximum(frame.fn, 0.0), of_mean * mean) for of_force, of_mean in FRICTION_ERROR
     )
+    return replace(frame, fn_sd=np.hypot(frame.fn_sd, normal), ft_sd=np.hypot(frame.ft_sd, measured * tangent))

@@ -112,6 +112,7 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         sliding_probability=np.linspace(0.9, 0.1, c),
         overlap=0.25 + frame.frame,
         positions_share=0.5 + 0.01 * frame.frame,
+        soft=frame.frame % 2,
         error_budget=np.linspace(0.0, 1.0, len(ERROR_PARTS)) / (1 + frame.frame),
         relative_error=0.15 + 0.01 * frame.frame,
     )

@@ -105,6 +105,7 @@ def test_a_file_of_schema_2_reads_as_the_numbers_it_was_made_of(file):
     grains = replace(full.grains, boundary=None)
     new = {
         "bearing_probability": None, "sliding_probability": None, "overlap": np.nan, "positions_share": 0.0,
+        "soft": 0,
         "force_change": np.nan, "strain": None, "shear": np.nan, "shear_step": np.nan, "doubt": "",
         "error_budget": None, "relative_error": np.nan,
     }  # fmt: skip

@@ -129,6 +129,8 @@ def test_what_slides_is_what_slides_at_the_friction_that_the_motion_shows():
 def test_a_friction_that_was_measured_is_as_exact_as_its_interval():
     frame = make_results(1, 8, 7, sweeps=2).frames[0]
     told = doubt_friction(frame, check(0.26, 0.22, 0.30), measured=True)
-    expected = FRICTION_ERROR[0] * 0.5 * math.log(0.26 / 0.22) * np.maximum(frame.fn, 0.0)
+    of_force, of_mean = FRICTION_ERROR[0]
+    mean = np.where(frame.fn_sd > 0, frame.fn[frame.fn > 0].mean(), 0.0)
+    expected = 0.5 * math.log(0.26 / 0.22) * np.hypot(of_force * np.maximum(frame.fn, 0.0), of_mean * mean)
     assert np.sqrt(told.fn_sd**2 - frame.fn_sd**2) == pytest.approx(expected, rel=1e-3, abs=1e-4)
     assert told.trust == frame.trust

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver.sequence.judging.intervals import (
+    FIRST_SCALE,
     FLOOR,
     FRICTION_POWER,
     NO_FRICTION,
@@ -15,6 +16,7 @@ from solver.sequence.judging.intervals import (
     formula_deviations,
     friction_share,
     groups_of,
+    interval_factors,
     widen_for_friction,
     witness_behind,
     witness_of,
@@ -51,12 +53,22 @@ def test_witness_follows_the_share_of_positions():
     assert [witness_of(share) for share in (0.0, 0.5, 1.0)] == [Witness.MOTION, Witness.BOTH, Witness.POSITIONS]
 
 
+def test_soft_grains_are_a_witness_of_their_own_and_doubt_of_them_widens(frame):
+    soft = replace(frame, soft=1, positions_share=0.7)
+    assert witness_behind(soft) == Witness.SOFT
+    assert witness_behind(replace(soft, frame=0)) == Witness.FIRST
+    sure, doubted = (interval_factors(replace(soft, trust=trust)) for trust in (0.98, 0.93))
+    assert (doubted > 1.2 * sure).all()
+
+
 def test_calibrated_deviations_tell_what_they_were_made_of(frame):
     told = calibrate_deviations(frame)
     made_of = formula_deviations(told)
     mean = frame.fn[frame.fn > 0].mean()
     known = frame.fn_sd > 0
-    expected = np.hypot(np.column_stack([frame.fn_sd, frame.ft_sd]) / mean, FLOOR)
+    formula, force = (np.column_stack(each) / mean for each in ((frame.fn_sd, frame.ft_sd), (frame.fn, frame.ft)))
+    nothing = 1.0 - frame.bearing_probability[:, None]
+    expected = np.sqrt(formula**2 + FLOOR**2 + nothing * force**2)
     assert made_of[known] == pytest.approx(expected[known])
     assert (told.fn_sd[~known] == 0).all()
 
@@ -75,20 +87,32 @@ def test_no_doubt_beyond_what_truths_told_widens_what_the_motion_says(frame):
     assert other.fn_sd == pytest.approx(one.fn_sd)
 
 
+def test_what_may_bear_nothing_errs_by_all_it_bears_and_the_first_frame_by_a_share_of_it(frame):
+    sure = replace(frame, bearing_probability=np.ones(len(frame.fn)))
+    doubtful = replace(frame, bearing_probability=np.full(len(frame.fn), 0.95))  # the same group
+    mean = frame.fn[frame.fn > 0].mean()
+    before, after = (formula_deviations(calibrate_deviations(each))[-1, 0] for each in (sure, doubtful))
+    assert after**2 - before**2 == pytest.approx(0.05 * (frame.fn[-1] / mean) ** 2)
+    first = formula_deviations(calibrate_deviations(replace(sure, frame=0)))[-1, 0]
+    assert first**2 - before**2 == pytest.approx((FIRST_SCALE * frame.fn[-1] / mean) ** 2)
+
+
 def test_the_first_frame_is_the_less_exact_the_more_friction_it_bears(frame):
     first = replace(frame, frame=0)
     assert (witness_behind(first), witness_behind(frame)) == (Witness.FIRST, Witness.MOTION)
-    little, much = (calibrate_deviations(replace(first, ft=share * first.fn)) for share in (0.02, 0.1))
+    little, much = (interval_factors(replace(first, ft=share * first.fn))[-1] for share in (0.02, 0.1))
     ratio = (0.1 + NO_FRICTION) / (0.02 + NO_FRICTION)
-    assert much.fn_sd[-1] / little.fn_sd[-1] == pytest.approx(ratio ** FRICTION_POWER[0])
-    assert much.ft_sd[-1] / little.ft_sd[-1] == pytest.approx(ratio ** FRICTION_POWER[1])
-    assert formula_deviations(much)[-1] == pytest.approx(formula_deviations(little)[-1])
+    assert much / little == pytest.approx(ratio**FRICTION_POWER)
     assert friction_share(frame) == 1.0
 
 
-def test_a_wrong_friction_widens_strong_contacts_most(frame):
+def test_a_wrong_friction_widens_strong_contacts_most_and_weak_ones_by_a_share_of_the_mean(frame):
     told = widen_for_friction(frame, 0.2, 0.26)
-    added = told.fn_sd**2 - frame.fn_sd**2
-    assert added[-1] == pytest.approx((0.9 * np.log(1.3) * frame.fn[-1]) ** 2)
-    assert added[0] == pytest.approx(0.0)
+    mean = frame.fn[frame.fn > 0].mean()
+    added = np.sqrt(told.fn_sd**2 - frame.fn_sd**2) / np.log(1.3)
+    assert added[-1] == pytest.approx(np.hypot(0.5 * frame.fn[-1], 0.4 * mean))
+    assert added[1] > 0.4 * mean
+    assert added[0] == 0.0  # it has no deviation to widen
+    sideways = np.sqrt(told.ft_sd**2 - frame.ft_sd**2) / np.log(1.3)
+    assert sideways[-1] == pytest.approx(0.26 * np.hypot(0.6 * frame.fn[-1], 0.4 * mean))
     assert (widen_for_friction(frame, 0.25, 0.25).ft_sd == frame.ft_sd).all()
