@@ -9,10 +9,12 @@ from .contents import pages
 from .reading import anchor, page_text
 
 HEADING = re.compile(r"^#{1,3} +(.+)$", re.MULTILINE)
+LEAD = re.compile(r"^- \*\*(.+?)\*\*", re.MULTILINE)  # of an item of a list: a heading of its own
 CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
-IN_HEADING, IN_TITLE = 10, 5  # what a word counts there, beside 1 in the text
+IN_HEADING, IN_TITLE = 10, 5  # what a word counts there, beside 1 in the text, where more than the latter are as many
 LOOKED_UP = {"commands.md", "settings.md", "schema.md", "api.md", "troubleshooting.md"}  # come after pages to read
 SMALL = "a an and are as at by can do does for from get how i if in is it may my of on or the to what with"
+SIGNS = {"mu": "μ", "phi": "φ"}  # the pages write the sign
 LITTLE = frozenset(re.findall(r"\w+", SMALL))  # words that say nothing of what is sought
 
 
@@ -32,7 +34,7 @@ class Section(NamedTuple):
 
 def find_sections(words: str, most: int = 8) -> list[Section]:
     """Sections that hold all words (or their beginnings), the likeliest first; none where there are no words."""
-    wanted = [word for word in re.findall(r"[^\s,;?!]+", words.lower()) if word not in LITTLE]
+    wanted = [SIGNS.get(word, word) for word in re.findall(r"[^\s,;?!]+", words.lower()) if word not in LITTLE]
     if not wanted:
         return []
     found = [(_worth(section, wanted), section) for section in _sections()]
@@ -55,9 +57,11 @@ def _sections() -> list[Section]:
 
 def _worth(section: Section, wanted: list[str]) -> int:
     heading, title, text = section.heading.lower(), section.title.lower(), section.text.lower()
+    leads = " ".join(LEAD.findall(text))
     worth = 0
     for word in wanted:
-        here = IN_HEADING * (word in heading) + IN_TITLE * (word in title) + min(text.count(word), IN_TITLE)
+        here = IN_HEADING * (word in heading or word in leads) + IN_TITLE * (word in title)
+        here += min(text.count(word), IN_TITLE)
         if not here:
             return 0
         worth += here

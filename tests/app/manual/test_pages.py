@@ -162,6 +162,10 @@ def test_the_python_of_a_page_runs(page, folder, monkeypatch, capsys):
     [
         ("how do I get walls?", "photographs.md", "How to get walls"),
         ("what if I do not know μ?", "photographs.md", "What you may not know"),
+        ("what if I do not know mu?", "photographs.md", "What you may not know"),
+        ("friction unknown", "photographs.md", "What you may not know"),
+        ("pixel size", "photographs.md", "What you may not know"),
+        ("lost rod", "photographs.md", "When rods are lost or mistaken"),
         ("may I believe frame 12?", "trust.md", "May I believe frame 12?"),
         ("how do I plot P(f) for my paper?", "python.md", "P(f) for a paper"),
         ("how do I run fifty experiments?", "campaigns.md", "Many experiments"),
