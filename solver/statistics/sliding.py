@@ -19,9 +19,9 @@ from solver.bodies.grains import Array
 from solver.contacts.contacts import ContactState
 from solver.statistics.bearing import logistic
 
-# Log odds: constant, (|f_t| / μ f_n)², share of the convex members on the cone, of the chains on it; sliding seen, and
-# seen against f_t; its size; weight; share of the positions of soft grains, and of hard ones.
-SLIDING = (-4.11, 0.86, 1.85, 0.99, 0.39, 0.70, 1.14, -2.84, 0.91, 0.60)
+# Log odds: constant, (|f_t| / μ f_n)², share of the convex members on the cone, of the chains on it; sliding seen
+# against f_t; sliding far; weight; share of the positions of soft grains, and of hard ones.
+SLIDING = (-4.05, 0.97, 1.87, 1.24, 0.71, 0.90, -2.66, 0.89, 0.64)
 SEEN = 4.0  # standard deviations of a sliding at which it counts half
 FAR = 1.0  # of what neighbours move by: the same of its size
 HEAVY = 0.1  # of the mean force: the same of weight
@@ -56,14 +56,13 @@ def sliding_probability(mobilised: Array, signs: SlidingSigns | None) -> Array:
     if signs is None:
         constant, square, eighth = SLIDING_WITHOUT_MEMBERS
         return logistic(constant + square * used**2 + eighth * used**8)
-    heavy = SLIDING[7] * signs.weight / (signs.weight + HEAVY)
+    heavy = SLIDING[6] * signs.weight / (signs.weight + HEAVY)
     if signs.borne is not None:
         constant, square, borne = SLIDING_AT_FIRST
         return logistic(constant + square * used**2 + borne * signs.borne + heavy)
-    constant, square, convex, chains, seen, against, far, _, of_soft, of_hard = SLIDING
+    constant, square, convex, chains, against, far, _, of_soft, of_hard = SLIDING
     odds = constant + square * used**2 + convex * signs.cone_share[:, 0] + chains * signs.cone_share[:, 1]
-    odds += seen * _saturating(signs.slip, SEEN) + against * _saturating(np.maximum(signs.slip, 0.0), SEEN)
-    odds += far * _saturating(signs.reach, FAR)
+    odds += against * _saturating(np.maximum(signs.slip, 0.0), SEEN) + far * _saturating(signs.reach, FAR)
     return logistic(odds + heavy + (of_soft if signs.soft else of_hard) * signs.positions_share)
 
 
