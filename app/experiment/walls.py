@@ -16,6 +16,7 @@ from .reading.tables import Table, check_frames, check_unique
 
 ENDS = {"bar": BAR, "corner": CORNER, "auto": NOT_TOLD}
 SIDES = {"in": IN, "out": OUT}
+FORCE_COLUMNS = ("frame", "wall", "fx", "fy")
 WALL_COLUMNS = ("frame", "wall", "x1", "y1", "x2", "y2")
 ARC_COLUMNS, LOAD_COLUMNS = ("frame", "wall", "x", "y", "radius", "side"), ("frame", "wall", "force")
 
@@ -158,7 +159,7 @@ def _read_wall_forces(
     """What sensors recorded on the walls (f, w, 2) [N], NaN where they did not; None without a table."""
     if section.forces is None:
         return None
-    table = experiment.table(section.forces, ("frame", "wall", "fx", "fy"))
+    table = experiment.table(section.forces, FORCE_COLUMNS)
     frame = table.integers("frame")
     wall = _wall_rows(table, names, frame, frame_count)
     force = np.full((frame_count, len(names), 2), np.nan)

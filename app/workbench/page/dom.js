@@ -40,7 +40,7 @@ export const sign = (mark) => h("span", { class: `sign ${mark}`, title: mark }, 
 export function numberField(label, value, unit, onvalue, more = {}) {
   const input = h("input", { type: "text", inputMode: "decimal", value: value === null || value === undefined ? "" : String(value), ...more,
     onchange: () => onvalue(input.value.trim()), onkeydown: (event) => event.key === "Enter" && input.blur() });
-  input.id = `field-${label.toLowerCase().replace(/[^a-z]+/g, "-")}`;
+  input.id = more.id ?? `field-${label.toLowerCase().replace(/[^a-z]+/g, "-")}`;
   return h("div", { class: "field" }, h("label", { htmlFor: input.id }, label), h("div", { class: "with-unit" }, input, unit && h("span", {}, unit)));
 }
 

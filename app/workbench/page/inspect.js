@@ -6,6 +6,7 @@ import { COLOURINGS, drawChange, drawLegend, drawNetwork } from "/page/network.j
 import { showLanes, jump } from "/page/lanes.js";
 import { agreementSection } from "/page/agreement.js";
 import { Recording } from "/page/recording.js";
+import { measured } from "/page/units.js";
 
 const VERDICTS = { c: "contact", n: "no contact", u: "unsure" };
 const SAID = { contact: "#2fbf93", "no contact": "#d55e00", unsure: "#f0e442" };
@@ -234,7 +235,7 @@ function rodCard(app) {
   return h("div", { class: "card here", id: "card" },
     h("div", { class: "fact" }, h("b", {}, named(chosen.id)), h("span", { class: "pill" }, n < 0 ? "lost" : net.rods.status[n])),
     rodPast ? [
-      fact("radius", `${digits(rodPast.radius * 1e3, 4)} mm`), fact("turned by", rodPast.rotation[k] === null ? "unknown" : `${digits(rodPast.rotation[k] * 180 / Math.PI, 3)}°`),
+      fact("radius", measured("length", rodPast.radius)), fact("turned by", rodPast.rotation[k] === null ? "unknown" : `${digits(rodPast.rotation[k] * 180 / Math.PI, 3)}°`),
       fact("place", rodPast.sigma[k] === null ? "–" : `± ${digits(rodPast.sigma[k] * 1e6, 2)} µm`), blind ? null : fact("unbalance / mean f_n", digits(rodPast.unbalance[k], 2)),
       h("span", { class: "soft" }, "correlation over the frames"), chart(58, (c, w, hh) => spark(app, c, w, hh, seen.zncc, null, false)),
     ] : null,

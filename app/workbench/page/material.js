@@ -1,6 +1,7 @@
 // Step 5: what the rods are made of, how they rub, how gravity lies.
 
 import { ask, digits, fact, h, numberField, parse } from "/page/dom.js";
+import { measured as measuredAs, typed as lengthOf, unit, within } from "/page/units.js";
 
 let presets = null;
 const ASSUMED = { density: 2700, length: 0.06, friction: 0.25 };
@@ -11,13 +12,13 @@ export const material = {
   panel(app) {
     const told = app.project.material, value = (name) => told[name] ?? ASSUMED[name];
     const set = (values) => app.change("set_material", values);
-    const typed = (name, factor = 1) => (text) => app.queue(async () => { set({ [name]: Number((parse(text, name) / factor).toPrecision(12)) }); });
+    const typed = (name) => (text) => app.queue(async () => { set({ [name]: parse(text, name) }); });
     const measured = told.friction === "measured";
     return [
       h("p", {}, "Begin with what the rods are made of; then put in what you have measured yourself."),
       h("div", { class: "chips" }, Object.entries(presets ?? {}).map(([name, of]) => h("button", { class: of.density === told.density && of.friction === told.friction ? "on" : "", onclick: () => set({ ...of, length: value("length") }) }, name))),
       numberField("density", digits(value("density"), 6), "kg/m³", typed("density")),
-      numberField("length", digits(value("length") * 1e3, 6), "mm", typed("length", 1e3)),
+      numberField("length", within("length", value("length"), 6), unit("length"), (text) => app.queue(async () => { set({ length: lengthOf("length", text, "length") }); })),
       h("h3", {}, "Friction"),
       h("div", { class: "chips" },
         h("button", { class: measured ? "" : "on", onclick: () => set({ friction: ASSUMED.friction }) }, "I know it"),
@@ -26,7 +27,7 @@ export const material = {
       numberField("at walls", told.wall_friction === undefined ? "" : digits(told.wall_friction, 4), "", (text) => app.queue(async () => { set({ wall_friction: text === "" ? "same" : parse(text, "wall friction") }); }), { placeholder: "as between rods" }),
       h("h3", {}, "Gravity in the picture"),
       h("div", { class: "chips" }, [["none: rods lie flat", [0, 0]], ["down: 9.81 m/s²", [0, -9.81]]].map(([words, gravity]) => h("button", { class: String(told.gravity ?? [0, 0]) === String(gravity) ? "on" : "", onclick: () => set({ gravity }) }, words))),
-      fact("used as", `ρ ${digits(value("density"))} kg/m³, ${digits(value("length") * 1e3)} mm long, μ ${measured ? "found" : digits(value("friction"))}`),
+      fact("used as", `ρ ${digits(value("density"))} kg/m³, ${measuredAs("length", value("length"), 3)} long, μ ${measured ? "found" : digits(value("friction"))}`),
     ];
   },
 };

@@ -1,6 +1,7 @@
 // Step 1: which photographs, in which order, when, and what of them is looked at.
 
 import { ask, chart, colour, digits, fact, h, numberField, parse, sign, tell } from "/page/dom.js";
+import { tableField } from "/page/tables.js";
 
 let cutting = null, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
 
@@ -17,9 +18,10 @@ export const photographs = {
       fact("photographs", String(project.files.length)),
       fact("size", project.width ? `${project.width} × ${project.height} px` : "–"),
       h("div", { class: "field" }, h("label", { htmlFor: "field-name" }, "name"), h("input", { id: "field-name", value: project.name, onchange: (event) => app.change("set_photographs", { name: event.target.value }) })),
-      told.times ? fact("times", told.times) : numberField("interval", told.interval, "s", (text) => app.queue(async () => {
+      told.times ? null : numberField("interval", told.interval, "s", (text) => app.queue(async () => {
         app.change("set_photographs", { interval: parse(text, "interval") });
       })),
+      tableField(app, "times"),
       h("div", { class: "field" }, h("label", { htmlFor: "field-channel" }, "channel"), h("select", { id: "field-channel", onchange: (event) => app.change("set_photographs", { channel: event.target.value }) },
         ["grey", "red", "green", "blue"].map((name) => h("option", { value: name, selected: name === (told.channel ?? "grey") }, name)))),
       h("div", { class: "row" },

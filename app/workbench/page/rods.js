@@ -1,6 +1,7 @@
 // Step 4: the rods of the first photograph: looked for, added, deleted, moved, resized; their radii in classes.
 
 import { ask, chart, colour, digits, fact, h, parse, strokeCircles, tell } from "/page/dom.js";
+import { siOf, measured, typed, unit, within } from "/page/units.js";
 
 export const CLASS_COLOURS = ["#56b4e9", "#e69f00", "#2fbf93", "#cc79a7", "#f0e442", "#d55e00", "#0072b2", "#999999"];
 let chosen = null, held = null, quality = null, told = null, proposed = null;
@@ -9,15 +10,15 @@ export const rods = {
   name: "rods", title: "Rods",
   hint: (app) => (app.project.rods ? "Click a rod to choose it, beside one to add one; drag to move; Shift+wheel to resize; Delete" : ""),
   keyHelp: [["Delete", "delete the chosen rod"], ["[ ]", "make it smaller, larger"], ["Shift+arrows", "move it by a quarter pixel"], ["N", "the next doubtful rod"]],
-  enter: (app) => { chosen = null; held = null; proposed = null; told = (app.project.photographs.radii ?? []).map((r) => digits(r * 1e3, 6)).join(", "); },
+  enter: (app) => { chosen = null; held = null; proposed = null; told = (app.project.photographs.radii ?? []).map((r) => within("length", r, 6)).join(", "); },
   tool,
   panel(app) {
     const { project } = app, found = project.rods;
     told ??= "";
-    const radii = () => told.split(/[,; ]+/).filter(Boolean).map((text) => parse(text, "radius") / 1e3);
+    const radii = () => told.split(/[,; ]+/).filter(Boolean).map((text) => typed("length", text, "radius"));
     return [
       h("p", {}, "Tell the radii if you know them: detection is then sure, and quick. Without them rods of any size are looked for, which takes a minute."),
-      h("div", { class: "field" }, h("label", { htmlFor: "field-radii" }, "known radii"), h("div", { class: "with-unit" }, h("input", { id: "field-radii", value: told, placeholder: "7, 8, 11", onchange: (event) => { told = event.target.value; } }), h("span", {}, "mm"))),
+      h("div", { class: "field" }, h("label", { htmlFor: "field-radii" }, "known radii"), h("div", { class: "with-unit" }, h("input", { id: "field-radii", value: told, placeholder: "7, 8, 11", onchange: (event) => { told = event.target.value; } }), h("span", {}, unit("length")))),
       h("button", { class: found ? "" : "primary", id: "detect", disabled: Boolean(told) && !project.pixel, onclick: () => app.queue(async () => {
         const answer = await ask("detect_rods", { at: project.at, radii: radii() });
         quality = answer.quality; chosen = null; proposed = null; app.take(answer); tell(`${answer.rods?.id.length ?? 0} rods found`);
@@ -27,7 +28,7 @@ export const rods = {
         chart(96, (c, width, height) => histogram(app, c, width, height)),
         h("div", { class: "row" },
           h("button", { disabled: !project.pixel, onclick: () => app.queue(async () => { proposed = (await ask("classes", { at: project.at })).radii; app.paint(); }) }, "Find classes"),
-          proposed ? h("button", { class: "primary", onclick: () => { const radii = proposed; told = radii.map((r) => digits(r * 1e3, 4)).join(", "); proposed = null; app.change("set_classes", { radii }, "", () => tell("Every rod has the nearest class's radius")); } }, `Use ${proposed.map((r) => digits(r * 1e3, 4)).join(", ")} mm`) : null,
+          proposed ? h("button", { class: "primary", onclick: () => { const radii = proposed; told = radii.map((r) => within("length", r, 4)).join(", "); proposed = null; app.change("set_classes", { radii }, "", () => tell("Every rod has the nearest class's radius")); } }, `Use ${proposed.map((r) => digits(r * 1e3, 4)).join(", ")} mm`) : null,
           radiiDiffer(project, told) && !proposed ? h("button", { onclick: () => app.queue(async () => { app.change("set_classes", { radii: radii() }); }) }, "Snap to the known radii") : null),
         chosenCard(app),
       ] : null,
@@ -74,7 +75,7 @@ function chosenCard(app) {
   const found = app.project.rods, n = found.id.indexOf(chosen), pixel = app.project.pixel;
   if (n < 0) return h("p", {}, "Choose a rod in the picture to see it here.");
   return h("div", { class: "card here" }, fact("rod", String(chosen)), fact("centre", `${digits(found.x[n], 6)}, ${digits(found.y[n], 6)} px`),
-    fact("radius", `${digits(found.r[n], 5)} px${pixel ? ` · ${digits(found.r[n] * pixel * 1e3, 4)} mm` : ""}`),
+    fact("radius", `${digits(found.r[n], 5)} px${pixel ? ` · ${measured("length", found.r[n] * pixel)}` : ""}`),
     quality && quality.length === found.id.length ? fact("outline seen", `${Math.round(quality[n] * 100)} %`) : null,
     h("div", { class: "row" }, h("button", { onclick: () => { const id = chosen; chosen = null; app.change("delete_rods", { ids: [id] }); } }, "Delete"), h("button", { onclick: () => nextDoubtful(app) }, "Next doubtful")));
 }
@@ -140,17 +141,17 @@ function tool(app) {
 }
 
 function histogram(app, c, width, height) {
-  const { rods: found, pixel } = app.project, unit = pixel ? pixel * 1e3 : 1, values = found.r.map((r) => r * unit);
+  const { rods: found, pixel } = app.project, per = pixel ? pixel / siOf("length") : 1, values = found.r.map((r) => r * per);
   const low = Math.min(...values) * 0.9, high = Math.max(...values) * 1.1, bins = 48, counts = new Array(bins).fill(0);
   for (const value of values) counts[Math.min(bins - 1, Math.floor((value - low) / (high - low || 1) * bins))] += 1;
   const most = Math.max(...counts), classes = classesOf(app.project), base = height - 20;
   counts.forEach((count, k) => {
     if (!count) return;
-    c.fillStyle = classes((low + (k + 0.5) / bins * (high - low)) / unit);
+    c.fillStyle = classes((low + (k + 0.5) / bins * (high - low)) / per);
     const tall = Math.max(2, (base - 8) * Math.sqrt(count / most));
     c.fillRect(8 + k / bins * (width - 16), base - tall, (width - 16) / bins - 1, tall);
   });
   c.fillStyle = colour("soft"); c.font = "11px system-ui, sans-serif"; c.textAlign = "left"; c.fillText(`${digits(low, 3)}`, 8, height - 6);
-  c.textAlign = "right"; c.fillText(`${digits(high, 3)} ${pixel ? "mm" : "px"}`, width - 8, height - 6); c.textAlign = "center"; c.fillText("radius", width / 2, height - 6);
-  for (const radius of proposed ?? []) { const x = 8 + (radius * 1e3 - low) / (high - low) * (width - 16); c.strokeStyle = colour("ink"); c.setLineDash([3, 3]); c.beginPath(); c.moveTo(x, 4); c.lineTo(x, base); c.stroke(); c.setLineDash([]); }
+  c.textAlign = "right"; c.fillText(`${digits(high, 3)} ${pixel ? unit("length") : "px"}`, width - 8, height - 6); c.textAlign = "center"; c.fillText("radius", width / 2, height - 6);
+  for (const radius of proposed ?? []) { const x = 8 + (radius / siOf("length") - low) / (high - low) * (width - 16); c.strokeStyle = colour("ink"); c.setLineDash([3, 3]); c.beginPath(); c.moveTo(x, 4); c.lineTo(x, base); c.stroke(); c.setLineDash([]); }
 }

@@ -1,6 +1,8 @@
 // Step 2: what a pixel is: two points and their distance, or rods whose radius is known, or the number itself.
 
-import { ask, digits, fact, h, numberField, parse, tell } from "/page/dom.js";
+import { ask, digits, fact, h, numberField, tell } from "/page/dom.js";
+import { lensForm } from "/page/lens.js";
+import { choice, measured, typed, unit, within } from "/page/units.js";
 
 let mode = "distance", line = null, metres = null, rods = [], drawn = null, held = null;
 
@@ -23,19 +25,20 @@ export const scale = {
       mode === "distance" ? [
         h("p", {}, "The farther apart the two points, the better: the whole frame, or a ruler in the rods' plane."),
         fact("drawn", length ? `${digits(length, 5)} px` : "nothing yet"),
-        numberField("distance", metres === null ? "" : digits(metres * 1e3, 7), "mm", (text) => { app.queue(async () => { metres = parse(text, "distance") / 1e3; send(app); }); }, { disabled: !line }),
+        numberField("distance", metres === null ? "" : within("length", metres, 7), unit("length"), (text) => { app.queue(async () => { metres = typed("length", text, "distance"); send(app); }); }, { disabled: !line }),
       ] : null,
       mode === "rods" ? [
         h("p", {}, "Measure a few rods of radii that you know; their sum sets the scale."),
-        rods.map((rod, k) => h("div", { class: "row" }, fact(`rod ${k + 1}`, `${digits(rod.r, 5)} px`), numberField(`radius ${"abcdefghij"[k] ?? ""}`, rod.radius ? digits(rod.radius * 1e3, 6) : "", "mm", (text) => app.queue(async () => { rod.radius = parse(text, "radius") / 1e3; app.paint(); })),
+        rods.map((rod, k) => h("div", { class: "row" }, fact(`rod ${k + 1}`, `${digits(rod.r, 5)} px`), numberField(`radius ${"abcdefghij"[k] ?? ""}`, rod.radius ? within("length", rod.radius, 6) : "", unit("length"), (text) => app.queue(async () => { rod.radius = typed("length", text, "radius"); app.paint(); })),
           h("button", { class: "quiet", title: "Take it away", onclick: () => { rods.splice(k, 1); app.paint(); } }, "✕"))),
         rods.length ? h("button", { class: "primary", disabled: rods.some((rod) => !rod.radius), onclick: () => app.change("set_scale", { rods: rods.map((rod) => ({ radius: rod.radius, pixels: rod.r })) }, "", said) }, "Set the scale by these") : null,
       ] : null,
-      mode === "number" ? numberField("pixel size", pixel ? digits(pixel * 1e3, 7) : "", "mm", (text) => app.queue(async () => { const size = parse(text, "pixel size") / 1e3; app.change("set_scale", { pixel_size: size }, "", said); })) : null,
+      mode === "number" ? numberField("pixel size", pixel ? within("length", pixel, 7) : "", unit("length"), (text) => app.queue(async () => { const size = typed("length", text, "pixel size"); app.change("set_scale", { pixel_size: size }, "", said); })) : null,
       h("h3", {}, "Found"),
-      h("div", { class: "fact" }, h("span", {}, "one pixel"), h("span", { class: "big" }, pixel ? `${digits(pixel * 1e3, 4)} mm` : "–")),
-      pixel ? fact("picture", `${digits(pixel * project.width * 1e3, 4)} × ${digits(pixel * project.height * 1e3, 4)} mm`) : null,
-      project.photographs.lens ? fact("lens", "straightened as told") : null,
+      h("div", { class: "fact" }, h("span", {}, "one pixel"), h("span", { class: "big" }, pixel ? measured("length", pixel) : "–")),
+      pixel ? fact("picture", `${within("length", pixel * project.width)} × ${measured("length", pixel * project.height)}`) : null,
+      choice("length", app),
+      lensForm(app),
     ];
   },
   draw(app, c, k) {
@@ -53,7 +56,7 @@ export const scale = {
   },
 };
 
-const said = (project) => tell(`One pixel is ${digits(project.pixel * 1e3, 5)} mm`);
+const said = (project) => tell(`One pixel is ${measured("length", project.pixel, 5)}`);
 
 function send(app) {
   if (line && metres) app.change("set_scale", { line, metres }, "", said);
@@ -98,7 +101,7 @@ function drawLength(c, k, [a, b], metres) {
     for (const end of [a, b]) { c.moveTo(end[0] - n[0], end[1] - n[1]); c.lineTo(end[0] + n[0], end[1] + n[1]); }
     c.stroke();
   }
-  label(c, k, (a[0] + b[0]) / 2 + n[0] * 2, (a[1] + b[1]) / 2 + n[1] * 2, metres ? `${digits(metres * 1e3, 6)} mm` : `${digits(along, 5)} px`);
+  label(c, k, (a[0] + b[0]) / 2 + n[0] * 2, (a[1] + b[1]) / 2 + n[1] * 2, metres ? measured("length", metres, 6) : `${digits(along, 5)} px`);
 }
 
 /** A round length in the corner of the picture. */
@@ -109,7 +112,7 @@ function drawBar(app, c, k) {
   const left = x - metres / project.pixel;
   c.fillStyle = "#000a"; c.fillRect(left - 8 / k, y - 24 / k, x - left + 16 / k, 34 / k);
   c.fillStyle = "#fff"; c.fillRect(left, y, x - left, 3 / k);
-  c.font = `${13 / k}px system-ui, sans-serif`; c.textAlign = "center"; c.fillText(`${digits(metres * 1e3, 3)} mm`, (left + x) / 2, y - 7 / k);
+  c.font = `${13 / k}px system-ui, sans-serif`; c.textAlign = "center"; c.fillText(measured("length", metres, 3), (left + x) / 2, y - 7 / k);
 }
 
 export function label(c, k, x, y, text, style = "#fff") {

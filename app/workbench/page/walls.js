@@ -1,7 +1,9 @@
 // Step 3: the bars around the packing: drawn or found, named, loaded or followed.
 
-import { digits, h, numberField, parse, tell } from "/page/dom.js";
+import { h, numberField, tell } from "/page/dom.js";
 import { label } from "/page/scale.js";
+import { tableField } from "/page/tables.js";
+import { choice, measured, typed, unit, within } from "/page/units.js";
 
 const COLOURS = ["#56b4e9", "#e69f00", "#cc79a7", "#f0e442", "#2fbf93", "#d55e00"];
 let chosen = null, line = null, held = null, snap = true, round = null, points = []; // round: the circle that is dragged; points: of a new one, null while bars are drawn
@@ -26,6 +28,7 @@ export const walls = {
         h("button", { class: project.walls.length ? "" : "primary", id: "find-walls", disabled: !project.rods, title: project.rods ? "" : "needs the rods: step 4", onclick: () => app.change("find_walls", {}, "Looking for the bars …", (told) => tell(`${told.walls.length} bars found`)) }, "Find the bars by the rods"),
         snapButton(app)),
       project.walls.map((wall, k) => card(app, wall, k)),
+      project.walls.length ? [h("h3", {}, "Measured at walls"), tableField(app, "load"), tableField(app, "forces"), choice("pressure", app)] : null,
     ];
   },
   draw(app, c, k) {
@@ -52,10 +55,10 @@ function card(app, wall, k) {
   return h("div", { class: `card ${wall.name === chosen ? "here" : ""}`, id: `wall-${wall.name}`, onclick: (event) => { if (event.target.tagName === "DIV" && chosen !== wall.name) { chosen = wall.name; app.paint(); } } },
     h("div", { class: "row" }, h("span", { class: "swatch", style: { background: COLOURS[k % COLOURS.length] } }),
       h("input", { value: wall.name, style: { flex: "1", fontWeight: 600 }, "aria-label": "name of the wall", id: `wall-name-${k}`, onchange: (event) => app.change("rename_wall", { name: wall.name, to: event.target.value.trim() }) }),
-      h("span", { class: "soft" }, wall.circle ? `r ${digits(wall.circle.radius * app.project.pixel * 1e3, 4)} mm` : `${digits(long * 1e3, 4)} mm`),
+      h("span", { class: "soft" }, wall.circle ? `r ${measured("length", wall.circle.radius * app.project.pixel)}` : measured("length", long)),
       h("button", { class: "quiet", title: "Delete this wall", onclick: () => app.change("delete_wall", { name: wall.name }) }, "✕")),
-    numberField(`pressure ${wall.name}`, wall.pressure === null ? "" : digits(wall.pressure / 1e3, 6), "kPa", (text) => app.queue(async () => {
-      plate({ pressure: text === "" ? null : parse(text, "pressure") * 1e3 });
+    numberField(`pressure ${wall.name}`, wall.pressure === null ? "" : within("pressure", wall.pressure, 6), unit("pressure"), (text) => app.queue(async () => {
+      plate({ pressure: text === "" ? null : typed("pressure", text, "pressure") });
     }), { placeholder: "moves as seen" }),
     wall.circle ? h("div", { class: "field" }, h("label", { htmlFor: `side-${k}` }, "packing is"), h("select", { id: `side-${k}`, onchange: (event) => { const { x, y, radius } = wall.circle; app.change("draw_circle", { name: wall.name, place: [x, y, radius], side: event.target.value }); } },
       [["in", "inside the circle"], ["out", "outside it"]].map(([value, words]) => h("option", { value, selected: value === wall.circle.side }, words))))
@@ -157,7 +160,7 @@ function drawWall(app, c, k, wall, style) {
   c.fillStyle = style;
   for (const end of [a, b]) { c.beginPath(); c.arc(end[0], end[1], (here ? 5.5 : 4) / k, 0, 2 * Math.PI); c.fill(); }
   const low = app.stage.toPhotograph(0, app.stage.boxHeight - 14)[1], high = app.stage.toPhotograph(0, 14)[1];
-  if (wall.name) label(c, k, (a[0] + b[0]) / 2 - n[0] * 44 / k, Math.min(Math.max((a[1] + b[1]) / 2 - n[1] * 44 / k, high), low), loaded ? `${wall.name} · ${digits(wall.pressure / 1e3, 4)} kPa` : wall.name, style);
+  if (wall.name) label(c, k, (a[0] + b[0]) / 2 - n[0] * 44 / k, Math.min(Math.max((a[1] + b[1]) / 2 - n[1] * 44 / k, high), low), loaded ? `${wall.name} · ${measured("pressure", wall.pressure)}` : wall.name, style);
 }
 
 function drawCircle(app, c, k, wall, style) {
@@ -171,5 +174,5 @@ function drawCircle(app, c, k, wall, style) {
     c.stroke();
   }
   c.fillStyle = style; c.beginPath(); c.arc(x, y, (here ? 5.5 : 4) / k, 0, 7); c.fill();
-  label(c, k, x, y + 22 / k, loaded ? `${wall.name} · ${digits(wall.pressure / 1e3, 4)} kPa` : wall.name, style);
+  label(c, k, x, y + 22 / k, loaded ? `${wall.name} · ${measured("pressure", wall.pressure)}` : wall.name, style);
 }

@@ -24,6 +24,7 @@ from ..mending.mender import Mender
 from ..running.job import Job
 from ..setup.circles import circles_of
 from ..setup.draft import Draft, stamp_of
+from ..setup.edits import TABLES
 from ..setup.folder import run_facts, run_folder
 from ..setup.steps import Understood, judge
 
@@ -212,6 +213,7 @@ class Project:
             "files": [file.name for file in found.files], "photographs": section,
             "pixel": None if found.scale is None else found.scale.mean_size,
             "walls": _walls(found), "rods": _rods(found), "material": found.data.get("material", {}),
+            "tables": _named_tables(found),
             "undo": self.draft.done[-1].what if self.draft.done else None,
             "redo": self.draft.undone[-1].what if self.draft.undone else None,
             "run": run_facts(self.results),
@@ -253,6 +255,15 @@ def _walls(found: Understood) -> list[dict[str, Any]]:
             "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
         })  # fmt: skip
     return told
+
+
+def _named_tables(found: Understood) -> dict[str, Any]:
+    """Tables from elsewhere that the experiment names, by what they are; None: no such table."""
+    sections = {section: found.data.get(section) for section, *_ in TABLES.values()}
+    return {
+        name: told.get(name) if isinstance(told := sections[section], dict) else None
+        for name, (section, *_) in TABLES.items()
+    }
 
 
 def _rods(found: Understood) -> dict[str, Any] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, StringConstraints
 
 from solver.bodies.wall_shapes import STRAIGHT
 
@@ -19,6 +19,8 @@ from .questions import Line, Number, Numbers, Point, Shape, Text, Whole, edit, q
 Pressure = Annotated[float, Field(ge=1e-3, le=1e11)]
 Three = Annotated[list[Point], Field(min_length=3, max_length=3)]
 Round = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Lens = Annotated[dict[Annotated[str, StringConstraints(max_length=2)], Number], Field(max_length=20)]
+Written = Annotated[str, StringConstraints(max_length=5_000_000)]  # a table of a hundred thousand rows
 LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
 Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
 
@@ -79,6 +81,24 @@ def set_scale(
     else:
         raise InputError("scale", "", "give the size of a pixel, a line and its length, or rods of known radius")
     edits.set_scale(opened.draft, told)
+    return opened.describe()
+
+
+@edit
+def set_lens(bench: Bench, at: Text, lens: Lens | None = None) -> dict[str, Any]:
+    """The coefficients of OpenCV's or of Brown's model; None: what bends the picture is found as far as gaps tell."""
+    opened = bench.project(at)
+    edits.set_lens(opened.draft, None if lens is None else dict(lens))
+    return opened.describe()
+
+
+@edit
+def set_table(
+    bench: Bench, at: Text, name: Literal["times", "load", "forces"], table: Written | None = None
+) -> dict[str, Any]:
+    """A table from elsewhere: times of the photographs, load of walls, forces to compare with; None: take it away."""
+    opened = bench.project(at)
+    edits.set_table(opened.draft, opened.understood(), name, table)
     return opened.describe()
 
 

@@ -8,21 +8,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from solver.bodies.grains import Array
 from solver.bodies.wall_shapes import STRAIGHT
 
 from ...errors import InputError
-from ...experiment.experiment import GrainGuess
+from ...experiment.config.input_sections import LensSection
+from ...experiment.experiment import TIME_COLUMNS, GrainGuess
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
-from ...experiment.walls import WALL_COLUMNS
+from ...experiment.walls import FORCE_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS
 from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from ...tracking.walls.inner_edge import find_bars, meeting_lines, snap_to_edge
 from .circles import arcs_table, circles_of, renamed
 from .draft import Draft, as_table
 from .steps import Understood, judge
 
+# Of what was written elsewhere, by its key: section, file, columns, and the keys in whose place it comes.
+TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
+    "times": ("photographs", "times.csv", TIME_COLUMNS, ("photographs.interval",)),
+    "load": ("walls", "load.csv", LOAD_COLUMNS, ()),
+    "forces": ("walls", "wall_forces.csv", FORCE_COLUMNS, ()),
+}
 GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
 AROUND = 3.0  # radii about a clicked rod in which its rim is looked for
@@ -47,10 +55,48 @@ def begin(draft: Draft, name: str, files: str) -> None:
 
 def set_scale(draft: Draft, keys: dict[str, Any]) -> None:
     """Set pixel_size, or distance; walls stay where they are in the picture."""
+    _set_where_walls_stay(draft, "scale", {"photographs.pixel_size": None, "photographs.distance": None, **keys})
+
+
+def set_lens(draft: Draft, lens: dict[str, float] | None) -> None:
+    """Set the lens' coefficients; walls stay where they are in the picture. Raises InputError where they are none."""
+    if lens is not None:
+        try:
+            LensSection.model_validate(lens)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise InputError(draft.file, f"key photographs.lens {where}".rstrip(), first["msg"]) from None
+    _set_where_walls_stay(draft, "lens", {"photographs.lens": lens})
+
+
+def set_table(draft: Draft, found: Understood, name: str, table: str | None) -> None:
+    """Write one of the TABLES from elsewhere; None: there is none. Raises InputError where it does not fit."""
+    section, file, columns, instead = TABLES[name]
+    key = f"{section}.{name}"
+    if table is None:
+        draft.set_keys(name, {key: None})
+        return
+    if section == "walls" and found.walls is None:
+        raise InputError(file, "", "tells of walls, and there are none: draw the walls first")
+    told = table.removeprefix("\ufeff").splitlines()
+    missing = [each for each in columns if not told or each not in [cell.strip() for cell in told[0].split(",")]]
+    if missing:
+        raise InputError(file, "", f"has no column {missing[0]}: it is a table {','.join(columns)}")
+    with draft.one_step(name):
+        draft.set_keys(name, {key: file, **dict.fromkeys(instead)}, {file: table.encode()})
+        before, after = found.steps[section].says, judge(draft).steps[section].says
+        for complaint in after:
+            if complaint not in before:
+                raise InputError(file, "", complaint)
+
+
+def _set_where_walls_stay(draft: Draft, what: str, keys: dict[str, Any]) -> None:
+    """Set keys that say where in the world a pixel is, and tell the walls anew."""
     before = judge(draft)
     walls, scale = before.walls, before.scale
-    with draft.one_step("scale"):
-        draft.set_keys("scale", {"photographs.pixel_size": None, "photographs.distance": None, **keys})
+    with draft.one_step(what):
+        draft.set_keys(what, keys)
         if walls is None or scale is None:
             return
         after = judge(draft).scale

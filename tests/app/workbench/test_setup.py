@@ -94,6 +94,57 @@ def test_walls_stay_in_the_picture_when_the_scale_changes(begun):
     np.testing.assert_allclose(told["walls"][0]["line"], before[0]["line"], atol=1e-4)
 
 
+def test_a_lens_is_told_and_taken_back_and_walls_stay_in_the_picture(begun):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    visitor.ask("draw_wall", at=at, line=[[20.0, 380.0], [300.0, 384.0]], name=None, snap=False)
+    before = visitor.ask("project", at=at)["walls"][0]["line"]
+    lens = {"xc": 160.0, "yc": 200.0, "K1": 1e-7}
+    told = visitor.ask("set_lens", at=at, lens=lens)
+    assert told["photographs"]["lens"] == lens
+    assert marks(told)["scale"] == "good"
+    assert np.abs(np.array(told["walls"][0]["line"]) - before).max() < 1e-3
+    assert "fx" in visitor.refused("set_lens", at=at, lens={"k1": 0.1})
+    assert visitor.ask("project", at=at)["photographs"]["lens"] == lens  # what is refused leaves no trace
+    assert "lens" not in visitor.ask("set_lens", at=at, lens=None)["photographs"]
+    assert visitor.ask("undo", at=at)["photographs"]["lens"] == lens
+
+
+def test_what_sensors_measured_at_walls_becomes_a_table(begun, photographs_only):
+    visitor, told = begun
+    at, folder = told["at"], photographs_only / "my photographs"
+    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    visitor.ask("set_photographs", at=at, interval=30.0)
+    table = "frame,wall,force\n" + "".join(f"{k},floor,{100 + k}\n" for k in range(4))
+    assert "draw the walls" in visitor.refused("set_table", at=at, name="load", table=table)
+    wall = visitor.ask("draw_wall", at=at, line=[[20.0, 380.0], [300.0, 384.0]], snap=False)["wall"]
+    visitor.ask("rename_wall", at=at, name=wall, to="floor")
+    told = visitor.ask("set_table", at=at, name="load", table=table)
+    assert told["tables"] == {"times": None, "load": "load.csv", "forces": None}
+    assert (folder / "load.csv").read_text() == table
+    walls = read_walls(load_experiment(folder), 4)
+    assert walls.load[2, walls.name.index("floor")] == 102.0
+    assert "no column force" in visitor.refused("set_table", at=at, name="load", table="frame,wall\n0,floor\n")
+    assert "roof" in visitor.refused("set_table", at=at, name="load", table=table.replace("floor", "roof"))
+    assert (folder / "load.csv").read_text() == table
+    told = visitor.ask("set_table", at=at, name="load", table=None)
+    assert told["tables"]["load"] is None
+    assert visitor.ask("undo", at=at)["tables"]["load"] == "load.csv"
+
+
+def test_uneven_times_come_as_a_table_in_place_of_the_interval(begun):
+    visitor, told = begun
+    at = told["at"]
+    visitor.ask("set_photographs", at=at, interval=30.0)
+    assert "3 frames" in visitor.refused("set_table", at=at, name="times", table="frame,time\n0,0\n1,2\n2,5\n")
+    told = visitor.ask("set_table", at=at, name="times", table="frame,time\n0,0\n1,2\n2,5\n3,9\n")
+    assert told["tables"]["times"] == "times.csv"
+    assert "interval" not in told["photographs"]
+    assert marks(told)["photographs"] == "good"
+    assert visitor.ask("undo", at=at)["photographs"]["interval"] == 30.0
+
+
 def test_walls_need_the_scale_and_names_are_words(begun):
     visitor, told = begun
     at = told["at"]
