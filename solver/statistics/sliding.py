@@ -66,9 +66,12 @@ def sliding_probability(mobilised: Array, signs: SlidingSigns | None) -> Array:
     return logistic(odds + heavy + (of_soft if signs.soft else of_hard) * signs.positions_share)
 
 
-def slides_at(slides: Array, told: float, friction: float) -> Array:
-    """P(slides) (c,) where forces were found with a friction that was told, but another one holds."""
-    odds = slides / np.maximum(1.0 - slides, LEAST_DOUBT) * (told / friction) ** TOLD_WRONG
+def slides_at(slides: Array, told: float, friction: float, share: float = 1.0) -> Array:
+    """P(slides) (c,) where forces were found with a friction that was told, but another one holds.
+
+    share: of the motion in the reported field, for it alone needs a friction.
+    """
+    odds = slides / np.maximum(1.0 - slides, LEAST_DOUBT) * (told / friction) ** (TOLD_WRONG * share)
     return odds / (1.0 + odds)
 
 

@@ -231,7 +231,14 @@ def _study_worlds(asked: _Asked, *, jobs: int, as_json: bool) -> int:
 
 
 def _study_numbers(asked: _Asked, *, fit: tuple[int, ...]) -> int:
-    from ...study.worlds.numbers import FIT_WORLDS, WORLDS, compare_numbers, fit_deviations, print_numbers
+    from ...study.worlds.numbers import (
+        FIT_WORLDS,
+        WORLDS,
+        compare_numbers,
+        fit_deviations,
+        print_by_world,
+        print_numbers,
+    )
     from ...study.worlds.solved_world import solve_worlds
     from ...study.worlds.world_table import WIDTH
 
@@ -246,6 +253,7 @@ def _study_numbers(asked: _Asked, *, fit: tuple[int, ...]) -> int:
         solved = solve_worlds(asked.plan, asked.worlds or WORLDS, asked.seeds, progress)
         found = [each for one in solved for each in compare_numbers(one)]
     print_numbers(console, found)
+    print_by_world(console, found, "sliding_fraction")
     return 0
 
 

@@ -47,6 +47,7 @@ SHAPES = ("fn_density", "ft_density", "mobilisation_density")  # compared as a w
 NOT_COMPARED = ("area",)  # no estimate
 DEGREES = ("friction_angle", "wall_ratio_angle", "principal_direction", "friction_angle_of_anisotropies")
 
+NONE_TOLD = "–"  # where no deviation is stated
 HEADINGS = ("statistic", "true mean", "bias", "worst world", "bias there", "scatter", "68 %", "95 %", "")
 
 
@@ -126,6 +127,31 @@ def print_numbers(console: Console, found: Sequence[Compared]) -> None:
     )  # fmt: skip
 
 
+def print_by_world(console: Console, found: Sequence[Compared], name: str) -> None:
+    """Print one row for every world: a statistic stated and true, its bias, its interval and how often that covers."""
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
+    for heading in (name, "true", "stated", "bias", "deviation", "68 %", "95 %"):
+        table.add_column(heading, justify="left" if heading == name else "right")
+    for row in world_rows(found, name):
+        table.add_row(*row)
+    console.print(table)
+
+
+def world_rows(found: Sequence[Compared], name: str) -> list[list[str]]:
+    """A row of cells for every world that a statistic is compared in."""
+    named = [each for each in found if each.name == name]
+    rows = []
+    for world in dict.fromkeys(each.world for each in named):
+        here = [each for each in named if each.world == world]
+        true, stated, deviation = (
+            np.concatenate([getattr(each, column) for each in here]) for column in ("true", "stated", "deviation")
+        )
+        values = (np.nanmean(true), np.nanmean(stated), np.nanmean(deviation))
+        true_mean, stated_mean, deviation_mean = (f"{value:.3g}" for value in values)
+        rows.append([world, true_mean, stated_mean, _told(relative_bias(here), name), deviation_mean, *_covered(here)])
+    return rows
+
+
 def number_rows(found: Sequence[Compared]) -> list[list[str]]:
     """A row of cells under HEADINGS for every statistic."""
     by_name = {name: [each for each in found if each.name == name] for name in compared_names()}
@@ -169,19 +195,23 @@ def _cells(rows: Sequence[Compared]) -> list[str]:
     by_world = {world: relative_bias(some) for world, some in sorted(worlds.items())}
     worst = max(by_world, key=lambda world: -1.0 if np.isnan(by_world[world]) else abs(by_world[world]))
     error = np.concatenate([each.error for each in rows]) / _unit(rows)
-    sigma = np.concatenate([each.deviation for each in rows])
-    known = np.isfinite(sigma) & np.isfinite(_raw(rows))
-    covered = [
-        f"{100.0 * np.mean(np.abs(_raw(rows)[known]) <= t * sigma[known]):.0f}" if known.any() else "–" for t in (1, 2)
-    ]
+    covered = _covered(rows)
     mean = np.degrees(np.nanmean(true)) if name in DEGREES else np.nanmean(true)
     flag = ""
     if name not in DEGREES and name not in SHAPES and abs(bias) > BIASED:
-        flag = "biased, interval told" if known.any() else "biased"
+        flag = "biased" if covered[0] == NONE_TOLD else "biased, interval told"
     return [
         "–" if name in SHAPES else f"{mean:.3g}", _told(bias, name), worst, _told(by_world[worst], name),
         _told(float(np.nanstd(error)), name), *covered, flag,
     ]  # fmt: skip
+
+
+def _covered(rows: Sequence[Compared]) -> list[str]:
+    """Percent of the frames within one and within two stated deviations."""
+    sigma = np.concatenate([each.deviation for each in rows])
+    error = np.abs(_raw(rows))
+    known = np.isfinite(sigma) & np.isfinite(error)
+    return [f"{100.0 * np.mean(error[known] <= t * sigma[known]):.0f}" if known.any() else NONE_TOLD for t in (1, 2)]
 
 
 def _raw(rows: Sequence[Compared]) -> Array:

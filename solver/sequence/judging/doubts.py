@@ -179,6 +179,6 @@ def doubt_friction(frame: FrameForces, check: FrictionCheck | None, *, measured:
     )
     told = replace(frame, trust=frame.trust * (1.0 - share), doubt="; ".join(filter(None, (words, frame.doubt))))
     if frame.sliding_probability is not None:
-        slides = slides_at(frame.sliding_probability, check.given, check.measured)
+        slides = slides_at(frame.sliding_probability, check.given, check.measured, 1.0 - frame.positions_share)
         told = replace(told, sliding_probability=slides, state=contact_state(frame.fn, slides))
     return widen_for_friction(told, check.given, check.measured)

@@ -1,7 +1,7 @@
 """Which statistics are held against the truth's."""
 
 import numpy as np
-from rodsight.study.worlds.numbers import SHAPES, compared_names, is_compared
+from rodsight.study.worlds.numbers import SHAPES, Compared, compared_names, is_compared, world_rows
 
 from tests.app.recording.fake_results import make_results
 
@@ -12,6 +12,17 @@ def test_what_is_compared_is_a_number_or_a_shape():
     assert {"sliding_fraction", "contact_count", "tail_exponent", *SHAPES} <= set(names)
     for name in names:
         assert np.ndim(getattr(statistics, name)) == (name in SHAPES), name
+
+
+def test_a_world_is_told_with_its_bias_and_how_often_its_interval_covers():
+    ten, none = np.full(10, 0.2), np.zeros(10, np.uint8)
+    error = np.r_[np.zeros(5), np.full(4, 0.015), 0.03]
+    found = [
+        Compared(world, 2, name, ten + error, ten, np.full(10, 0.01), 0.1 * ten, none)
+        for world in ("gravity", "soft") for name in ("sliding_fraction", "mobilisation")
+    ]  # fmt: skip
+    expected = ["0.2", "0.209", "+4.5 %", "0.01", "50", "90"]
+    assert world_rows(found, "sliding_fraction") == [["gravity", *expected], ["soft", *expected]]
 
 
 def test_sizes_of_forces_are_compared_only_where_something_tells_them():

@@ -76,6 +76,7 @@ def test_of_a_friction_told_too_high_more_contacts_slide_than_was_found():
     found = np.array([0.0, 0.2, 0.8, 1.0])
     assert (slides_at(found, 0.4, 0.25) > found).tolist() == [False, True, True, False]
     assert slides_at(found, 0.25, 0.25) == pytest.approx(found)
+    assert slides_at(found, 0.4, 0.25, 0.0) == pytest.approx(found)  # positions alone
 
 
 def test_shares_are_counted_by_the_kind_of_member():
