@@ -6,6 +6,7 @@ here, each entry with its reason: LEFT_OUT, SMALLER and ADDED.
 
 from __future__ import annotations
 
+import gzip
 import os
 import re
 import shlex
@@ -24,6 +25,7 @@ import pytest
 from rodsight.recording.viewing import recording_server
 from rodsight.synthetic.synthesis import synthesize
 
+from tests.app.exchange.foreign.test_pegs import write_frame
 from tests.app.manual.test_pages import README, TEXTS, commands
 from tests.program import ROOT, rodsight
 
@@ -136,7 +138,9 @@ def _write_foreign_files(folder: Path) -> None:
     balls = "".join(f"{x}\t{y}\t0\t0.008\n" for x, y in zip(frame.x, frame.y, strict=True))
     (folder / "spheres.txt").write_text(f"#format x_y_z_r\n{balls}")
     assert rodsight("export", "dic", "runs/shear", "--out", "folder") == 0
-    assert rodsight("synth", "solved", "--preset", "photoelastic", "--no-photographs") == 0
+    (folder / "solved").mkdir()
+    for stem in ("DSC9_solved", "DSC10_solved"):
+        write_frame(folder / "solved", stem)
 
 
 @pytest.fixture
@@ -157,8 +161,13 @@ def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         servers.append(recording_server.RecordingServer(files))
         return servers[-1].address
 
+    def pack_quickly(data: bytes, *_: object, **__: object) -> bytes:  # the viewer, for each page anew
+        return pack(data, 1)
+
     servers: list[recording_server.RecordingServer] = []
+    pack = gzip.compress
     monkeypatch.chdir(here)
+    monkeypatch.setattr(gzip, "compress", pack_quickly)
     monkeypatch.setattr(webbrowser, "open", look_and_stop)
     monkeypatch.setattr(recording_server, "serve_apart", serve_here)
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
