@@ -30,6 +30,7 @@ from ..look.texts import printable
 from ..packing_layers.backdrop import log_photograph
 from ..packing_layers.changes import log_changes
 from ..packing_layers.film import FilmWriter
+from ..packing_layers.force_doubt import log_force_doubt
 from ..packing_layers.grains_and_walls import log_grains_and_walls
 from ..packing_layers.legends import log_legends
 from ..packing_layers.network import SweepChoice, chosen_sweeps, log_network
@@ -136,6 +137,7 @@ class Recorder:
             log_photograph(clock, scene.canvas, photograph)
         log_grains_and_walls(clock, scene, forces)
         self.network_rows += log_network(clock, scene, forces, self._former, self._sweeps, self._kept)
+        log_force_doubt(clock, scene, forces)
         log_starts(clock, forces)
         self._log_solve(clock, scene, forces)
         log_unconverged(clock, scene, forces, self._sweeps, self._kept)

@@ -43,6 +43,7 @@ GRAINS_LOST = "/grains/lost"
 FORCES = "/contacts/force"
 FORCES_ACROSS = "/contacts/force/across"
 SLIDING = "/contacts/sliding"
+FORCE_DOUBT = "/contacts/doubt"
 GAPS = "/contacts/gap"
 GAINED = "/contacts/gained"
 PARTED = "/contacts/parted"
@@ -265,6 +266,10 @@ SCHEMA: tuple[Entity, ...] = (
         _STRIPS, When.START, Condition.CELL,
     ),
     Entity(SLIDING, "contacts at the Coulomb limit", _POINTS, When.START_AND_END),
+    Entity(
+        FORCE_DOUBT, "dim edges of the reported forces, as wide as f_n and two standard deviations would be drawn",
+        _STRIPS, When.START_AND_END,
+    ),
     Entity(GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
     Entity(GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
     Entity(PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),

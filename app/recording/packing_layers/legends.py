@@ -55,9 +55,9 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     mean = style.range.mean
     values = [(0.0, "0"), (mean, f"mean {mean:.3g} N"), (0.5 * (top + mean), f"{0.5 * (top + mean):.3g}")]
     values.append((top, f"≥ {top:.3g} N"))
-    notes = [(0.5, "point: sliding contact", SLIDING)]
+    notes = [(0.2, "point: sliding contact", SLIDING), (0.62, "dim edge: 95 % of f_n", INK)]
     if scene.tracks.boundary is not None:
-        notes.append((0.9, "rim: boundary", BOUNDARY))
+        notes.append((0.96, "rim: boundary", BOUNDARY))
     places = [(value / top, text) for value, text in values]
     _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places, notes)
 

@@ -62,7 +62,13 @@ class Layout:
 
 _PACKING = [entities.WALLS, entities.CELL, f"{entities.GRAINS}/**"]
 _LOW, _HIGH = rrb.Corner2D.LeftBottom, rrb.Corner2D.LeftTop
-_FORCES = [entities.FORCES, entities.FORCES_ACROSS, entities.SLIDING, f"{entities.FORCE_LEGEND}/**"]
+_FORCES = [
+    entities.FORCE_DOUBT,
+    entities.FORCES,
+    entities.FORCES_ACROSS,
+    entities.SLIDING,
+    f"{entities.FORCE_LEGEND}/**",
+]
 _SHARE = (-0.04, 1.05)  # of an axis for shares and correlations
 _RESIDUALS = (-6.4, 3.0)  # log10; room for a legend above
 

@@ -161,6 +161,7 @@ def _legend(scene: Scene, clipped: int, drawn: int) -> str:
         f"colour grow linearly with f_n, the same in every frame: grey and thin below {force.weak:.3g} N (half the "
         f"mean), then deep red, orange, yellow, up to cream at {force.top:.3g} N. "
         f"{clipped} of {drawn} forces are above and drawn as {force.top:.3g} N.\n"
+        "- **Dim edges** of lines: as wide as a force that is two standard deviations larger; sweeps have none.\n"
         "- **Cyan dots**: contacts at the Coulomb limit (sliding).\n"
         "- **Strokes at the rim** show rotation: they pointed up in frame 0. Amber outline: doubtful pose. "
         "Blue outline: a rod that no photograph shows, inferred from its neighbours. "
