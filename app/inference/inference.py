@@ -25,7 +25,7 @@ from solver.sequence.failure import describe_error, failed_frame, find_unseen
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_first_again, solve_sequence
 from solver.sequence.judging.doubts import doubt_friction
-from solver.sequence.judging.statistic_intervals import with_deviations
+from solver.sequence.judging.statistic_intervals import widen_for_friction, with_deviations
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics, no_statistics
@@ -97,7 +97,9 @@ class CorrectedSequence:
 
     def restate(self, statistics: FrameStatistics, judged: FrameForces, check: FrictionCheck | None) -> FrameStatistics:
         """The statistics of a frame after the check: of another friction other contacts slide."""
-        return statistics if check is None or check.agrees else _summarize(self, judged)
+        if check is None or check.agrees or judged.status is FrameStatus.FAILED:
+            return statistics
+        return widen_for_friction(_summarize(self, judged), check.given, check.measured)
 
     def find_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
         """What the motion of all solved frames says of the friction that was given; they are looked at once."""

@@ -8,6 +8,7 @@ Positions alone know little of what slides, so that stresses read from them err 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -51,6 +52,20 @@ RELATIVE = frozenset({
     "contact_count", "mean_fn", "max_fn", "chain_count",
 })  # fmt: skip
 SIZED = frozenset({"pressure", "sigma_1", "sigma_2", "mean_fn", "max_fn"})  # nothing, where no size of forces is known
+# Error for every e-fold by which the friction was told wrong, with what a constant above is multiplied by.
+FRICTION_ERROR: dict[str, float] = {
+    "friction_angle": 0.14,
+    "wall_ratio_angle": 0.16,
+    "principal_direction": 0.18,
+    "pressure": 0.19,
+    "sigma_1": 0.28,
+    "mean_fn": 0.23,
+    "max_fn": 0.5,
+    "normal_force_anisotropy": 0.23,
+    "tangential_force_anisotropy": 0.075,
+    "friction_angle_of_anisotropies": 0.15,
+    "mobilisation": 0.18,
+}
 LEAST_DOUBT = 0.03  # 1 − T below which truths told nothing more
 
 
@@ -71,6 +86,17 @@ def with_deviations(
         if scale_is_known or name not in SIZED
     }
     return replace(statistics, **told)
+
+
+def widen_for_friction(statistics: FrameStatistics, given: float, measured: float) -> FrameStatistics:
+    """Statistics with the error of a friction that the motion contradicts in their deviations."""
+    excess = abs(math.log(measured / given)) if given > 0 and measured > 0 else 0.0
+    return replace(statistics, **{
+        f"{name}_sd": math.hypot(
+            getattr(statistics, f"{name}_sd"), excess * error * size_of(name, float(getattr(statistics, name)))
+        )
+        for name, error in FRICTION_ERROR.items()
+    })  # fmt: skip
 
 
 def deviation_of(name: str, value: float, witness: Witness, trust: float) -> float:

@@ -16,8 +16,10 @@ from rodsight.tracks import Tracks, WallTracks
 from solver.bodies.rods import RodMaterial
 from solver.convex.friction_check import FrictionCheck
 from solver.detection.touch_probability import ContactProbabilitySettings
-from solver.sequence.frame_forces import FrameForces
+from solver.sequence.frame_forces import FrameStatus
+from solver.sequence.judging.statistic_intervals import FRICTION_ERROR
 from solver.statistics.frame_statistics import FrameStatistics
+from tests.app.recording.fake_results import make_results
 from tests.solver.sequence.test_frames import sheared_frames
 
 TRUE = 0.21
@@ -71,15 +73,19 @@ def test_sequences_solved_again_take_the_friction_that_was_found() -> None:
     assert told.with_friction(TRUE) is told
 
 
-def test_statistics_are_told_anew_where_the_motion_contradicts_the_friction(monkeypatch) -> None:
-    monkeypatch.setattr(inference, "_summarize", lambda sequence, frame: ("anew", frame))
-    asked = cast(CorrectedSequence, None)
+def test_statistics_are_told_anew_and_less_sure_where_the_motion_contradicts_the_friction(monkeypatch) -> None:
+    results = make_results(1, 8, 7, sweeps=2)
+    frame = replace(results.frames[0], status=FrameStatus.SETTLED)
+    before, anew = results.statistics[0], replace(results.statistics[0], friction_angle_sd=0.01)
+    monkeypatch.setattr(inference, "_summarize", lambda sequence, judged: anew)
 
-    def told(check: FrictionCheck | None) -> object:
-        return CorrectedSequence.restate(asked, cast(FrameStatistics, "before"), cast(FrameForces, "judged"), check)
+    def told(check: FrictionCheck | None, status: FrameStatus = FrameStatus.SETTLED) -> FrameStatistics:
+        return CorrectedSequence.restate(cast(CorrectedSequence, None), before, replace(frame, status=status), check)
 
     def check(measured: float) -> FrictionCheck:
         return FrictionCheck(0.25, measured, measured - 0.03, measured + 0.03, 1, 3, True, np.ones(3), np.ones(3))
 
-    assert told(None) == told(check(0.26)) == "before"
-    assert told(check(0.4)) == ("anew", "judged")
+    assert told(None) is told(check(0.26)) is told(check(0.4), FrameStatus.FAILED) is before
+    wide = told(check(0.4)).friction_angle_sd
+    assert wide == pytest.approx(np.hypot(0.01, FRICTION_ERROR["friction_angle"] * np.log(1.6)))
+    assert wide > 0.04
