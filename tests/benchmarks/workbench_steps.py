@@ -33,9 +33,10 @@ WATCH = """(() => {
   globalThis.waits = { open: 0, took: [] };
   globalThis.fetch = async (address, ...rest) => {
     const since = performance.now(), name = String(address).split("?")[0] + (String(address).includes("size=20000") ? " (all pixels)" : "");
-    waits.open += 1;
+    const counts = name !== "/ask/quality"; // measured beside everything else, and said to be under way
+    waits.open += counts;
     try { const answer = await ask(address, ...rest); const bytes = await answer.clone().arrayBuffer(); waits.took.push([name, performance.now() - since, bytes.byteLength]); return answer; }
-    finally { waits.open -= 1; }
+    finally { waits.open -= counts; }
   };
   const drawn = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
   globalThis.settled = async () => {

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from ...errors import InputError
+from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Image, read_photograph
 from ...experiment.units import Scale
 from ...run_folder import SUMMARY
@@ -79,23 +80,15 @@ class Project:
         if found.experiment is None or found.shape is None:
             raise InputError(self.draft.file, "key photographs", "names nothing that can be looked at yet")
         section, rods = found.data.get("photographs", {}), found.rods
-        centre = None if rods is None else np.stack([rods.x, rods.y], axis=1)
-        told = (
-            section.get("channel"),
-            section.get("region"),
-            section.get("follow"),
-            None if centre is None else centre.tobytes(),
-        )
-        stamp = found.files, self._pattern_stamp(found.data), told
+        told = tuple(str(section.get(key)) for key in ("channel", "region", "follow"))
+        stamp = found.files, self._pattern_stamp(found.data), told, _size_of(rods)
         with self._measuring:  # not the other lock: pictures are answered meanwhile
             if self._quality is None or self._quality[0] != stamp:
-                radius = None if rods is None else rods.radius
-                self._quality = (
-                    stamp,
-                    measure_pictures(
-                        found.experiment.photographs(), centre, radius, patterned=section.get("follow") != "outline"
-                    ),
-                )
+                centre = None if rods is None else np.stack([rods.x, rods.y], axis=1)
+                self._quality = stamp, measure_pictures(
+                    found.experiment.photographs(), centre, None if rods is None else rods.radius,
+                    patterned=section.get("follow") != "outline",
+                )  # fmt: skip
             return self._quality[1]
 
     def photograph(self, frame: int) -> Image:
@@ -255,6 +248,11 @@ def _walls(found: Understood) -> list[dict[str, Any]]:
             "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
         })  # fmt: skip
     return told
+
+
+def _size_of(rods: GrainGuess | None) -> tuple[int, int] | None:
+    """What a measurement on some of the rods hangs on: a rod that is moved, or ten that are added, changes nothing."""
+    return None if rods is None or not len(rods.id) else (len(rods.id) // 10, round(float(np.median(rods.radius))))
 
 
 def _named_tables(found: Understood) -> dict[str, Any]:
