@@ -57,7 +57,7 @@ class Mender:
 
     def __init__(self, ids: NDArray[np.int64], circles: Array, photograph: Callable[[int], Image]) -> None:
         """ids (n,) and circles (n, 3): centre and radius [px] of the rods on photograph 0."""
-        self.ids, self.circles, self._photograph = ids, circles, photograph
+        self.ids, self.circles, self._read = ids, circles, photograph
         x, y, radius = circles.T
         self._tracker = Tracker(photograph(0), (x, y, radius), workers=1)
         self._ready: OrderedDict[int, Registration] = OrderedDict()
@@ -138,6 +138,10 @@ class Mender:
             here = _cut_out(self._photograph(frame), pose, radius)
             told += [here, _difference(here, first, disc) + 128.0]
         return [np.clip(np.rint(each), 0, 255).astype(np.uint8) for each in told]
+
+    def _photograph(self, frame: int) -> Image:
+        """A photograph; the first, with which all are compared, is at hand anyway."""
+        return self._tracker.patches.reference.image if frame == 0 else self._read(frame)
 
     def _registration(self, frame: int) -> Registration:
         with self._lock:

@@ -83,6 +83,7 @@ app.tool = (tool) => app.stage.use(tool);
 app.home = () => {
   app.step.leave?.(app);
   app.project = null;
+  app.stage.draw = () => {}; // what a step draws is drawn over a photograph of its project
   history.replaceState(null, "", location.pathname);
   at("crumb").replaceChildren(); at("standing").replaceChildren();
   for (const id of ["undo", "redo"]) at(id).hidden = true;

@@ -3,13 +3,14 @@
 import { ask, chart, colour, digits, fact, h, numberField, parse, sign, tell } from "/page/dom.js";
 import { tableField } from "/page/tables.js";
 
-let cutting = null, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
+const SOON = 400; // [ms]
+let soon = 0, cutting = null, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
 
 export const photographs = {
   name: "photographs", title: "Photographs", frames: true,
   hint: () => (cutting ? "Drag over the part that is to be looked at" : ""),
-  enter: (app) => { measured = null; measure(app); },
-  taken: (app) => { measure(app); },
+  enter: (app) => { measured = null; measureSoon(app); },
+  taken: measureSoon,
   leave: () => { cutting = null; },
   panel(app) {
     const { project } = app, told = project.photographs;
@@ -43,10 +44,12 @@ export const photographs = {
   },
 };
 
-/** Light, noise and pattern are measured beside everything else: nobody waits for them. */
+/** Light, noise and pattern are measured beside everything else, once the photograph is shown: nobody waits for them. */
+function measureSoon(app) { clearTimeout(soon); soon = setTimeout(() => measure(app), SOON); }
+
 async function measure(app) {
   const { project } = app;
-  if (!project.files.length) return;
+  if (!project?.files.length || app.step !== photographs) return;
   try {
     const answer = await ask("quality", { at: project.at });
     if (app.project?.at === project.at && app.step === photographs) { measured = { at: project.at, ...answer }; app.paint(); }
@@ -63,6 +66,7 @@ function quality(app) {
 
 /** Mean grey level and contrast of the photographs that were looked at; a bar marks the one that is shown. */
 function curves(app, c, width, height) {
+  if (!app.project || !measured) return; // drawn a moment later: somebody may have gone on
   const { frame, light, contrast } = measured, pad = 30, last = Math.max(app.project.files.length - 1, 1);
   const high = 1.08 * Math.max(...light, ...contrast, 1), x = (k) => pad + k / last * (width - pad - 8), y = (v) => height - 6 - v / high * (height - 14);
   c.fillStyle = colour("accent"); c.globalAlpha = 0.18; c.fillRect(x(app.frame) - 3, 2, 6, height - 4); c.globalAlpha = 1;

@@ -3,11 +3,11 @@
 import { at } from "/page/dom.js";
 
 const LOUPE = 172, MAGNIFIED = 6;
-const IDLE = 150; // [ms] of a picture being looked at before its neighbours are asked for
+const IDLE = 300; // [ms] of a picture being looked at before its neighbours are asked for
 const SMALL = 1400, ENOUGH = 1.2; // [px] of the small picture; how far it is enlarged before all pixels are asked for
 
-async function fetchPicture(url, size) {
-  const answer = await fetch(`${url}&size=${size}`);
+async function fetchPicture(url, size, priority = "auto") {
+  const answer = await fetch(`${url}&size=${size}`, { priority });
   return answer.ok ? createImageBitmap(await answer.blob()) : null;
 }
 
@@ -34,7 +34,7 @@ export class Stage {
     const image = (await this.foreseen.get(url)) ?? (await fetchPicture(url, SMALL)); // none where it could not be foreseen
     if (!image || this.wanted !== url) return;
     // Each is used once: a file that changes is read anew when one comes back to it.
-    this.idle = setTimeout(() => { this.foreseen = new Map(beside.map((each) => [each, this.foreseen.get(each) ?? fetchPicture(each, SMALL).catch(() => null)])); }, IDLE);
+    this.idle = setTimeout(() => { this.foreseen = new Map(beside.map((each) => [each, this.foreseen.get(each) ?? fetchPicture(each, SMALL, "low").catch(() => null)])); }, IDLE);
     this.foreseen.delete(url);
     this.image = image;
     if (this.fitted !== `${this.width}x${this.height}`) this.fit();
