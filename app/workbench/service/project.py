@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...experiment.experiment import GrainGuess
-from ...experiment.photographs import Image, read_photograph
+from ...experiment.photographs import Channel, Image, read_photograph
 from ...experiment.units import Scale
 from ...run_folder import SUMMARY
 from ...tracking.picture_quality import PictureQuality, measure_pictures
@@ -29,7 +29,8 @@ from ..setup.edits import TABLES
 from ..setup.folder import run_facts, run_folder
 from ..setup.steps import Understood, judge
 
-KEPT = 4  # photographs in memory
+KEPT = 6  # photographs in memory: the one shown, two to either side, the first
+KEPT_PICTURES, SMALL_PICTURE = 32, 2_000_000  # of them as they were sent; [bytes]
 QUALITY = 90  # of JPEG
 CROP = 240  # [px] of a crop as it is sent
 
@@ -50,7 +51,8 @@ class Project:
         self.draft = Draft(folder)
         self.lock = threading.RLock()
         self.editing = threading.RLock()  # held from what an edit reads to what it writes
-        self._photographs: OrderedDict[tuple[Path, int, str], Image] = OrderedDict()
+        self._photographs: OrderedDict[tuple[Path, int, Channel], Image] = OrderedDict()
+        self._pictures: OrderedDict[tuple[Path, int, Channel, int], bytes] = OrderedDict()
         self._stamp: Any = None
         self._understood: Understood | None = None
         self._job: Job | None = None
@@ -93,25 +95,40 @@ class Project:
 
     def photograph(self, frame: int) -> Image:
         """One photograph, grey; those looked at last are kept."""
-        found = self.understood()
-        if not 0 <= frame < len(found.files):
-            raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
-        file, section = found.files[frame], found.data.get("photographs", {})
-        key = (file, file.stat().st_mtime_ns, section.get("channel", "grey"))
+        key = self._photograph_key(frame)
         with self.lock:
             if key in self._photographs:
                 self._photographs.move_to_end(key)
                 return self._photographs[key]
-        image = read_photograph(file, channel=key[2])
+        image = read_photograph(key[0], channel=key[2])
         with self.lock:
             self._photographs[key] = image
             while len(self._photographs) > KEPT:
                 self._photographs.popitem(last=False)
         return image
 
+    def _photograph_key(self, frame: int) -> tuple[Path, int, Channel]:
+        """What a photograph is, as long as its file and the channel stay the same. Raises InputError."""
+        found = self.understood()
+        if not 0 <= frame < len(found.files):
+            raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
+        file, section = found.files[frame], found.data.get("photographs", {})
+        return file, file.stat().st_mtime_ns, section.get("channel", "grey")
+
     def picture(self, frame: int, widest: int) -> bytes:
-        """One photograph as JPEG, no wider or higher than so many pixels."""
-        return as_jpeg(self.photograph(frame), widest)
+        """One photograph as JPEG, no wider or higher than so many pixels; small ones that were sent last are kept."""
+        key = *self._photograph_key(frame), widest
+        with self.lock:
+            if key in self._pictures:
+                self._pictures.move_to_end(key)
+                return self._pictures[key]
+        picture = as_jpeg(self.photograph(frame), widest)
+        if len(picture) <= SMALL_PICTURE:
+            with self.lock:
+                self._pictures[key] = picture
+                while len(self._pictures) > KEPT_PICTURES:
+                    self._pictures.popitem(last=False)
+        return picture
 
     @property
     def name(self) -> str:
