@@ -34,7 +34,8 @@ class Section(NamedTuple):
 
 def find_sections(words: str, most: int = 8) -> list[Section]:
     """Sections that hold all words (or their beginnings), the likeliest first; none where there are no words."""
-    wanted = [SIGNS.get(word, word) for word in re.findall(r"[^\s,;?!]+", words.lower()) if word not in LITTLE]
+    told = map(str, re.findall(r"[^\s,;?!]+", words.lower()))
+    wanted = [SIGNS.get(word, word) for word in told if word not in LITTLE]
     if not wanted:
         return []
     found = [(_worth(section, wanted), section) for section in _sections()]

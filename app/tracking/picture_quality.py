@@ -166,7 +166,8 @@ def _look(image: Image, places: Array, reach: Array) -> tuple[float, float, floa
     contrast = patches.norm[seen] / np.sqrt(patches.pixel_count[seen])
     width = WIDTH_OF_LENGTH * patches.correlation_length[seen]
     sigma = np.sqrt(2.0) * patches.sigma_per_noise[seen]  # both photographs have their noise
-    return float(image.mean()), clipped, *(float(np.median(each)) for each in (contrast, width, sigma))
+    middle = np.median([contrast, width, sigma], axis=1)
+    return float(image.mean()), clipped, float(middle[0]), float(middle[1]), float(middle[2])
 
 
 def _cut_together(image: Image, places: Array, reach: Array) -> Patches:
