@@ -23,12 +23,12 @@ from solver.together import available_cores
 
 from .atomic import write_atomically
 from .errors import InputError, RunError, UndeterminedError
-from .experiment.boundary import bound_tracks, free_surfaces
+from .experiment.boundary import bound_tracks
 from .experiment.config.experiment_file import as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
 from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
-from .experiment.plausibility import check_inside, check_radii, doubtful_loads, open_sides, rods_beyond_ends
+from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
 from .inference.inference import (
@@ -71,7 +71,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         walls = read_walls(experiment, tracks.frame_count)
         tracks = bound_tracks(experiment, tracks, walls)
         if walls is not None:
-            _check_packing(run, tracks, walls)
+            run.notes.extend(check_packing(experiment, tracks, walls))
         ids, count = tracks.id, tracks.frame_count
     else:
         photographs = experiment.photographs()
@@ -123,7 +123,6 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     kept: list[str] = []
 
     def keep(stage: str) -> Checkpoint:
-        run.take_up(stage)
         checkpoint = run.checkpoint(stage, uncorrected)
         if stage == "tracking":  # walls are followed by themselves, whatever is told of rods
             keep_frames_before(checkpoint, read_corrections(experiment, None, len(experiment.photographs())))
@@ -135,7 +134,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     )  # fmt: skip
     tracks = bound_tracks(experiment, tracks, walls)
     if walls is not None:
-        _check_packing(run, tracks, walls)
+        run.notes.extend(check_packing(experiment, tracks, walls))
         walls = walls.frames(start, stop)
     tracks = tracks.frames(start, stop)
     write_found_tables(run.folder, tables)
@@ -393,13 +392,3 @@ def conclude(run: Run, results: Results, truth: TruthContacts | None, since: flo
     summary = summarize(results, agreement, {**run.timings.seconds, "total": time.perf_counter() - since})
     save_summary(run.file(SUMMARY), summary)
     return summary
-
-
-def _check_packing(run: Run, tracks: Tracks, walls: WallTracks) -> None:
-    check_inside(run.experiment, tracks, walls)
-    check_radii(run.experiment, tracks)
-    run.notes.extend(rods_beyond_ends(tracks, walls))
-    run.notes.extend(doubtful_loads(run.experiment, tracks, walls))
-    if walls.cell is None and tracks.boundary is None:
-        run.notes.extend(open_sides(walls))
-    run.notes.extend(free_surfaces(run.experiment, tracks, walls))

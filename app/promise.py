@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .experiment.experiment import Experiment, read_grain_guess
+from .experiment.experiment import Experiment, GrainGuess, read_grain_guess
 from .inference.data_budget import LOOKED_AT, UNPROMISED, measure_budget
 from .progress import Progress, silent
 from .tracks import Tracks, WallTracks
+
+if TYPE_CHECKING:
+    from .tracking.picture_quality import PictureQuality
 
 
 def glimpse(
@@ -21,17 +25,21 @@ def glimpse(
     return track_first(experiment, LOOKED_AT, progress, tell)
 
 
-def describe_photographs(experiment: Experiment) -> list[str]:
-    """Light, noise and pattern of the photographs in a few sentences. Raises InputError."""
+def measure_photographs(experiment: Experiment, rods: GrainGuess | None) -> PictureQuality:
+    """What the photographs are good for; rods [px]: where some are in the first, None: not known."""
     from .tracking.picture_quality import measure_pictures
 
-    rods = read_grain_guess(experiment)
     centre = None if rods is None else np.stack([rods.x, rods.y], axis=1)
     section = experiment.config.photographs
-    measured = measure_pictures(
+    return measure_pictures(
         experiment.photographs(), centre, None if rods is None else rods.radius,
         patterned=section is None or section.follow != "outline",
     )  # fmt: skip
+
+
+def describe_photographs(experiment: Experiment) -> list[str]:
+    """Light, noise and pattern of the photographs in a few sentences. Raises InputError."""
+    measured = measure_photographs(experiment, read_grain_guess(experiment))
     return [*measured.facts(), *measured.faults()]
 
 

@@ -154,13 +154,6 @@ class Run:
         with suppress(OSError):  # not empty, or not there
             (self.folder / UNFINISHED).rmdir()
 
-    def take_up(self, stage: str) -> None:
-        """Begin a stage with the frames that were set aside when it was finished, unless it has begun already."""
-        aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
-        if aside.is_dir() and not place.exists():
-            place.parent.mkdir(exist_ok=True)
-            aside.rename(place)
-
     def set_aside(self, stage: str) -> None:
         """Keep the frames of a stage that is finished, for it is to be done again where somebody corrects it."""
         aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
@@ -171,7 +164,11 @@ class Run:
         self.forget(stage)
 
     def checkpoint(self, stage: str, fingerprint: str) -> Checkpoint:
-        """Finished frames of an unfinished stage that is made from this."""
+        """Finished frames of an unfinished stage that is made from this; of a stage not begun, those set aside."""
+        aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
+        if aside.is_dir() and not place.exists():
+            place.parent.mkdir(exist_ok=True)
+            aside.rename(place)
         return Checkpoint(self.folder / UNFINISHED / stage, fingerprint, self.notes)
 
 

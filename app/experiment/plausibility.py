@@ -11,6 +11,7 @@ from solver.bodies.wall_shapes import IN, OUT, STRAIGHT, reach_of_wall
 
 from ..errors import InputError
 from ..tracks import Tracks, WallTracks
+from .boundary import free_surfaces
 from .experiment import Experiment
 
 NEIGHBOURS = 8  # of a grain, among which is the one it is closest to in radii
@@ -28,6 +29,19 @@ PLACE_OF_PACKING = {
     OUT: "outside the circle (its side is out)",
 }
 SPACIOUS = 1.0  # widths of the packing between it and a wall, from which on they do not belong together
+
+
+def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
+    """What is doubtful about rods, walls and loads, in sentences. Raises InputError where they cannot be right."""
+    check_inside(experiment, tracks, walls)
+    check_radii(experiment, tracks)
+    sides = open_sides(walls) if walls.cell is None and tracks.boundary is None else []
+    return [
+        *rods_beyond_ends(tracks, walls),
+        *doubtful_loads(experiment, tracks, walls),
+        *sides,
+        *free_surfaces(experiment, tracks, walls),
+    ]
 
 
 def check_radii(experiment: Experiment, tracks: Tracks) -> None:

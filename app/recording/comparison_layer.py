@@ -30,9 +30,9 @@ from .look.force_style import ForceRange, ForceStyle
 from .look.scene import Scene, tracks_in_cell
 from .look.texts import printable
 from .look.values import known, log_scalar
+from .packing_layers.forces.network import body_values
 from .packing_layers.grains_and_walls import log_grains_and_walls
 from .packing_layers.legends import PIECES, log_force_legend, log_ramp_legend
-from .packing_layers.network import body_values
 from .tabs.views import curve_view, drawn_view, packing_view
 
 APPLICATION_ID = "rodsight-compare"  # its own, so that a user's layout of runs is not used for comparisons

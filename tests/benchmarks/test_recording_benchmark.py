@@ -30,7 +30,7 @@ from rodsight.recording.files.recorder import BATCHES, Recorder
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.look.scene import Scene
-from rodsight.recording.packing_layers.network import SweepChoice
+from rodsight.recording.packing_layers.forces.network import SweepChoice
 from rodsight.recording.tabs.blueprint import Layout, make_blueprint
 from rodsight.recording.tabs.layout_property import send_layout
 from rodsight.recording.viewing.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers

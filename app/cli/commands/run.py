@@ -130,10 +130,11 @@ def check(
     request = Request(experiment, settings, quiet)
     with open_run(request, writes=False) as run:
         tracks, walls = pipeline.check(run)
-        seen, pictured = None, []
+        seen, sentences = None, []
         if budget and not quiet:  # nobody would read it
             seen = (tracks, walls) if tracks is not None else glimpse(run.experiment, run.progress, run.notes.append)
-            pictured = [] if tracks is not None else describe_photographs(run.experiment)
+            sentences = [] if tracks is not None else describe_photographs(run.experiment)
+            sentences += describe_promise(*seen)[0]
     config = run.experiment.config
     if tracks is not None:
         what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
@@ -144,7 +145,7 @@ def check(
     console = request.console
     console.print(f"{config.name}: the input is good: {what}.", highlight=False)
     _tell_notes(run, console)
-    for sentence in [*pictured, *([] if seen is None else describe_promise(*seen)[0])]:
+    for sentence in sentences:
         tell(console, sentence)
     return 0
 

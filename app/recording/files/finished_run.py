@@ -21,7 +21,7 @@ from ..look import entities
 from ..look.canvas import Canvas
 from ..look.force_style import ForceRange, ForceStyle
 from ..look.scene import Scene, tracks_in_cell
-from ..packing_layers.network import SweepChoice
+from ..packing_layers.forces.network import SweepChoice
 from ..parts import forget_parts, part_of
 from ..tabs.axis_ranges import find_extremes
 from ..tabs.blueprint import Layout, Tab, make_blueprint

@@ -34,7 +34,7 @@ from ..look import entities
 from ..look.canvas import Canvas
 from ..look.force_style import ForceRange, ForceStyle
 from ..look.scene import Scene, tracks_in_cell
-from ..packing_layers.network import SweepChoice
+from ..packing_layers.forces.network import SweepChoice
 from ..tabs.blueprint import Layout, make_blueprint
 from ..tabs.layout_property import send_layout
 from ..viewing.headless import free_port

@@ -30,14 +30,14 @@ from ..look.texts import printable
 from ..packing_layers.backdrop import log_photograph
 from ..packing_layers.changes import log_changes
 from ..packing_layers.film import FilmWriter
-from ..packing_layers.force_doubt import log_force_doubt
+from ..packing_layers.forces.force_doubt import log_force_doubt
+from ..packing_layers.forces.network import SweepChoice, chosen_sweeps, log_network
+from ..packing_layers.forces.true_forces import TruthWriter
 from ..packing_layers.grains_and_walls import log_grains_and_walls
 from ..packing_layers.legends import log_legends
-from ..packing_layers.network import SweepChoice, chosen_sweeps, log_network
 from ..packing_layers.reviewed import log_reviewed
 from ..packing_layers.rods_in_3d import log_rods
 from ..packing_layers.touching import log_touching, log_touching_styles
-from ..packing_layers.true_forces import TruthWriter
 from ..packing_layers.unconverged import log_unconverged
 from ..tabs.summary_tab import FrameFacts, log_summary
 from .properties import send_experiment, send_outcome

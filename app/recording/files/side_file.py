@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...results.results import Results
 from ..look.clock import Clock, strain_ways
 from ..look.force_style import ForceRange, ForceStyle
-from ..packing_layers.network import SweepChoice, send_sweeps, visible_sweeps
+from ..packing_layers.forces.network import SweepChoice, send_sweeps, visible_sweeps
 from ..tabs.layout_property import read_layout
 from .recorder import BATCHES
 from .writing import writing

@@ -266,10 +266,7 @@ SCHEMA: tuple[Entity, ...] = (
         _STRIPS, When.START, Condition.CELL,
     ),
     Entity(SLIDING, "contacts at the Coulomb limit", _POINTS, When.START_AND_END),
-    Entity(
-        FORCE_DOUBT, "dim edges of the reported forces, as wide as f_n and two standard deviations would be drawn",
-        _STRIPS, When.START_AND_END,
-    ),
+    Entity(FORCE_DOUBT, "dim edges as wide as f_n and two standard deviations", _STRIPS, When.START_AND_END),
     Entity(GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
     Entity(GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
     Entity(PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),

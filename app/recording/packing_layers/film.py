@@ -20,7 +20,7 @@ from ..look.canvas import Canvas
 from ..look.clock import Clock
 from ..look.colours import FAINT, INK, LOADED_WALL, Rgba, packed, packed_one
 from ..look.scene import Scene
-from .network import SweepChoice, visible_sweeps
+from .forces.network import SweepChoice, visible_sweeps
 
 COLUMNS, ROWS = 3, 3  # of frames
 SWEEP_COLUMNS = 2  # … of sweeps, in as many rows

@@ -16,7 +16,7 @@ from ..look.canvas import Canvas
 from ..look.colours import ADDED, BOUNDARY, FORBIDDEN, GAINED, INK, LOST, SLIDING, Rgba, packed_one
 from ..look.scene import Scene
 from .changes import gap_colours, gap_range
-from .contact_colours import COLOURINGS
+from .forces.contact_colours import COLOURINGS
 from .unconverged import DECADES, doubt_colours
 
 PIECES = 48

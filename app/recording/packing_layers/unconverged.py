@@ -20,8 +20,8 @@ from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import DOUBT_RAMP, OPEN, packed, packed_one
 from ..look.scene import Scene
+from .forces.network import SweepChoice, visible_sweeps
 from .grains_and_walls import last_seen
-from .network import SweepChoice, visible_sweeps
 
 DECADES = (-4.0, 0.0)  # log10 of the mean f_n: the ends of the colour ramp for an unbalance
 SWEEP_SHARE = 0.01  # that times as much for the change of one sweep

@@ -17,8 +17,9 @@ from ...errors import InputError
 from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Channel, Image, read_photograph
 from ...experiment.units import Scale
+from ...promise import measure_photographs
 from ...run_folder import SUMMARY
-from ...tracking.picture_quality import PictureQuality, measure_pictures
+from ...tracking.picture_quality import PictureQuality
 from ...verdicts.log import VERDICTS
 from ..inspecting.found import Found, find_run, run_stamp
 from ..mending.mender import Mender
@@ -86,11 +87,7 @@ class Project:
         stamp = found.files, self._pattern_stamp(found.data), told, _size_of(rods)
         with self._measuring:  # not the other lock: pictures are answered meanwhile
             if self._quality is None or self._quality[0] != stamp:
-                centre = None if rods is None else np.stack([rods.x, rods.y], axis=1)
-                self._quality = stamp, measure_pictures(
-                    found.experiment.photographs(), centre, None if rods is None else rods.radius,
-                    patterned=section.get("follow") != "outline",
-                )  # fmt: skip
+                self._quality = stamp, measure_photographs(found.experiment, rods)
             return self._quality[1]
 
     def photograph(self, frame: int) -> Image:

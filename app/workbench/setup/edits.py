@@ -3,18 +3,17 @@ photograph come from the page, files hold metres."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from solver.bodies.grains import Array
 from solver.bodies.wall_shapes import STRAIGHT
 
 from ...errors import InputError
-from ...experiment.config.input_sections import LensSection
 from ...experiment.experiment import TIME_COLUMNS, GrainGuess
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
@@ -60,14 +59,9 @@ def set_scale(draft: Draft, keys: dict[str, Any]) -> None:
 
 def set_lens(draft: Draft, lens: dict[str, float] | None) -> None:
     """Set the lens' coefficients; walls stay where they are in the picture. Raises InputError where they are none."""
-    if lens is not None:
-        try:
-            LensSection.model_validate(lens)
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"])
-            raise InputError(draft.file, f"key photographs.lens {where}".rstrip(), first["msg"]) from None
-    _set_where_walls_stay(draft, "lens", {"photographs.lens": lens})
+    keys = {"photographs.lens": lens}
+    with _no_new_complaint(draft, "lens", "scale"):
+        _set_where_walls_stay(draft, "lens", keys)
 
 
 def set_table(draft: Draft, found: Understood, name: str, table: str | None) -> None:
@@ -83,12 +77,19 @@ def set_table(draft: Draft, found: Understood, name: str, table: str | None) -> 
     missing = [each for each in columns if not told or each not in [cell.strip() for cell in told[0].split(",")]]
     if missing:
         raise InputError(file, "", f"has no column {missing[0]}: it is a table {','.join(columns)}")
-    with draft.one_step(name):
+    with _no_new_complaint(draft, name, section, file):
         draft.set_keys(name, {key: file, **dict.fromkeys(instead)}, {file: table.encode()})
-        before, after = found.steps[section].says, judge(draft).steps[section].says
-        for complaint in after:
+
+
+@contextmanager
+def _no_new_complaint(draft: Draft, what: str, step: str, file: str | None = None) -> Iterator[None]:
+    """One step of undo, taken back with InputError where it makes a step complain of what it did not before."""
+    before = judge(draft).steps[step].says
+    with draft.one_step(what):
+        yield
+        for complaint in judge(draft).steps[step].says:
             if complaint not in before:
-                raise InputError(file, "", complaint)
+                raise InputError(file or draft.file, "", complaint)
 
 
 def _set_where_walls_stay(draft: Draft, what: str, keys: dict[str, Any]) -> None:

@@ -40,9 +40,11 @@ def test_photographs_of_no_experiment_become_one(begun, photographs_only):
 def test_what_photographs_are_good_for_is_told_and_measured_once(begun, monkeypatch):
     visitor, told = begun
     measured: list[bool] = []
-    plain = project.measure_pictures
+    plain = project.measure_photographs
     monkeypatch.setattr(
-        project, "measure_pictures", lambda *what, **more: (measured.append(what[1] is None), plain(*what, **more))[1]
+        project,
+        "measure_photographs",
+        lambda *what, **more: (measured.append(what[1] is None), plain(*what, **more))[1],
     )
     answer = visitor.ask("quality", at=told["at"])
     assert answer["frame"] == [0, 1, 2, 3]

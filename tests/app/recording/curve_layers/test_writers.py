@@ -17,9 +17,9 @@ from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.look.scene import Scene
 from rodsight.recording.look.texts import printable
 from rodsight.recording.packing_layers.changes import gap_colours
+from rodsight.recording.packing_layers.forces.true_forces import TruthWriter
 from rodsight.recording.packing_layers.grains_and_walls import _spin_marks, last_seen
 from rodsight.recording.packing_layers.rods_in_3d import turns_from_axis
-from rodsight.recording.packing_layers.true_forces import TruthWriter
 from rodsight.results.results import TruthContacts
 from rodsight.results.truth import score
 

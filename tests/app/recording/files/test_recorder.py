@@ -15,7 +15,7 @@ from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.look.scene import Scene
-from rodsight.recording.packing_layers.network import SweepChoice
+from rodsight.recording.packing_layers.forces.network import SweepChoice
 from rodsight.recording.tabs.blueprint import Tab
 from rodsight.recording.viewing.viewer import viewer_binary
 

@@ -19,7 +19,7 @@ from rodsight.recording.look.colours import (
 )
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.packing_layers.backdrop import encode_photograph
-from rodsight.recording.packing_layers.network import SweepChoice, chosen_sweeps, visible_sweeps
+from rodsight.recording.packing_layers.forces.network import SweepChoice, chosen_sweeps, visible_sweeps
 
 from tests.app.recording.fake_results import RADIUS, make_results
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
-from rodsight.recording.packing_layers.contact_colours import COLOURINGS
+from rodsight.recording.packing_layers.forces.contact_colours import COLOURINGS
 from rodsight.recording.packing_layers.unconverged import changes_per_sweep, doubt_colours
 
 from solver.contacts.contacts import Contacts

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces
 
-from ..look import entities
-from ..look.clock import Clock
-from ..look.colours import packed
-from ..look.scene import Scene
+from ...look import entities
+from ...look.clock import Clock
+from ...look.colours import packed
+from ...look.scene import Scene
 
 DEVIATIONS = 2.0  # as the bands of curves
 DIM = 0.42  # of the force's own colour

@@ -15,12 +15,12 @@ from solver.contacts.contacts import Contacts, ContactState
 from solver.nlgs.sweep_record import SweepHistory
 from solver.sequence.frame_forces import FrameForces
 
-from ..look import entities
-from ..look.clock import Clock
-from ..look.colours import SLIDING, packed_one
-from ..look.force_style import ForceStyle
-from ..look.scene import Scene
-from ..look.values import known
+from ...look import entities
+from ...look.clock import Clock
+from ...look.colours import SLIDING, packed_one
+from ...look.force_style import ForceStyle
+from ...look.scene import Scene
+from ...look.values import known
 from .contact_colours import contact_colours
 
 CHUNK_BYTES = 1_000_000  # of one columnar message: the viewers load and drop data by the message

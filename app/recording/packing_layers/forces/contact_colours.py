@@ -17,9 +17,9 @@ from solver.bodies.grains import Array
 from solver.contacts.pairs import recall
 from solver.sequence.frame_forces import FrameForces
 
-from ..look import entities
-from ..look.colours import DIFFERENCE_RAMP, DOUBT_RAMP, OPEN, PROBABILITY_RAMP, packed, packed_one
-from ..look.scene import Scene
+from ...look import entities
+from ...look.colours import DIFFERENCE_RAMP, DOUBT_RAMP, OPEN, PROBABILITY_RAMP, packed, packed_one
+from ...look.scene import Scene
 
 LEVELS = 21  # colours of a ramp that are told apart: few of them keep the file small; odd, so that one is the middle
 MOST_CHANGE = 1.0  # of the mean f_n: where the colour of a change ends

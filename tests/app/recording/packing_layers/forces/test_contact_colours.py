@@ -7,7 +7,7 @@ import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.colours import OPEN, packed_one
-from rodsight.recording.packing_layers.contact_colours import COLOURINGS
+from rodsight.recording.packing_layers.forces.contact_colours import COLOURINGS
 
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest

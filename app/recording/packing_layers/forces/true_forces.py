@@ -10,13 +10,13 @@ from solver.contacts.pairs import align
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.agreement import Agreement, compare_forces
 
-from ...results.results import TruthContacts
-from ..look import entities
-from ..look.axes import Axes, round_step
-from ..look.clock import Clock
-from ..look.colours import INK, SERIES, packed_one
-from ..look.scene import Scene
-from ..look.values import known, log_scalar
+from ....results.results import TruthContacts
+from ...look import entities
+from ...look.axes import Axes, round_step
+from ...look.clock import Clock
+from ...look.colours import INK, SERIES, packed_one
+from ...look.scene import Scene
+from ...look.values import known, log_scalar
 from .network import body_values
 
 
