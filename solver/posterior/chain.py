@@ -8,7 +8,8 @@ import numpy as np
 
 from solver.bodies.grains import Array
 from solver.posterior.frame_evidence import FrameEvidence
-from solver.posterior.kernels import Centres, Pairs, run, start_state
+from solver.posterior.kernels import run
+from solver.posterior.records import Centres, Pairs, make_room, start_state
 from solver.posterior.settings import PosteriorSettings
 
 EXACT = 1e-7  # mean diameters: what counts as without error
@@ -30,8 +31,8 @@ def run_chain(
 ) -> Chain:
     """Sweep once for each of the laws, from a start without errors."""
     state = start_state(pairs, centres, settings.stiffness)
-    sums = (np.zeros((len(pairs.i), 5)), np.zeros((len(state.error), 4)), np.zeros(4))
-    run(rng, pairs, centres, laws, state, settings.kept, sums)
+    sums = (np.zeros((len(pairs.i), 5)), np.zeros((len(state.body), 4)), np.zeros(4))
+    run(rng, pairs, centres, laws, state, make_room(pairs, centres), settings.kept, sums)
     return Chain(*(each / settings.kept for each in sums))
 
 
