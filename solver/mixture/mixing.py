@@ -14,7 +14,7 @@ from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
 from solver.contacts.pairs import recall
 from solver.posterior.frame_posterior import FramePosterior
-from solver.posterior.mixing import ForceField, mix_fields
+from solver.posterior.mixing import ForceField, expected_correlation, mix_fields
 
 PRESSED = 0.6  # overlap over what neighbours move by, at which motion is worth half of what it is for hard grains
 OFFERED = 0.3  # P(bears) from which on a pair that the motion's network lacks is offered to it
@@ -60,9 +60,10 @@ def mix_on(
     are hard; worth: of the motion, as `worth_of_motion` says. Errors: ValueError where either is without force.
     """
     worth = 1.0 if soft_trust is None else 0.0 if np.isnan(motion_trust) else worth
-    found = mix_fields(
-        ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust), positions, worth
-    )  # fmt: skip
+    # Where no load tells the size of forces, elastic loading passes for sound motion: no more is expected of it.
+    expected = expected_correlation(motion_trust) if own_scale else motion_trust
+    field = ForceField(contacts.key, np.column_stack([motion.fn, motion.ft]), motion_trust, expected)
+    found = mix_fields(field, positions, worth)
     told = _on(contacts, positions)
     factor = float(motion.fn.sum() / positions.fn.sum())
     force, share, trust = recall(contacts.key, found.key, found.force, fill=0.0), found.share, found.trust

@@ -57,6 +57,14 @@ def test_the_mixture_is_nearer_to_the_truth_than_either_and_has_the_sum_of_the_m
 
 
 @pytest.mark.unit
+def test_motion_counts_by_its_bound_alone_where_no_load_confirms_it(fields) -> None:
+    _, one, two = fields
+    given = some_contacts(), told_by_motion(one), told_by_positions(two), 0.9
+    confirmed, alone = (mix_on(*given, own_scale=each, soft_trust=None).share for each in (True, False))
+    assert alone > confirmed + 0.05
+
+
+@pytest.mark.unit
 def test_the_deviation_holds_what_the_two_differ_by(fields) -> None:
     _, one, two = fields
     found = mix_on(some_contacts(), told_by_motion(one), told_by_positions(two), 0.9, own_scale=True, soft_trust=None)

@@ -5,7 +5,14 @@ import pytest
 
 from solver.contacts.contacts import Contacts
 from solver.posterior.frame_posterior import FramePosterior
-from solver.posterior.mixing import ForceField, MixedField, believe, mix_fields, share_of_posterior
+from solver.posterior.mixing import (
+    ForceField,
+    MixedField,
+    believe,
+    expected_correlation,
+    mix_fields,
+    share_of_posterior,
+)
 
 COUNT = 400
 RNG_SEED = 2
@@ -83,6 +90,26 @@ def test_neither_field_is_believed_worse_than_they_agree() -> None:
     assert believe(0.9, 0.95, np.nan) == pytest.approx((0.9, 0.9025))
     assert share_of_posterior(0.0, 0.0) == 0.5
     assert share_of_posterior(0.8, 0.8) == pytest.approx(0.5)
+
+
+def test_what_is_expected_of_motion_sets_its_share_and_no_trust() -> None:
+    truth, motion, posterior = make_fields(0.2, 0.4)
+    other = posterior_with(posterior, 0.97)
+    bound = ForceField(other.contacts.key, np.column_stack([motion, motion]), 0.91)
+    expected = replace(bound, expected=expected_correlation(0.91))
+    by_bounds, found = mix_fields(bound, other), mix_fields(expected, other)
+    assert found.share < by_bounds.share - 0.05
+    assert r(found.force[:, 0], truth) > r(by_bounds.force[:, 0], truth)
+    assert found.trust < r(found.force[:, 0], truth)
+
+
+def test_a_bound_is_exceeded_by_sound_motion_alone() -> None:
+    assert expected_correlation(0.9) == pytest.approx(0.955)
+    assert expected_correlation(0.6) == pytest.approx(0.6)
+    assert expected_correlation(0.2) == pytest.approx(0.2)
+    assert np.isnan(expected_correlation(np.nan))
+    bounds = np.linspace(0.0, 1.0, 101)
+    assert (np.diff([expected_correlation(each) for each in bounds]) > 0.0).all()
 
 
 def test_chains_that_disagree_lower_the_share_of_the_posterior() -> None:
