@@ -117,7 +117,7 @@ def _experiment(layout: Layout) -> rrb.Container:
         packing_view("Force network", layout.canvas, [*photograph, *_PACKING, *_FORCES]),
         rrb.Vertical(
             lanes_view(),
-            curve_view("Friction angle [°]", _banded(angles), layout.extremes, height=200.0, corner=_HIGH),
+            curve_view("Friction angle [°]", angles, layout.extremes, height=200.0, corner=_HIGH),
             curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
             flags_view(),
             row_shares=[1.15, 2.0, 2.0, 1.5],
@@ -183,9 +183,9 @@ def _statistics(layout: Layout) -> rrb.Container:
     coordination = [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS]
     strong = [entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE]
     plots: list[tuple[str, list[str]]] = [
-        ("Coordination number", _banded(coordination)),
+        ("Coordination number", coordination),
         ("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
-        ("Sliding and mobilisation", _banded([entities.SLIDING_FRACTION, entities.MOBILISATION])),
+        ("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
         ("Strong network, force chains", [*strong, entities.CHAIN_GRAIN_SHARE]),
     ]
     below: list[rrb.View] = [curve_view(name, paths, layout.extremes, height=330.0) for name, paths in plots]
@@ -223,9 +223,9 @@ def _loads(layout: Layout) -> rrb.Container:
         entries *= 2
     return rrb.Vertical(
         rrb.Horizontal(
-            plot("Friction angle [°]", _banded(angles)),
-            plot("Principal stresses [kPa]", _banded(stresses)),
-            plot("Direction of σ₁ [°]", _banded([entities.PRINCIPAL_DIRECTION])),
+            plot("Friction angle [°]", angles),
+            plot("Principal stresses [kPa]", stresses),
+            plot("Direction of σ₁ [°]", [entities.PRINCIPAL_DIRECTION]),
         ),
         rrb.Horizontal(
             plot("Anisotropies", anisotropies),
@@ -322,8 +322,3 @@ def _truth(layout: Layout) -> rrb.Container:
         row_shares=[1.7, 1.0],
         name=Tab.TRUTH,
     )
-
-
-def _banded(paths: list[str]) -> list[str]:
-    """Curves with the bands of those that have one."""
-    return [*paths, *(path + entities.BAND for path in paths if path in entities.BANDED)]

@@ -94,13 +94,15 @@ def curve_view(
     corner: rrb.Corner2D = rrb.Corner2D.RightTop,
     axis: rrb.TimeAxis | None = None,
 ) -> rrb.View:
-    """A plot of curves, over the whole test where no other axis is given.
+    """A plot of curves and of the bands of those that have one, over the whole test where no other axis is given.
 
     extremes: of the curves, to leave room for the legend; y_range is taken instead where it is given. height [px] of
-    the plot in a usual window; entries of the legend, by default one per path, none for a single one.
+    the plot in a usual window; entries of the legend, by default one per path, none for a single one. Bands share one.
     """
+    bands = [path + entities.BAND for path in contents if path in entities.BANDED]
     if entries is None:
-        entries = len(contents) if len(contents) > 1 else 0
+        entries = len(contents) + bool(bands) if len(contents) + bool(bands) > 1 else 0
+    contents = [*contents, *bands]
     if y_range is None:
         y_range = range_with_room(extremes or {}, contents, entries=entries, height=height, top=corner in _TOP)
     return rrb.TimeSeriesView(

@@ -7,8 +7,8 @@ from rodsight.recording.curve_layers.settling import ALL_TRACKED, SOME_CUT, SOME
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
-from rodsight.recording.look.entities import SCHEMA, Condition
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.written_schema import SCHEMA, Condition
 from rodsight.recording.packing_layers.grains_and_walls import grain_colours
 from rodsight.tracks import TrackStatus
 

@@ -1,0 +1,275 @@
+"""The written schema of a recording: every timeline, every entity, every component, in one place.
+
+Four timelines. `frame` counts photographs from 0; `time` [s] and `microstrain` say when and how far into the test
+they were taken. `sweep` counts Gauss-Seidel sweeps over the whole run: frame k occupies the values first_sweep[k] …
+first_sweep[k+1] − 1, one value per sweep and a last one for the reported field (that one alone where a frame was not
+swept at all). Rows that belong to a frame carry all timelines; on those of photographs the last row of a frame wins, so
+`frame` shows the reported forces while `sweep` shows the solve on its way to them.
+
+`microstrain` is the way of the packing's strain, in millionths, so that it never turns back: of every step between
+photographs its shear, or its greatest principal strain where that is greater. A shear test that goes one way only is
+thus drawn over its shear, an oedometer over its axial strain. Files without `frames/strain` have no such timeline.
+
+The first row of a frame carries the geometry, the later ones only widths and colours. The sweeps are those of the
+Gauss-Seidel chain, its own last one included; the row after it shows the reported field, which the estimator
+`ensemble` makes of several chains and convex members: the forces may step there. Values to be clicked (`fn`,
+`ft`, …) are those of the reported field.
+
+Lengths in the 2D views are pixels of the photograph as recorded (y down; a photograph above 4 megapixels
+is recorded at half size), or nominal pixels of 1/30 mean radius without photographs. The 3D view is in metres.
+
+The recording's property `experiment` holds what a run was given (name, frames, grains, friction, pressure, …), its
+property `outcome` what came of it, `settings` the configuration as TOML: in a catalogue each is a column.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from . import entities
+
+
+class When(Enum):
+    """On which rows an entity has data."""
+
+    START = "first sweep of every frame, on all timelines"
+    START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on all timelines"
+    START_AND_END = "cleared at the first sweep of every frame, set at its last row, on all timelines"
+    END = "last row of every frame, on all timelines"
+    SWEEPS = "every sweep on `sweep`, the last one of every frame on the others"
+    FOUND = "when there is something to say, on all timelines"
+    STATIC = "once, without a time"
+
+    @property
+    def timelines(self) -> frozenset[str]:
+        if self is When.STATIC:
+            return frozenset()
+        return frozenset({entities.FRAME, entities.SWEEP, entities.TIME, entities.STRAIN})
+
+
+class Condition(Enum):
+    """Which recordings have an entity."""
+
+    ALWAYS = "always"
+    PHOTOGRAPHS = "with photographs"
+    SWEPT = "where frames were swept"
+    TOLERANCE = "where a stopping level was given"
+    TRUTH = "with a truth"
+    RADII = "where radii were tuned by the coordination number"
+    FLAGS = "where something was flagged"
+    WALL_FORCES = "where wall forces were recorded"
+    BUDGET = "where an error budget was asked for"
+    CELL = "of a periodic cell"
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """One entity of the recording."""
+
+    path: str
+    meaning: str
+    components: frozenset[str]
+    when: When
+    condition: Condition = Condition.ALWAYS
+    per_frame: bool = False  # an entity for some frames, whose number ends the path
+
+
+def _of(archetype: str, *names: str) -> frozenset[str]:
+    return frozenset(f"{archetype}:{name}" for name in names)
+
+
+_STRIPS = _of("LineStrips2D", "strips", "radii", "colors", "draw_order")
+_POINTS = _of("Points2D", "positions", "radii", "colors", "draw_order")
+_TICKS = _of("Points2D", "positions", "radii", "colors", "labels", "show_labels")
+_FILM = _STRIPS | _TICKS
+_SCALAR = _of("Scalars", "scalars")
+_LINE = _of("SeriesLines", "colors", "names", "widths")
+_LANE = _of("StateChange", "state") | _of("StateConfiguration", "values", "labels", "colors")
+_FORCE_VALUES = frozenset({"i", "j", "grain_a", "body_b", "fn", "ft"})
+_CONTACT_VALUES = _FORCE_VALUES | {
+    "gap_um", "fn_sd", "mobilisation", "state", "age", "probability", "sliding_probability", "bearing_probability",
+}  # fmt: skip
+_CONTACT_COLOURS = frozenset(f"{entities.coloured_by(name)}:colors" for name in entities.COLOURED_BY)
+_GRAIN_VALUES = frozenset({"id", "x_mm", "y_mm", "theta_deg", "sigma_um", "zncc", "status", "unbalance"})
+
+
+def _scalar(path: str, meaning: str, when: When = When.END, condition: Condition = Condition.ALWAYS) -> Entity:
+    return Entity(path, meaning, _SCALAR | _LINE, when, condition)
+
+
+SCHEMA: tuple[Entity, ...] = (
+    Entity(
+        entities.PHOTOGRAPH, "the photograph, JPEG, shown dimmed",
+        _of("EncodedImage", "blob", "media_type", "opacity", "draw_order"), When.START, Condition.PHOTOGRAPHS,
+    ),
+    Entity(entities.WALLS, "walls, one strip each; loaded plates brighter", _STRIPS | {"name", "drive"}, When.START),
+    Entity(entities.CELL, "edges of the periodic cell", _STRIPS, When.START, Condition.CELL),
+    Entity(
+        entities.GRAINS, "outline of every grain, instance = row; lost ones where they were last seen",
+        _of("Ellipses2D", "centers", "half_sizes", "line_radii", "colors", "draw_order") | _GRAIN_VALUES, When.START,
+    ),
+    Entity(entities.GRAIN_SPINS, "mark at the rim that was at the top in frame 0", _STRIPS, When.START),
+    Entity(entities.GRAINS_LOST, "cross over every grain without a pose", _STRIPS, When.START),
+    Entity(
+        entities.FORCES,
+        "contacts, centre to centre (wall: centre to contact point); width and colour grow with f_n; further colours, "
+        "to be chosen among, by other quantities",
+        _STRIPS | _CONTACT_VALUES | _CONTACT_COLOURS, When.START_AND_SWEEPS,
+    ),
+    Entity(
+        entities.FORCES_ACROSS, "second halves of the contacts across the edge of a periodic cell, as reported",
+        _STRIPS, When.START, Condition.CELL,
+    ),
+    Entity(entities.SLIDING, "contacts at the Coulomb limit", _POINTS, When.START_AND_END),
+    Entity(entities.FORCE_DOUBT, "dim edges as wide as f_n and two standard deviations", _STRIPS, When.START_AND_END),
+    Entity(entities.GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
+    Entity(entities.GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
+    Entity(entities.PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),
+    Entity(
+        entities.VERDICTS, "contacts that a reviewer added or forbade", _STRIPS | {"source", "grain_a", "body_b"},
+        When.START,
+    ),
+    Entity(entities.SCALE_BAR, "a bar of a round length", _STRIPS, When.STATIC),
+    Entity(entities.SCALE_BAR_LENGTH, "its length", _TICKS, When.STATIC),
+    Entity(entities.FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
+    Entity(entities.FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
+    Entity(entities.GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
+    Entity(entities.GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
+    *(
+        Entity(f"{entities.COLOUR_LEGENDS}/{name}", f"colour by {name}", _STRIPS, When.STATIC)
+        for name in entities.COLOURED_BY
+    ),
+    *(
+        Entity(f"{entities.COLOUR_LEGENDS}/{name}/ticks", "its values", _TICKS, When.STATIC)
+        for name in entities.COLOURED_BY
+    ),
+    Entity(entities.MAP_LEGEND, "colour of unbalance and change", _STRIPS, When.STATIC),
+    Entity(entities.MAP_LEGEND_TICKS, "its values, over the mean f_n", _TICKS, When.STATIC),
+    _scalar(entities.SWEEP_FORCE_CHANGE, "log10 of the greatest |Δf|/|f|", When.SWEEPS, Condition.SWEPT),
+    _scalar(entities.SWEEP_NATURAL_MAP, "log10 of the natural-map residual", When.SWEEPS, Condition.SWEPT),
+    _scalar(
+        entities.SWEEP_UNBALANCE, "log10 of the worst grain unbalance over the mean f_n", When.SWEEPS, Condition.SWEPT,
+    ),
+    _scalar(entities.TOLERANCE, "log10 of the stopping level", When.START, Condition.TOLERANCE),
+    Entity(
+        entities.RESIDUAL_CURVES, "residuals of the frame over its sweeps, both logarithmic, and those of a cold start",
+        _STRIPS, When.START, Condition.SWEPT,
+    ),
+    Entity(
+        entities.RESIDUAL_MARKS, "the recorded sweep on these curves", _POINTS, When.START_AND_SWEEPS, Condition.SWEPT,
+    ),
+    Entity(entities.RESIDUAL_AXES, "axes and the stopping level", _STRIPS, When.STATIC, Condition.SWEPT),
+    Entity(entities.RESIDUAL_TICKS, "their values", _TICKS, When.STATIC, Condition.SWEPT),
+    Entity(
+        entities.UNBALANCE_MAP, "grains, colour by |ΣF| of the recorded forces over the mean f_n", _POINTS,
+        When.START_AND_SWEEPS,
+    ),
+    Entity(
+        entities.CHANGE_MAP,
+        "contacts, colour by the change of a sweep over the mean f_n, on average since the recorded one before",
+        _STRIPS, When.START_AND_SWEEPS,
+    ),
+    Entity(entities.STATUS_LANE, "status of the frame", _LANE, When.START),
+    Entity(entities.TRACKING_LANE, "whether every grain has a pose", _LANE, When.START),
+    _scalar(entities.TRUST, "estimated correlation with the true forces, given these inputs"),
+    _scalar(
+        entities.ERROR_BUDGET, "share of each cause in the variance of the forces' error", When.END, Condition.BUDGET,
+    ),
+    _scalar(entities.SIMILARITY, "correlation of f_n with the frame before, common contacts"),
+    _scalar(entities.CORRECTION, "ε, how much the forces must correct the measured motion"),
+    _scalar(entities.OLD_UNBALANCE, "ū, unbalance of the former forces on this network"),
+    _scalar(entities.START_DIFFERENCE, "H, what is left of the difference between two starts"),
+    _scalar(entities.FRAMES_SINCE_RESET, "frames since the last reset"),
+    _scalar(entities.WARM_RESIDUAL, "log10 of the natural-map residual after one sweep from the former forces"),
+    _scalar(entities.COLD_RESIDUAL, "… after one sweep from zero forces"),
+    _scalar(entities.SAVED_SWEEPS, "sweeps that zero forces need to come as far as the former ones in one"),
+    _scalar(entities.SWEEP_COUNT, "sweeps of the frame"),
+    _scalar(entities.FINAL_NATURAL_MAP, "log10 of the natural-map residual reached"),
+    _scalar(entities.FINAL_UNBALANCE, "log10 of the worst grain unbalance of the reported field"),
+    _scalar(entities.GAINED_COUNT, "contacts gained since the frame before"),
+    _scalar(entities.PARTED_COUNT, "contacts lost since the frame before"),
+    _scalar(entities.EXPECTED_COUNT, "expected number of contacts: the sum of P(touch)"),
+    _scalar(entities.DOUBTFUL_COUNT, "contacts kept though P(touch) < 1/2"),
+    Entity(
+        entities.FLAGS, "what a user must know about a frame", _of("TextLog", "text", "level"), When.FOUND,
+        Condition.FLAGS,
+    ),
+    _scalar(entities.FRICTION_ANGLE, "asin((σ₁−σ₂)/(σ₁+σ₂)) [°]"),
+    _scalar(entities.WALL_RATIO_ANGLE, "atan(T/N) on the loaded plate [°]"),
+    _scalar(entities.PRINCIPAL_DIRECTION, "direction of σ₁ [°], counter-clockwise from x"),
+    _scalar(entities.PRESSURE, "half the trace of the stress [kPa]"),
+    _scalar(entities.COORDINATION_NUMBER, "contacts with force per grain"),
+    _scalar(entities.COORDINATION_NUMBER_WITHOUT_RATTLERS, "the same, rattlers left out"),
+    _scalar(entities.RATTLER_COUNT, "grains without load"),
+    _scalar(entities.CONTACT_COUNT, "contacts with force"),
+    _scalar(entities.SLIDING_FRACTION, "share of them at the Coulomb limit"),
+    _scalar(entities.MEAN_FN, "mean f_n [N]"),
+    _scalar(entities.MAX_FN, "greatest f_n [N]"),
+    _scalar(entities.FABRIC_ANISOTROPY, "2 (F₁ − F₂) of the fabric tensor"),
+    _scalar(entities.SIGMA_1, "greatest principal stress [kPa]"),
+    _scalar(entities.SIGMA_2, "smallest principal stress [kPa]"),
+    _scalar(entities.ANISOTROPY_ANGLE, "friction angle that the anisotropies add up to [°]"),
+    _scalar(entities.CONTACT_ANISOTROPY, "a_c, of contact directions"),
+    _scalar(entities.BRANCH_ANISOTROPY, "a_l, of branch lengths"),
+    _scalar(entities.NORMAL_FORCE_ANISOTROPY, "a_n, of normal forces"),
+    _scalar(entities.TANGENTIAL_FORCE_ANISOTROPY, "a_t, of tangential forces"),
+    _scalar(entities.MOBILISATION, "mean |f_t| / (μ f_n)"),
+    _scalar(entities.TAIL_EXPONENT, "β of the exponential tail of P(f_n) above the mean"),
+    _scalar(entities.PLATEAU_RATIO, "P(f_n) of the weakest forces over its plateau below the mean; 1: flat"),
+    _scalar(entities.STRONG_SHARE, "share of the contacts with more than the mean f_n"),
+    _scalar(entities.STRONG_PRESSURE_SHARE, "share of the pressure that they carry"),
+    _scalar(entities.STRONG_DEVIATOR_SHARE, "share of the stress deviator that they carry"),
+    _scalar(entities.CHAIN_COUNT, "force chains"),
+    _scalar(entities.CHAIN_GRAIN_SHARE, "share of the grains that belong to one"),
+    _scalar(entities.WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
+    _scalar(entities.WALL_TANGENTIAL_FORCE, "… along the wall [N]"),
+    _scalar(entities.WALL_NORMAL_RECORDED, "what sensors recorded of it [N]", When.END, Condition.WALL_FORCES),
+    _scalar(entities.WALL_TANGENTIAL_RECORDED, "… along the wall [N]", When.END, Condition.WALL_FORCES),
+    *(_scalar(path + entities.BAND, "the same, two standard deviations less and more") for path in entities.BANDED),
+    Entity(entities.FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
+    Entity(entities.FORCE_DENSITY_TAIL, "exponential tail above the mean, this frame", _STRIPS, When.END),
+    Entity(entities.FORCE_DENSITY_TAIL_VALUE, "its exponent", _TICKS, When.END),
+    Entity(entities.FORCE_DENSITY_POOLED, "the same, all frames so far", _STRIPS, When.END),
+    Entity(entities.FORCE_DENSITY_AXES, "axes", _STRIPS, When.STATIC),
+    Entity(entities.FORCE_DENSITY_TICKS, "their values", _TICKS, When.STATIC),
+    Entity(entities.STRESS_CROSS, "principal stresses, length over the pressure", _STRIPS, When.END),
+    Entity(entities.STRESS_VALUES, "their values [kPa]", _TICKS, When.END),
+    Entity(entities.STRESS_CURVE, "normal stress over the pressure in every direction", _STRIPS, When.END),
+    Entity(entities.STRESS_AXES, "circle of the pressure, axes", _STRIPS, When.STATIC),
+    Entity(entities.ROSE, "directions of contacts with force, relative number", _STRIPS, When.END),
+    Entity(entities.ROSE_OF_FORCES, "the same, weighted by f_n", _STRIPS, When.END),
+    Entity(entities.ROSE_AXES, "circle of an isotropic packing, axes", _STRIPS, When.STATIC),
+    Entity(entities.ROSE_TICKS, "names of the curves", _TICKS, When.STATIC),
+    Entity(entities.RADIUS_CURVE, "coordination number over a common change of all radii", _STRIPS, When.STATIC,
+           Condition.RADII),
+    Entity(entities.RADIUS_FOUND, "the change that was taken", _POINTS, When.STATIC, Condition.RADII),
+    Entity(entities.RADIUS_AXES, "axes and the wanted number", _STRIPS, When.STATIC, Condition.RADII),
+    Entity(entities.RADIUS_TICKS, "their values", _TICKS, When.STATIC, Condition.RADII),
+    Entity(
+        entities.RODS, "rods as cylinders [m]",
+        _of("Cylinders3D", "lengths", "radii", "centers", "colors", "fill_mode"), When.END,
+    ),
+    Entity(
+        entities.ROD_CHAINS, "forces above the mean as capsules before the rods [m]",
+        _of("Capsules3D", "lengths", "radii", "translations", "quaternions", "colors", "fill_mode"), When.END,
+    ),
+    Entity(
+        entities.FILM_FRAMES, "strong forces of at most nine frames side by side, an entity each below this one",
+        _FILM, When.STATIC, per_frame=True,
+    ),
+    Entity(
+        entities.FILM_PLACE, "which of them is the nearest",
+        _of("LineStrips2D", "strips", "radii", "colors"), When.START,
+    ),
+    Entity(entities.FILM_SWEEPS, "strong forces of some sweeps side by side", _FILM, When.START),
+    Entity(entities.TRUTH_FORCES, "true contact forces, same widths and colours", _STRIPS | _FORCE_VALUES, When.START,
+           Condition.TRUTH),
+    Entity(entities.TRUTH_SCATTER, "inferred over true f_n", _POINTS, When.END, Condition.TRUTH),
+    Entity(entities.TRUTH_AXES, "axes and the line of equality", _STRIPS, When.STATIC, Condition.TRUTH),
+    Entity(entities.TRUTH_TICKS, "their values [N]", _TICKS, When.STATIC, Condition.TRUTH),
+    _scalar(entities.TRUTH_R_FN, "correlation of f_n with the truth", When.END, Condition.TRUTH),
+    _scalar(entities.TRUTH_R_FT, "correlation of f_t with the truth", When.END, Condition.TRUTH),
+    _scalar(entities.TRUTH_ERROR, "relative L2 error of (f_n, f_t)", When.END, Condition.TRUTH),
+    Entity(entities.SUMMARY, "settings, trust, legend", _of("TextDocument", "text", "media_type"), When.STATIC),
+)  # fmt: skip
