@@ -75,29 +75,41 @@ def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimat
     """Solve a frame from the state that the frame before it left behind."""
     if problem.refined is None:
         return _estimate_by_chain(problem, state)
-    estimate = _estimate_by_ensemble(problem, state, None, NO_DEMAND)
-    evidence = gather_evidence(problem, estimate, state)
-    if not _ask_positions(problem, evidence):
-        return estimate, evidence
+    alone = None
+    if not _ask_whatever_is_found(problem):
+        alone = _by_motion_alone(problem, state)
+        estimate, evidence = alone
+        if problem.sequence.positions is None or not _says_little(problem, evidence) or not estimate.fn.any():
+            return alone
     assert problem.sequence.positions is not None
     positions = problem.sequence.positions.at(problem.k, problem.verdicts)
-    if positions is None or not (positions.fn.any() and estimate.fn.any()):
-        return estimate, evidence
-    offered = _estimate_by_ensemble(problem, state, positions, estimate.demand)
-    told = trust(gather_evidence(problem, offered, state))
-    mixed = _mix(problem, offered, positions, told)
-    return mixed, gather_evidence(problem, mixed, state)
+    if positions is not None and positions.fn.any():
+        offered = _estimate_by_ensemble(problem, state, positions, NO_DEMAND if alone is None else alone[0].demand)
+        if offered.fn.any():
+            told = trust(gather_evidence(problem, offered, state))
+            mixed = _mix(problem, offered, positions, told)
+            return mixed, gather_evidence(problem, mixed, state)
+    return _by_motion_alone(problem, state) if alone is None else alone
 
 
-def _ask_positions(problem: FrameProblem, evidence: Evidence) -> bool:
-    """Whether the motion says so little of this frame that positions alone are to be asked, too."""
+def _by_motion_alone(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
+    estimate = _estimate_by_ensemble(problem, state, None, NO_DEMAND)
+    return estimate, gather_evidence(problem, estimate, state)
+
+
+def _ask_whatever_is_found(problem: FrameProblem) -> bool:
+    """Whether positions are asked whatever the motion says: its field without them then need not be known."""
     settings = problem.settings
     if problem.sequence.positions is None:
         return False
-    if settings.positions == "always" or settings.soft or not evidence.assessed:
+    if settings.positions == "always" or settings.soft or not problem.motion.spans:
         return True
-    if not problem.packing.scale_is_known:
-        return True  # loading without sliding looks like agreement, and no load contradicts it
+    # Loading without sliding looks like agreement, and no load contradicts it.
+    return not problem.packing.scale_is_known
+
+
+def _says_little(problem: FrameProblem, evidence: Evidence) -> bool:
+    """Whether the motion says so little of this frame that positions alone are to be asked, too."""
     # That rods were inferred lowers the trust, but positions know nothing better of them.
     return not trust(replace(evidence, inferred=0)) >= MOTION_SUFFICES
 
