@@ -17,13 +17,15 @@ from scipy.special import ndtr
 from solver.bodies.grains import Array
 from solver.together import work_together
 
-ROUNDS = 60
+ROUNDS = 60  # at most
+SETTLED = 1e-7  # by which a round raises the logarithm of the likelihood when nothing that matters changes
 START = 0.2  # quantile of all gaps near which those of touching pairs are looked for first
 LEAST_SHARE = 0.3  # that touches: strong friction with the ground would drive it to zero otherwise
 MOST_SHARE = 0.97
 WIDEST = 0.4  # scatter of touching gaps over the reach: open ones must be told from them
 NO_DENSITY = 1e-300
 ENOUGH = 30  # touching pairs to fit the mean by
+FLAT = 1e-13  # share of the greatest variance below which a trait does not vary
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +78,12 @@ def _maximise(gap: Array, trait: Array, reach: float, a: float, s: float) -> tup
     plane = np.asfortranarray(np.column_stack([np.ones(len(g)), x]))
     least, total, likelihood = s, 0.0, -np.inf
     for _ in range(ROUNDS):
-        mean = a + x @ slope
+        mean, former = a + x @ slope, likelihood
         touching, opened = _densities(g - mean, s, reach - mean, share[frame])
         density = np.maximum(touching + opened, NO_DENSITY)
         likelihood, weight = float(np.log(density).sum()), touching / density
         total = float(weight.sum())
-        if total < ENOUGH:
+        if total < ENOUGH or abs(likelihood - former) < SETTLED:
             break
         a, slope = _fit_mean(g, plane, weight)
         s = min(float(np.sqrt(weight @ (g - a - x @ slope) ** 2 / total)), WIDEST * max(reach - a, least))
@@ -100,6 +102,6 @@ def _densities(rest: Array, s: float, room: Array, share: Array) -> tuple[Array,
 
 def _fit_mean(g: Array, plane: Array, weight: Array) -> tuple[float, Array]:
     """Weighted plane through the gaps, over ones and traits (c, 1 + t); flat along traits that do not vary."""
-    root = np.sqrt(weight)
-    found = np.linalg.lstsq(plane * root[:, None], g * root, rcond=1e-9)[0]
+    weighted = plane * weight[:, None]
+    found = np.linalg.lstsq(weighted.T @ plane, weighted.T @ g, rcond=FLAT)[0]
     return float(found[0]), np.asarray(found[1:], dtype=np.float64)
