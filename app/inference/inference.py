@@ -21,6 +21,7 @@ from solver.calibration.calibrate import Calibration
 from solver.contacts.radius_tuning import RadiusTuning
 from solver.contacts.verdicts import Verdicts
 from solver.convex.friction_check import FrictionCheck, WallFriction
+from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.failure import describe_error, failed_frame, find_unseen
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.frames import solve_first_again, solve_sequence
@@ -36,6 +37,7 @@ from ..tracks import Tracks, WallTracks
 from .boundary import measure_noise, mend
 from .calibration import calibrate_tracks, known_radii
 from .friction_and_radii import friction_of, measure_friction, measure_friction_of_walls, tuned_radii
+from .known_forces.carried_back import carry_back
 from .known_forces.first_frame import ask_first_again
 from .known_forces.soft_errors import correct_soft
 from .radii import calibrate_with_radii
@@ -221,11 +223,19 @@ def renew_first(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> S
     """
     if not sequence.settings.asks_positions or not frames or frames[0].status is FrameStatus.FAILED:
         return None
-    positions = ask_first_again(sequence, frames)
-    if positions is None or not positions.fn.any():
-        return None
+    renewed, positions = None, ask_first_again(sequence, frames)
+    if positions is not None and positions.fn.any():
+        renewed = _solve_first(sequence, positions, "later photographs tell the errors of its grains' own")
+    if len(frames) > 1:
+        carried = carry_back(sequence, frames[0] if renewed is None else renewed.forces, frames[1])
+        if carried is not None:
+            renewed = _solve_first(sequence, carried, "the forces of the next photograph count here, too")
+    return renewed
+
+
+def _solve_first(sequence: CorrectedSequence, told: FramePosterior, why: str) -> SolvedFrame:
     forces, state = solve_first_again(
-        sequence.packing, sequence.snapshots, sequence.settings, positions,
+        sequence.packing, sequence.snapshots, sequence.settings, told, why,
         verdicts=sequence.verdicts, failed=sequence.failed,
     )  # fmt: skip
     return SolvedFrame(forces, _summarize(sequence, forces), state)

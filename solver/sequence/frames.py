@@ -80,11 +80,12 @@ def solve_first_again(
     snapshots: Sequence[Snapshot],
     settings: SequenceSettings,
     positions: FramePosterior,
+    why: str,
     *,
     verdicts: Mapping[int, Verdicts] | None = None,
     failed: Mapping[int, str] | None = None,
 ) -> tuple[FrameForces, SequenceState]:
-    """Solve frame 0 once more, with what its positions say now that the frames after it are known.
+    """Solve frame 0 once more, with what is told of it now that the frames after it are known; why: its reason says.
 
     Arguments as of `solve_sequence`. Raises what a frame raises that cannot be solved.
     """
@@ -94,7 +95,7 @@ def solve_first_again(
         ready.sequence, 0, SequenceState.first(packing), _Blocks(ready.sequence).find(0), verdicts.get(0, NO_VERDICTS)
     )
     frame, state = solve_frame(problem, SequenceState.first(packing))
-    told = [ready.remark, "later photographs tell the errors of its grains' own", frame.reason]
+    told = [ready.remark, why, frame.reason]
     return replace(frame, reason="; ".join(each for each in told if each)), state
 
 
