@@ -115,6 +115,7 @@ class FrameForces:
     ] = NAN
     positions_share: Annotated[float, Quantity("what positions alone count in the reported field", since=2)] = 0.0
     soft: Annotated[int, Quantity("1: grains are soft, their overlaps told forces; 0: hard", since=2)] = 0
+    unseen_doubt: Annotated[float, Quantity("share of the trust taken by rods that no photograph shows", since=2)] = 0.0
     doubt: Annotated[str, Quantity("what lowers the trust and what to do about it, the worst first", since=2)] = ""
     error_budget: Annotated[
         Array | None,

@@ -26,6 +26,7 @@ from solver.sequence.judging.judgement import (
     free_standard_deviation,
     hidden_share,
     tangential_standard_deviation,
+    unseen_doubt,
 )
 from solver.sequence.state import SequenceState
 from solver.statistics.balance import grain_unbalance
@@ -143,6 +144,7 @@ def _describe(
         overlap=estimate.overlap,
         positions_share=0.0 if estimate.mixture is None else estimate.mixture.share,
         soft=int(problem.settings.soft),
+        unseen_doubt=unseen_doubt(evidence),
     )
 
 

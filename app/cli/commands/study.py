@@ -258,7 +258,7 @@ def _study_numbers(asked: _Asked, *, fit: tuple[int, ...]) -> int:
 
 
 def _study_intervals(asked: _Asked, *, fit: tuple[int, ...]) -> int:
-    from ...study.worlds import intervals
+    from ...study.worlds import interval_fit, intervals
     from ...study.worlds.contact_errors import ContactErrors, measure_errors
     from ...study.worlds.solved_world import solve_worlds
 
@@ -268,7 +268,7 @@ def _study_intervals(asked: _Asked, *, fit: tuple[int, ...]) -> int:
             known = ContactErrors.joined([
                 measure_errors(each) for each in solve_worlds(asked.plan, intervals.FIT_WORLDS, fit, progress)
             ])  # fmt: skip
-            intervals.print_fit(console, intervals.fit_intervals(known))
+            interval_fit.print_fit(console, interval_fit.fit_intervals(known))
             intervals.print_intervals(console, "On the worlds and seeds of the fit, constants in use", known)
         solved = solve_worlds(asked.plan, asked.worlds or intervals.JUDGE_WORLDS, asked.seeds, progress)
         judged = [measure_errors(each) for each in solved]

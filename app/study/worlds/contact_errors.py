@@ -14,10 +14,9 @@ from solver.sequence.frame_forces import FrameForces
 from solver.sequence.judging.intervals import (
     DOUBTED,
     SLIDES,
-    counted_doubt,
     formula_deviations,
-    friction_share,
     groups_of,
+    terms_of,
     witness_behind,
 )
 from solver.statistics.agreement import compare_forces
@@ -41,8 +40,7 @@ class ContactErrors:
     sliding: NDArray[np.bool_]  # (c,)
     doubtful: NDArray[np.bool_]  # (c,)
     witness: NDArray[np.uint8]  # (c,) of Witness
-    doubt: Array  # (c,) 1 − T, before the motion contradicted the friction
-    friction: Array  # (c,) as `friction_share` says
+    terms: Array  # (c, t) of Term, before the motion contradicted the friction
     force: Array  # (c, 2)
     error: Array  # (c, 2) stated less true
     deviation: Array  # (c, 2) stated
@@ -89,8 +87,7 @@ def _of_frame(
         sliding=frame.sliding_probability[told] > SLIDES,
         doubtful=frame.bearing_probability[told] < DOUBTED,
         witness=np.full(count, witness_behind(frame), np.uint8),
-        doubt=np.full(count, counted_doubt(before)),
-        friction=np.full(count, friction_share(before)),
+        terms=np.tile(terms_of(before), (count, 1)),
         force=force[told] / mean,
         error=(force - exact)[told] / mean,
         deviation=np.column_stack([frame.fn_sd, frame.ft_sd])[told] / mean,

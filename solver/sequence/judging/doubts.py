@@ -15,13 +15,12 @@ from solver.convex.friction_check import INTERVAL, FrictionCheck
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.judging.intervals import widen_for_friction
 from solver.sequence.judging.judgement import (
-    HOLE_DOUBT,
-    INFERRED_DOUBT,
     TRUST_CORRECTION,
     TRUST_DISAGREEMENT,
     Evidence,
     find_faults,
     trust,
+    unseen_doubt,
 )
 from solver.sequence.settings import SURFACE
 from solver.statistics.sliding import contact_state, slides_at
@@ -133,7 +132,7 @@ def _softness(evidence: Evidence) -> Doubt | None:
 
 
 def _unseen(evidence: Evidence) -> Doubt | None:
-    share = (HOLE_DOUBT * evidence.holes + INFERRED_DOUBT * evidence.inferred) / max(evidence.grains, 1)
+    share = unseen_doubt(evidence)
     words = "; ".join(filter(None, (
         f"holes that would fit a rod: {evidence.holes}" if evidence.holes else "",
         f"rods that were inferred: {evidence.inferred}" if evidence.inferred else "",

@@ -1,11 +1,12 @@
 """Intervals that cover: factors that bring the formula's standard deviations to what truth shows, by kind of contact.
 
-Split conformal prediction by groups: on simulated packings the ratio of error to stated deviation was collected for
-every group of contacts, and factors were chosen so that one and two deviations cover 68 and 95 % there;
-`rodsight study intervals` fits them anew and prints what they cover on worlds and seeds that they have not seen. What a
-group does not say, trust does: where the methods disagree they err by more than their spread, and where positions and
-motion were mixed their difference overstates the error of the mean. To the first photograph no motion leads: there
-errors grow with the friction that the field bears, for positions alone know little of tangential forces.
+On simulated packings the ratio of error to stated deviation was collected for every group of contacts, and factors
+were chosen so that one and two deviations cover 68 and 95 % in every group and world together, as nearly as errors with
+heavy tails allow (`rodsight study intervals --fit 4 5` fits them anew and prints what they cover on worlds and seeds
+that they have not seen). What a group does not say, terms of the frame do: where the methods disagree they err by more
+than their spread, and where positions and motion were mixed, by the more the more of the force pattern is new. To the
+first photograph no motion leads: there errors grow with the friction that the field bears, for positions alone know
+little of tangential forces.
 """
 
 from __future__ import annotations
@@ -41,35 +42,54 @@ class Witness(IntEnum):
     POSITIONS = 2
     FIRST = 3  # positions, of a frame that no motion leads to
     SOFT = 4  # overlaps of soft grains, with or without motion
+    SOFT_FIRST = 5  # overlaps of soft grains, of a frame that no motion leads to
+
+
+class Term(IntEnum):
+    """What of a frame widens or narrows all its intervals, by a power of e for every unit."""
+
+    DOUBT = 0  # 1 − T, save for what rods that no photograph shows take of it
+    CHANGE = 1  # ln of the share of the force pattern that is new, over what is usual
+    FRICTION = 2  # ln of the friction that the field bears, over what is usual
 
 
 WEAK, STRONG = 0.5, 1.5  # of the mean f_n
 SLIDES = 0.5  # P(slides) from which on
 DOUBTED = 0.9  # P(bears force) below which
 BOTH = (0.02, 0.98)  # share of the positions between which both count
-# σ/⟨f⟩ = factor of witness and group · exp(slope (1 − T)) · TYPICAL (s / TYPICAL)^(1 + power), where s² adds up the
+# σ/⟨f⟩ = factor of witness and group · exp(Σ slope · term) · TYPICAL (s / TYPICAL)^(1 + power), where s² adds up the
 # squares of the formula's σ/⟨f⟩, of FLOOR, of what a contact that may bear nothing errs by, √(1 − P(bears)) f, and of
-# the first frame of FIRST_SCALE f; of the first frame times a power of its friction. Last axis: f_n, f_t.
+# the first frame of FIRST_SCALE f. Last axis: f_n, f_t.
 FLOOR = np.array([0.02, 0.006])  # members that agree on nothing being there are wrong by this now and then
 FIRST_SCALE = 0.15  # stresses that positions tell without any motion err by so much, all forces together
 TYPICAL = np.array([0.2, 0.06])
 FACTOR = np.array([
-    [[0.57, 0.58], [0.55, 0.65], [0.52, 0.68], [0.57, 0.56], [0.56, 0.64], [0.52, 0.42]],
-    [[0.54, 0.41], [0.55, 0.43], [0.60, 0.51], [0.64, 0.46], [0.61, 0.51], [0.45, 0.41]],
-    [[0.63, 0.42]] * len(Group),  # of hard grains hardly ever: as of the first frame
-    [[0.63, 0.42]] * len(Group),
-    [[0.30, 0.34], [0.30, 0.32], [0.36, 0.34], [0.31, 0.37], [0.31, 0.38], [0.30, 0.49]],
+    [[0.54, 0.50], [0.52, 0.61], [0.49, 0.65], [0.53, 0.51], [0.53, 0.59], [0.44, 0.35]],
+    [[0.46, 0.33], [0.46, 0.33], [0.52, 0.41], [0.48, 0.34], [0.51, 0.40], [0.45, 0.36]],
+    [[0.51, 0.32]] * len(Group),  # of hard grains hardly ever: as of the first frame
+    [[0.51, 0.32]] * len(Group),
+    [[0.37, 0.34], [0.33, 0.24], [0.37, 0.24], [0.34, 0.29], [0.32, 0.26], [0.40, 0.86]],
+    [[0.80, 0.68]] * len(Group),
 ])  # fmt: skip
-TRUST_SLOPE = np.array([[6.35, 5.47], [-0.15, 0.19], [0.0, 0.0], [0.0, 0.0], [12.75, 6.81]])  # by witness
-POWER = np.array([[-0.10, -0.24], [0.0, -0.01], [-0.17, -0.19], [-0.17, -0.19], [-0.15, -0.02]])  # by witness
-FRICTION_POWER = np.array([1.00, 1.32])  # of the first frame
+# By witness and term; 0: not asked.
+SLOPE = np.array([
+    [[7.27, 6.39], [0.0, 0.0], [0.0, 0.0]],
+    [[0.64, 1.25], [0.13, 0.07], [0.0, 0.0]],
+    [[0.0, 0.0], [0.0, 0.0], [0.87, 1.40]],
+    [[0.0, 0.0], [0.0, 0.0], [0.87, 1.40]],
+    [[10.46, 5.23], [0.0, 0.0], [0.0, 0.0]],
+    [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],
+])  # fmt: skip
+POWER = np.array([[-0.12, -0.31], [0.01, 0.04], [0.13, 0.01], [0.13, 0.01], [0.02, 0.34], [0.99, -0.60]])  # by witness
 MOST_DOUBT = 0.4  # 1 − T beyond which truths told nothing more
 # The same for contact forces: what lowers the trust of a motion further is what it hides, not what it shows.
-MOST_DOUBT_BY_WITNESS = (0.1, MOST_DOUBT, MOST_DOUBT, 0.0, 0.1)
+MOST_DOUBT_BY_WITNESS = (0.1, MOST_DOUBT, MOST_DOUBT, 0.0, 0.1, 0.0)
+USUAL_CHANGE, CHANGES = 0.05, (0.005, 0.6)  # share of the force pattern that is new; what truths told something of
 USUAL_FRICTION, NO_FRICTION = 0.04, 0.0125  # share of f_t in f_n, all contacts together; less is not told from nothing
 # For every e-fold by which the friction was told wrong: error of f_n over f_n and over ⟨f⟩; of f_t over μ times these.
 # Contacts that a wrong friction leaves without force are wrong most of all.
 FRICTION_ERROR = ((0.5, 0.4), (0.6, 0.4))
+TOLD_HIGH = 0.75  # of it where the friction was told too high: what slides in truth is then held all the same
 
 
 def groups_of(frame: FrameForces) -> NDArray[np.uint8]:
@@ -101,13 +121,16 @@ def doubt_of(trust: float | Array) -> Array:
 def witness_behind(frame: FrameForces) -> Witness:
     """What the frame's field was read from; the first frame of all has no motion that leads to it."""
     if frame.frame == 0:
-        return Witness.FIRST
+        return Witness.SOFT_FIRST if frame.soft else Witness.FIRST
     return Witness.SOFT if frame.soft else witness_of(frame.positions_share)
 
 
-def counted_doubt(frame: FrameForces) -> float:
-    """1 − T as far as it widens the intervals of the frame's contacts."""
-    return min(float(doubt_of(frame.trust)), MOST_DOUBT_BY_WITNESS[witness_behind(frame)])
+def terms_of(frame: FrameForces) -> Array:
+    """The frame's value of every Term (t,)."""
+    hidden = min(frame.unseen_doubt, MOST_DOUBT)
+    doubt = min(float(doubt_of(frame.trust / (1.0 - hidden))), MOST_DOUBT_BY_WITNESS[witness_behind(frame)])
+    change = float(np.clip(np.nan_to_num(frame.force_change, nan=USUAL_CHANGE), *CHANGES))
+    return np.array([doubt, math.log(change / USUAL_CHANGE), math.log(friction_share(frame))])
 
 
 def friction_share(frame: FrameForces) -> float:
@@ -134,7 +157,7 @@ def calibrate_deviations(frame: FrameForces) -> FrameForces:
 def _errors_with_force(frame: FrameForces, mean: float) -> Array:
     """What errs as the force does (c, 2): of contacts that may bear none, and of all contacts of the first frame."""
     nothing = np.zeros_like(frame.fn) if frame.bearing_probability is None else 1.0 - frame.bearing_probability
-    scale = FIRST_SCALE if witness_behind(frame) is Witness.FIRST else 0.0
+    scale = FIRST_SCALE if frame.frame == 0 else 0.0
     return np.sqrt(nothing + scale**2)[:, None] * np.abs(np.column_stack([frame.fn, frame.ft])) / mean
 
 
@@ -145,17 +168,19 @@ def formula_deviations(frame: FrameForces) -> Array:
 
 
 def interval_factors(frame: FrameForces) -> Array:
-    """What group, witness and trust make of the deviations of f_n and f_t (c, 2), of the first frame its friction."""
+    """What group, witness and the frame's terms make of the deviations of f_n and f_t (c, 2)."""
     witness = witness_behind(frame)
-    of_frame = np.exp(TRUST_SLOPE[witness] * counted_doubt(frame)) * friction_share(frame) ** FRICTION_POWER
-    return FACTOR[witness][groups_of(frame)] * of_frame
+    return FACTOR[witness][groups_of(frame)] * np.exp(terms_of(frame) @ SLOPE[witness])
 
 
 def widen_for_friction(frame: FrameForces, given: float, measured: float, share: float = 1.0) -> FrameForces:
-    """The frame with the error of its friction in its deviations: a share of what lies between two frictions."""
-    if not (given > 0 and measured > 0):
+    """The frame with the error of its friction in its deviations: a share of what lies between two frictions.
+
+    Forces that positions alone told know nothing of sliding: theirs stay.
+    """
+    if not (given > 0 and measured > 0) or frame.positions_share > BOTH[1]:
         return frame
-    excess = share * abs(math.log(measured / given))
+    excess = share * abs(math.log(measured / given)) * (TOLD_HIGH if measured < given else 1.0)
     mean = np.where(frame.fn_sd > 0, np.nan_to_num(mean_normal_force(frame.fn)), 0.0)  # what has no deviation gets none
     normal, tangent = (
         excess * np.hypot(of_force * np.maximum(frame.fn, 0.0), of_mean * mean) for of_force, of_mean in FRICTION_ERROR

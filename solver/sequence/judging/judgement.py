@@ -99,11 +99,15 @@ def trust(evidence: Evidence) -> float:
 
 def _with_deductions(trust: float, evidence: Evidence) -> float:
     """T less what holes and inferred grains take off, and what is hidden."""
-    doubtful = HOLE_DOUBT * evidence.holes + INFERRED_DOUBT * evidence.inferred
-    unseen = doubtful / max(evidence.grains, 1)
     if evidence.unseen_share > MOST_UNSEEN:
         trust *= 1.0 - evidence.unseen_share
-    return float(np.clip(trust, 0.0, 1.0) * max(1.0 - unseen, 0.0)) * (1.0 - evidence.hidden_share)
+    return float(np.clip(trust, 0.0, 1.0) * max(1.0 - unseen_doubt(evidence), 0.0)) * (1.0 - evidence.hidden_share)
+
+
+def unseen_doubt(evidence: Evidence) -> float:
+    """Share of the trust that rods take which no photograph shows: holes that would fit one, and inferred ones."""
+    doubtful = HOLE_DOUBT * evidence.holes + INFERRED_DOUBT * evidence.inferred
+    return doubtful / max(evidence.grains, 1)
 
 
 def hidden_share(fn: Array, shown: NDArray[np.bool_]) -> float:

@@ -21,7 +21,7 @@ def study():
     errors = ContactErrors(
         world=np.full(COUNT, "shear"), seed=np.zeros(COUNT, np.int64), frame=np.ones(COUNT, np.int64),
         group=np.ones(COUNT, np.uint8), wall=rng.random(COUNT) < 0.1, sliding=none, doubtful=none,
-        witness=np.zeros(COUNT, np.uint8), doubt=np.full(COUNT, 0.05), friction=np.ones(COUNT),
+        witness=np.zeros(COUNT, np.uint8), terms=np.zeros((COUNT, 3)),
         force=rng.random((COUNT, 2)) * 2,
         error=rng.standard_normal((COUNT, 2)), deviation=np.ones((COUNT, 2)), formula=np.ones((COUNT, 2)),
     )  # fmt: skip

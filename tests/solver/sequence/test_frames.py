@@ -14,6 +14,7 @@ from solver.sequence import ensemble
 from solver.sequence.frame_forces import FrameStatus
 from solver.sequence.frames import solve_sequence
 from solver.sequence.judging.doubts import lower_bound
+from solver.sequence.judging.judgement import INFERRED_DOUBT, unseen_doubt
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
 from tests.packings import LENGTH, squeezed_heap
@@ -182,6 +183,14 @@ def test_the_members_disagreement_is_evidence_and_a_single_chain_has_none():
         assert np.all(frame.fn_sd[frame.fn > 0] > 0)
     for _, state in run(packing, snapshots):
         assert np.isnan(state.evidence.disagreement)
+
+
+def test_a_frame_says_what_of_its_trust_rods_take_that_nobody_saw():
+    packing, snapshots = sheared_frames(2)
+    for inferred in (0, 2):
+        frame, state = run(replace(packing, inferred=inferred), snapshots)[1]
+        assert frame.unseen_doubt == unseen_doubt(state.evidence)
+        assert (frame.unseen_doubt > 2 * INFERRED_DOUBT / packing.grains.count - 1e-12) == (inferred == 2)
 
 
 def test_a_share_of_the_load_is_evidence_only_where_a_load_is_known():

@@ -8,15 +8,18 @@ import pytest
 from solver.sequence.judging.intervals import (
     FIRST_SCALE,
     FLOOR,
-    FRICTION_POWER,
     NO_FRICTION,
+    SLOPE,
+    USUAL_CHANGE,
     Group,
+    Term,
     Witness,
     calibrate_deviations,
     formula_deviations,
     friction_share,
     groups_of,
     interval_factors,
+    terms_of,
     widen_for_friction,
     witness_behind,
     witness_of,
@@ -56,7 +59,7 @@ def test_witness_follows_the_share_of_positions():
 def test_soft_grains_are_a_witness_of_their_own_and_doubt_of_them_widens(frame):
     soft = replace(frame, soft=1, positions_share=0.7)
     assert witness_behind(soft) == Witness.SOFT
-    assert witness_behind(replace(soft, frame=0)) == Witness.FIRST
+    assert witness_behind(replace(soft, frame=0)) == Witness.SOFT_FIRST
     sure, doubted = (interval_factors(replace(soft, trust=trust)) for trust in (0.98, 0.93))
     assert (doubted > 1.2 * sure).all()
 
@@ -73,12 +76,29 @@ def test_calibrated_deviations_tell_what_they_were_made_of(frame):
     assert (told.fn_sd[~known] == 0).all()
 
 
-def test_doubt_widens_where_motion_speaks_and_narrows_the_mean_of_both_witnesses(frame):
-    for share, grows in ((0.0, True), (0.5, False)):
-        sure, doubted = (
-            calibrate_deviations(replace(frame, positions_share=share, trust=trust)).fn_sd[-1] for trust in (0.95, 0.7)
+def test_doubt_widens_where_motion_speaks(frame):
+    sure, doubted = (calibrate_deviations(replace(frame, trust=trust)).fn_sd[-1] for trust in (0.95, 0.7))
+    assert doubted > 1.1 * sure
+
+
+def test_new_forces_widen_where_both_witnesses_speak_and_say_nothing_where_motion_does(frame):
+    for share, grows in ((0.5, True), (0.0, False)):
+        same, new = (
+            calibrate_deviations(replace(frame, positions_share=share, force_change=change)).fn_sd[-1]
+            for change in (0.02, 0.3)
         )
-        assert (doubted > sure) == grows
+        assert (new > 1.1 * same) == grows
+    unknown, usual = (interval_factors(replace(frame, positions_share=0.5, force_change=change))
+                      for change in (np.nan, USUAL_CHANGE))  # fmt: skip
+    assert unknown == pytest.approx(usual)
+
+
+def test_rods_that_nobody_saw_take_trust_away_but_no_exactness_where_forces_are_shown(frame):
+    whole = replace(frame, trust=0.96)
+    hidden = replace(frame, trust=0.96 * 0.9, unseen_doubt=0.1)
+    assert interval_factors(hidden) == pytest.approx(interval_factors(whole))
+    assert (interval_factors(replace(frame, trust=0.96 * 0.9)) > 1.2 * interval_factors(whole)).all()
+    assert terms_of(replace(hidden, unseen_doubt=1.0))[Term.DOUBT] == 0.0  # all of it: no division by nothing
 
 
 def test_no_doubt_beyond_what_truths_told_widens_what_the_motion_says(frame):
@@ -102,7 +122,7 @@ def test_the_first_frame_is_the_less_exact_the_more_friction_it_bears(frame):
     assert (witness_behind(first), witness_behind(frame)) == (Witness.FIRST, Witness.MOTION)
     little, much = (interval_factors(replace(first, ft=share * first.fn))[-1] for share in (0.02, 0.1))
     ratio = (0.1 + NO_FRICTION) / (0.02 + NO_FRICTION)
-    assert much / little == pytest.approx(ratio**FRICTION_POWER)
+    assert much / little == pytest.approx(ratio ** SLOPE[Witness.FIRST, Term.FRICTION])
     assert friction_share(frame) == 1.0
 
 
@@ -116,3 +136,7 @@ def test_a_wrong_friction_widens_strong_contacts_most_and_weak_ones_by_a_share_o
     sideways = np.sqrt(told.ft_sd**2 - frame.ft_sd**2) / np.log(1.3)
     assert sideways[-1] == pytest.approx(0.26 * np.hypot(0.6 * frame.fn[-1], 0.4 * mean))
     assert (widen_for_friction(frame, 0.25, 0.25).ft_sd == frame.ft_sd).all()
+    high = widen_for_friction(frame, 0.26, 0.2)
+    assert np.hypot(frame.fn_sd[1:], 0.75 * np.log(1.3) * added[1:]) == pytest.approx(high.fn_sd[1:])
+    alone = replace(frame, positions_share=1.0)  # positions know nothing of sliding
+    assert (widen_for_friction(alone, 0.2, 0.26).fn_sd == alone.fn_sd).all()
