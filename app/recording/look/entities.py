@@ -27,6 +27,7 @@ FORCE_LEGEND = "/legend/force"
 SCALE_BAR = "/legend/scale"
 SCALE_BAR_LENGTH = "/legend/scale/length"
 FORCE_LEGEND_TICKS = "/legend/force/ticks"
+FORCE_LEGEND_NOTES = "/legend/force/notes"
 GAP_LEGEND = "/legend/gap"
 GAP_LEGEND_TICKS = "/legend/gap/ticks"
 COLOUR_LEGENDS = "/legend/by"  # and the quantity

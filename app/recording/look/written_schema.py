@@ -134,6 +134,7 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(entities.SCALE_BAR_LENGTH, "its length", _TICKS, When.STATIC),
     Entity(entities.FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
     Entity(entities.FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
+    Entity(entities.FORCE_LEGEND_NOTES, "what points, edges and rims are", _TICKS, When.STATIC),
     Entity(entities.GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
     Entity(entities.GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
     *(

@@ -59,7 +59,8 @@ def log_force_legend(stream: rr.RecordingStream, scene: Scene) -> None:
     if scene.tracks.boundary is not None:
         notes.append((0.96, "rim: boundary", BOUNDARY))
     places = [(value / top, text) for value, text in values]
-    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places, notes)
+    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_TICKS, places)
+    _log_ticks(stream, scene.canvas, entities.FORCE_LEGEND_NOTES, [], notes)
 
 
 def _log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:

@@ -69,6 +69,7 @@ _FORCES = [
     entities.SLIDING,
     f"{entities.FORCE_LEGEND}/**",
 ]
+_PLAIN_LEGEND = [entities.FORCE_LEGEND, entities.FORCE_LEGEND_TICKS]  # where there are no edges, points or rims
 _SHARE = (-0.04, 1.05)  # of an axis for shares and correlations
 _RESIDUALS = (-6.4, 3.0)  # log10; room for a legend above
 
@@ -265,8 +266,7 @@ def _contacts(layout: Layout) -> rrb.Container:
 def _maps(layout: Layout) -> rrb.Container:
     """The contacts, each map coloured by another quantity; what is chosen in one is chosen in all."""
     thin = 0.13 * layout.canvas.grain_radius
-    legend = f"{entities.FORCE_LEGEND}/**"
-    first = [entities.WALLS, entities.FORCES, entities.SLIDING, legend]
+    first = [entities.WALLS, entities.FORCES, *_PLAIN_LEGEND]
     views = [packing_view("Normal force f_n", layout.canvas, first)]
     for quantity, name, radius in (
         (entities.TANGENTIAL, "Tangential force f_t", None),
@@ -311,9 +311,7 @@ def _truth(layout: Layout) -> rrb.Container:
     return rrb.Vertical(
         rrb.Horizontal(
             packing_view("Inferred forces", layout.canvas, [*_PACKING, *_FORCES]),
-            packing_view(
-                "True forces", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, f"{entities.FORCE_LEGEND}/**"]
-            ),
+            packing_view("True forces", layout.canvas, [*_PACKING, entities.TRUTH_FORCES, *_PLAIN_LEGEND]),
         ),
         rrb.Horizontal(
             drawn_view("f_n: inferred over true", "/truth/scatter", (-60.0, 425.0), (-15.0, 455.0)),

@@ -8,6 +8,7 @@ import rerun as rr
 from rodsight.recording.curve_layers.convergence import SMALLEST, power_of_ten
 from rodsight.recording.curve_layers.force_density import BINS as DENSITY_BINS
 from rodsight.recording.curve_layers.force_density import EDGES, density_points, merged
+from rodsight.recording.curve_layers.statistic_curves import CURVES
 from rodsight.recording.curve_layers.stress_and_fabric import BINS, ROSE_REACH, direction_shares, rose_outline
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
@@ -20,6 +21,7 @@ from rodsight.recording.packing_layers.changes import gap_colours
 from rodsight.recording.packing_layers.forces.true_forces import TruthWriter
 from rodsight.recording.packing_layers.grains_and_walls import _spin_marks, last_seen
 from rodsight.recording.packing_layers.rods_in_3d import turns_from_axis
+from rodsight.recording.tabs.views import curve_view
 from rodsight.results.results import TruthContacts
 from rodsight.results.truth import score
 
@@ -180,3 +182,17 @@ def test_bands_reach_two_deviations_to_either_side_and_recorded_forces_stand_bes
     band = latest(path, entities.FRICTION_ANGLE + entities.BAND, entities.FRAME, 1)["Scalars:scalars"]
     assert band == pytest.approx([angle - 3.0, angle + 3.0])
     assert latest(path, entities.WALL_NORMAL_RECORDED, entities.FRAME, 1)["Scalars:scalars"][0] == pytest.approx(40.0)
+
+
+def test_every_curve_of_the_statistics_has_its_band_and_every_plot_that_shows_it_shows_both(tmp_path):
+    results = make_results(2, sweeps=2)
+    deviations = {f"{curve.field}_sd": 0.25 for curve in CURVES}
+    told = [replace(each, **deviations) for each in results.statistics]
+    path = write_recording(replace(results, statistics=told), tmp_path / "run.rrd").path
+    assert {curve.path for curve in CURVES} == set(entities.BANDED)
+    for curve in CURVES:
+        value = latest(path, curve.path, entities.FRAME, 1)["Scalars:scalars"][0]
+        band = latest(path, curve.path + entities.BAND, entities.FRAME, 1)["Scalars:scalars"]
+        assert band == pytest.approx([value - 0.5 * curve.unit, value + 0.5 * curve.unit], nan_ok=True), curve
+    view = curve_view("both", [entities.TAIL_EXPONENT, entities.TRUST])
+    assert view.contents == [entities.TAIL_EXPONENT, entities.TRUST, entities.TAIL_EXPONENT + entities.BAND]
