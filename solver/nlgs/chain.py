@@ -12,7 +12,8 @@ from solver.bodies.packing import Packing
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
 from solver.detection.networks import Network
-from solver.nlgs.problem import ContactProblem, assemble, inertial_impedance, kinematic_impedance
+from solver.nlgs.interval import Interval
+from solver.nlgs.problem import ContactProblem, inertial_impedance, kinematic_impedance
 from solver.nlgs.solve import NlgsSettings, Solution, solve, unbalance_of
 from solver.nlgs.sweep_record import Keep, SweepHistory, SweepRecorder
 from solver.nlgs.warm_start import ForceMemory
@@ -64,21 +65,18 @@ def advance_chain(
     packing: Packing, motion: FrameMotion, memory: ForceMemory, settings: ChainSettings, network: Network
 ) -> ChainStep:
     """Take the forces of the former frame through one interval, on the contacts of a network."""
+    return advance_through(Interval(packing, motion, network), memory, settings)
+
+
+def advance_through(interval: Interval, memory: ForceMemory, settings: ChainSettings) -> ChainStep:
+    """The same through an interval that other chains go through, too."""
+    packing, motion = interval.packing, interval.motion
     fresh = len(memory.key) == 0
     steps = (settings.spin_up if fresh else settings.substeps) if motion.spans else 1
     sweeps = settings.sweeps if motion.spans else settings.sweeps * settings.substeps
     impedance, kappa = _impedance(packing, motion, settings, steps)
     nlgs = NlgsSettings(sweeps, settings.force_change, None, settings.relaxation)
     recorder = SweepRecorder(steps * sweeps, settings.keep)
-    load = packing.load(motion.endpoints, motion.side, motion.load)
-
-    def contacts_at(fraction: float) -> tuple[ContactProblem, Contacts, Walls]:
-        state, walls = motion.at(fraction, load)
-        contacts, reluctance = network.at(fraction, packing.grains, state, walls)
-        # Reluctance counts in displacements of a step, so the time of a step cancels.
-        closing = None if reluctance is None else motion.velocity_rms * reluctance
-        problem = assemble(packing.grains, state, walls, contacts, packing.material, impedance, closing=closing)
-        return problem, contacts, walls
 
     def solve_step(problem: ContactProblem, contacts: Contacts, guess: Array) -> Solution:
         recorder.begin(problem, contacts)
@@ -88,11 +86,11 @@ def advance_chain(
 
     carried, done = memory, 0
     for step in range(1, steps):
-        problem, contacts, _ = contacts_at(step / steps)
+        problem, contacts, _ = interval.at(step / steps, impedance)
         solution = solve_step(problem, contacts, memory.recall(contacts))
         memory = memory.renew(contacts, solution.force, motion.grains.present)
         done += solution.sweeps
-    problem, contacts, walls = contacts_at(1.0)
+    problem, contacts, walls = interval.at(1.0, impedance)
     solution = solve_step(problem, contacts, memory.recall(contacts))
     former = None if fresh else carried.recall(contacts)
     return ChainStep(

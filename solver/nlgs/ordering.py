@@ -7,14 +7,34 @@ groups in which no two share a body, so that a whole group can be worked on at o
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
+from solver.contacts.contacts import Contacts
 
 GROUP = 32  # contacts between grains that share no grain; four vectors of eight numbers
 WALL_GROUP = 4  # contacts with walls: a frame has no more walls to tell apart
+
+
+class VisitingOrder(NamedTuple):
+    """Rows of contacts as a sweep visits them."""
+
+    pair: NDArray[np.int64]  # (p,) between grains, the first `grouped` of them in groups that share no grain
+    wall: NDArray[np.int64]  # (q,) with walls, after them
+    grouped: int
+
+
+def order_contacts(contacts: Contacts) -> VisitingOrder:
+    """The order that contacts are visited in, those with walls last."""
+    point, i, j = contacts.point, contacts.i, contacts.j
+    pair, wall = np.flatnonzero(~contacts.with_wall), np.flatnonzero(contacts.with_wall)
+    order, grouped = visiting_order(point[pair], i[pair], j[pair], GROUP)
+    wall_order, _ = visiting_order(point[wall], i[wall], j[wall], WALL_GROUP)
+    return VisitingOrder(pair[order], wall[wall_order], grouped)
 
 
 def visiting_order(

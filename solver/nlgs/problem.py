@@ -19,7 +19,7 @@ from solver.bodies.grains import Array, GrainMotion, Grains
 from solver.bodies.packing import Material
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
-from solver.nlgs.ordering import GROUP, WALL_GROUP, visiting_order
+from solver.nlgs.ordering import GROUP, VisitingOrder, order_contacts
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
 CACHE_LINE = 64  # bytes
@@ -77,11 +77,12 @@ def assemble(
     impedance: Array,
     *,
     closing: Array | None = None,
+    order: VisitingOrder | None = None,
 ) -> ContactProblem:
     """Assemble the contact problem of one frame (or sub-step).
 
     impedance (n,) [N s/m]; closing (c,) [m/s], the velocity at which a contact must close before it bears force
-    (a doubtful contact's extra gap over the time of the step), 0 if absent.
+    (a doubtful contact's extra gap over the time of the step), 0 if absent; order: of `order_contacts`, if it is known.
     """
     n = grains.count
     if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
@@ -102,13 +103,8 @@ def assemble(
         plate[walls.loaded, 0] = -walls.load[walls.loaded] * plate_compliance
         plate[walls.loaded, 1] = plate_compliance
 
-    rows_pair = np.flatnonzero(~contacts.with_wall)
-    rows_wall = np.flatnonzero(contacts.with_wall)
+    rows_pair, rows_wall, grouped = order_contacts(contacts) if order is None else order
     point, i, j = contacts.point, contacts.i, contacts.j
-    order, grouped = visiting_order(point[rows_pair], i[rows_pair], j[rows_pair], GROUP)
-    rows_pair = rows_pair[order]
-    order, _ = visiting_order(point[rows_wall], i[rows_wall], j[rows_wall], WALL_GROUP)
-    rows_wall = rows_wall[order]
     closing = np.zeros(contacts.count) if closing is None else closing
 
     pair_w = compliance[i[rows_pair]] + compliance[j[rows_pair]]

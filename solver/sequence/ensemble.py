@@ -25,7 +25,8 @@ from solver.convex.program import Balance, assemble_balance, polish
 from solver.detection.displacement import find_reversals, member_intervals
 from solver.detection.networks import PairProbability, ProbablePairs
 from solver.mixture.mixing import offered_pairs
-from solver.nlgs.chain import ChainStep, advance_chain, force_scale
+from solver.nlgs.chain import ChainStep, advance_through, force_scale
+from solver.nlgs.interval import Interval
 from solver.nlgs.warm_start import ForceMemory
 from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.demand import NO_DEMAND, ROUNDS, WINS, Demand, find_demand
@@ -276,7 +277,8 @@ def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touc
             uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
             other = other.renew(contacts, uniform, problem.snapshot.present)
         starts.append((other, silent))
-    tasks = [partial(advance_chain, packing, motion, memory, told, network) for memory, told in starts]
+    interval = Interval(packing, motion, network)
+    tasks = [partial(advance_through, interval, memory, told) for memory, told in starts]
     soft, stiff, *rest = work_together(tasks, problem.settings.workers)
     if not rest:
         return _Chains(soft, stiff, state.other, np.nan, state.agreeing)

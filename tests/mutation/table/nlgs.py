@@ -128,11 +128,19 @@ MUTANTS = [
         ("(worst / mean, mean_size / mean) if mean > 0", "(worst / mean, worst / mean) if mean > 0"),
     ),
     *mutants_of(
+        "solver/nlgs/interval.py",
+        CHAIN,
+        ("motion.velocity_rms * reluctance", "0.0 * reluctance"),
+        ("if np.array_equal(known, impedance):", "if len(known) == len(impedance):"),
+    ),
+    *mutants_of(
         "solver/nlgs/chain.py",
         CHAIN,
         ("diameter = 2.0 * float(packing.grains.radius.mean())", "diameter = float(packing.grains.radius.mean())"),
-        ("motion.velocity_rms * reluctance", "0.0 * reluctance"),
-        ("problem, contacts, _ = contacts_at(step / steps)", "problem, contacts, _ = contacts_at(1.0)"),
+        (
+            "problem, contacts, _ = interval.at(step / steps, impedance)",
+            "problem, contacts, _ = interval.at(1.0, impedance)",
+        ),
         ("(settings.spin_up if fresh else settings.substeps)", "settings.substeps"),
         ("memory=memory.renew(contacts, solution.force, motion.grains.present)", "memory=former"),
         ("step = motion.interval / steps", "step = motion.interval"),

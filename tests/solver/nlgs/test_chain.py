@@ -8,7 +8,8 @@ import pytest
 from solver.bodies.motion import FrameMotion
 from solver.bodies.packing import Material, Packing
 from solver.detection.networks import NearPairs, PairProbability, ProbablePairs
-from solver.nlgs.chain import ChainSettings, advance_chain, force_scale
+from solver.nlgs.chain import ChainSettings, advance_chain, advance_through, force_scale
+from solver.nlgs.interval import Interval
 from solver.nlgs.warm_start import ForceMemory
 from tests.packings import LENGTH, squeezed_heap
 
@@ -72,6 +73,16 @@ def test_sub_steps_go_evenly_through_the_interval():
         assert position == pytest.approx(STATE.position - (1.0 - fraction) * 2.0 * STATE.velocity, abs=1e-15)
         assert endpoints == pytest.approx(WALLS.endpoints - (1.0 - fraction) * 2e-6, abs=1e-15)
     assert np.array_equal(first.walls.endpoints, WALLS.endpoints)
+
+
+def test_chains_share_the_contacts_of_an_interval_and_are_as_each_by_itself():
+    spy = Spy()
+    interval = Interval(PACKING, MOTION, spy)
+    for settings in (SETTINGS, replace(SETTINGS, kappa=0.1), SETTINGS):
+        shared = advance_through(interval, ForceMemory.empty(), settings)
+        alone = advance_chain(PACKING, MOTION, ForceMemory.empty(), settings, NEAR)
+        np.testing.assert_array_equal(shared.solution.force, alone.solution.force)
+    assert len(spy.asked) == 4
 
 
 def test_a_doubtful_contact_bears_less():
