@@ -35,9 +35,12 @@ def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], wall
             1,
         )
     place = place[inside & np.isfinite(place).all(axis=1)]
+    tree = KDTree(centre)
+    # Nearly all places are ruled out by the nearest centre, whose search is quick.
+    place = place[np.asarray(tree.query(place)[0]) - radius.min() >= least]
     if not len(place):
         return np.empty((0, 2))
-    distance, near = KDTree(centre).query(place, k=min(NEIGHBOURS, len(seen)))
+    distance, near = tree.query(place, k=min(NEIGHBOURS, len(seen)))
     room = (np.asarray(distance) - radius[np.asarray(near)]).min(axis=1)
     found: list[Array] = []
     for k in np.argsort(-room, kind="stable"):

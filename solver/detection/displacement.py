@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
@@ -53,14 +55,21 @@ def displacement_scale(before: Array, after: Array, sigma: Array) -> float:
     count = min(NEIGHBOURS, len(seen) - 1)
     if count < 1:
         raise ValueError("fewer than two grains are seen in both frames: no displacement scale")
-    found = KDTree(before[seen]).query(before[seen], k=count + 1)
-    distance, near = np.asarray(found[0]), np.asarray(found[1])
+    distance, near = _neighbours(before[seen].tobytes(), count)
     moved = after[seen] - before[seen]
-    rest = moved - moved[near[:, 1:]].mean(axis=1)
+    rest = moved - moved[near].mean(axis=1)
     variance = sigma[seen] ** 2
-    noise = 2.0 * (variance.mean() + variance[near[:, 1:]].mean() / count)
-    least = max(variance.mean(), (LEAST_SCALE * distance[:, 1:].mean()) ** 2)
+    noise = 2.0 * (variance.mean() + variance[near].mean() / count)
+    least = max(variance.mean(), (LEAST_SCALE * distance) ** 2)
     return float(np.sqrt(max((rest**2).mean() - noise, least)))
+
+
+@lru_cache(maxsize=8)  # intervals around a frame begin at the same few photographs
+def _neighbours(place: bytes, count: int) -> tuple[float, NDArray[np.intp]]:
+    """Mean distance to the `count` nearest of places (n, 2) [m], as bytes, and which these are (n, count)."""
+    at = np.frombuffer(place).reshape(-1, 2)
+    distance, near = KDTree(at).query(at, k=count + 1)
+    return float(np.asarray(distance)[:, 1:].mean()), np.asarray(near)[:, 1:]
 
 
 def find_reversals(endpoints: Array, position: Array) -> NDArray[np.bool_]:
