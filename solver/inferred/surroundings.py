@@ -65,6 +65,11 @@ class Surroundings:
         if not len(crossing):
             return crossing
         rows = self._rows[k]
+        # Nearly all of them overlap the grain whose centre is nearest, which is found quickly.
+        away, nearest = self._tree[k].query(crossing)
+        crossing = crossing[away - self.radius[rows[nearest]] - size > -deep]
+        if not len(crossing):
+            return crossing
         _, nearest = self._tree[k].query(crossing, k=min(NEAR_ROOM, len(rows)))
         distance = np.linalg.norm(crossing[:, None] - self.position[k][rows[nearest]], axis=2)
         gap = np.column_stack([
