@@ -308,9 +308,8 @@ async function begin() {
   document.title = `${state.about.name} – contact review`;
   connect();
   await queue(async () => present((await ask("next")).pair));
-  const theme = matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark";
   try {
-    state.viewer = await startViewer(at("viewer"), theme, pick);
+    state.viewer = await startViewer(at("viewer"), pick);
     await queue(() => showPicture());
     at("loading").hidden = true;
   } catch (error) {

@@ -71,7 +71,7 @@ function calm(canvas) {
 }
 
 /** Start the viewer on a canvas. onClick(x, y) is told what was clicked, in pixels of the picture. */
-export async function startViewer(canvas, theme, onClick) {
+export async function startViewer(canvas, onClick) {
   if (!globalThis.WebAssembly || !canvas.ownerDocument.createElement("canvas").getContext("webgl2")) {
     throw new Error("this browser draws no WebGL");
   }
@@ -85,7 +85,7 @@ export async function startViewer(canvas, theme, onClick) {
     persist: false,
     notebook: false,
     enable_history: false,
-    theme,
+    theme: "dark", // whatever the page is: labels over dark pictures are hard to read in light
     panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden", time: "Hidden" },
     on_viewer_event: (told) => {
       const event = typeof told === "string" ? JSON.parse(told) : told;

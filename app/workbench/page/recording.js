@@ -41,7 +41,7 @@ export class Recording {
       this.box.prepend(canvas);
       this.handle = new viewer.WebHandle({
         url: addresses.map((address) => location.origin + address), hide_welcome_screen: true, render_backend: "webgl", persist: false, notebook: false,
-        enable_history: false, theme: matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark",
+        enable_history: false, theme: "dark", // whatever the page is: labels over dark pictures are hard to read in light
         panel_state_overrides: Object.fromEntries(PANELS.map((name) => [name, "Hidden"])),
         on_viewer_event: (event) => { this.hear(typeof event === "string" ? JSON.parse(event) : event); },
       });
