@@ -229,7 +229,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     assert walls is not None
     since = time.perf_counter()
     try:
-        sequence = correct_sequence(_inputs(run, log, tracks, walls))
+        sequence = correct_sequence(_inputs(run, log, tracks, walls)).with_first_renewed()
     except UndeterminedError as error:
         raise InputError(run.experiment.file, f"key {error.key}", str(error)) from None
     run.tell_manifest(log)

@@ -38,7 +38,7 @@ from .boundary import measure_noise, mend
 from .calibration import calibrate_tracks, known_radii
 from .friction_and_radii import friction_of, measure_friction, measure_friction_of_walls, tuned_radii
 from .known_forces.carried_back import carry_back
-from .known_forces.first_frame import ask_first_again
+from .known_forces.first_frame import ask_first_again, ask_first_in_full, expects_to_ask_again
 from .known_forces.soft_errors import correct_soft
 from .radii import calibrate_with_radii
 from .settings import InferenceSettings
@@ -87,6 +87,11 @@ class CorrectedSequence:
     failed: Mapping[int, str]  # frames that show nothing, and why; their snapshots lie between their neighbours'
     wall_friction: WallFriction | None = None  # that was measured; None: told, or as between grains
     friction_measured: bool = False
+
+    def with_first_renewed(self) -> CorrectedSequence:
+        """The same for who calls `renew_first` after the last frame: the first is solved from a brief look before."""
+        again = self.settings.asks_positions and expects_to_ask_again(self)
+        return replace(self, settings=replace(self.settings, first_again=again))
 
     def check_friction(self, frames: Sequence[FrameForces]) -> tuple[list[FrameForces], FrictionCheck | None]:
         """What the motion of all solved frames says of the friction that was given, and how far they hold after it."""
@@ -226,6 +231,10 @@ def renew_first(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> S
     renewed, positions = None, ask_first_again(sequence, frames)
     if positions is not None and positions.fn.any():
         renewed = _solve_first(sequence, positions, "later photographs tell the errors of its grains' own")
+    elif sequence.settings.first_again:
+        positions = ask_first_in_full(sequence)
+        if positions is not None and positions.fn.any():
+            renewed = _solve_first(sequence, positions, "its positions were asked at length when all were known")
     if len(frames) > 1:
         carried = carry_back(sequence, frames[0] if renewed is None else renewed.forces, frames[1])
         if carried is not None:
@@ -243,7 +252,7 @@ def _solve_first(sequence: CorrectedSequence, told: FramePosterior, why: str) ->
 
 def solve_all(sequence: CorrectedSequence, progress: Callable[[int], None] = lambda _: None) -> list[SolvedFrame]:
     """All frames as a run states them: the first as it is seen from the others. progress hears how many are solved."""
-    frames = []
+    frames, sequence = [], sequence.with_first_renewed()
     for frame in solve_frames(sequence):
         frames.append(frame)
         progress(len(frames))

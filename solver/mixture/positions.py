@@ -29,9 +29,14 @@ class Positions:
         settings: PosteriorSettings,
         workers: int | None = None,
         told: Mapping[int, FramePosterior] | None = None,
+        *,
+        first_again: bool = False,
     ) -> None:
-        """workers: threads; None: one for every core. told: what they say of some frames, where it is known better."""
-        self._workers = workers
+        """workers: threads; None: one for every core. told: what they say of some frames, where it is known better.
+
+        first_again: frame 0 is asked again when all are known, and need not be asked at length before.
+        """
+        self._workers, self._first_again = workers, first_again
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._gathered: SequenceEvidence | None = None
         self._known: dict[int, FramePosterior | None] = dict(told or {})
@@ -52,7 +57,9 @@ class Positions:
         evidence = self._gathered.of_frame(k, verdicts=verdicts)
         if evidence.contacts.count == 0:
             return None
-        settings = self._gathered.settings.alone() if k == 0 else self._gathered.settings  # no motion leads to frame 0
+        settings = self._gathered.settings
+        if k == 0 and not self._first_again:  # no motion leads to frame 0
+            settings = settings.alone()
         return infer_frame(evidence, settings, draws_of(k), self._workers)
 
 

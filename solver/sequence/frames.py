@@ -128,7 +128,11 @@ def _prepare(
         snapshots = bridge_frames(snapshots, unbelieved)
         snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
     asked = settings.asks_positions and len(snapshots) > 1
-    positions = Positions(packing, snapshots, settings.posterior, settings.workers, told) if asked else None
+    positions = None
+    if asked:
+        positions = Positions(
+            packing, snapshots, settings.posterior, settings.workers, told, first_again=settings.first_again
+        )
     return _Ready(SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known), failed, remark)
 
 

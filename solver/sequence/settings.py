@@ -29,6 +29,7 @@ class SequenceSettings:
     ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
     positions: Literal["needed", "always", "never"] = "needed"  # ensemble: ask positions alone where motion says little
     posterior: PosteriorSettings = field(default_factory=PosteriorSettings)
+    first_again: bool = False  # positions of the first frame are asked again when all are known: beforehand, briefly
     soft: bool = False  # grains overlap by more than noise and errors: positions are asked of every frame
     overlap_seen: float = 0.0  # [m] mean overlap of soft grains by their gaps; 0: these do not show it
     soft_trust: float = SEEN_AT_MOST  # the most that their overlaps are believed

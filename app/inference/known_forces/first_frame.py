@@ -35,6 +35,26 @@ SEED = 1  # of the draws behind the deviations that are left
 UNSOUND = (FrameStatus.FAILED, FrameStatus.SUSPECT)
 
 
+def expects_to_ask_again(sequence: CorrectedSequence) -> bool:
+    """Whether later frames will probably tell more of the first one's positions than it does by itself."""
+    calibration, failed = sequence.calibration, sequence.failed
+    if calibration is None or not calibration.applied or 0 in failed:
+        return False
+    return sequence.tracks.frame_count - len(failed) > FEWEST
+
+
+def ask_first_in_full(sequence: CorrectedSequence) -> FramePosterior | None:
+    """What the positions of the first frame say by themselves; None where no two bodies are near."""
+    try:
+        evidence = gather_evidence_of(sequence, sequence.tracks)
+    except ValueError:
+        return None
+    first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS))
+    if first.contacts.count == 0:
+        return None
+    return infer_frame(first, evidence.settings.alone(), draws_of(0), sequence.settings.workers)
+
+
 def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> FramePosterior | None:
     """What the positions of the first frame say of its forces, once those of the others are known.
 

@@ -76,6 +76,23 @@ def test_it_follows_from_the_others_alone(wrong_centres):
     np.testing.assert_array_equal(first.fn, again.fn)
 
 
+def test_who_expects_to_ask_again_and_cannot_asks_at_length(wrong_centres, monkeypatch):
+    sequence, _, before = wrong_centres
+    expecting = sequence.with_first_renewed()
+    assert expecting.settings.first_again
+    assert not replace(sequence, calibration=None).with_first_renewed().settings.first_again
+    monkeypatch.setattr(inference, "ask_first_again", lambda *_: None)
+    monkeypatch.setattr(inference, "carry_back", lambda *_: None)
+    frames = [each.forces for each in before]
+    assert renew_first(sequence, frames) is None
+    renewed = renew_first(expecting, frames)
+    assert renewed is not None
+    assert "asked at length" in renewed.forces.reason
+    one, two = frames[0], renewed.forces
+    force = [np.column_stack([each.fn, each.ft]) for each in (one, two)]
+    assert compare_forces(one.contacts.key, force[0], two.contacts.key, force[1]).r_fn > 0.98
+
+
 def test_nothing_is_asked_where_nothing_can_be_told(wrong_centres):
     sequence, _, before = wrong_centres
     frames = [each.forces for each in before]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from solver.bodies.grains import Grains
+from solver.mixture import positions
 from solver.mixture.positions import Positions
 from solver.mixture.softness import find_overlap
 from solver.posterior.settings import PosteriorSettings
@@ -49,3 +50,13 @@ def test_positions_say_the_same_of_a_frame_whatever_was_asked_before(soft) -> No
     assert first is not None
     assert second is not None
     assert np.array_equal(first.fn, second.fn)
+
+
+def test_the_first_frame_is_asked_at_length_unless_it_is_asked_again(soft, monkeypatch) -> None:
+    brief, kept = PosteriorSettings(annealing=20, settling=5, kept=10), []
+    monkeypatch.setattr(positions, "infer_frame", lambda _, settings, *rest: kept.append(settings.kept))
+    for first_again in (False, True):
+        asked = Positions(soft.packing, soft.snapshots, brief, first_again=first_again)
+        asked.at(0)
+        asked.at(2)
+    assert kept == [brief.alone().kept, brief.kept, brief.kept, brief.kept]
