@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
 
+LEVELS = 8  # of P(bears force), over which rattlers are counted
+
 
 def contacts_per_grain(contacts: Contacts, bearing: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Number of bearing contacts of every grain (n,), those with walls included."""
@@ -28,6 +30,16 @@ def rattlers(contacts: Contacts, bearing: NDArray[np.bool_], present: NDArray[np
         if not lost.any():
             return loose
         bearing &= ~lost
+
+
+def expected_rattlers(contacts: Contacts, bears: Array, present: NDArray[np.bool_]) -> float:
+    """Expected number of rattlers, from P(bears force) of the contacts (c,).
+
+    A mean over LEVELS of the probability from which on a contact counts: contacts of one grain are doubtful together,
+    and the grains that one level alone finds are fewer than there are, for a doubt frees more grains than it holds.
+    """
+    levels = (np.arange(LEVELS) + 0.5) / LEVELS
+    return float(np.mean([rattlers(contacts, bears > level, present).sum() for level in levels]))
 
 
 def coordination_number(

@@ -12,7 +12,7 @@ from solver.bodies.grains import Array, Grains
 from solver.bodies.packing import Material
 from solver.bodies.quantity import Quantity, quantities
 from solver.bodies.walls import Walls
-from solver.contacts.connectivity import coordination_number, rattlers
+from solver.contacts.connectivity import coordination_number, expected_rattlers
 from solver.contacts.contacts import Contacts
 from solver.statistics.fabric import anisotropies, contact_fabric, fabric_anisotropy
 from solver.statistics.force_chains import find_force_chains
@@ -78,7 +78,7 @@ class FrameStatistics:
     principal_direction: Annotated[float, Quantity("direction of σ₁, in (−π/2, π/2]", "rad")]
     coordination_number: Annotated[float, Quantity("contacts with force per grain, those with walls counted once")]
     coordination_number_without_rattlers: Annotated[float, Quantity("contacts with force per grain that is no rattler")]
-    rattler_count: Annotated[int, Quantity("grains that cannot be in balance: fewer than two contacts")]
+    rattler_count: Annotated[int, Quantity("grains with fewer than two contacts, as many as are expected")]
     contact_count: Annotated[int, Quantity("contacts bearing force, as many as are expected to")]
     sliding_fraction: Annotated[float, Quantity("share of the contacts bearing force that slide")]
     mean_fn: Annotated[float, Quantity("mean f_n over contacts bearing force", "N")]
@@ -199,7 +199,7 @@ def frame_statistics(
         coordination_number_without_rattlers=coordination_number(
             contacts, surely, counted, without_rattlers=True, weight=likely.bears
         ),
-        rattler_count=int(rattlers(contacts, surely, counted).sum()),
+        rattler_count=round(expected_rattlers(contacts, likely.bears, counted)),
         contact_count=round(float(weight.sum())),
         sliding_fraction=weighted_mean(slides, weight),
         mean_fn=weighted_mean(carried, weight),

@@ -68,7 +68,13 @@ def study(
     estimator: Annotated[
         Literal["ensemble", "nlgs"], tyro.conf.arg(help="mean of seven solutions, or one chain")
     ] = "ensemble",
-    ensemble: Annotated[int, tyro.conf.arg(metavar="K", help="uncertainty: sequences solved again")] = 8,
+    ensemble: Annotated[
+        int | None,
+        tyro.conf.arg(
+            metavar="K",
+            help="uncertainty: sequences solved again, default 8; intervals: what they add to the deviations",
+        ),
+    ] = None,
     worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
     fit: Annotated[
@@ -123,7 +129,7 @@ def study(
     if subject == "numbers":
         return _study_numbers(asked, fit=fit)
     if subject == "intervals":
-        return _study_intervals(asked, fit=fit)
+        return _study_intervals(asked, fit=fit, members=ensemble or 0)
     if subject == "budget":
         return _study_budget(asked, fit=fit)
     for option, given in (("--worlds", worlds), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
@@ -144,7 +150,8 @@ def study(
             study_accuracy(seeds, grains=grains, folder=out, estimator=estimator, console=console, progress=progress)
         elif subject == "uncertainty":
             study_uncertainty(
-                seeds[:half], seeds[half:], members=ensemble, grains=grains, estimator=estimator, folder=out,
+                seeds[:half], seeds[half:], members=8 if ensemble is None else ensemble, grains=grains,
+                estimator=estimator, folder=out,
                 console=console, progress=progress,
             )  # fmt: skip
         elif subject == "status":
@@ -257,12 +264,13 @@ def _study_numbers(asked: _Asked, *, fit: tuple[int, ...]) -> int:
     return 0
 
 
-def _study_intervals(asked: _Asked, *, fit: tuple[int, ...]) -> int:
+def _study_intervals(asked: _Asked, *, fit: tuple[int, ...], members: int) -> int:
     from ...study.worlds import interval_fit, intervals
     from ...study.worlds.contact_errors import ContactErrors, measure_errors
     from ...study.worlds.solved_world import solve_worlds
+    from ...study.worlds.world_table import WIDTH
 
-    console = table_console()
+    console = table_console(WIDTH)
     with progress_of(asked.quiet) as progress:
         if fit:
             known = ContactErrors.joined([
@@ -270,11 +278,16 @@ def _study_intervals(asked: _Asked, *, fit: tuple[int, ...]) -> int:
             ])  # fmt: skip
             interval_fit.print_fit(console, interval_fit.fit_intervals(known))
             intervals.print_intervals(console, "On the worlds and seeds of the fit, constants in use", known)
-        solved = solve_worlds(asked.plan, asked.worlds or intervals.JUDGE_WORLDS, asked.seeds, progress)
-        judged = [measure_errors(each) for each in solved]
-    intervals.print_intervals(
-        console, "Share of contacts within one and two stated deviations, %", ContactErrors.joined(judged)
-    )
+        worlds = asked.worlds or intervals.JUDGE_WORLDS
+        judged, widened = [], []
+        for each in solve_worlds(asked.plan, worlds, asked.seeds, progress, members=members):
+            judged.append(measure_errors(each))
+            widened += [measure_errors(each, widened=True)] if members else []
+    title = "Share of contacts within one and two stated deviations, %"
+    intervals.print_intervals(console, title, ContactErrors.joined(judged))
+    if members:
+        told = f"The same with the spread of {members} sequences solved again"
+        intervals.print_intervals(console, told, ContactErrors.joined(widened))
     return 0
 
 

@@ -54,9 +54,12 @@ class ContactErrors:
         return cls(*(np.concatenate([getattr(each, field.name) for each in parts]) for field in fields(cls)))
 
 
-def measure_errors(solved: SolvedWorld) -> ContactErrors:
-    """Errors of all frames of a solved world; where nothing tells a size, truth is brought to ours."""
-    told = solved.checked
+def measure_errors(solved: SolvedWorld, *, widened: bool = False) -> ContactErrors:
+    """Errors of all frames of a solved world; where nothing tells a size, truth is brought to ours.
+
+    widened: with the deviations that its members give.
+    """
+    told = solved.widened if widened else solved.checked
     parts = [
         _of_frame(solved, each.forces, told[k], *solved.true[k])
         for k, each in enumerate(solved.frames)

@@ -139,4 +139,4 @@ def _fit_quantiles(columns: csr_array, size: Array, weight: Array, cells: csr_ar
             slope = slope - columns.T @ pull
         return value, slope
 
-    return minimize(loss, np.zeros(columns.shape[1]), jac=True, method="L-BFGS-B", options={"maxiter": 400}).x
+    return minimize(loss, np.zeros(len(ridge)), jac=True, method="L-BFGS-B", options={"maxiter": 400}).x

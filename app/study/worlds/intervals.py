@@ -6,7 +6,7 @@ seeds of other worlds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,19 +68,33 @@ def print_intervals(console: Console, title: str, errors: ContactErrors) -> None
     beside = [f"{what} {name}" for name in COMPONENTS for what in ("mean", "score")]
     for heading in ("number", *shares, *beside):
         table.add_column(heading, justify="right")
+    table.add_column("beyond")
     one = np.quantile(np.abs(errors.error[_later(errors)]), COVERED[1], axis=0) / 2.0
     rows = [*GROUPS.items()]
     rows += [(str(world), _of_world(world)) for world in np.unique(errors.world)]
     for name, choose in rows:
         part = errors.select(choose(errors))
         if len(part.group):
-            told = [f"{100.0 * share:.0f}" for share in covered(part)]
-            table.add_row(name, str(len(part.group)), *told, *_beside(part, one))
+            shares = covered(part)
+            told = [f"{100.0 * share:.0f}" for share in shares]
+            table.add_row(name, str(len(part.group)), *told, *_beside(part, one), tell_misses(shares))
     console.print(table)
     console.print(
         "Mean: stated deviation over the mean f_n. Score: of intervals of two deviations, over the score with one "
-        "deviation for all contacts, which covers 95 % of them; below 1 is better.", highlight=False, soft_wrap=True,
+        "deviation for all contacts, which covers 95 % of them; below 1 is better. Beyond: shares that are off by more "
+        "than 5 % within one deviation, 2 % within two, too many (+) or too few (−).", highlight=False, soft_wrap=True,
     )  # fmt: skip
+
+
+def tell_misses(shares: Sequence[float]) -> str:
+    """Which of the shares that `covered` gives are off by more than TOLERANCE, and to which side; empty: none."""
+    names = [f"{name} {share}" for name in COMPONENTS for share in (68, 95)]
+    told = [
+        f"{name} {'+' if share > aimed else '−'}"
+        for name, share, aimed, tolerance in zip(names, shares, COVERED * 2, TOLERANCE * 2, strict=True)
+        if abs(share - aimed) > tolerance
+    ]
+    return ", ".join(told)
 
 
 def _beside(errors: ContactErrors, one: Array) -> list[str]:

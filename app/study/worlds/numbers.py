@@ -41,6 +41,8 @@ FIT_WORLDS: tuple[WorldName, ...] = (
 )
 FITTED = (Witness.MOTION, Witness.BOTH, Witness.POSITIONS)  # statistics of a first frame have no deviation
 BIASED = 0.05  # of the true value: more is a bias to be told
+FAR_OFF = 0.15  # of the true value: more in one world is to be covered by the interval …
+COVERS = 0.93  # … with this share of its frames within two deviations
 CONE = 0.999  # quantile of |f_t| / f_n of true contacts that is their friction, for a fifth of them are on the cone
 IN_PI = ("principal_direction",)  # directions: the same after half a turn
 SHAPES = ("fn_density", "ft_density", "mobilisation_density")  # compared as a whole: the share that is elsewhere
@@ -130,8 +132,8 @@ def print_numbers(console: Console, found: Sequence[Compared]) -> None:
 def print_by_world(console: Console, found: Sequence[Compared], name: str) -> None:
     """Print one row for every world: a statistic stated and true, its bias, its interval and how often that covers."""
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-    for heading in (name, "true", "stated", "bias", "deviation", "68 %", "95 %"):
-        table.add_column(heading, justify="left" if heading == name else "right")
+    for heading in (name, "true", "stated", "bias", "deviation", "68 %", "95 %", ""):
+        table.add_column(heading, justify="left" if heading in (name, "") else "right")
     for row in world_rows(found, name):
         table.add_row(*row)
     console.print(table)
@@ -148,8 +150,18 @@ def world_rows(found: Sequence[Compared], name: str) -> list[list[str]]:
         )
         values = (np.nanmean(true), np.nanmean(stated), np.nanmean(deviation))
         true_mean, stated_mean, deviation_mean = (f"{value:.3g}" for value in values)
-        rows.append([world, true_mean, stated_mean, _told(relative_bias(here), name), deviation_mean, *_covered(here)])
+        bias, covered = relative_bias(here), _covered(here)
+        rows.append([
+            world, true_mean, stated_mean, _told(bias, name), deviation_mean, *covered, _tell_far_off(bias, covered[1]),
+        ])  # fmt: skip
     return rows
+
+
+def _tell_far_off(bias: float, within_two: str) -> str:
+    """Whether a bias in one world is far off, and if it is, whether the interval covers."""
+    if not abs(bias) > FAR_OFF:
+        return ""
+    return "covered" if within_two != NONE_TOLD and float(within_two) >= 100.0 * COVERS else "far off"
 
 
 def number_rows(found: Sequence[Compared]) -> list[list[str]]:

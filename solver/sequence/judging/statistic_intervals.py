@@ -30,7 +30,7 @@ DEVIATION: dict[str, tuple[float, float, float]] = {
     "coordination_number_without_rattlers": (0.087, 0.058, 0.055),
     "rattler_count": (0.41, 1.3, 1),
     "contact_count": (0.074, 0.11, 0.066),
-    "sliding_fraction": (0.13, 0.26, 0.46),
+    "sliding_fraction": (0.16, 0.26, 0.46),  # of rods 1:5 in size a whole packing is off by what others are in a frame
     "mobilisation": (0.065, 0.29, 0.64),
     "mean_fn": (0.17, 0.24, 0.58),
     "max_fn": (0.28, 0.47, 0.58),

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.study.worlds.contact_errors import ContactErrors
+from rodsight.study.worlds.contact_errors import ContactErrors, measure_errors
 from rodsight.study.worlds.interval_fit import fit_intervals
-from rodsight.study.worlds.intervals import COVERED, TOLERANCE, covered, interval_score
+from rodsight.study.worlds.intervals import COVERED, TOLERANCE, covered, interval_score, tell_misses
+from rodsight.study.worlds.solved_world import solve_one
+from rodsight.study.worlds.world_score import WorldPlan
 
 from solver.sequence.judging.intervals import Group
 
@@ -54,3 +56,17 @@ def test_the_score_is_least_for_the_narrowest_intervals_that_cover():
     error = np.random.default_rng(3).standard_normal(COUNT)
     scores = {width: interval_score(error, np.full(COUNT, width)) for width in (0.6, 0.98, 2.0)}
     assert min(scores, key=lambda width: scores[width]) == 0.98
+
+
+def test_what_is_beyond_its_tolerance_is_told_with_its_side():
+    assert tell_misses((0.72, 0.94, 0.64, 0.97)) == ""
+    assert tell_misses((0.74, 0.95, 0.68, 0.93)) == "f_n 68 +, f_t 95 −"
+
+
+@pytest.mark.screen  # a world of its own, solved twice
+def test_members_widen_what_is_stated_and_never_narrow_it(tmp_path):
+    solved = solve_one(WorldPlan(40, tmp_path), "shear", 1, members=1)
+    alone, together = (measure_errors(solved, widened=widened) for widened in (False, True))
+    assert (together.error == alone.error).all()
+    assert (together.deviation >= alone.deviation).all()
+    assert together.deviation.mean() > 1.005 * alone.deviation.mean()

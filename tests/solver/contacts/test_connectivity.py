@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.contacts.connectivity import contacts_per_grain, coordination_number, rattlers
+from solver.contacts.connectivity import contacts_per_grain, coordination_number, expected_rattlers, rattlers
 from solver.contacts.contacts import Contacts
 
 
@@ -26,6 +26,13 @@ def test_a_contact_counts_for_both_its_grains_and_a_wall_for_one():
 def test_what_hangs_on_a_loose_grain_is_loose_too():
     assert rattlers(RING, ALL, HERE).tolist() == [False, False, False, True, True]
     assert rattlers(RING, ALL & (np.arange(6) != 0), HERE).tolist() == [True] * 5
+
+
+def test_as_many_rattle_as_are_expected_to_where_a_contact_is_doubtful():
+    sure = ALL.astype(float)
+    assert expected_rattlers(RING, sure, HERE) == 2.0
+    doubtful = np.where(np.arange(6) == 0, 0.75, sure)  # likely enough to count alone, and all five rattle without it
+    assert expected_rattlers(RING, doubtful, HERE) == 0.75 * 2 + 0.25 * 5
 
 
 def test_the_coordination_number_is_the_mean_over_grains_that_are_there():

@@ -10,6 +10,7 @@ from solver.sequence.judging.intervals import (
     FLOOR,
     NO_FRICTION,
     SLOPE,
+    TOLD_HIGH,
     USUAL_CHANGE,
     Group,
     Term,
@@ -137,6 +138,6 @@ def test_a_wrong_friction_widens_strong_contacts_most_and_weak_ones_by_a_share_o
     assert sideways[-1] == pytest.approx(0.26 * np.hypot(0.6 * frame.fn[-1], 0.4 * mean))
     assert (widen_for_friction(frame, 0.25, 0.25).ft_sd == frame.ft_sd).all()
     high = widen_for_friction(frame, 0.26, 0.2)
-    assert np.hypot(frame.fn_sd[1:], 0.75 * np.log(1.3) * added[1:]) == pytest.approx(high.fn_sd[1:])
+    assert np.hypot(frame.fn_sd[1:], TOLD_HIGH * np.log(1.3) * added[1:]) == pytest.approx(high.fn_sd[1:])
     alone = replace(frame, positions_share=1.0)  # positions know nothing of sliding
     assert (widen_for_friction(alone, 0.2, 0.26).fn_sd == alone.fn_sd).all()

@@ -34,6 +34,12 @@ def test_what_is_seen_to_slide_against_its_force_slides_more_likely_than_what_sl
     assert noise < 1.2 * still
 
 
+def test_what_leapt_in_the_interval_may_have_come_to_rest_since():
+    slip = np.array([8.0, 60.0])
+    seen, leapt = sliding_probability(np.full(2, 0.9), _signs(2, slip=slip, reach=np.ones(2)))
+    assert 0.3 * seen < leapt < 0.8 * seen
+
+
 def test_what_is_heavy_comes_to_rest_off_the_cone():
     mobilised = np.full(2, 0.9)
     for borne in (None, 0.4):
