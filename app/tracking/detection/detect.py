@@ -19,7 +19,7 @@ from scipy.spatial import KDTree
 from solver.bodies.grains import Array
 
 from ...experiment.photographs import Image
-from .discs import OVERLAP, find_discs
+from .discs import OVERLAP, Discs, find_discs
 from .outlines import Measured, Outliner
 from .rings import Circles, find_circles, without_overlap
 
@@ -103,7 +103,8 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     if whole is not None and whole.covered > CLEAN and whole.spread < EVEN:
         # Nothing is painted on the grains, so a little of an outline tells, and gaps may be as narrow as they like.
         outliner.plain = True
-        table, complete = _judge_discs(outliner, table, smallest, CLEAN_QUALITY * settings.quality_least)
+        first_discs = whole if smallest <= SMALLEST else None
+        table, complete = _judge_discs(outliner, table, smallest, CLEAN_QUALITY * settings.quality_least, first_discs)
     if not complete:
         rough = find_circles(image, radii, score_least=settings.score_least)
         table = _judge(outliner, rough, table, known, settings.quality_least)
@@ -170,16 +171,18 @@ def _closer(outliner: Outliner, rough: Measured, close: Measured) -> Measured:
     return close if close.sigma < sigma else replace(rough, sigma=sigma)
 
 
-def _judge_discs(outliner: Outliner, table: Array, smallest: float, quality_least: float) -> tuple[Array, bool]:
+def _judge_discs(
+    outliner: Outliner, table: Array, smallest: float, quality_least: float, first: Discs | None = None
+) -> tuple[Array, bool]:
     """The table x, y, radius, quality (c, 4) with the discs that prove grains, in passes over what each leaves.
 
-    Discs that leave much of the bright uncovered are not taken for grains. Returns also whether next to nothing of the
-    bright is left.
+    Discs that leave much of the bright uncovered are not taken for grains. first: the discs of the first pass, where
+    they are known. Returns also whether next to nothing of the bright is left.
     """
     level = outliner.level()
     whole, left = 0.0, np.inf
     for k in range(DISC_PASSES + 1):
-        discs = find_discs(level, table, smallest)
+        discs = first if k == 0 and first is not None else find_discs(level, table, smallest)
         whole, left = max(whole, discs.area), discs.area
         if k == DISC_PASSES or len(discs.candidates.x) == 0 or discs.covered < CLEAN_REST:
             break

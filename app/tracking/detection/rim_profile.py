@@ -34,6 +34,7 @@ NEAREST_DARK = 1.0
 # Scatter of C/A that paint makes [1/px], and misfit of the model [grey] against which it is weighed.
 PAINT_SLOPE = 0.25
 MISFIT = 3.0
+FAR = 6.0  # widths of the blur beyond which an edge is over: 1e-9 of it is left
 
 
 def locate_edges(
@@ -144,8 +145,13 @@ def _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expec
             square = 0.0
             for k in range(low, high + 1):
                 t = (edge - (first + step * k)) / width
-                cumulative = 0.5 * math.erfc(-t * math.sqrt(0.5))
-                density = math.exp(-0.5 * t * t) * 0.3989422804014327
+                if t > FAR:
+                    cumulative, density = 1.0, 0.0
+                elif t < -FAR:
+                    cumulative, density = 0.0, 0.0
+                else:
+                    cumulative = 0.5 * math.erfc(-t * math.sqrt(0.5))
+                    density = math.exp(-0.5 * t * t) * 0.3989422804014327
                 ramp = width * (t * cumulative + density)
                 e = rays[p, k] - dark[p] - level * cumulative - slope * ramp
                 j0 = level * density / width + slope * cumulative
