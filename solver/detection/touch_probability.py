@@ -21,7 +21,7 @@ from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
 from solver.contacts.pairs import join_keys, split_keys
 from solver.detection.displacement import displacement_scale
-from solver.detection.touch_probability_kernels import smooth_candidates
+from solver.detection.touch_probability_kernels import CLOSES, DECAY, OPENS, SPREADS, smooth_candidates
 
 OPEN_STATES = 48  # open gaps, spaced quadratically: fine where touching is decided
 STAY = 0.95  # probability that a contact lasts one interval
@@ -170,13 +170,14 @@ def smooth_gaps(gap: Array, sigma: Array, scale: Array, settings: ContactProbabi
         return SmoothedGaps(touch, mean, variance)
     widest = max(6.0 * float(scale.max(initial=0.0)), 12.0 * float(np.median(sigma[known])))
     state_gap, width = _states(widest)
-    transition = np.stack([_transition(state_gap, width, s) for s in scale]) if frames > 1 else np.empty((0, 1, 1))
+    steps = [find_transition(state_gap, width, s) for s in scale]
+    transition = np.stack(steps) if frames > 1 else np.empty((0, 4, len(width)))
     start = np.concatenate([[FIRST_TOUCH], (1.0 - FIRST_TOUCH) * width[1:] / width[1:].sum()])
     states = len(state_gap)
     smooth_candidates(
         gap + 0.5 * settings.overlap, sigma, LOWEST_GAP, state_gap, start,
-        transition, np.ascontiguousarray(transition.transpose(0, 2, 1)), LIKELIHOOD_FLOOR,
-        np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), touch,
+        transition, width, STAY, LIKELIHOOD_FLOOR,
+        np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), np.empty((3, states)), touch,
         settings.overlap**2 + width**2 / 12.0, np.maximum(sigma**2 - settings.overlap**2, (1e-3 * sigma) ** 2),
         mean, variance,
     )  # fmt: skip
@@ -198,14 +199,14 @@ def _states(widest: float) -> tuple[Array, Array]:
     return np.concatenate([[0.0], middle]), np.concatenate([[0.0], np.diff(edge)])
 
 
-def _transition(state_gap: Array, width: Array, scale: float) -> Array:
-    """Probability of going from state (row) to state (column) in one interval (q, q); rows sum to 1."""
-    matrix = np.empty((len(state_gap), len(state_gap)))
+def find_transition(state_gap: Array, width: Array, scale: float) -> Array:
+    """How states follow one another in one interval, in rows (4, q) as the kernel reads them."""
+    rows = np.zeros((4, len(state_gap)))
+    rows[DECAY, 2:] = np.exp(-np.diff(state_gap[1:]) / scale)
     opened = np.exp(-(state_gap - state_gap[1])[1:] / scale) * width[1:]
-    matrix[0, 0] = STAY
-    matrix[0, 1:] = (1.0 - STAY) * opened / opened.sum()
+    rows[OPENS, 1:] = (1.0 - STAY) * opened / opened.sum()
     # A gap that would close by more than itself touches: the Laplace law's mass below zero.
-    matrix[1:, 0] = 0.5 * np.exp(-state_gap[1:] / scale)
+    rows[CLOSES, 1:] = 0.5 * np.exp(-state_gap[1:] / scale)
     moved = np.exp(-np.abs(state_gap[1:, None] - state_gap[None, 1:]) / scale) * width[None, 1:]
-    matrix[1:, 1:] = (1.0 - matrix[1:, :1]) * moved / moved.sum(axis=1, keepdims=True)
-    return matrix
+    rows[SPREADS, 1:] = (1.0 - rows[CLOSES, 1:]) / moved.sum(axis=1)
+    return rows

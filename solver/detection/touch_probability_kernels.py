@@ -1,4 +1,8 @@
-"""The hidden Markov smoother's loop over candidate pairs, frames and states."""
+"""The hidden Markov smoother's loop over candidate pairs, frames and states.
+
+How far a gap moves in an interval follows Laplace's law, exp(−|g − g'| / scale): sums with it over all states are two
+recursions along the states, one up and one down, instead of a product with a matrix.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +11,26 @@ from numba import njit
 
 from solver.bodies.grains import Array
 
+# Rows of a transition, by state: what is left of Laplace's law from the state below to this one; probability that a
+# contact opens to this state; that it closes from it; and that it does not, over the law's sum over all open states.
+DECAY, OPENS, CLOSES, SPREADS = range(4)
 
-@njit(cache=True)
+
+@njit(cache=True, error_model="numpy")
 def smooth_candidates(
     gap: Array,  # (f, c) [m] measured gap plus half an overlap; NaN: unknown
     sigma: Array,  # (f, c) [m] standard deviation of the gap
     lowest: float,  # [σ_g] a deeper overlap counts as this one
     state_gap: Array,  # (q,) [m] gap of each state, ascending; state 0 touches
     start: Array,  # (q,) probability of the states in the first frame
-    forward: Array,  # (f − 1, q, q) transition from row to column
-    backward: Array,  # (f − 1, q, q) its transpose
+    transition: Array,  # (f − 1, 4, q), of `find_transition`
+    extent: Array,  # (q,) [m] width of the interval of gaps that a state stands for
+    stay: float,  # probability that a contact lasts one interval
     floor: float,  # least likelihood of a measurement, for outliers
     emission: Array,  # (f, q) scratch
     alpha: Array,  # (f, q) scratch
     beta: Array,  # (2, q) scratch
+    moved: Array,  # (3, q) scratch
     touch: Array,  # (f, c) out: probability that the pair touches
     width: Array,  # (q,) [m²] variance of the true gap within a state
     error: Array,  # (f, c) [m²] variance of the measured gap about the true one
@@ -29,6 +39,8 @@ def smooth_candidates(
 ) -> None:
     frames, candidates = gap.shape
     states = len(state_gap)
+    farthest = -2.0 * np.log(floor) + 1e-6
+    value, up, down = moved[0], moved[1], moved[2]
     for c in range(candidates):
         for f in range(frames):
             measured = gap[f, c]
@@ -40,7 +52,7 @@ def smooth_candidates(
             measured = min(max(measured, lowest * s), state_gap[states - 1])
             for q in range(states):
                 z = (measured - state_gap[q]) / s
-                emission[f, q] = max(np.exp(-0.5 * z * z), floor)
+                emission[f, q] = max(np.exp(-0.5 * z * z), floor) if z * z < farthest else floor
 
         total = 0.0
         for q in range(states):
@@ -49,12 +61,16 @@ def smooth_candidates(
         for q in range(states):
             alpha[0, q] /= total
         for f in range(1, frames):
-            for r in range(states):
-                alpha[f, r] = 0.0
-            for q in range(states):
-                a = alpha[f - 1, q]
-                for r in range(states):
-                    alpha[f, r] += a * forward[f - 1, q, r]
+            step, before = transition[f - 1], alpha[f - 1]
+            for r in range(1, states):
+                value[r] = before[r] * step[SPREADS, r]
+            closed = stay * before[0]
+            for r in range(1, states):
+                closed += before[r] * step[CLOSES, r]
+            alpha[f, 0] = closed
+            _blur(value, step[DECAY], up, down)
+            for r in range(1, states):
+                alpha[f, r] = (up[r] + down[r]) * extent[r] + before[0] * step[OPENS, r]
             total = 0.0
             for r in range(states):
                 alpha[f, r] *= emission[f, r]
@@ -70,12 +86,17 @@ def smooth_candidates(
             alpha[frames - 1], beta[0], gap[frames - 1, c], error[frames - 1, c], state_gap, width
         )
         for f in range(frames - 2, -1, -1):
-            for q in range(states):
-                beta[1, q] = 0.0
-            for r in range(states):
+            step = transition[f]
+            touching = beta[0, 0] * emission[f + 1, 0]
+            opened = 0.0
+            for r in range(1, states):
                 b = beta[0, r] * emission[f + 1, r]
-                for q in range(states):
-                    beta[1, q] += b * backward[f, r, q]
+                opened += b * step[OPENS, r]
+                value[r] = b * extent[r]
+            _blur(value, step[DECAY], up, down)
+            for q in range(1, states):
+                beta[1, q] = (up[q] + down[q]) * step[SPREADS, q] + touching * step[CLOSES, q]
+            beta[1, 0] = stay * touching + opened
             total = 0.0
             share = 0.0
             for q in range(states):
@@ -87,7 +108,21 @@ def smooth_candidates(
             mean[f, c], variance[f, c] = _moments(alpha[f], beta[0], gap[f, c], error[f, c], state_gap, width)
 
 
-@njit(cache=True)
+@njit(inline="always")
+def _blur(value, decay, up, down):  # type: ignore[no-untyped-def]
+    """Set up + down to Σ_q value_q exp(−|g − g_q| / scale) for every open state, the first one being 1.
+
+    Both ways at once: each step of one waits for the step before it.
+    """
+    above, below, states = 0.0, 0.0, len(value)
+    for k in range(1, states):
+        above = above * decay[k] + value[k]
+        up[k] = above
+        down[states - k] = below
+        below = (below + value[states - k]) * decay[states - k]
+
+
+@njit(cache=True, error_model="numpy")
 def _moments(
     alpha: Array, beta: Array, measured: float, error: float, state_gap: Array, width: Array
 ) -> tuple[float, float]:

@@ -112,25 +112,37 @@ def test_half_an_overlap_is_allowed_for():
     np.testing.assert_allclose(shifted, probability(gap), atol=EXACT)
 
 
+def as_matrix(step: np.ndarray, state_gap: np.ndarray, width: np.ndarray, scale: float) -> np.ndarray:
+    """The probabilities (q, q) of going from row to column that the rows of a transition stand for."""
+    _, opens, closes, spreads = step
+    apart = np.abs(state_gap[:, None] - state_gap[None, :])
+    matrix = spreads[:, None] * np.exp(-apart / scale) * width[None, :]
+    matrix[:, 0], matrix[0] = closes, opens
+    matrix[0, 0] = 0.95
+    return matrix
+
+
 def test_smoother_agrees_with_summing_over_all_paths():
     from solver.detection import touch_probability as module
     from solver.detection.touch_probability_kernels import smooth_candidates
 
     rng = np.random.default_rng(1)
     states, frames = 4, 4
-    state_gap = np.array([0.0, 10e-6, 30e-6, 70e-6])
+    state_gap, width = np.array([0.0, 10e-6, 30e-6, 70e-6]), np.array([0.0, 20e-6, 20e-6, 60e-6])
     start = np.array([0.5, 0.1, 0.2, 0.2])
-    step = rng.dirichlet(np.ones(states), size=states)
+    step = module.find_transition(state_gap, width, 25e-6)
     gap = rng.uniform(0, 70e-6, (frames, 5))
     touch = np.empty((frames, 5))
-    forward = np.repeat(step[None], frames - 1, axis=0)
     smooth_candidates(
-        gap, np.full(gap.shape, SIGMA), module.LOWEST_GAP, state_gap, start, forward,
-        np.ascontiguousarray(forward.transpose(0, 2, 1)), 1e-12,
-        np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), touch,
+        gap, np.full(gap.shape, SIGMA), module.LOWEST_GAP, state_gap, start, np.repeat(step[None], frames - 1, axis=0),
+        width, module.STAY, 1e-12,
+        np.empty((frames, states)), np.empty((frames, states)), np.empty((2, states)), np.empty((3, states)), touch,
         np.zeros(states), np.full(gap.shape, SIGMA**2), np.empty(gap.shape), np.empty(gap.shape),
     )  # fmt: skip
-    expected = np.stack([enumerate_paths(gap[:, c], state_gap, start, step) for c in range(5)], axis=1)
+    expected = np.stack(
+        [enumerate_paths(gap[:, c], state_gap, start, as_matrix(step, state_gap, width, 25e-6)) for c in range(5)],
+        axis=1,
+    )
     np.testing.assert_allclose(touch, expected, atol=EXACT)
 
 
@@ -154,9 +166,10 @@ def test_an_unknown_gap_is_what_its_neighbours_in_time_make_of_it():
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e-4, 1e-1])
 def test_transitions_are_probabilities_at_any_scale(scale: float):
-    from solver.detection.touch_probability import _states, _transition
+    from solver.detection.touch_probability import _states, find_transition
 
-    matrix = _transition(*_states(5e-4), scale)
+    state_gap, width = _states(5e-4)
+    matrix = as_matrix(find_transition(state_gap, width, scale), state_gap, width, scale)
     assert matrix.min() >= 0
     np.testing.assert_allclose(matrix.sum(axis=1), 1.0, atol=EXACT)
 
