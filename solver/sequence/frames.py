@@ -17,6 +17,7 @@ from solver.bodies.packing import Packing
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
 from solver.detection.precision import believed_precision, measure_precision, with_precision
 from solver.detection.refinement import RefinedBlock, block_of, refine
+from solver.detection.touch_probability import AHEAD
 from solver.mixture.positions import Positions
 from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.failure import describe_error, failed_frame, find_fault, find_unseen, forget_forces
@@ -91,9 +92,8 @@ def solve_first_again(
     """
     verdicts = {} if verdicts is None else verdicts
     ready = _prepare(packing, snapshots, settings, verdicts, failed, {0: positions})
-    problem = pose_frame(
-        ready.sequence, 0, SequenceState.first(packing), _Blocks(ready.sequence).find(0), verdicts.get(0, NO_VERDICTS)
-    )
+    refined = _Blocks(ready.sequence).find_first()
+    problem = pose_frame(ready.sequence, 0, SequenceState.first(packing), refined, verdicts.get(0, NO_VERDICTS))
     frame, state = solve_frame(problem, SequenceState.first(packing))
     told = [ready.remark, why, frame.reason]
     return replace(frame, reason="; ".join(each for each in told if each)), state
@@ -151,14 +151,23 @@ class _Blocks:
 
     def find(self, k: int) -> RefinedBlock | None:
         """The block that frame k belongs to; None where a single chain solves it."""
-        packing, snapshots, settings = self._sequence.packing, self._sequence.snapshots, self._sequence.settings
-        if settings.estimator != "ensemble" or len(snapshots) < 2:
+        snapshots = self._sequence.snapshots
+        if self._sequence.settings.estimator != "ensemble" or len(snapshots) < 2:
             return None
         number, start, end = block_of(k, len(snapshots))
         if number != self._number:
-            self._block = refine(packing.grains, snapshots[start:end], settings.ensemble.probability, start=start)
-            self._number = number
+            self._block, self._number = self._refine(start, end), number
         return self._block
+
+    def find_first(self) -> RefinedBlock | None:
+        """What frame 0 alone is solved from: the window after it, for the rest of its block tells it nothing more."""
+        if self._sequence.settings.estimator != "ensemble" or len(self._sequence.snapshots) < 2:
+            return None
+        return self._refine(0, AHEAD + 1)
+
+    def _refine(self, start: int, end: int) -> RefinedBlock:
+        probability = self._sequence.settings.ensemble.probability
+        return refine(self._sequence.packing.grains, self._sequence.snapshots[start:end], probability, start=start)
 
 
 def _with_measured_precision(
