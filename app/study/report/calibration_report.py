@@ -18,8 +18,8 @@ from ... import __version__
 from ...progress import Progress, silent
 from ...synthetic.worlds.names import WorldName
 from ..worlds.contact_errors import ContactErrors, measure_errors
-from ..worlds.intervals import FIRST, GROUPS, covered
-from ..worlds.numbers import Compared, compare_numbers, number_rows, relative_bias
+from ..worlds.intervals import FIRST, GROUPS, covered, tell_misses
+from ..worlds.numbers import Compared, compare_numbers, number_rows, relative_bias, world_rows
 from ..worlds.solved_world import SolvedWorld, solve_worlds
 from ..worlds.world_score import WorldPlan
 
@@ -72,11 +72,18 @@ class CalibrationStudy:
         parts = {name: self.errors.select(choose(self.errors)) for name, choose in GROUPS.items()}
         return {name: covered(part) for name, part in parts.items() if len(part.group) >= FEW}
 
+    @property
+    def coverage_by_world(self) -> dict[str, tuple[float, ...]]:
+        """The same of all contacts of each world, its first frames left out."""
+        late = self.errors.select(GROUPS["all"](self.errors))
+        return {str(world): covered(late.select(late.world == world)) for world in np.unique(late.world)}
+
     def facts(self) -> dict[str, Any]:
         """All as plain values."""
         return {
             "version": __version__, "worlds": list(self.worlds), "seeds": list(self.seeds), "grains": self.grains,
             "data": self.data_hash, "contacts": len(self.errors.group), "coverage": self.coverage,
+            "coverage_by_world": self.coverage_by_world,
             "frames": len(self.frames.r), "too_trusting": self.too_trusting,
             "bias": {
                 name: relative_bias([each for each in self.numbers if each.name == name])
@@ -116,6 +123,17 @@ def broken(study: CalibrationStudy) -> list[str]:
     if abs(sliding) > MOST_SLIDING_BIAS:
         found.append(f"the share of sliding contacts is off by {100 * sliding:+.0f} %")
     return found
+
+
+def rows_of_coverage(study: CalibrationStudy) -> list[list[str]]:
+    """A row of cells for every kind of contact and every world: what is covered, and what of it is off."""
+    both = {**study.coverage, **study.coverage_by_world}
+    return [[name, *(f"{100.0 * share:.0f}" for share in shares), tell_misses(shares)] for name, shares in both.items()]
+
+
+def rows_of_sliding(study: CalibrationStudy) -> list[list[str]]:
+    """A row of cells for every world: the share of contacts that slide, under WORLD_HEADINGS."""
+    return world_rows(study.numbers, "sliding_fraction")
 
 
 def rows_of_numbers(study: CalibrationStudy) -> list[list[str]]:

@@ -13,8 +13,8 @@ from scipy.special import erf
 
 from ...figures.page import COLOURS, DASHES, INK, VERMILION, add_title, new_figure, paper_style
 from ..worlds.intervals import COMPONENTS, GROUPS
-from ..worlds.numbers import HEADINGS
-from .calibration_report import CalibrationStudy, rows_of_numbers
+from ..worlds.numbers import HEADINGS, WORLD_HEADINGS
+from .calibration_report import CalibrationStudy, rows_of_coverage, rows_of_numbers, rows_of_sliding
 
 REACH = 3.0  # deviations
 MARKS = "osv^D<>Ph*Xd"
@@ -40,9 +40,8 @@ td, th { padding: .1rem .9rem .1rem 0; text-align: right } td:first-child, th:fi
 the normal law. Above it intervals are too wide, below it too narrow.</p>
 <img src="{{ coverage }}" alt="Coverage of the intervals of normal and tangential forces by kind of contact">
 <table><thead><tr><th>contacts</th>
-<th>f_n 68 %</th><th>f_n 95 %</th><th>f_t 68 %</th><th>f_t 95 %</th></tr></thead><tbody>
-{% for name, shares in facts.coverage.items() %}<tr><td>{{ name }}</td>
-{% for share in shares %}<td>{{ "%.0f"|format(100 * share) }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
+<th>f_n 68 %</th><th>f_n 95 %</th><th>f_t 68 %</th><th>f_t 95 %</th><th>beyond 5 and 2 %</th></tr></thead><tbody>
+{% for row in covered %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
 <h2>Trust</h2>
 <p>Trust is a lower bound of the correlation with the true normal forces: at most 5 % of the frames may lie below the
 line. {{ "%.1f"|format(100 * facts.too_trusting) }} % do.</p>
@@ -52,6 +51,9 @@ line. {{ "%.1f"|format(100 * facts.too_trusting) }} % do.</p>
 {% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
 <p>Bias: mean of stated less true over the mean true value; of angles in degrees; of densities the share that lies in
 another bin. Scatter: of single frames about the bias. 68 %, 95 %: frames within one and two stated deviations.</p>
+<h3>The share of contacts that slide, by world</h3>
+<table><thead><tr>{% for each in world_headings %}<th>{{ each }}</th>{% endfor %}</tr></thead><tbody>
+{% for row in sliding %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
 </body></html>
 """)
 
@@ -61,8 +63,9 @@ def report_page(study: CalibrationStudy) -> str:
     with paper_style():
         coverage, trust = _encoded(draw_coverage(study)), _encoded(draw_trust(study))
     return _PAGE.render(
-        facts=study.facts(), coverage=coverage, trust=trust, headings=HEADINGS, rows=rows_of_numbers(study)
-    )
+        facts=study.facts(), coverage=coverage, covered=rows_of_coverage(study), trust=trust, headings=HEADINGS,
+        rows=rows_of_numbers(study), world_headings=WORLD_HEADINGS, sliding=rows_of_sliding(study),
+    )  # fmt: skip
 
 
 def draw_coverage(study: CalibrationStudy) -> Figure:

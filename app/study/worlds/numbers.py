@@ -50,6 +50,7 @@ NOT_COMPARED = ("area",)  # no estimate
 DEGREES = ("friction_angle", "wall_ratio_angle", "principal_direction", "friction_angle_of_anisotropies")
 
 NONE_TOLD = "–"  # where no deviation is stated
+WORLD_HEADINGS = ("world", "true", "stated", "bias", "deviation", "68 %", "95 %", "")
 HEADINGS = ("statistic", "true mean", "bias", "worst world", "bias there", "scatter", "68 %", "95 %", "")
 
 
@@ -132,7 +133,7 @@ def print_numbers(console: Console, found: Sequence[Compared]) -> None:
 def print_by_world(console: Console, found: Sequence[Compared], name: str) -> None:
     """Print one row for every world: a statistic stated and true, its bias, its interval and how often that covers."""
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-    for heading in (name, "true", "stated", "bias", "deviation", "68 %", "95 %", ""):
+    for heading in (name, *WORLD_HEADINGS[1:]):
         table.add_column(heading, justify="left" if heading in (name, "") else "right")
     for row in world_rows(found, name):
         table.add_row(*row)
@@ -140,7 +141,7 @@ def print_by_world(console: Console, found: Sequence[Compared], name: str) -> No
 
 
 def world_rows(found: Sequence[Compared], name: str) -> list[list[str]]:
-    """A row of cells for every world that a statistic is compared in."""
+    """A row of cells under WORLD_HEADINGS for every world that a statistic is compared in."""
     named = [each for each in found if each.name == name]
     rows = []
     for world in dict.fromkeys(each.world for each in named):

@@ -51,6 +51,9 @@ def test_the_page_tells_version_seeds_and_the_hash_of_its_data(study):
     assert other.data_hash != study.data_hash
     for word in (rodsight.__version__, "shear", "seeds", "sliding_fraction", "All that is stated holds", "doubtful"):
         assert (word in page) == (word != "doubtful"), word  # no doubtful contacts, nothing said of them
+    assert page.count("<tr><td>shear</td>") == 2  # its intervals, and the share that slides in it
+    narrow = report_page(replace(study, errors=replace(study.errors, deviation=0.8 * study.errors.deviation)))
+    assert ("f_n 68 −" in page, "f_n 68 −" in narrow) == (False, True)
     assert "http" not in page.replace("http://www.w3.org", "")  # it needs nothing else
 
 
