@@ -24,7 +24,7 @@ from ..worlds.solved_world import SolvedWorld, solve_worlds
 from ..worlds.world_score import WorldPlan
 
 # Between which shares a group's intervals hold, of one and of two deviations; and the same of few contacts.
-HOLDS = ((0.58, 0.83), (0.88, 0.99))
+HOLDS = ((0.60, 0.82), (0.91, 0.985))
 FEW = 400  # contacts of a group, below which nothing is said of it
 MOST_TOO_TRUSTING = 0.05  # of the frames: r may be below T in
 MOST_SLIDING_BIAS = 0.15  # of the true share of sliding contacts
