@@ -273,9 +273,7 @@ def _study_intervals(asked: _Asked, *, fit: tuple[int, ...], members: int) -> in
     console = table_console(WIDTH)
     with progress_of(asked.quiet) as progress:
         if fit:
-            known = ContactErrors.joined([
-                measure_errors(each) for each in solve_worlds(asked.plan, intervals.FIT_WORLDS, fit, progress)
-            ])  # fmt: skip
+            known = interval_fit.errors_of_fit(asked.plan, fit, progress)
             interval_fit.print_fit(console, interval_fit.fit_intervals(known))
             intervals.print_intervals(console, "On the worlds and seeds of the fit, constants in use", known)
         worlds = asked.worlds or intervals.JUDGE_WORLDS

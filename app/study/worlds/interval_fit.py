@@ -7,7 +7,9 @@ world, what both miss in each counts, too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.console import Console
@@ -16,18 +18,23 @@ from scipy.sparse import csr_array
 from scipy.special import expit
 
 from solver.bodies.grains import Array
+from solver.dem.truth import UnbalancedError
 from solver.sequence.judging.intervals import FACTOR, POWER, SLOPE, TYPICAL, Group, Term, Witness
 
-from .contact_errors import ContactErrors
-from .intervals import COVERED, FIRSTS, GROUPS, TOLERANCE
+from ...progress import Progress, silent
+from .contact_errors import ContactErrors, measure_errors
+from .intervals import COVERED, FIRSTS, FIT_WORLDS, GROUPS, TOLERANCE
+from .solved_world import solve_one
+from .world_score import WorldPlan
 
 ASKED = {  # terms by witness; of all others truths told too little
-    Witness.MOTION: (Term.DOUBT,),
+    Witness.MOTION: (Term.DOUBT, Term.SIZE),
     Witness.BOTH: (Term.DOUBT, Term.CHANGE),
     Witness.FIRST: (Term.FRICTION,),
     Witness.SOFT: (Term.DOUBT,),
     Witness.SOFT_FIRST: (),
 }
+SIZES = (0.5, 1.0, 2.0)  # of the packings of a study, so that what their size does can be told
 WEIGHTS = (1.0, 3.0)  # of the two quantiles, for the second is seldom missed
 HELD = 3.0  # weight of a coverage that is off by its tolerance, in the mean of all cells
 POOLED = 6.0  # cells that a group of all worlds together counts as
@@ -55,6 +62,17 @@ class IntervalFit:
         of_frame = np.exp(np.einsum("ct,ctk->ck", errors.terms, self.slope[witness]))
         size = (errors.formula / TYPICAL) ** (1.0 + self.power[witness])
         return TYPICAL * self.factor[witness, errors.group] * of_frame * size
+
+
+def errors_of_fit(plan: WorldPlan, seeds: Sequence[int], progress: Progress = silent) -> ContactErrors:
+    """Errors on the worlds of the fit, of SIZES times the plan's grains; packings that do not rest are passed over."""
+    found = []
+    cases = [(size, world, seed) for size in SIZES for world in FIT_WORLDS for seed in seeds]
+    for done, (size, world, seed) in enumerate(cases):
+        progress("worlds", done, len(cases))
+        with suppress(UnbalancedError):
+            found.append(measure_errors(solve_one(replace(plan, grains=round(size * plan.grains)), world, seed)))
+    return ContactErrors.joined(found)
 
 
 def fit_intervals(errors: ContactErrors) -> IntervalFit:

@@ -11,6 +11,8 @@ from rodsight.study.worlds.contact_errors import ContactErrors
 from rodsight.study.worlds.numbers import Compared, compared_names
 from rodsight.study.worlds.world_score import WorldPlan
 
+from solver.sequence.judging.intervals import Term
+
 COUNT = 6000
 
 
@@ -21,7 +23,7 @@ def study():
     errors = ContactErrors(
         world=np.full(COUNT, "shear"), seed=np.zeros(COUNT, np.int64), frame=np.ones(COUNT, np.int64),
         group=np.ones(COUNT, np.uint8), wall=rng.random(COUNT) < 0.1, sliding=none, doubtful=none,
-        witness=np.zeros(COUNT, np.uint8), terms=np.zeros((COUNT, 3)),
+        witness=np.zeros(COUNT, np.uint8), terms=np.zeros((COUNT, len(Term))),
         force=rng.random((COUNT, 2)) * 2,
         error=rng.standard_normal((COUNT, 2)), deviation=np.ones((COUNT, 2)), formula=np.ones((COUNT, 2)),
     )  # fmt: skip

@@ -10,7 +10,7 @@ from rodsight.study.worlds.intervals import COVERED, TOLERANCE, covered, interva
 from rodsight.study.worlds.solved_world import solve_one
 from rodsight.study.worlds.world_score import WorldPlan
 
-from solver.sequence.judging.intervals import Group
+from solver.sequence.judging.intervals import Group, Term
 
 COUNT = 12_000
 
@@ -25,7 +25,7 @@ def _errors(rng: np.random.Generator) -> ContactErrors:
     return ContactErrors(
         world=np.where(np.arange(COUNT) % 2 == 0, "shear", "biaxial"), seed=np.zeros(COUNT, np.int64),
         frame=np.ones(COUNT, np.int64), group=group, wall=no, sliding=no, doubtful=no,
-        witness=np.zeros(COUNT, np.uint8), terms=np.column_stack([doubt, 0.0 * doubt, 0.0 * doubt]),
+        witness=np.zeros(COUNT, np.uint8), terms=np.column_stack([doubt, *np.zeros((len(Term) - 1, COUNT))]),
         force=np.ones((COUNT, 2)),
         error=size[:, None] * formula * rng.standard_normal((COUNT, 2)), deviation=formula, formula=formula,
     )  # fmt: skip

@@ -94,6 +94,15 @@ def test_new_forces_widen_where_both_witnesses_speak_and_say_nothing_where_motio
     assert unknown == pytest.approx(usual)
 
 
+def test_the_more_contacts_there_are_the_less_walls_tell_of_them(frame):
+    half = np.arange(len(frame.fn)) % 2 == 0
+    fewer = replace(frame, fn=np.where(half, 0.0, frame.fn))
+    grown = terms_of(frame)[Term.SIZE] - terms_of(fewer)[Term.SIZE]
+    assert grown == pytest.approx(np.log((frame.fn > 0).sum() / (fewer.fn > 0).sum()))
+    assert SLOPE[Witness.MOTION, Term.SIZE, 0] > 0.05
+    assert np.isfinite(terms_of(replace(frame, fn=0.0 * frame.fn))[Term.SIZE])
+
+
 def test_rods_that_nobody_saw_take_trust_away_but_no_exactness_where_forces_are_shown(frame):
     whole = replace(frame, trust=0.96)
     hidden = replace(frame, trust=0.96 * 0.9, unseen_doubt=0.1)
