@@ -22,6 +22,7 @@ from solver.dem.truth import UnbalancedError
 from solver.sequence.judging.intervals import FACTOR, POWER, SLOPE, TYPICAL, Group, Term, Witness
 
 from ...progress import Progress, silent
+from ...synthetic.worlds.names import WorldName
 from .contact_errors import ContactErrors, measure_errors
 from .intervals import COVERED, FIRSTS, FIT_WORLDS, GROUPS, TOLERANCE
 from .solved_world import solve_one
@@ -67,7 +68,9 @@ class IntervalFit:
 def errors_of_fit(plan: WorldPlan, seeds: Sequence[int], progress: Progress = silent) -> ContactErrors:
     """Errors on the worlds of the fit, of SIZES times the plan's grains; packings that do not rest are passed over."""
     found = []
-    cases = [(size, world, seed) for size in SIZES for world in FIT_WORLDS for seed in seeds]
+    cases: list[tuple[float, WorldName, int]] = [
+        (size, world, seed) for size in SIZES for world in FIT_WORLDS for seed in seeds
+    ]
     for done, (size, world, seed) in enumerate(cases):
         progress("worlds", done, len(cases))
         with suppress(UnbalancedError):
