@@ -14,13 +14,20 @@ class GapNoise:
     def __init__(self, sequence: MeasuredSequence, rows: GapRows, normal: Array, factor: float) -> None:
         """normal (m, 2): unit vectors of the gaps, from i towards j; factor: noise of positions over that stated."""
         n = sequence.grain_count
-        self._frame, self._i, self._j, self._normal = rows.frame, rows.i, rows.second_grain(n), normal
         self._shape = sequence.position.shape
         self._sigma = factor * np.where(sequence.present, sequence.sigma, 0.0)[..., None]
-        self._other = np.where(rows.with_wall(n), 0.0, 1.0)[:, None]  # a wall has no noise
+        # Many draws look at the same places: x and y by themselves, by one index, are found three times as fast.
+        start = rows.frame.astype(np.int64) * n
+        self._first, self._second = start + rows.i, start + rows.second_grain(n)
+        self._normal = np.ascontiguousarray(normal.T)
+        self._other = np.where(rows.with_wall(n), 0.0, 1.0)  # a wall has no noise
 
     def draw(self, rng: np.random.Generator) -> Array:
         """Errors (m,) [m] of the gaps."""
-        noise = self._sigma * rng.standard_normal(self._shape)
-        apart = self._other * noise[self._frame, self._j] - noise[self._frame, self._i]
-        return np.einsum("mk,mk->m", self._normal, apart)
+        noise = (self._sigma * rng.standard_normal(self._shape)).reshape(-1, 2)
+        x, y = (self._along(axis, noise) for axis in (0, 1))
+        return x + y
+
+    def _along(self, axis: int, noise: Array) -> Array:
+        one = np.ascontiguousarray(noise[:, axis])
+        return self._normal[axis] * (self._other * one.take(self._second) - one.take(self._first))
