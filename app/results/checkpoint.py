@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from enum import IntEnum
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -22,13 +22,13 @@ import numpy as np
 
 from ..atomic import write_atomically
 from ..errors import RunError
-from .hdf5.lazy import Lazily
+from .hdf5.lazy import Lazily, Remembered
 from .packed_arrays import pack, unpack
 
 T = TypeVar("T")
 CHECKSUM = 32  # bytes at the beginning of a file
 FORMAT = "packed arrays"  # part of the checksum: what an earlier version left in another form is not there
-MOST_KEPT = 2  # frames that were read last
+ROOM = 1 << 26  # [bytes] for frames that were read last: friction, doubts and two passes of storing ask for each again
 
 
 class Checkpoint:
@@ -73,8 +73,8 @@ class Checkpoint:
 
     def lazily(self, count: int, *kinds: type) -> tuple[Lazily[Any], ...]:
         """The first frames, read whenever they are asked for: a sequence for each kind."""
-        load = lru_cache(MOST_KEPT)(lambda frame: self.load(frame, *kinds))
-        return tuple(Lazily(count, lambda frame, at=at: load(frame)[at]) for at in range(len(kinds)))
+        loaded = Remembered(count, lambda frame: self.load(frame, *kinds), _bytes_of, ROOM)
+        return tuple(Lazily(count, lambda frame, at=at: loaded[frame][at]) for at in range(len(kinds)))
 
     def drop(self, first: int) -> None:
         """Remove the frames from this one on."""
@@ -113,6 +113,10 @@ def flatten(value: Any, prefix: str = "") -> list[tuple[str, np.ndarray]]:
         elif part is not None:
             result.append((f"{prefix}{each.name}", np.asarray(part)))
     return result
+
+
+def _bytes_of(values: list[Any]) -> int:
+    return sum(array.nbytes for value in values for _, array in flatten(value))
 
 
 def restore(kind: type[T], named: Mapping[str, Any], prefix: str) -> T:
