@@ -8,23 +8,25 @@ import numpy as np
 
 from solver.bodies.grains import Grains
 from solver.boundary.boundary import Boundary, BoundarySettings, mend_boundary
-from solver.detection.precision import contradiction, measure_precision
+from solver.detection.precision import contradiction, describe_contradiction, measure_precision
 
 from ..tracks import Tracks, WallTracks
 from .snapshots import make_snapshots, measure_sequence
 
 
-def measure_noise(tracks: Tracks, walls: WallTracks) -> Tracks:
-    """Put the noise that the gaps show in the place of that stated, where they contradict.
+def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
+    """Put the noise that the gaps show in the place of that stated, where they contradict, and say so.
 
     Constant errors of centres and radii leave it alone: it is read from what the gaps of touching rods do in time.
     """
     grains = Grains.of_rods(tracks.radius, density=1.0, length=1.0)
     found = measure_precision(grains, make_snapshots(replace(tracks, centre_sigma=None), walls))
     if found is None:
-        return tracks
+        return tracks, ""
     factor = contradiction(found, _stated_noise(tracks))
-    return tracks if factor == 1.0 else replace(tracks, sigma=factor * tracks.sigma)
+    if factor == 1.0:
+        return tracks, ""
+    return replace(tracks, sigma=factor * tracks.sigma), describe_contradiction(found, factor)
 
 
 def _stated_noise(tracks: Tracks) -> float:

@@ -87,6 +87,7 @@ class CorrectedSequence:
     failed: Mapping[int, str]  # frames that show nothing, and why; their snapshots lie between their neighbours'
     wall_friction: WallFriction | None = None  # that was measured; None: told, or as between grains
     friction_measured: bool = False
+    noise_told: str = ""  # where the noise that was measured contradicts the stated one
 
     def with_first_renewed(self) -> CorrectedSequence:
         """The same for who calls `renew_first` after the last frame: the first is solved from a brief look before."""
@@ -148,9 +149,10 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         walls = replace(walls, endpoints=np.stack([each.endpoints for each in bridge_frames(told, failed)]))
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
+    noise_told = ""
     if settings.boundary is not None:
         if settings.sequence.measure_precision:
-            tracks = measure_noise(tracks, walls)
+            tracks, noise_told = measure_noise(tracks, walls)
         tracks, walls, boundary = mend(settings.boundary, tracks, walls)
     if settings.calibration is not None:  # tracks that were corrected are hard
         told = find_softness(inputs.material, settings.sequence, tracks, walls, failed)
@@ -186,7 +188,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     corrected = CorrectedSequence(
         packing, tracks, walls, snapshots if nothing_seen else bridge_frames(snapshots, failed),
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
-        inputs.material.friction_measured,
+        inputs.material.friction_measured, noise_told,
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft(corrected)
 
@@ -218,7 +220,7 @@ def solve_frames(
             reason = f"nothing can be made of its forces ({describe_error(error)})"
             members = sequence.settings.keep_members
             forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
-        yield SolvedFrame(forces, statistics, state)
+        yield SolvedFrame(_with_noise_told(sequence, forces), statistics, state)
 
 
 def renew_first(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> SolvedFrame | None:
@@ -247,7 +249,14 @@ def _solve_first(sequence: CorrectedSequence, told: FramePosterior, why: str) ->
         sequence.packing, sequence.snapshots, sequence.settings, told, why,
         verdicts=sequence.verdicts, failed=sequence.failed,
     )  # fmt: skip
-    return SolvedFrame(forces, _summarize(sequence, forces), state)
+    return SolvedFrame(_with_noise_told(sequence, forces), _summarize(sequence, forces), state)
+
+
+def _with_noise_told(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
+    """The first frame says what was found out about the noise of all."""
+    if forces.frame != 0 or not sequence.noise_told:
+        return forces
+    return replace(forces, reason=f"{sequence.noise_told}; {forces.reason}")
 
 
 def solve_all(sequence: CorrectedSequence, progress: Callable[[int], None] = lambda _: None) -> list[SolvedFrame]:

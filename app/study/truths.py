@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from solver.bodies.grains import Array
 from solver.bodies.packing import Packing
 from solver.bodies.rods import RodMaterial
-from solver.contacts.pairs import make_keys
+from solver.contacts.contacts import Contacts
+from solver.contacts.pairs import Keys, make_keys
 from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
 from solver.nlgs.chain import ChainSettings
 from solver.sequence.frame_forces import FrameForces
@@ -99,8 +100,21 @@ def true_forces(truth: DemTruth, frame: int) -> tuple[NDArray[np.int64], Array]:
 
 
 def agreement_of(forces: FrameForces, truth: DemTruth, frame: int) -> Agreement:
-    """Agreement of inferred forces with the truth's photograph `frame`."""
-    return compare_forces(forces.contacts.key, np.column_stack([forces.fn, forces.ft]), *true_forces(truth, frame))
+    """Agreement of inferred forces with the truth's photograph `frame`; those of inferred rods are left out."""
+    key, seen = truth_keys(forces.contacts, truth)
+    return compare_forces(key, np.column_stack([forces.fn, forces.ft])[seen], *true_forces(truth, frame))
+
+
+def truth_keys(contacts: Contacts, truth: DemTruth) -> tuple[Keys, NDArray[np.bool_]]:
+    """Keys of the contacts as the truth counts bodies, and which contacts (c,) have one.
+
+    Rods that were inferred come after all others, before the walls; which of the truth's they are is not asked.
+    """
+    rods = len(truth.radius)
+    wall = contacts.with_wall
+    seen = (contacts.i < rods) & (wall | (contacts.j < rods))
+    j = np.where(wall, contacts.j - contacts.grain_count + rods, contacts.j)
+    return make_keys(contacts.i[seen], j[seen], rods + len(truth.wall_names)), seen
 
 
 def starts_of(truth: DemTruth, length: int) -> tuple[int, ...]:

@@ -55,6 +55,12 @@ def contradiction(found: Precision, stated: float) -> float:
     return 1.0 if 1.0 / CONTRADICTION <= factor <= CONTRADICTION else factor
 
 
+def describe_contradiction(found: Precision, factor: float) -> str:
+    """What contradicts the stated precision, in words; factor: measured over stated."""
+    told = f"{1e6 * found.sigma:.2g} µm from photograph to photograph, {factor:.2g} times the stated precision"
+    return f"positions scatter by {told}, as the gaps of touching rods show"
+
+
 def believed_precision(found: Precision, stated: Sequence[float], overlap: float) -> tuple[float, float]:
     """Factor on the stated standard deviations (f,) [m], and the overlap [m] to go on with.
 

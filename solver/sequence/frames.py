@@ -15,7 +15,7 @@ from solver.bodies.bridging import bridge_frames
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
-from solver.detection.precision import believed_precision, measure_precision, with_precision
+from solver.detection.precision import believed_precision, describe_contradiction, measure_precision, with_precision
 from solver.detection.refinement import RefinedBlock, block_of, refine
 from solver.detection.touch_probability import AHEAD
 from solver.mixture.positions import Positions
@@ -183,8 +183,7 @@ def _with_measured_precision(
         factor = max(factor, 1.0)
     remark = ""
     if factor != 1.0:
-        told = f"{1e6 * found.sigma:.2g} µm from photograph to photograph, {factor:.2g} times the stated precision"
-        remark = f"positions scatter by {told}, as the gaps of touching rods show"
+        remark = describe_contradiction(found, factor)
         snapshots = with_precision(snapshots, factor)
     if settings.measure_overlap:
         ensemble = settings.ensemble

@@ -28,6 +28,7 @@ COUNTS = 0.4  # of the second frame's information: its errors are partly those o
 DRIFT = 0.6  # share of the mean square difference of both frames that is change, not error
 MOST_POSITIONS = 0.5  # in the second frame: what its positions say those of the first said already
 UNNAMED = 0.2  # deviation of a force on a pair that a frame does not list, over the mean f_n
+PLAIN = 0.7  # of a stated deviation: what calibration, which deviations meet once more, makes of it taken off
 LEAST = 0.02  # the same of any deviation: a force that is said to be certain outweighs nothing
 
 
@@ -43,10 +44,10 @@ def carry_back(sequence: CorrectedSequence, first: FrameForces, second: FrameFor
     _, one, two = align(first.contacts.key, first.fn, second.contacts.key, second.fn)
     if not min(one.sum(), two.sum()) > 0.0:
         return None
-    counts = COUNTS * float(np.clip((pearson(one, two) - ALIKE[0]) / (ALIKE[1] - ALIKE[0]), 0.0, 1.0))
-    if not counts > 0.0:
+    alike = float(np.clip((pearson(one, two) - ALIKE[0]) / (ALIKE[1] - ALIKE[0]), 0.0, 1.0))
+    if not alike > 0.0:
         return None
-    scale = float(one.sum() / two.sum())  # loads may have changed
+    counts, scale = COUNTS * alike, float(one.sum() / two.sum())
     mean = float(first.fn.mean())
     own = np.column_stack([first.fn_sd, first.ft_sd])
     told = np.column_stack([second.fn, second.ft]), np.column_stack([second.fn_sd, second.ft_sd])
@@ -58,7 +59,15 @@ def carry_back(sequence: CorrectedSequence, first: FrameForces, second: FrameFor
     blended, left = _blend(
         np.column_stack([first.fn, first.ft]), np.maximum(own, LEAST * mean) ** 2, force, counts, deviation**2 + drift
     )
-    return _as_posterior(first, blended, np.sqrt(left), sequence.packing.grains.count)
+    # Positions know the pattern better than the size of stresses along free walls, which sliding tells.
+    size = (_risen(sequence) / scale) ** alike
+    return _as_posterior(first, size * blended, PLAIN * size * np.sqrt(left), sequence.packing.grains.count)
+
+
+def _risen(sequence: CorrectedSequence) -> float:
+    """The first frame's loads over the second's."""
+    first, second = (sequence.packing.mean_pressure(each) for each in sequence.snapshots[:2])
+    return first / second if min(first, second) > 0.0 else 1.0
 
 
 def _blend(one: Array, variance: Array, two: Array, counts: float, other: Array) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ from solver.statistics.agreement import compare_forces
 
 from ...inference.inference import Inputs, infer_frames
 from ...progress import Progress, silent
-from ..truths import agreement_of, observe, simulate, starts_of, true_forces
+from ..truths import agreement_of, observe, simulate, starts_of, true_forces, truth_keys
 
 WINDOW = 12  # photographs of one sequence
 FAULTY_WINDOW = 6
@@ -63,6 +63,7 @@ class StatusSample:
     error: Array  # (c, 2) of f_n and f_t on the contacts of sound frames, over the mean f_n
     force: Array  # (c,) f_n over the mean
     spread: Array  # (c, 2) of the members' f_n and f_t over the mean f_n
+    stated: Array  # (c, 2) deviations of f_n and f_t that are stated, over the mean f_n
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +121,7 @@ def observe_status(truths: Sequence[DemTruth], noises: Sequence[float], *, progr
         np.concatenate([part.error for part in parts if not any(part.fault)]),
         np.concatenate([part.force for part in parts if not any(part.fault)]),
         np.concatenate([part.spread for part in parts if not any(part.fault)]),
+        np.concatenate([part.stated for part in parts if not any(part.fault)]),
     )
 
 
@@ -193,7 +195,7 @@ def _observe_window(truth: DemTruth, start: int, noise: float, fault: str, rng: 
     inputs = observe(truth, range(start, start + window), noise, rng)
     if fault:
         inputs = _spoil(inputs, fault, rng)
-    rows, errors, forces, spreads = [], [], [], []
+    rows, errors, forces, spreads, stated = [], [], [], [], []
     for solved in infer_frames(inputs):
         frame, state = solved.forces, solved.state
         if frame.frame == 0:
@@ -204,14 +206,15 @@ def _observe_window(truth: DemTruth, start: int, noise: float, fault: str, rng: 
         rows.append(
             (state.evidence, frame.status, agreement_of(frame, truth, k).r_fn, _change(key, force, before, former))
         )
-        error, relative, spread = _contact_errors(frame, key, force)
+        error, relative, spread, told = _contact_errors(frame, *truth_keys(frame.contacts, truth), key, force)
         errors.append(error)
         forces.append(relative)
         spreads.append(spread)
+        stated.append(told)
     evidence, status, r, change = zip(*rows, strict=True)
     return StatusSample(
         list(evidence), list(status), np.array(r), np.array(change), [fault] * len(rows),
-        np.concatenate(errors), np.concatenate(forces), np.concatenate(spreads),
+        np.concatenate(errors), np.concatenate(forces), np.concatenate(spreads), np.concatenate(stated),
     )  # fmt: skip
 
 
@@ -243,19 +246,25 @@ def _change(key: Keys, force: Array, before: Keys, former: Array) -> float:
     return 1.0 - compare_forces(key, force, before, former).r_fn
 
 
-def _contact_errors(frame: FrameForces, key: Keys, force: Array) -> tuple[Array, Array, Array]:
-    """Error (c, 2), f_n (c,) and spread (c, 2) over the mean f_n, of contacts that bear force here or in truth."""
-    true = recall(frame.contacts.key, key, force)
+def _contact_errors(
+    frame: FrameForces, own: Keys, seen: NDArray[np.bool_], key: Keys, force: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Error (c, 2), f_n (c,), spread and stated deviations (c, 2) over the mean f_n, of contacts that bear force.
+
+    Here or in truth; own: the keys of the frame's `seen` contacts as the truth's are counted.
+    """
+    true = recall(own, key, force)
     mean = float(frame.fn[frame.fn > 0].mean())
-    bearing = np.maximum(frame.fn, true[:, 0]) > WEAK * mean
-    error = (np.column_stack([frame.fn, frame.ft]) - true) / mean
-    relative = frame.fn / mean
-    formula = formula_deviations(frame)
+    found = np.column_stack([frame.fn, frame.ft])[seen]
+    bearing = np.maximum(found[:, 0], true[:, 0]) > WEAK * mean
+    error, relative = (found - true) / mean, found[:, 0] / mean
+    formula = formula_deviations(frame)[seen]
     spread = np.column_stack([
         _spread_behind(formula[:, c], relative, (np.hypot(constants[0], FLOOR[c]), *constants[1:]))
         for c, constants in enumerate((judgement.NORMAL_DEVIATION, judgement.TANGENT_DEVIATION))
     ])  # fmt: skip
-    return error[bearing], relative[bearing], spread[bearing]
+    stated = np.column_stack([frame.fn_sd, frame.ft_sd])[seen] / mean
+    return error[bearing], relative[bearing], spread[bearing], stated[bearing]
 
 
 def _spread_behind(deviation: Array, force: Array, constants: tuple[float, float, float]) -> Array:

@@ -62,12 +62,26 @@ def test_what_is_carried_lies_between_both_and_in_the_cone(sheared):
     carried = carry_back(sequence, first, second)
     assert carried is not None
     assert (np.abs(carried.ft) <= sequence.packing.material.friction * carried.fn * (1 + 1e-6) + 1e-9).all()
-    again = carry_back(
-        sequence, first, replace(second, fn=2.0 * second.fn, ft=2.0 * second.ft, fn_sd=2.0 * second.fn_sd)
-    )
-    assert again is not None
-    np.testing.assert_allclose(again.fn, carried.fn, rtol=1e-9)  # loads may have changed
-    assert (carried.fn_deviation <= np.maximum(first.fn_sd, 0.02 * first.fn.mean()) + 1e-12).all()
+    stated = np.maximum(first.fn_sd, 0.02 * first.fn.mean())
+    assert (carried.fn_deviation <= stated * carried.fn.sum() / first.fn.sum() + 1e-12).all()
+
+
+def test_the_size_is_the_second_photographs_as_its_load_tells(sheared):
+    sequence, _, (first, second) = sheared
+    still = [replace(each, load=None) for each in sequence.snapshots]
+    plate = np.isfinite(sequence.packing.pressure)
+    half = np.where(plate, 0.5 * sequence.packing.walls_of(still[0]).load, np.nan)
+    lighter = [replace(still[0], load=half), *still[1:]]
+    doubled = {name: 2.0 * getattr(second, name) for name in ("fn", "ft", "fn_sd", "ft_sd")}
+    told = [
+        carry_back(replace(sequence, snapshots=snapshots), first, frame)
+        for snapshots, frame in ((still, second), (lighter, second), (still, replace(second, **doubled)))
+    ]
+    assert all(each is not None for each in told)
+    of_second, of_lighter, of_doubled = (each.fn for each in told if each is not None)
+    assert of_second.sum() == pytest.approx(second.fn.sum(), rel=0.03)
+    np.testing.assert_allclose(of_lighter, 0.5 * of_second, rtol=1e-6)
+    np.testing.assert_allclose(of_doubled, 2.0 * of_second, rtol=1e-6)
 
 
 def test_it_counts_the_less_the_less_both_are_alike(sheared):

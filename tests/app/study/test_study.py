@@ -1,5 +1,6 @@
 """The studies run on packings far too small to conclude anything from: that they run and count is all."""
 
+from dataclasses import replace
 from io import StringIO
 
 import numpy as np
@@ -8,7 +9,7 @@ from rich.console import Console
 from rodsight.inference.inference import infer_frames
 from rodsight.study.accuracy import measure_accuracy
 from rodsight.study.claims import study_claims
-from rodsight.study.truths import agreement_of, observe, simulate, starts_of
+from rodsight.study.truths import agreement_of, observe, simulate, starts_of, truth_keys
 
 GRAINS, TURN, WINDOW = 30, 3.0, 7
 
@@ -67,3 +68,20 @@ def test_the_papers_claims_are_listed_with_a_verdict(folder, monkeypatch):
     assert len(verdicts) == 5
     assert all(row.measured and row.verdict for row in verdicts)
     assert "settles in about five photographs" in shown.getvalue()
+
+
+def test_forces_of_a_packing_with_an_inferred_rod_are_compared_body_by_body(truth):
+    start = starts_of(truth, WINDOW)[0]
+    frame = next(infer_frames(observe(truth, range(start, start + WINDOW), 1e-6, np.random.default_rng(1)))).forces
+    contacts, rods = frame.contacts, len(truth.radius)
+    wider = replace(
+        contacts, grain_count=rods + 1, j=np.where(contacts.with_wall, contacts.j + 1, contacts.j).astype(np.int32)
+    )
+    own, seen = truth_keys(contacts, truth)
+    other, also_seen = truth_keys(wider, truth)
+    assert seen.all()
+    assert also_seen.all()
+    np.testing.assert_array_equal(own, contacts.key)
+    np.testing.assert_array_equal(other, own)
+    strange = replace(wider, j=np.where(np.arange(wider.count) == 0, rods, wider.j).astype(np.int32))
+    assert truth_keys(strange, truth)[1].tolist() == [False, *[True] * (wider.count - 1)]
