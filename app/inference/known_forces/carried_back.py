@@ -28,8 +28,8 @@ COUNTS = 0.4  # of the second frame's information: its errors are partly those o
 DRIFT = 0.6  # share of the mean square difference of both frames that is change, not error
 MOST_POSITIONS = 0.5  # in the second frame: what its positions say those of the first said already
 UNNAMED = 0.2  # deviation of a force on a pair that a frame does not list, over the mean f_n
-PLAIN = 0.7  # of a stated deviation: what calibration, which deviations meet once more, makes of it taken off
-LEAST = 0.02  # the same of any deviation: a force that is said to be certain outweighs nothing
+LEAST = 0.02  # the least of any deviation, over the mean f_n: a force that is said to be certain outweighs nothing
+PLAIN = 0.7  # of a stated deviation: without what calibration makes of it, for it is calibrated once more
 
 
 def carry_back(sequence: CorrectedSequence, first: FrameForces, second: FrameForces) -> FramePosterior | None:
@@ -82,10 +82,9 @@ def _blend(one: Array, variance: Array, two: Array, counts: float, other: Array)
 def _as_posterior(first: FrameForces, force: Array, deviation: Array, grains: int) -> FramePosterior:
     """A field on the first frame's contacts, as positions tell theirs; its agreement with the motion sets the trust."""
     assert first.bearing_probability is not None
-    nothing = np.zeros(grains)
     return FramePosterior(
         contacts=first.contacts, fn=force[:, 0], ft=force[:, 1],
         fn_deviation=deviation[:, 0], ft_deviation=deviation[:, 1], bears=first.bearing_probability,
-        centre_error=np.zeros((grains, 2)), radius_error=nothing, overlap=first.overlap,
+        centre_error=np.zeros((grains, 2)), radius_error=np.zeros(grains), overlap=first.overlap,
         overlap_deviation=0.0, offset=0.0, offset_deviation=0.0, trust=1.0, agreement=1.0,
     )  # fmt: skip
