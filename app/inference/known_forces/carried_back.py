@@ -35,11 +35,12 @@ PLAIN = 0.7  # of a stated deviation: without what calibration makes of it, for 
 def carry_back(sequence: CorrectedSequence, first: FrameForces, second: FrameForces) -> FramePosterior | None:
     """What positions and the second frame say of the first one's forces; None where the second says nothing.
 
-    Soft grains are told by overlap, which no later frame surpasses, and without a load a frame's scale means nothing.
+    Soft grains are told by overlap, which no later frame surpasses; without a loaded plate a frame's scale means
+    nothing, or follows from weight.
     """
     if second.status in UNSOUND or second.positions_share > MOST_POSITIONS:
         return None
-    if first.soft or not sequence.packing.scale_is_known:
+    if first.soft or not np.isfinite(sequence.packing.pressure).any():
         return None
     _, one, two = align(first.contacts.key, first.fn, second.contacts.key, second.fn)
     if not min(one.sum(), two.sum()) > 0.0:
