@@ -15,8 +15,8 @@ from jaxtyping import Float
 
 from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
-from solver.posterior.chain import Chain, centres_of, laws_of, pairs_of, run_chain
 from solver.posterior.frame_evidence import FrameEvidence
+from solver.posterior.sampler.chain import Chain, centres_of, laws_of, pairs_of, run_chain
 from solver.posterior.settings import PosteriorSettings
 from solver.statistics.agreement import pearson
 from solver.together import work_together

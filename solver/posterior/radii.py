@@ -15,8 +15,8 @@ from jaxtyping import Float
 from solver.bodies.grains import Array
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
-from solver.posterior.chain import Chain, centres_of, laws_of, pairs_of, run_chain
-from solver.posterior.records import Centres, Pairs
+from solver.posterior.sampler.chain import Chain, centres_of, laws_of, pairs_of, run_chain
+from solver.posterior.sampler.records import Centres, Pairs
 from solver.posterior.sequence_evidence import SequenceEvidence, gather_evidence
 from solver.posterior.settings import PosteriorSettings
 

@@ -16,7 +16,7 @@ from solver.calibration.calibrate import Calibration
 from solver.calibration.equations import rotate_offsets
 from solver.calibration.known_forces import find_grain_errors
 from solver.contacts.verdicts import NO_VERDICTS
-from solver.mixture.positions import draws_of
+from solver.mixture.positions import Positions, draws_of
 from solver.posterior.frame_posterior import FramePosterior, infer_frame
 from solver.posterior.sequence_evidence import SequenceEvidence
 from solver.sequence.frame_forces import FrameForces, FrameStatus
@@ -45,14 +45,9 @@ def expects_to_ask_again(sequence: CorrectedSequence) -> bool:
 
 def ask_first_in_full(sequence: CorrectedSequence) -> FramePosterior | None:
     """What the positions of the first frame say by themselves; None where no two bodies are near."""
-    try:
-        evidence = gather_evidence_of(sequence, sequence.tracks)
-    except ValueError:
-        return None
-    first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS))
-    if first.contacts.count == 0:
-        return None
-    return infer_frame(first, evidence.settings.alone(), draws_of(0), sequence.settings.workers)
+    settings = sequence.settings
+    positions = Positions(sequence.packing, sequence.snapshots, settings.posterior, settings.workers)
+    return positions.at(0, sequence.verdicts.get(0, NO_VERDICTS))
 
 
 def ask_first_again(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> FramePosterior | None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from solver.posterior.draws import draw_above, draw_between, scaled_cdf
+from solver.posterior.sampler.draws import draw_above, draw_between, scaled_cdf
 
 DRAWS = 4000
 SURE = 4.5  # standard errors, of a fixed seed

@@ -10,10 +10,10 @@ from scipy.stats import norm
 from solver.bodies.grains import Grains
 from solver.contacts.contacts import detect_contacts, measure_contacts
 from solver.contacts.pairs import recall
-from solver.posterior.chain import centres_of, laws_of, pairs_of, run_chain
 from solver.posterior.frame_evidence import FrameEvidence, KnownForces
 from solver.posterior.frame_posterior import HONEST, infer_frame
 from solver.posterior.radii import stack_frames
+from solver.posterior.sampler.chain import centres_of, laws_of, pairs_of, run_chain
 from solver.posterior.settings import PosteriorSettings
 from solver.statistics.balance import unbalances
 from tests.packings import box, heap_at_rest

@@ -10,8 +10,8 @@ import math
 
 from numba import njit
 
-from solver.posterior.draws import draw_above, draw_between, scaled_cdf
-from solver.posterior.records import CX, CY, DELTA, FX, FY, KNOWN, LEVER, TORQUE
+from solver.posterior.sampler.draws import draw_above, draw_between, scaled_cdf
+from solver.posterior.sampler.records import CX, CY, DELTA, FX, FY, KNOWN, LEVER, TORQUE
 
 HOPELESS = 100.0  # logarithm of the odds against bearing beyond which they need not be known
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.bodies.grains import Array
 from solver.posterior.frame_evidence import FrameEvidence
-from solver.posterior.kernels import run
-from solver.posterior.records import Centres, Pairs, make_room, start_state
+from solver.posterior.sampler.kernels import run
+from solver.posterior.sampler.records import Centres, Pairs, make_room, start_state
 from solver.posterior.settings import PosteriorSettings
 
 EXACT = 1e-7  # mean diameters: what counts as without error

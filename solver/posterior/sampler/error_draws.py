@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from solver.posterior.records import CX, CY, DELTA
+from solver.posterior.sampler.records import CX, CY, DELTA
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

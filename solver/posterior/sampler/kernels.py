@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from numba import njit
 
-from solver.posterior.common_draws import draw_common, draw_scale
-from solver.posterior.contact_draws import draw_contacts, weigh_contacts
-from solver.posterior.error_draws import draw_errors, factorize_errors
-from solver.posterior.records import CX, Law
+from solver.posterior.sampler.common_draws import draw_common, draw_scale
+from solver.posterior.sampler.contact_draws import draw_contacts, weigh_contacts
+from solver.posterior.sampler.error_draws import draw_errors, factorize_errors
+from solver.posterior.sampler.records import CX, Law
 
 
 @njit(cache=True, nogil=True)

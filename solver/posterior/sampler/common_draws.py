@@ -6,8 +6,8 @@ import math
 
 from numba import njit
 
-from solver.posterior.draws import draw_above
-from solver.posterior.records import CX, CY, DELTA, FX, FY, KNOWN, TORQUE
+from solver.posterior.sampler.draws import draw_above
+from solver.posterior.sampler.records import CX, CY, DELTA, FX, FY, KNOWN, TORQUE
 
 SCALE_STEPS = 4  # of Metropolis, a sweep
 
