@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .image_header import claimed_size
+from .png_chunks import is_whole_png
 from .reading.input_files import InputFiles
 
 Image = NDArray[np.float32]
@@ -124,16 +125,26 @@ class Photographs(Sequence[Image]):
             raise InputError(self.files[0], what, f"reaches beyond its {shape[1]} x {shape[0]} pixels")
 
     def check(self) -> None:
-        """Read every photograph once, so that a bad one is known before any work begins."""
-        for frame in range(len(self)):
-            self[frame]
+        """Look through every photograph once, so that a bad one is known before any work begins.
+
+        A PNG carries checksums: one that is whole is not decoded for this.
+        """
+        for frame, file in enumerate(self.files):
+            content = _content_of(file, self._inputs, self._max_pixels)
+            told = claimed_size(content) if is_whole_png(content) else None
+            if told is None or told != self.shape[::-1]:
+                self._of_one_size(frame, _grey_of(file, content, self._look.channel))
 
     def __len__(self) -> int:
         return len(self.files)
 
     def __getitem__(self, frame: int) -> Image:  # pyright: ignore[reportIncompatibleMethodOverride]
+        image = read_photograph(self.files[frame], self._inputs, self._max_pixels, self._look.channel)
+        return self._look.cut(self._of_one_size(frame, image))
+
+    def _of_one_size(self, frame: int, image: Image) -> Image:
+        """The image, if it has the size of the first. Raises InputError."""
         file = self.files[frame]
-        image = read_photograph(file, self._inputs, self._max_pixels, self._look.channel)
         if self._shape is None and file == self.files[0]:
             self._shape = _shape_of(image)
             self.check_region(self._shape)
@@ -144,7 +155,7 @@ class Photographs(Sequence[Image]):
                 f"photograph {range(len(self))[frame]}",
                 f"is {image.shape[1]} x {image.shape[0]} pixels, the first photograph {width} x {height}",
             )
-        return self._look.cut(image)
+        return image
 
     def __iter__(self) -> Iterator[Image]:
         for frame in range(len(self)):
@@ -203,18 +214,28 @@ def read_photograph(
     what it is; max_pixels: that it may claim to have. Raises InputError for what is not a photograph, and for
     raw files while the package that reads them is not installed.
     """
-    try:
-        content = (InputFiles() if inputs is None else inputs).read(file)
-    except OSError as error:
-        raise InputError(file, "", f"cannot be read: {error.strerror or error}") from None
+    return _grey_of(file, _content_of(file, inputs, max_pixels), channel)
+
+
+def _grey_of(file: Path, content: bytes, channel: Channel) -> Image:
     if file.suffix.lower() in RAW_SUFFIXES:
         return _to_grey(file, _develop(file, content), CHANNELS[channel])
-    _refuse_truncated(file, content)
-    _refuse_huge(file, content, max_pixels)
     pixels = _decode(content)
     if pixels is None:
         raise InputError(file, "", "is not a photograph that can be read (PNG, TIFF or JPEG)")
     return _to_grey(file, pixels, CHANNELS[channel])
+
+
+def _content_of(file: Path, inputs: InputFiles | None, max_pixels: int) -> bytes:
+    """The bytes of a photograph; raises InputError where they are cut short or claim too many pixels."""
+    try:
+        content = (InputFiles() if inputs is None else inputs).read(file)
+    except OSError as error:
+        raise InputError(file, "", f"cannot be read: {error.strerror or error}") from None
+    if file.suffix.lower() not in RAW_SUFFIXES:
+        _refuse_truncated(file, content)
+        _refuse_huge(file, content, max_pixels)
+    return content
 
 
 def _to_grey(file: Path, pixels: NDArray, weight: NDArray[np.float32]) -> Image:

@@ -50,6 +50,27 @@ def test_photographs_are_read_only_when_asked_for(tmp_path: Path) -> None:
         photographs.check()
 
 
+def test_a_whole_png_is_not_decoded_to_be_checked_and_one_that_is_not_is_named(tmp_path: Path, monkeypatch) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64), dtype=np.uint8)
+    files = [write(tmp_path, f"{k}.png", noise) for k in range(3)]
+    decoded = []
+    monkeypatch.setattr(cv2, "imdecode", lambda *given, really=cv2.imdecode: decoded.append(1) or really(*given))
+    Photographs(files).check()
+    assert len(decoded) == 1  # the first, whose size all have
+    content = bytearray(files[2].read_bytes())
+    content[len(content) // 2] ^= 1
+    files[2].write_bytes(bytes(content))
+    with pytest.raises(InputError, match=r"2\.png"):
+        Photographs(files).check()
+
+
+def test_check_names_a_photograph_of_another_size(tmp_path: Path) -> None:
+    for name, shape in (("a1.png", (4, 6)), ("a2.png", (6, 4))):
+        write(tmp_path, name, np.zeros(shape, np.uint8))
+    with pytest.raises(InputError, match=r"a2\.png: photograph 1: is 4 x 6 pixels"):
+        Photographs.matching(tmp_path, "*.png").check()
+
+
 @pytest.mark.parametrize("suffix", [".png", ".tif"])
 def test_sixteen_bits_keep_every_level(tmp_path: Path, suffix: str) -> None:
     levels = np.arange(65536, dtype=np.uint16).reshape(256, 256)
