@@ -1,0 +1,34 @@
+"""A PNG is whole where nothing of it is missing and every checksum is right."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from rodsight.experiment.png_chunks import AROUND, is_whole_png
+
+PICTURE = np.random.default_rng(0).integers(0, 255, (40, 60), dtype=np.uint8)
+WHOLE = cv2.imencode(".png", PICTURE)[1].tobytes()
+END = len(WHOLE) - AROUND
+
+
+def test_what_an_encoder_wrote_is_whole():
+    assert is_whole_png(WHOLE)
+    assert is_whole_png(WHOLE + b"what follows the end is nobody's")
+
+
+@pytest.mark.parametrize("content", [b"", b"text", WHOLE[:8], WHOLE[1:], WHOLE[:-1], WHOLE[:END], WHOLE[:100]])
+def test_what_is_cut_is_not(content):
+    assert not is_whole_png(content)
+
+
+@pytest.mark.parametrize("at", [8, 12, 20, 30, 45, len(WHOLE) // 2, END - 1, END, END + 5, len(WHOLE) - 1])
+def test_a_single_wrong_bit_is_seen(at):
+    content = bytearray(WHOLE)
+    content[at] ^= 1
+    assert not is_whole_png(bytes(content))
+
+
+def test_a_header_and_an_end_are_no_picture():
+    header = WHOLE[: 8 + AROUND + 13]
+    assert not is_whole_png(header + WHOLE[END:])
