@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces, FrameStatus
 from solver.sequence.state import SequenceState
@@ -28,6 +28,7 @@ from .experiment.config.experiment_file import as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
 from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
+from .experiment.photographs import EightBits, ReadAhead
 from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
@@ -354,27 +355,24 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     from .recording.files.side_file import write_side_file
 
     since = time.perf_counter()
-    section = run.experiment.config.photographs
-    photographs = run.experiment.photographs() if section is not None else None
-
-    def photograph(frame: int) -> NDArray[np.uint8] | None:
-        if photographs is None:
-            return None
-        return np.clip(np.rint(photographs[run.frames[0] + frame]), 0, 255).astype(np.uint8)
-
-    file = run.file(RECORDING)
-    report = write_recording(
-        results,
-        file,
-        photograph=photograph if photographs is not None else None,
-        scale=make_scale(section, photographs.shape[0], results.calibration)
-        if section and photographs is not None
-        else None,
-        sweeps="log" if run.full_frames else run.experiment.config.recording.sweeps,
-        max_size=run.max_size,
-        truth=truth,
-        progress=lambda done, total: run.progress("recording", done, total),
-    )
+    section, scale, file = run.experiment.config.photographs, None, run.file(RECORDING)
+    with ExitStack() as opened:
+        pictures = None
+        if section is not None:
+            photographs = run.experiment.photographs()
+            scale = make_scale(section, photographs.shape[0], results.calibration)
+            shown = EightBits(photographs, run.frames[0])
+            pictures = opened.enter_context(ReadAhead(shown, len(results.frames)))
+        report = write_recording(
+            results,
+            file,
+            photograph=None if pictures is None else pictures.__getitem__,
+            scale=scale,
+            sweeps="log" if run.full_frames else run.experiment.config.recording.sweeps,
+            max_size=run.max_size,
+            truth=truth,
+            progress=lambda done, total: run.progress("recording", done, total),
+        )
     run.notes.extend(report.notes)
     run.file(SIDE).unlink(missing_ok=True)  # of a former recording
     if run.full_frames:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from ..experiment.photographs import EightBits
 from ..experiment.scaling import make_scale
 from ..run_folder import Run
 from .terminal import tell
@@ -43,13 +44,13 @@ def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, Liv
 
 
 def _watch(run: Run, viewer: str, say: Callable[[str], None]) -> LiveProcess:
-    from ..recording.files.live_process import GreyPhotographs, LiveProcess
+    from ..recording.files.live_process import LiveProcess
 
     config = run.experiment.config
     photograph = scale = None
     if config.photographs is not None:
         photographs = run.experiment.photographs()
-        photograph = GreyPhotographs(photographs, run.frames[0])
+        photograph = EightBits(photographs, run.frames[0]).__getitem__
         scale = make_scale(config.photographs, photographs.shape[0])
     sweeps = "none" if config.recording.sweeps == "none" else "log"
     return LiveProcess(run.file(LIVE), say, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)

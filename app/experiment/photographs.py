@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import Literal, Protocol
+from typing import Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,35 +162,46 @@ class Photographs(Sequence[Image]):
             yield self[frame]
 
 
-class Readable(Protocol):
-    def __getitem__(self, frame: int, /) -> Image:
+P = TypeVar("P", covariant=True)
+
+
+class Readable(Protocol[P]):
+    def __getitem__(self, frame: int, /) -> P:
         """Photograph `frame` (H, W)."""
         ...
 
 
-class ReadAhead:
+@dataclass(frozen=True, slots=True)
+class EightBits:
+    """The photographs of a run's frames as they are shown, in whole levels; read where and when they are asked for."""
+
+    photographs: Readable[Image]  # of the whole experiment, 255 is white
+    first: int  # photograph of the run's frame 0
+
+    def __getitem__(self, frame: int) -> NDArray[np.uint8]:
+        return np.clip(np.rint(self.photographs[self.first + frame]), 0, 255).astype(np.uint8)
+
+
+class ReadAhead(Generic[P]):
     """Photographs that are asked for one after the other: the next is read while one is worked at.
 
     To be closed, or used as a context: the thread ends with it.
     """
 
-    def __init__(self, photographs: Readable, stop: int) -> None:
+    def __init__(self, photographs: Readable[P], stop: int) -> None:
         self._photographs, self._stop = photographs, stop
         self._reader = ThreadPoolExecutor(1, "photographs")
-        self._coming: tuple[int, Future[Image]] | None = None
+        self._coming: tuple[int, Future[P]] | None = None
 
-    def __getitem__(self, frame: int) -> Image:
+    def __getitem__(self, frame: int) -> P:
         """Photograph `frame`; what reading it raised is raised here."""
         coming, self._coming = self._coming, None
-        if coming is not None and coming[0] == frame:
-            image = coming[1].result()
-        else:
-            image = self._photographs[frame]
+        image = coming[1].result() if coming is not None and coming[0] == frame else self._photographs[frame]
         if frame + 1 < self._stop:
             self._coming = (frame + 1, self._reader.submit(self._photographs.__getitem__, frame + 1))
         return image
 
-    def __enter__(self) -> ReadAhead:
+    def __enter__(self) -> ReadAhead[P]:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -19,15 +19,15 @@ from ...experiment.units import Scale
 from ...results.results import Results, TruthContacts
 from ..look import entities
 from ..look.canvas import Canvas
-from ..look.force_style import ForceRange, ForceStyle
+from ..look.force_style import ForceStyle
 from ..look.scene import Scene, tracks_in_cell
 from ..packing_layers.forces.network import SweepChoice
 from ..parts import forget_parts, part_of
-from ..tabs.axis_ranges import find_extremes
 from ..tabs.blueprint import Layout, Tab, make_blueprint
 from ..tabs.layout_property import send_layout
 from ..viewing.viewer import run_tool
 from .recorder import BATCHES, SWEEPS_KEPT, PhotographSource, Recorder
+from .survey import Survey, survey_frames
 from .writing import writing
 
 FrameProgress = Callable[[int, int], None]  # frames done, frames in all
@@ -82,15 +82,16 @@ def write_recording(
     if photograph is not None and scale is None:
         raise ValueError("photographs need the scale that says where the grains are in them")
     path, begin = Path(path), time.perf_counter()
-    _ask_for_room(path.parent, results, SweepChoice(sweeps), max_size)
+    survey = survey_frames(results)
+    _ask_for_room(path.parent, survey.contact_count, SweepChoice(sweeps), max_size)
     first = photograph(0) if photograph else None
     tracks = tracks_in_cell(results.tracks, results.walls)
     canvas = Canvas.around(tracks, scale, None if first is None else (first.shape[0], first.shape[1]))
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
-        ForceStyle.on(canvas, ForceRange.of(results.frames)), truth, tolerance, results.radius_tuning,
+        ForceStyle.on(canvas, survey.force_range), truth, tolerance, results.radius_tuning,
     )  # fmt: skip
-    run = _Run(results, scene, photograph, active, progress, part_frames)
+    run = _Run(results, survey, scene, photograph, active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
     unfinished = [each.with_name(each.name + ".part") for each in parts]
     notes: tuple[str, ...] = ()
@@ -126,12 +127,11 @@ def _size(files: list[Path]) -> int:
     return sum(each.stat().st_size for each in files)
 
 
-def layout_of(results: Results, scene: Scene, *, photographs: bool) -> Layout:
+def _layout_of(scene: Scene, survey: Survey, frames: int, *, photographs: bool) -> Layout:
     """What the blueprint must know of a finished run."""
     return Layout(
-        scene.canvas, scene.rod_length, len(results.frames), photographs, scene.truth is not None, scene.walls.count,
-        scene.radius_tuning is not None, scene.walls.force is not None,
-        any(each.error_budget is not None for each in results.frames), find_extremes(results),
+        scene.canvas, scene.rod_length, frames, photographs, scene.truth is not None, scene.walls.count,
+        scene.radius_tuning is not None, scene.walls.force is not None, survey.has_error_budget, survey.extremes,
     )  # fmt: skip
 
 
@@ -140,6 +140,7 @@ class _Run:
     """What is written, however much of it."""
 
     results: Results
+    survey: Survey
     scene: Scene
     photograph: PhotographSource | None
     active: Tab
@@ -169,7 +170,7 @@ def _plans(choice: SweepChoice, *, limited: bool) -> list[_Plan]:
 def _write(run: _Run, parts: list[Path], plan: _Plan, notes: tuple[str, ...], max_size: int | None) -> Recorder | None:
     """Write the whole run, part by part; None, early, where it grows beyond max_size."""
     results, photograph, total = run.results, run.photograph, len(run.results.frames)
-    layout = layout_of(results, run.scene, photographs=photograph is not None)
+    layout = _layout_of(run.scene, run.survey, total, photographs=photograph is not None)
     name, recorder, before = str(uuid.uuid4()), None, 0
     for number, part in enumerate(parts):
         begin, end = number * run.part_frames, min((number + 1) * run.part_frames, total)
@@ -208,11 +209,10 @@ def _give_index(part: Path) -> None:
         whole.unlink(missing_ok=True)
 
 
-def _ask_for_room(folder: Path, results: Results, choice: SweepChoice, max_size: int | None) -> None:
+def _ask_for_room(folder: Path, contacts: int, choice: SweepChoice, max_size: int | None) -> None:
     """Raise RunError where not even the forces of all frames would find room: better now than after minutes."""
-    contacts = [forces.contacts.count for forces in results.frames]
     rows = 1 if choice is SweepChoice.NONE or max_size is not None else 1 + LEAST_ROWS
-    needed, free = sum(contacts) * rows * BYTES_PER_CONTACT, shutil.disk_usage(folder).free
+    needed, free = contacts * rows * BYTES_PER_CONTACT, shutil.disk_usage(folder).free
     if free < needed:
         raise RunError(
             f"{folder}: has {_megabytes(free)} free, and the recording needs more than {_megabytes(needed)}: make "

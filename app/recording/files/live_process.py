@@ -15,14 +15,10 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.frame_statistics import FrameStatistics
@@ -33,17 +29,6 @@ from .live import LiveRecording
 NICENESS = 10  # added to that of the run; a system that weighs whole sessions (autogroup) pays no heed to it
 CUT_SHORT = "The run ended before its last frame."
 COMMAND = f"from {__name__} import serve; serve()"
-
-
-@dataclass(frozen=True, slots=True)
-class GreyPhotographs:
-    """Photographs of a run's frames as they are recorded; read where and when they are asked for."""
-
-    photographs: Sequence[NDArray[np.float32]]  # of the whole experiment, each (H, W), 255 is white
-    first: int  # photograph of the run's frame 0
-
-    def __call__(self, frame: int) -> NDArray[np.uint8]:
-        return np.clip(np.rint(self.photographs[self.first + frame]), 0, 255).astype(np.uint8)
 
 
 class LiveProcess:

@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from solver.bodies.walls import Walls
+from solver.sequence.frame_forces import FrameForces
+from solver.statistics.frame_statistics import FrameStatistics
 
-from ...results.results import Results
+from ...tracks import WallTracks
 from ..curve_layers.statistic_curves import band_values, recorded_values, statistic_values, wall_values
 from ..look import entities
 
@@ -19,10 +21,15 @@ MOST_ROOM = 0.55  # of a plot, for its legend
 MARGIN = 0.06  # of the span, where there is no legend
 
 
-def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
+class CurveExtremes:
     """Least and greatest value of every curve whose values are known before the recording is written."""
-    found: dict[str, tuple[float, float]] = {}
-    for frame, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
+
+    def __init__(self, walls: WallTracks) -> None:
+        self._walls = walls
+        self.found: dict[str, tuple[float, float]] = {}
+
+    def add(self, frame: int, forces: FrameForces, statistics: FrameStatistics) -> None:
+        """Have them hold one frame, a row of the walls."""
         values = [*statistic_values(statistics), (entities.CORRECTION, forces.correction)]
         values += [(entities.OLD_UNBALANCE, forces.old_unbalance), (entities.START_DIFFERENCE, forces.start_difference)]
         values += [(entities.FRAMES_SINCE_RESET, float(forces.frames_since_reset))]
@@ -31,17 +38,16 @@ def find_extremes(results: Results) -> dict[str, tuple[float, float]]:
             values.append((entities.EXPECTED_COUNT, float(np.nansum(forces.probability))))
         if frame:
             values.append((entities.SIMILARITY, forces.similarity))
-        walls = Walls.at_rest(results.walls.endpoints[frame], side=results.walls.side)
+        walls = Walls.at_rest(self._walls.endpoints[frame], side=self._walls.side)
         for path, several in (*wall_values(walls, statistics), *band_values(statistics)):
             values += [(path, float(value)) for value in several]
-        if results.walls.force is not None:
-            for path, several in recorded_values(walls, results.walls.force[frame]):
+        if self._walls.force is not None:
+            for path, several in recorded_values(walls, self._walls.force[frame]):
                 values += [(path, float(value)) for value in several]
         for path, value in values:
             if np.isfinite(value):
-                low, high = found.get(path, (value, value))
-                found[path] = min(low, value), max(high, value)
-    return found
+                low, high = self.found.get(path, (value, value))
+                self.found[path] = min(low, value), max(high, value)
 
 
 def range_with_room(
