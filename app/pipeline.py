@@ -297,7 +297,7 @@ def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint)
     if done:
         last = SolvedFrame(*checkpoint.load(done - 1, FrameForces, FrameStatistics, SequenceState))
     run.progress("solving", done, total)
-    for frame in solve_frames(sequence, after=last, observer=run.note_failure):
+    for frame in solve_frames(sequence, after=last, observer=run.note_failure, ahead=True):
         checkpoint.save(frame.forces.frame, frame.forces, frame.statistics, frame.state)
         if run.watch is not None:
             run.watch.frame(frame.forces, frame.statistics)

@@ -6,9 +6,9 @@ Threads, for compiled kernels let others run beside them and everything stays wh
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import TypeVar, cast
 
 Result = TypeVar("Result")
 
@@ -18,13 +18,39 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def work_together(tasks: Sequence[Callable[[], Result]], workers: int | None) -> list[Result]:
+def work_together(
+    tasks: Sequence[Callable[[], Result]],
+    workers: int | None,
+    more: Callable[[], Sequence[Callable[[], Result]]] | None = None,
+) -> list[Result]:
     """The results of all tasks in their order, on so many threads; None: one for every core.
 
-    Where some fail, the error is that of the first of them.
+    more: makes further tasks, whose results follow; the first are under way meanwhile. Where some fail, the error is
+    that of the first of them.
     """
-    threads = min(available_cores() if workers is None else workers, len(tasks))
+    threads = available_cores() if workers is None else workers
+    if more is None:
+        threads = min(threads, len(tasks))
     if threads < 2:
-        return [task() for task in tasks]
+        done = [task() for task in tasks]
+        return done + [task() for task in (more() if more is not None else ())]
     with ThreadPoolExecutor(threads) as pool:
-        return [each.result() for each in [pool.submit(task) for task in tasks]]
+        begun = [pool.submit(task) for task in tasks]
+        begun += [pool.submit(task) for task in (more() if more is not None else ())]
+        return [each.result() for each in begun]
+
+
+def one_ahead(items: Iterator[Result], workers: int | None) -> Iterator[Result]:
+    """The same items, each made while the one before it is worked at; one worker: each when it is asked for.
+
+    What making an item raises is raised in its place.
+    """
+    if (available_cores() if workers is None else workers) < 2:
+        yield from items
+        return
+    ended = object()
+    with ThreadPoolExecutor(1) as maker:
+        coming = maker.submit(next, items, ended)
+        while (item := coming.result()) is not ended:
+            coming = maker.submit(next, items, ended)
+            yield cast(Result, item)

@@ -30,6 +30,7 @@ from solver.sequence.judging.statistic_intervals import widen_for_friction, with
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
 from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics, no_statistics
+from solver.together import one_ahead
 
 from ..errors import UndeterminedError
 from ..progress import Observer, unheard
@@ -194,13 +195,17 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
 
 
 def solve_frames(
-    sequence: CorrectedSequence, *, after: SolvedFrame | None = None, observer: Observer = unheard
+    sequence: CorrectedSequence,
+    *,
+    after: SolvedFrame | None = None,
+    observer: Observer = unheard,
+    ahead: bool = False,
 ) -> Iterator[SolvedFrame]:
     """Solve frame after frame; `after`: the last one that is solved already, None: begin with the first.
 
-    observer: hears what a frame could not be solved for.
+    observer: hears what a frame could not be solved for. ahead: whether the next frame is begun while one is worked at.
     """
-    for forces, state in solve_sequence(
+    solved = solve_sequence(
         sequence.packing,
         sequence.snapshots,
         sequence.settings,
@@ -209,7 +214,9 @@ def solve_frames(
         verdicts=sequence.verdicts,
         failed=sequence.failed,
         observer=partial(observer, "solving"),
-    ):
+        ahead=ahead,
+    )
+    for forces, state in one_ahead(solved, sequence.settings.workers) if ahead else solved:
         try:
             statistics = _summarize(sequence, forces)
         except MemoryError:  # not the frame's fault
@@ -262,7 +269,7 @@ def _with_noise_told(sequence: CorrectedSequence, forces: FrameForces) -> FrameF
 def solve_all(sequence: CorrectedSequence, progress: Callable[[int], None] = lambda _: None) -> list[SolvedFrame]:
     """All frames as a run states them: the first as it is seen from the others. progress hears how many are solved."""
     frames, sequence = [], sequence.with_first_renewed()
-    for frame in solve_frames(sequence):
+    for frame in solve_frames(sequence, ahead=True):
         frames.append(frame)
         progress(len(frames))
     first = renew_first(sequence, [each.forces for each in frames])

@@ -8,28 +8,28 @@ them; averaging more of one kind gains nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.bodies.motion import Snapshot
-from solver.contacts.contacts import Contacts, measure_pairs
-from solver.contacts.pairs import are_among, are_there, join_keys, recall
-from solver.contacts.verdicts import apply_verdicts
+from solver.contacts.contacts import Contacts
+from solver.contacts.pairs import are_among
 from solver.convex.members import RefinedMotion, SeenSlip, Slip, advance_member, read_slip, steady_slip
-from solver.convex.program import Balance, assemble_balance, polish
+from solver.convex.program import Balance, ConvexForces, assemble_balance, polish
 from solver.detection.displacement import find_reversals, member_intervals
 from solver.detection.networks import PairProbability, ProbablePairs
-from solver.mixture.mixing import offered_pairs
 from solver.nlgs.chain import ChainStep, advance_through, force_scale
 from solver.nlgs.interval import Interval
 from solver.nlgs.warm_start import ForceMemory
 from solver.posterior.frame_posterior import FramePosterior
 from solver.sequence.demand import NO_DEMAND, ROUNDS, WINS, Demand, find_demand
+from solver.sequence.frame_contacts import TouchingPairs, find_touching
 from solver.sequence.frame_problem import FrameProblem
 from solver.sequence.judging.judgement import SETTLED_DIFFERENCE
 from solver.statistics.agreement import relative_change
@@ -73,6 +73,8 @@ class EnsembleState:
 AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
 MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programs
 CHAINS = 2  # of the MEMBERS, the first
+
+Task = Callable[[], Any]  # one member: a ChainStep, or forces with what is remembered of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,12 +161,28 @@ def solve_ensemble(
 
 def _solve_members(
     problem: FrameProblem, state: EnsembleState, positions: FramePosterior | None, demand: Demand
-) -> tuple[_Touching, _Chains, Balance, _Members]:
+) -> tuple[TouchingPairs, _Chains, Balance, _Members]:
     """All members on the contacts that were detected, offered and demanded."""
-    touching = _find_touching(problem, positions, demand)
-    chains = _advance_chains(problem, state, touching)
-    balance = assemble_frame_balance(problem, touching.contacts, chains.soft)
-    return touching, chains, balance, _advance_members(problem, state, touching, balance, chains)
+    touching = find_touching(problem, positions, demand)
+    starts = _chain_starts(problem, state, touching)
+    workers = problem.settings.workers
+    if problem.packing.scale_is_known:  # convex members do not wait for the chains
+        balance = assemble_frame_balance(problem, touching.contacts)
+        slips: list[Slip | None] = []
+
+        def members() -> list[Task]:
+            slips.extend(_slips(problem, touching.contacts))
+            return _member_tasks(problem, state, touching, balance, slips)
+
+        found = work_together(starts, workers, members)
+        steps, convex = found[: len(starts)], found[len(starts) :]
+    else:
+        steps = work_together(starts, workers)
+        balance = assemble_frame_balance(problem, touching.contacts, steps[0])
+        slips = list(_slips(problem, touching.contacts))
+        convex = work_together(_member_tasks(problem, state, touching, balance, slips), workers)
+    chains = _compare_chains(touching.contacts, steps, state)
+    return touching, chains, balance, _gather_members(slips, convex, chains)
 
 
 def _tell_demand(contacts: Contacts, fn: Array, demand: Demand) -> list[str]:
@@ -174,21 +192,6 @@ def _tell_demand(contacts: Contacts, fn: Array, demand: Demand) -> list[str]:
         return []
     bearing = int((fn[asked] > WINS * fn[fn > 0].mean()).sum()) if (fn > 0).any() else 0
     return [f"the balance demanded {asked.sum()} pairs that were not detected, of which {bearing} bear force"]
-
-
-@dataclass(frozen=True, slots=True)
-class _Touching:
-    """The contacts of the frame, and how likely they touch."""
-
-    contacts: Contacts
-    told: Array  # (c,) P(touch) as detected; 0 for a contact that only people saw
-    probability: Array  # (c,) the same, but 1 for what people saw
-    forbidden: Contacts  # detected, but left out for people forbade them
-    forbidden_probability: Array  # (m,) P(touch) of those, as detected
-
-    @property
-    def pairs(self) -> PairProbability:
-        return PairProbability(self.contacts.key, self.probability)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,48 +222,8 @@ class _Members:
         return [force for force, place in zip(self.force, self.place, strict=True) if place >= CHAINS]
 
 
-def _find_touching(problem: FrameProblem, positions: FramePosterior | None, demand: Demand) -> _Touching:
-    packing, snapshot, verdicts, refined = problem.packing, problem.snapshot, problem.verdicts, problem.refined
-    assert refined is not None
-    least = problem.settings.ensemble.probability.least
-    detected, touch = refined.contacts_at(snapshot, problem.k, packing.grains, problem.walls, least)
-    if positions is not None:
-        detected, touch = _with_offered(problem, detected, touch, positions)
-    detected, touch = _with_demanded(problem, detected, touch, demand)
-    contacts, before = apply_verdicts(
-        detected, verdicts, packing.grains, snapshot.position, snapshot.present, problem.walls
-    )
-    # A pair that people saw touch is certain, whatever its measured gaps say.
-    told = np.where(before >= 0, touch[before], 0.0) if len(touch) else np.zeros(contacts.count)
-    probability = np.where(are_among(contacts.key, verdicts.forced), 1.0, told)
-    forbidden = are_among(detected.key, verdicts.forbidden)
-    return _Touching(contacts, told, probability, detected.select(forbidden), touch[forbidden])
-
-
-def _with_offered(
-    problem: FrameProblem, detected: Contacts, touch: Array, positions: FramePosterior
-) -> tuple[Contacts, Array]:
-    """Contacts and P(touch) with the pairs added that bear force by the positions: nothing else brings them back."""
-    offered = offered_pairs(positions)
-    here = are_there(offered.key, problem.snapshot.present, offered.body_count)
-    key = join_keys(detected.key, offered.key[here])
-    contacts = measure_pairs(problem.packing.grains, problem.snapshot.position, problem.walls, key)
-    bears = recall(key, positions.contacts.key, positions.bears, fill=0.0)
-    told = recall(key, detected.key, touch, fill=0.0)
-    return contacts, np.where(are_among(key, offered.key), np.maximum(told, bears), told)
-
-
-def _with_demanded(problem: FrameProblem, detected: Contacts, touch: Array, demand: Demand) -> tuple[Contacts, Array]:
-    """Contacts and P(touch) with the pairs added that the balance demands."""
-    if demand.count == 0:
-        return detected, touch
-    key = join_keys(detected.key, demand.key)
-    contacts = measure_pairs(problem.packing.grains, problem.snapshot.position, problem.walls, key)
-    asked = recall(key, demand.key, demand.probability, fill=0.0)
-    return contacts, np.maximum(recall(key, detected.key, touch, fill=0.0), asked)
-
-
-def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touching) -> _Chains:
+def _chain_starts(problem: FrameProblem, state: EnsembleState, touching: TouchingPairs) -> list[Task]:
+    """The two chains, and the first once more from another start where that still tells something."""
     packing, motion, contacts = problem.packing, problem.motion, touching.contacts
     chain = problem.settings.chain
     network = ProbablePairs(state.pairs if motion.spans else touching.pairs, touching.pairs)
@@ -278,8 +241,12 @@ def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touc
             other = other.renew(contacts, uniform, problem.snapshot.present)
         starts.append((other, silent))
     interval = Interval(packing, motion, network)
-    tasks = [partial(advance_through, interval, memory, told) for memory, told in starts]
-    soft, stiff, *rest = work_together(tasks, problem.settings.workers)
+    return [partial(advance_through, interval, memory, told) for memory, told in starts]
+
+
+def _compare_chains(contacts: Contacts, steps: list[ChainStep], state: EnsembleState) -> _Chains:
+    """What the chains gave, and how far two starts of the first differ."""
+    soft, stiff, *rest = steps
     if not rest:
         return _Chains(soft, stiff, state.other, np.nan, state.agreeing)
     (again,) = rest
@@ -288,10 +255,12 @@ def _advance_chains(problem: FrameProblem, state: EnsembleState, touching: _Touc
     return _Chains(soft, stiff, again.memory, difference, agreeing)
 
 
-def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep) -> Balance:
-    packing, walls = problem.packing, problem.walls
-    # Without load and weight forces are known up to a scale: that of the first chain.
-    wall_total = None if packing.scale_is_known else float(soft.solution.fn[contacts.gauge].sum())
+def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep | None = None) -> Balance:
+    """Balance of the frame on these contacts; soft: the first chain, needed where no load tells the scale."""
+    packing, walls, wall_total = problem.packing, problem.walls, None
+    if not packing.scale_is_known:  # without load and weight forces are known up to a scale: that of the first chain
+        assert soft is not None
+        wall_total = float(soft.solution.fn[contacts.gauge].sum())
     return assemble_balance(
         contacts, packing.grains, walls, present=problem.snapshot.present,
         friction=packing.material.friction_at(contacts.with_wall),
@@ -300,30 +269,30 @@ def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: Chai
     )  # fmt: skip
 
 
-def _advance_members(
-    problem: FrameProblem, state: EnsembleState, touching: _Touching, balance: Balance, chains: _Chains
-) -> _Members:
+def _member_tasks(
+    problem: FrameProblem, state: EnsembleState, touching: TouchingPairs, balance: Balance, slips: Sequence[Slip | None]
+) -> list[Task]:
+    """The convex members that have something to read."""
     former = (state.last, state.ahead, state.around, state.wide, state.steady)
-    fields = [chains.soft.solution.force, chains.stiff.solution.force]
-    worth, place = [1.0, 1.0], [0, 1]
-    memories: list[ForceMemory | None] = []
-    remarks: list[str] = []
-    slips = _slips(problem, touching.contacts)
-    tasks = [
+    convex = problem.settings.ensemble.convex
+    return [
         partial(
-            advance_member,
-            balance,
-            touching.contacts,
-            problem.snapshot,
-            slip,
-            touching.probability,
-            memory,
-            problem.settings.ensemble.convex,
+            advance_member, balance, touching.contacts, problem.snapshot, slip, touching.probability, memory, convex
         )
         for slip, memory in zip(slips, former, strict=True)
         if slip is not None
     ]
-    found = iter(work_together(tasks, problem.settings.workers))
+
+
+def _gather_members(
+    slips: Sequence[Slip | None], convex: Sequence[tuple[ConvexForces, ForceMemory]], chains: _Chains
+) -> _Members:
+    """All members that came to an end; convex: what those gave that had something to read."""
+    fields = [chains.soft.solution.force, chains.stiff.solution.force]
+    worth, place = [1.0, 1.0], [0, 1]
+    memories: list[ForceMemory | None] = []
+    remarks: list[str] = []
+    found = iter(convex)
     for number, slip in enumerate(slips, start=CHAINS):
         if slip is None:
             memories.append(None)

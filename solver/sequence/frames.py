@@ -16,7 +16,7 @@ from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
 from solver.detection.precision import believed_precision, describe_contradiction, measure_precision, with_precision
-from solver.detection.refinement import RefinedBlock, block_of, refine
+from solver.detection.refinement import BLOCK, RefinedBlock, block_of, refine
 from solver.detection.touch_probability import AHEAD
 from solver.mixture.positions import Positions
 from solver.posterior.frame_posterior import FramePosterior
@@ -26,6 +26,7 @@ from solver.sequence.frame_forces import FrameForces
 from solver.sequence.frame_problem import SequenceProblem
 from solver.sequence.settings import SequenceSettings
 from solver.sequence.state import SequenceState
+from solver.together import one_ahead
 
 
 def solve_sequence(
@@ -38,6 +39,7 @@ def solve_sequence(
     verdicts: Mapping[int, Verdicts] | None = None,
     failed: Mapping[int, str] | None = None,
     observer: Callable[[int, Exception], None] | None = None,
+    ahead: bool = False,
 ) -> Iterator[tuple[FrameForces, SequenceState]]:
     """Solve the frames first, first + 1, … one after the other; yields each frame with the state after it.
 
@@ -45,13 +47,14 @@ def solve_sequence(
     the motion that follows it. After it a single chain starts afresh, the ensemble from what its convex members read
     of frame 0.
     verdicts: what people said of frames, by frame. failed: frames that are not to be solved, and why; others that
-    show nothing, or cannot be solved, join them. observer: hears what a frame could not be solved for.
+    show nothing, or cannot be solved, join them. observer: hears what a frame could not be solved for. ahead: all
+    frames will be asked for, so that what the next ones share is prepared meanwhile.
     Raises ValueError where times do not ascend.
     """
     verdicts = {} if verdicts is None else verdicts
     ready = _prepare(packing, snapshots, settings, verdicts, failed)
     state = SequenceState.first(packing) if state is None else state
-    blocks = _Blocks(ready.sequence)
+    blocks = _Blocks(ready.sequence, ahead=ahead)
     for k in range(first, len(snapshots)):
         frame = following = None
         reason = ready.failed.get(k, "")
@@ -143,21 +146,34 @@ def _check_times(snapshots: Sequence[Snapshot]) -> None:
 
 
 class _Blocks:
-    """The blocks of frames that are refined together, one at a time."""
+    """The blocks of frames that are refined together; ahead: each while the frames of the one before it are solved."""
 
-    def __init__(self, sequence: SequenceProblem) -> None:
+    def __init__(self, sequence: SequenceProblem, *, ahead: bool = False) -> None:
         self._sequence = sequence
-        self._number, self._block = -1, None
+        self._workers = sequence.settings.workers if ahead else 1
+        self._coming: Iterator[RefinedBlock] = iter(())
+        self._number: int | None = None  # of the block that is there
+        self._block: RefinedBlock | None = None
 
     def find(self, k: int) -> RefinedBlock | None:
         """The block that frame k belongs to; None where a single chain solves it."""
         snapshots = self._sequence.snapshots
         if self._sequence.settings.estimator != "ensemble" or len(snapshots) < 2:
             return None
-        number, start, end = block_of(k, len(snapshots))
+        number, _, _ = block_of(k, len(snapshots))
         if number != self._number:
-            self._block, self._number = self._refine(start, end), number
+            if self._number is None or number != self._number + 1:
+                self._coming = one_ahead(self._refine_from(k), self._workers)
+            self._number = None  # until it is there: where it cannot be made, the next frame tries again
+            self._block, self._number = next(self._coming), number
         return self._block
+
+    def _refine_from(self, k: int) -> Iterator[RefinedBlock]:
+        """Refine the block of frame k, and those after it."""
+        count = len(self._sequence.snapshots)
+        for first in range(k, count, BLOCK):
+            _, start, end = block_of(first, count)
+            yield self._refine(start, end)
 
     def find_first(self) -> RefinedBlock | None:
         """What frame 0 alone is solved from: the window after it, for the rest of its block tells it nothing more."""

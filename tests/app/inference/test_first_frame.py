@@ -62,7 +62,7 @@ def test_the_others_stay_as_they_are(wrong_centres, monkeypatch):
     sequence, _, before = wrong_centres
     first = replace(before[0], state=before[1].state)
     monkeypatch.setattr(inference, "renew_first", lambda *_: first)
-    monkeypatch.setattr(inference, "solve_frames", lambda *_: iter(before))
+    monkeypatch.setattr(inference, "solve_frames", lambda *_, **__: iter(before))
     assert [id(each) for each in solve_all(sequence)] == [id(each) for each in [first, *before[1:]]]
 
 
