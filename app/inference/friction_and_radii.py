@@ -35,8 +35,9 @@ def friction_of(
     snapshots: Sequence[Snapshot],
     frames: Sequence[FrameForces],
     settings: ContactProbabilitySettings,
+    workers: int | None = 1,
 ) -> FrictionCheck | None:
-    """Check the friction on the quietest consecutive frames.
+    """Check the friction on the quietest consecutive frames; workers: threads.
 
     None where there are too few, where there is no friction to check, or where too many grains are lost.
     """
@@ -53,11 +54,16 @@ def friction_of(
     first = int(starts[np.argmax([quiet[s : s + count].sum() for s in starts])])
     if lost[first - 1 : first + count + 1].mean() > TOLERATED_LOSS:
         return None
-    return check_friction(packing, snapshots, first, first + count - 1, force_scale(packing, ChainSettings()), settings)
+    unit = force_scale(packing, ChainSettings())
+    return check_friction(packing, snapshots, first, first + count - 1, unit, settings, workers)
 
 
 def measure_friction(
-    material: RodMaterial, packing: Packing, snapshots: Sequence[Snapshot], settings: ContactProbabilitySettings
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
 ) -> RodMaterial:
     """The material with the friction that the motion shows, found anew with it until both agree.
 
@@ -70,7 +76,7 @@ def measure_friction(
     unit = force_scale(packing, ChainSettings())
     for _ in range(GUESSES):
         guess = replace(packing, material=material.friction_law())
-        found = check_friction(guess, snapshots, first, first + count - 1, unit, settings)
+        found = check_friction(guess, snapshots, first, first + count - 1, unit, settings, workers)
         if not np.isfinite(found.measured):
             raise FrictionError("nothing slides in these photographs, so that they do not tell it: give a number")
         change = abs(found.measured / material.friction - 1.0)
@@ -82,7 +88,11 @@ def measure_friction(
 
 
 def measure_friction_of_walls(
-    material: RodMaterial, packing: Packing, snapshots: Sequence[Snapshot], settings: ContactProbabilitySettings
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
 ) -> WallFriction | None:
     """The friction of walls that the motion shows; None where it was told, or where it is not shown."""
     count = min(FRAMES, len(snapshots) - 2)
@@ -90,7 +100,7 @@ def measure_friction_of_walls(
         return None
     first = max(1, (len(snapshots) - count) // 2)
     unit = force_scale(packing, ChainSettings())
-    return measure_wall_friction(packing, snapshots, first, first + count - 1, unit, settings)
+    return measure_wall_friction(packing, snapshots, first, first + count - 1, unit, settings, workers)
 
 
 class FrictionError(UndeterminedError):

@@ -113,7 +113,7 @@ class CorrectedSequence:
     def find_friction(self, frames: Sequence[FrameForces]) -> FrictionCheck | None:
         """What the motion of all solved frames says of the friction that was given; they are looked at once."""
         probability = self.settings.for_radii(self.packing.grains.radius).ensemble.probability
-        check = friction_of(self.packing, self.snapshots, frames, probability)
+        check = friction_of(self.packing, self.snapshots, frames, probability, self.settings.workers)
         found = self.wall_friction
         if check is not None and found is not None:
             check = replace(check, wall_measured=found.measured, wall_low=found.low, wall_high=found.high)
@@ -180,9 +180,9 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     if material.friction_measured and not nothing_seen:
         seen = bridge_frames(snapshots, failed)
         probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
-        material = measure_friction(material, packing, seen, probability)
+        material = measure_friction(material, packing, seen, probability, settings.sequence.workers)
         packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
-        of_walls = measure_friction_of_walls(material, packing, seen, probability)
+        of_walls = measure_friction_of_walls(material, packing, seen, probability, settings.sequence.workers)
         if of_walls is not None:
             material = replace(material, wall_friction=of_walls.measured)
             packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -16,6 +17,7 @@ from solver.convex.friction_estimate import FACTORS, SlidingFrame, estimate_fric
 from solver.convex.members import measured_slip
 from solver.convex.program import assemble_balance
 from solver.detection.touch_probability import ContactProbabilitySettings, probable_contacts, window_of
+from solver.together import work_together
 
 # The least power gap lies below the true friction: by this factor on simulated packings, give or take the scatter
 # (packings of 500 and 1172 grains, μ = 0.15, 0.25 and 0.4).
@@ -64,15 +66,17 @@ def check_friction(
     last: int,
     force_unit: float,
     settings: ContactProbabilitySettings,
+    workers: int | None = 1,
 ) -> FrictionCheck:
     """Measure the friction from the sliding in the frames first … last, each over (k − 1, k + 1).
 
-    force_unit [N]: a typical contact force. Errors: ValueError unless 1 ≤ first ≤ last < number of frames − 1.
+    force_unit [N]: a typical contact force; workers: threads, on which no bit depends.
+    Errors: ValueError unless 1 ≤ first ≤ last < number of frames − 1.
     """
     if not 1 <= first <= last < len(snapshots) - 1:
         raise ValueError(f"frames {first} … {last} have no neighbours on both sides in {len(snapshots)} frames")
-    frames = [_sliding_frame(packing, snapshots, k, force_unit, settings) for k in range(first, last + 1)]
-    found = estimate_friction(frames, FACTORS)
+    frames = _sliding_frames(packing, snapshots, range(first, last + 1), force_unit, settings, workers)
+    found = estimate_friction(frames, FACTORS, workers=workers)
     given = packing.material.friction
     measured = given * found.factor / KNOWN_BIAS
     spread = 0.0 if np.isnan(found.factor_sd) else found.factor_sd / max(found.factor, 1e-12)
@@ -99,21 +103,35 @@ def measure_wall_friction(
     last: int,
     force_unit: float,
     settings: ContactProbabilitySettings,
+    workers: int | None = 1,
 ) -> WallFriction | None:
     """Measure the friction of walls as `check_friction` does that of all contacts, that between grains being known.
 
     None where too few rods are at walls, or where what slides there does not tell it.
     """
-    frames = [_sliding_frame(packing, snapshots, k, force_unit, settings) for k in range(first, last + 1)]
+    frames = _sliding_frames(packing, snapshots, range(first, last + 1), force_unit, settings, workers)
     if np.mean([np.count_nonzero(frame.contacts.with_wall) for frame in frames]) < FEWEST_AT_WALLS:
         return None
-    found = estimate_friction(frames, WALL_FACTORS, of_walls=True)
+    found = estimate_friction(frames, WALL_FACTORS, of_walls=True, workers=workers)
     spread = found.factor_sd / max(found.factor, 1e-12)
     if not found.enclosed or not spread < WALL_SCATTER:
         return None
     measured = packing.material.wall_friction * found.factor
     width = INTERVAL * float(np.hypot(spread, WALL_BIAS_SCATTER))
     return WallFriction(measured, measured * max(1.0 - width, 0.0), measured * (1.0 + width))
+
+
+def _sliding_frames(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    numbers: Sequence[int],
+    force_unit: float,
+    settings: ContactProbabilitySettings,
+    workers: int | None,
+) -> list[SlidingFrame]:
+    return work_together(
+        [partial(_sliding_frame, packing, snapshots, k, force_unit, settings) for k in numbers], workers
+    )
 
 
 def _sliding_frame(

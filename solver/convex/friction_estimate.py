@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from solver.bodies.grains import Array
 from solver.contacts.contacts import Contacts
 from solver.convex.program import Balance, ConvexSettings, solve_member
 from solver.nlgs.warm_start import ForceMemory
+from solver.together import work_together
 
 FACTORS = (0.5, 0.6, 0.7, 0.8, 0.88, 0.94, 1.0, 1.06, 1.14, 1.25, 1.45, 1.7, 2.0)  # of the assumed coefficient
 SIDE = 2  # trials that are wanted on either side of the least gap
@@ -59,18 +61,22 @@ def estimate_friction(
     settings: ConvexSettings | None = None,
     *,
     of_walls: bool = False,
+    workers: int | None = 1,
 ) -> FrictionEstimate:
     """Find the friction that explains the sliding of consecutive frames best, as a factor on the assumed one.
 
     Friction between grains and with walls is changed by the same factor (those with walls must not be zero); of_walls:
     that with walls alone, that between grains being known. Each
     trial is a chain of its own through the frames; of the factors only those about the valley that is met from the
-    one nearest to 1 are tried. Errors: ValueError without frames or with fewer than three factors.
+    one nearest to 1 are tried. workers: threads that try them; no bit depends on it.
+    Errors: ValueError without frames or with fewer than three factors.
     """
     trial = np.sort(np.asarray(factors, dtype=np.float64))
     if not len(frames) or len(trial) < 3:
         raise ValueError("friction needs at least one frame and three trial factors")
-    trial, gap = _walk_into_valley(trial, lambda factor: np.array(_gaps_of_a_chain(frames, factor, settings, of_walls)))
+    trial, gap = _walk_into_valley(
+        trial, lambda factor: np.array(_gaps_of_a_chain(frames, factor, settings, of_walls)), workers
+    )
     gap = gap[np.isfinite(gap).all(axis=1)]
     if not len(gap):
         return FrictionEstimate(np.nan, np.nan, trial, np.full(len(trial), np.nan), False)
@@ -78,24 +84,31 @@ def estimate_friction(
     return FrictionEstimate(factor, _jackknife(trial, gap), trial, gap.mean(axis=0), enclosed)
 
 
-def _walk_into_valley(trial: Array, gaps_of: Callable[[float], Array]) -> tuple[Array, Array]:
+def _walk_into_valley(trial: Array, gaps_of: Callable[[float], Array], workers: int | None = 1) -> tuple[Array, Array]:
     """Try neighbour after neighbour until two lie on either side of the least gap, whichever frame is left out.
 
     trial (q,), ascending; gaps_of a factor: those of all frames (f,). The factors tried (p,), and their gaps (f, p).
     """
     first = last = int(np.argmin(np.abs(np.log(trial))))
-    gap = gaps_of(float(trial[first]))[:, None]
+    # These are asked for in nearly every walk, which begins downwards: side by side.
+    sure = [q for q in (first, first - 1, first - 2, first + 1) if 0 <= q < len(trial)]
+    known = dict(zip(sure, work_together([partial(gaps_of, float(trial[q])) for q in sure], workers), strict=True))
+
+    def gaps_at(q: int) -> Array:
+        return known[q] if q in known else gaps_of(float(trial[q]))
+
+    gap = gaps_at(first)[:, None]
     while True:
-        known = gap[np.isfinite(gap).all(axis=1)]
-        if not len(known):
+        finite = gap[np.isfinite(gap).all(axis=1)]
+        if not len(finite):
             break
-        least = first + np.argmin([known.mean(axis=0), *_means_without_one(known)], axis=1)
+        least = first + np.argmin([finite.mean(axis=0), *_means_without_one(finite)], axis=1)
         if first > max(int(least.min()) - SIDE, 0):
             first -= 1
-            gap = np.column_stack([gaps_of(float(trial[first])), gap])
+            gap = np.column_stack([gaps_at(first), gap])
         elif last < min(int(least.max()) + SIDE, len(trial) - 1):
             last += 1
-            gap = np.column_stack([gap, gaps_of(float(trial[last]))])
+            gap = np.column_stack([gap, gaps_at(last)])
         else:
             break
     return trial[first : last + 1], gap

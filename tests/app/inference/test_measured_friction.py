@@ -32,7 +32,7 @@ def measure(monkeypatch):
     asked: list[float] = []
 
     def by(answer, material: RodMaterial | None = None) -> tuple[RodMaterial, list[float]]:
-        def check(packing, snapshots, first, last, unit, settings) -> FrictionCheck:
+        def check(packing, snapshots, first, last, unit, settings, workers) -> FrictionCheck:
             given = packing.material.friction
             asked.append(given)
             measured, enclosed = answer(given)

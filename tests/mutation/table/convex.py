@@ -64,12 +64,12 @@ MUTANTS = [
         ("1.0 + float(np.sum(ft * slip)) / possible", "1.0 - float(np.sum(ft * slip)) / possible"),
         ("0.5 * (x[0] + x[1]) - 0.5 * left / curvature", "x[1]"),
         (
-            "least = first + np.argmin([known.mean(axis=0), *_means_without_one(known)], axis=1)",
-            "least = first + np.argmin([known.mean(axis=0)], axis=1)",
+            "least = first + np.argmin([finite.mean(axis=0), *_means_without_one(finite)], axis=1)",
+            "least = first + np.argmin([finite.mean(axis=0)], axis=1)",
         ),
         (
-            "np.column_stack([gaps_of(float(trial[first])), gap])",
-            "np.column_stack([gap, gaps_of(float(trial[first]))])",
+            "np.column_stack([gaps_at(first), gap])",
+            "np.column_stack([gap, gaps_at(first)])",
         ),
         ("friction=tried * frame.balance.friction", "friction=frame.balance.friction"),
     ),

@@ -104,10 +104,12 @@ def valleys(lowest: np.ndarray) -> np.ndarray:
     return 0.1 + np.log(np.array(FACTORS) / lowest[:, None]) ** 2
 
 
+@pytest.mark.parametrize("workers", [1, 3])
 @pytest.mark.parametrize("lowest", [0.3, 0.55, 0.75, 0.92, 1.0, 1.1, 1.5, 2.5])
-def test_the_walk_finds_what_all_trials_would(lowest: float):
+def test_the_walk_finds_what_all_trials_would(lowest: float, workers: int):
     every, trial = valleys(lowest * np.linspace(0.9, 1.1, 8)), np.array(FACTORS)
-    tried, gap = _walk_into_valley(trial, lambda factor: every[:, FACTORS.index(factor)])
+    tried, gap = _walk_into_valley(trial, lambda factor: every[:, FACTORS.index(factor)], workers)
+    assert list(tried) == sorted(tried)
     assert _least(tried, gap.mean(axis=0)) == _least(trial, every.mean(axis=0))
     assert _jackknife(tried, gap) == _jackknife(trial, every)
 
