@@ -20,7 +20,7 @@ JITTER = 0.3  # of a lattice cell, either way
 SOFTENING = 1e-3  # the springs' share of their stiffness while overlaps are pushed apart
 SOFT_STEPS, SOFT_DRAG = 4000, 50.0  # –, [1/s]
 LOADING_STEPS, LOADING_DRAG = 5000, 20.0  # between two looks at the balance, [1/s]
-LOADING_ROUNDS = 40
+LOADING_ROUNDS, ROUNDS_OF = 40, 2000  # at most, of so many rods; of more as many more as their rows: sound has to pass
 PREPARED = 1e-3  # unbalance, of grains and plate, at which a packing counts as at rest
 
 
@@ -73,7 +73,7 @@ def prepare_packing(
     cell.run(np.zeros(SOFT_STEPS))
     loading = settings if loose else frictionless
     cell = ShearCell(radius, cell.position, width=width, height=height, settings=loading, drag=LOADING_DRAG)
-    for _ in range(LOADING_ROUNDS):
+    for _ in range(round(LOADING_ROUNDS * max(count / ROUNDS_OF, 1.0) ** 0.5)):
         cell.run(np.zeros(LOADING_STEPS))
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
             return ShearCell(radius, cell.position, width=width, height=cell.height, settings=settings)

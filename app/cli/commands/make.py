@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from rich.console import Console
 
-from ...errors import InputError
+from ...errors import InputError, RunError
 from ...synthetic.worlds.names import MeasuredPreset, PhotographedPreset, WorldName
 from ..arguments import Quiet
 from ..terminal import progress_of
@@ -55,7 +57,7 @@ def synth(
     from ...synthetic.synthesis import synthesize
     from ...synthetic.worlds.making import make_world
 
-    with progress_of(quiet) as progress:
+    with _at_rest(out), progress_of(quiet) as progress:
         if preset in ("small", "paper"):
             made = synthesize(
                 out, progress=progress, preset=preset, seed=seed, photographs=photographs, noise=noise or 0.0,
@@ -90,3 +92,14 @@ def _photoelastic(out: Path, seed: int, grains: int | None, progress: Progress, 
         command = f"rodsight import pegs {out} EXPERIMENT --pixel-size {made.pixel_size:.4g}"
         Console().print(f"{out}: {told}. Next: {command}", highlight=False, soft_wrap=True)
     return 0
+
+
+@contextmanager
+def _at_rest(out: Path) -> Iterator[None]:
+    """Say in one line of a simulation that does not come to rest that another packing may."""
+    from solver.dem.simulation import UnbalancedError
+
+    try:
+        yield
+    except UnbalancedError as error:
+        raise RunError(f"{out}: {error}; another --seed or number of --grains may") from None

@@ -33,3 +33,12 @@ def test_a_folder_that_is_a_file_is_one_line(tracked, tmp_path, capsys):
     assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 1
     assert capsys.readouterr().err.count("\n") == 1
     assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_a_simulation_that_does_not_come_to_rest_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("rodsight.synthetic.dense_packing.LOADING_ROUNDS", 0)
+    assert rodsight("synth", tmp_path / "out", "--grains", "30", "--no-photographs", "--quiet") == 1
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "did not come to rest" in told
+    assert not (tmp_path / "out").exists()
