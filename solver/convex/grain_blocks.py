@@ -43,7 +43,8 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
     """
     node, component = _nodes_of_rows(len(load), grain_count)
     entries, count = matrix.tocoo(), int(node.max(initial=-1)) + 1
-    which, place = np.unique(entries.col % contacts * count + node[entries.row], return_inverse=True)
+    pair = entries.col.astype(np.int64) % contacts * count + node[entries.row]  # beyond 32 bits from 50 000 grains on
+    which, place = np.unique(pair, return_inverse=True)
     contact, of = which // count, which % count
     leg = np.zeros((len(which), 2 * ROWS))
     np.add.at(leg, (place, 2 * component[entries.row] + entries.col // contacts), entries.data)
