@@ -14,10 +14,10 @@ import numpy as np
 from numba import njit
 
 from solver.bodies.grains import Array
-from solver.nlgs.contact_law import project_on_cone
-from solver.nlgs.kernels import apply_forces, measure_forces, measure_natural_map, workspace
-from solver.nlgs.ordering import GROUP
 from solver.nlgs.problem import ContactProblem
+from solver.nlgs.sweeping.contact_law import project_on_cone
+from solver.nlgs.sweeping.kernels import apply_forces, measure_forces, measure_natural_map, workspace
+from solver.nlgs.sweeping.ordering import GROUP
 
 PERIOD = 20  # sweeps between two steps: shorter ones gain less than they cost
 REGULARISATION = 1e-10  # of the squared residuals' differences

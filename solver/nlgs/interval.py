@@ -14,8 +14,8 @@ from solver.bodies.packing import Packing
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
 from solver.detection.networks import Network
-from solver.nlgs.ordering import VisitingOrder, order_contacts
 from solver.nlgs.problem import ContactProblem, assemble
+from solver.nlgs.sweeping.ordering import VisitingOrder, order_contacts
 
 
 class Instant(NamedTuple):

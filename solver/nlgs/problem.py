@@ -19,7 +19,7 @@ from solver.bodies.grains import Array, GrainMotion, Grains
 from solver.bodies.packing import Material
 from solver.bodies.walls import Walls
 from solver.contacts.contacts import Contacts
-from solver.nlgs.ordering import GROUP, VisitingOrder, order_contacts
+from solver.nlgs.sweeping.ordering import GROUP, VisitingOrder, order_contacts
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
 CACHE_LINE = 64  # bytes

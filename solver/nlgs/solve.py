@@ -18,7 +18,8 @@ from jaxtyping import Float
 
 from solver.bodies.grains import Array
 from solver.nlgs.acceleration import PERIOD, Acceleration
-from solver.nlgs.kernels import (
+from solver.nlgs.problem import ContactProblem, aligned_zeros
+from solver.nlgs.sweeping.kernels import (
     advance,
     apply_forces,
     measure_forces,
@@ -26,8 +27,7 @@ from solver.nlgs.kernels import (
     measure_state,
     measure_unbalance,
 )
-from solver.nlgs.measured_sweeps import advance_and_measure, find_rest, rest_shape
-from solver.nlgs.problem import ContactProblem, aligned_zeros
+from solver.nlgs.sweeping.measured_sweeps import advance_and_measure, find_rest, rest_shape
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,10 +21,10 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
-from solver.nlgs.kernels import advance, apply_forces
 from solver.nlgs.problem import ContactProblem, aligned_zeros
 from solver.nlgs.solve import NlgsSettings, Solution, Stop, solve
 from solver.nlgs.sweep_record import SweepHistory, SweepRecorder
+from solver.nlgs.sweeping.kernels import advance, apply_forces
 from tests.benchmarks.plain_kernel import plain_problem, plain_state, plain_sweeps
 from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, StaticPacking, jammed_packing, static_problem
 

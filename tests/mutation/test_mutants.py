@@ -9,7 +9,7 @@ from tests.mutation.table import MUTANTS
 
 def test_a_mutant_whose_text_is_gone_is_said_to_be_stale():
     with pytest.raises(StaleMutantError, match="0 times"):
-        Mutant("solver/nlgs/contact_law.py", "no such line", "", ()).locate(ROOT)
+        Mutant("solver/nlgs/sweeping/contact_law.py", "no such line", "", ()).locate(ROOT)
     with pytest.raises(StaleMutantError, match="not once"):
         Mutant("solver/nlgs", "import", "", ()).locate(ROOT)
 

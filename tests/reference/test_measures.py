@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from solver.nlgs.acceleration import extrapolate, inner_products
-from solver.nlgs.contact_law import project_on_cone
-from solver.nlgs.kernels import (
+from solver.nlgs.sweeping.contact_law import project_on_cone
+from solver.nlgs.sweeping.kernels import (
     advance,
     apply_forces,
     measure_forces,
@@ -13,8 +13,8 @@ from solver.nlgs.kernels import (
     measure_state,
     measure_unbalance,
 )
-from solver.nlgs.measured_sweeps import advance_and_measure, find_rest, rest_shape
-from solver.nlgs.ordering import GROUP, visiting_order
+from solver.nlgs.sweeping.measured_sweeps import advance_and_measure, find_rest, rest_shape
+from solver.nlgs.sweeping.ordering import GROUP, visiting_order
 from tests.reference.twins.ordering import plain_order
 from tests.reference.twins.packing import make_case, make_guess
 from tests.reference.twins.sweeps import PlainSolver, greatest_change, mean_normal

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from solver.nlgs.kernels import advance, apply_forces
-from solver.nlgs.ordering import GROUP
 from solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance
+from solver.nlgs.sweeping.kernels import advance, apply_forces
+from solver.nlgs.sweeping.ordering import GROUP
 from tests.reference.twins.packing import LOST, make_case, make_guess
 from tests.reference.twins.sweeps import PLATE, PlainSolver
 

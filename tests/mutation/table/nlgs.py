@@ -8,7 +8,7 @@ MEASURES = ("tests/reference/test_measures.py",)
 
 MUTANTS = [
     *mutants_of(
-        "solver/nlgs/contact_law.py",
+        "solver/nlgs/sweeping/contact_law.py",
         (*SWEEPS, *MEASURES),
         ("fn = max(fn, 0.0)", "fn = abs(fn)"),
         ("limit = friction * fn", "limit = 0.5 * friction * fn"),
@@ -16,7 +16,7 @@ MUTANTS = [
         ("ft - ut * inverse_wtt, friction", "ft + ut * inverse_wtt, friction"),
     ),
     *mutants_of(
-        "solver/nlgs/kernels.py",
+        "solver/nlgs/sweeping/kernels.py",
         (*SWEEPS, *MEASURES),
         ("THIRD = 1.0 / 3.0", "THIRD = 1.0 / 2.0"),
         ("        body[i, 2] -= ci * (2.0 * force[c, 1])", "        body[i, 2] -= ci * force[c, 1]"),
@@ -70,7 +70,7 @@ MUTANTS = [
         ("return worst, total / max(grains, 1.0)", "return worst, total / count"),
     ),
     *mutants_of(
-        "solver/nlgs/measured_sweeps.py",
+        "solver/nlgs/sweeping/measured_sweeps.py",
         MEASURES,
         ("        flat_was[:] = flat", "        flat_was[:] = 1.0 * flat_was"),
         ("        was_plate[:] = plate", "        was_plate[:] = 1.0 * was_plate"),
@@ -114,8 +114,8 @@ MUTANTS = [
         ("if self._natural_map < kept_natural_map:", "if self._natural_map > 0.0:"),
     ),
     *mutants_of(
-        "solver/nlgs/ordering.py",
-        ("tests/reference/test_measures.py", "tests/solver/nlgs/test_ordering.py"),
+        "solver/nlgs/sweeping/ordering.py",
+        ("tests/reference/test_measures.py", "tests/solver/nlgs/sweeping/test_ordering.py"),
         ("group_of[j[c]] = groups", "group_of[i[c]] = groups"),
         ("_spread(cell[:, 1]) << np.uint64(1)", "_spread(cell[:, 1]) << np.uint64(2)"),
     ),

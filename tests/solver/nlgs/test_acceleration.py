@@ -5,9 +5,9 @@ from solver.bodies.grains import GrainMotion
 from solver.bodies.packing import Material
 from solver.contacts.contacts import detect_contacts
 from solver.nlgs.acceleration import PERIOD, Acceleration, extrapolate, inner_products
-from solver.nlgs.kernels import advance, apply_forces
 from solver.nlgs.problem import assemble
 from solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps
+from solver.nlgs.sweeping.kernels import advance, apply_forces
 from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, jammed_packing
 from tests.packings import squeezed_heap
 from tests.solver.nlgs.test_natural_map import natural_map_of

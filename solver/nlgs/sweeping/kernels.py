@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.nlgs.contact_law import relax_contact
-from solver.nlgs.grain_records import WIDTH, gather_differences, gather_records, scatter_records
-from solver.nlgs.ordering import GROUP as L
+from solver.nlgs.sweeping.contact_law import relax_contact
+from solver.nlgs.sweeping.grain_records import WIDTH, gather_differences, gather_records, scatter_records
+from solver.nlgs.sweeping.ordering import GROUP as L
 
 THIRD = 1.0 / 3.0  # W_nn over W_tt between two solid rods
 IDS = 2 * L  # numbers in a block

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.nlgs.contact_law import relax_contact
-from solver.nlgs.grain_records import (
+from solver.nlgs.sweeping.contact_law import relax_contact
+from solver.nlgs.sweeping.grain_records import (
     RECORD,
     WIDTH,
     gather_differences,
@@ -20,7 +20,7 @@ from solver.nlgs.grain_records import (
     scatter_records,
     transpose_records,
 )
-from solver.nlgs.kernels import (
+from solver.nlgs.sweeping.kernels import (
     CELL_ROWS,
     IDS,
     ROWS,
@@ -34,7 +34,7 @@ from solver.nlgs.kernels import (
     relax_wall,
     workspace,
 )
-from solver.nlgs.ordering import GROUP as L
+from solver.nlgs.sweeping.ordering import GROUP as L
 
 # Where in the workspace: records of the grains, what they differed by before the sweep, and sums, one of each per lane.
 DIFFERENCES, MISS, SQUARES, NORMAL, BEARING, CHANGE, SIZE, WORKSPACE = (

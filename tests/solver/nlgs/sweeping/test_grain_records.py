@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from solver.nlgs.grain_records import RECORD, WIDTH, gather_differences, gather_records, scatter_records
+from solver.nlgs.sweeping.grain_records import RECORD, WIDTH, gather_differences, gather_records, scatter_records
 
 GRAINS, STRIDE = 40, 16
 

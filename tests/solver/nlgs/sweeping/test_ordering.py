@@ -3,8 +3,8 @@ import pytest
 
 from solver.bodies.packing import Material
 from solver.contacts.contacts import detect_contacts
-from solver.nlgs.ordering import GROUP, visiting_order
 from solver.nlgs.problem import assemble
+from solver.nlgs.sweeping.ordering import GROUP, visiting_order
 from tests.packings import squeezed_heap
 
 
