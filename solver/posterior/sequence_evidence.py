@@ -17,17 +17,16 @@ from solver.bodies.grains import Array
 from solver.bodies.motion import Snapshot
 from solver.bodies.packing import Packing
 from solver.contacts.contacts import measure_pairs
-from solver.contacts.pairs import Keys, are_among, split_keys
+from solver.contacts.pairs import Keys, are_among
 from solver.contacts.verdicts import NO_VERDICTS, Verdicts
 from solver.posterior.error_scatter import ErrorScatter, scatter_of
 from solver.posterior.frame_evidence import FrameEvidence, KnownForces
-from solver.posterior.gap_series import GapNoise, GapSeries, measure_noise, measure_series, smooth_series
+from solver.posterior.gap_series import GapNoise, GapSeries
+from solver.posterior.near_gaps import NEAR, find_near_gaps, traits_of
 from solver.posterior.settings import PosteriorSettings
-from solver.posterior.touching import TouchingGaps, fit_touching
+from solver.posterior.touching import TouchingGaps
 
-NEAR = 0.01  # [mean diameter] of gaps of pairs that do not touch but may soon
 REACH = 6.0  # standard deviations of a gap, beyond
-FARTHEST = 0.3  # mean diameters: pairs beyond it are no near pairs
 SCATTER = 0.8  # standard deviation of contact forces over their mean
 APART = 1.0  # standard deviations that touching pairs stand apart from which on the gaps must share an error
 SCATTER_FRAMES = 8  # photographs that tell errors of radii from errors of centres
@@ -99,10 +98,10 @@ def gather_evidence(
     settings = settings or PosteriorSettings()
     diameter = 2.0 * float(packing.grains.radius.mean())
     stated = float(np.median([each.sigma for each in snapshots]))
-    found = _find_touching(packing, snapshots, NEAR * diameter + REACH * np.sqrt(2.0) * stated + 3.0 * shared_error)
+    found = find_near_gaps(packing, snapshots, NEAR * diameter + REACH * np.sqrt(2.0) * stated + 3.0 * shared_error)
     series, noise, touching, wide = found.series, found.noise, found.touching, found.reach
     corrected = shared_error > 0.0 or touching.offset > APART * touching.deviation
-    gap, left = smooth_series(series.gap, noise)
+    gap, left = found.smooth, found.left
     error = _shared_error(packing, snapshots, series, touching) if corrected else np.zeros(len(series.key))
     overlap = 0.0 if corrected else max(-touching.offset, 0.0)
     scatter = _error_scatter(packing, snapshots, series, gap, touching, wide)
@@ -142,46 +141,9 @@ def _centre_variance(touching: TouchingGaps, overlap: float, radius: float, cova
     return (1.0 - doubt) * left + doubt * min(covariance, left)
 
 
-@dataclass(frozen=True, slots=True)
-class _Found:
-    series: GapSeries
-    noise: GapNoise
-    touching: TouchingGaps
-    reach: float  # [m]
-
-
-def _find_touching(packing: Packing, snapshots: Sequence[Snapshot], reach: float) -> _Found:
-    """Find the gaps of touching pairs, looking farther than `reach` [m] where they lie there."""
-    diameter, grains = 2.0 * float(packing.grains.radius.mean()), packing.grains.count
-    stated = float(np.median([each.sigma for each in snapshots]))
-    while True:
-        series = measure_series(packing, snapshots, reach)
-        noise = measure_noise(series, stated)
-        farthest = reach >= FARTHEST * diameter
-        if len(series.key) < grains and not farthest:  # fewer than two a grain: something shifts all gaps
-            reach = min(2.0 * reach, FARTHEST * diameter)
-            continue
-        touching = _fit_mixture(packing, snapshots, series, noise, reach)
-        needed = touching.offset + NEAR * diameter + 4.0 * touching.deviation
-        if needed <= reach or farthest:
-            return _Found(series, noise, touching, reach)
-        reach = min(max(needed, 1.2 * reach), FARTHEST * diameter)
-
-
-def _fit_mixture(
-    packing: Packing, snapshots: Sequence[Snapshot], series: GapSeries, noise: GapNoise, reach: float
-) -> TouchingGaps:
-    """Fit pairs of grains where there are any: walls are known otherwise."""
-    gap, _ = smooth_series(series.gap, noise)
-    with np.errstate(invalid="ignore"):
-        gap = np.where(gap < reach, gap, np.nan)
-    some = ~series.with_wall if (~series.with_wall).any() else np.ones(len(series.key), np.bool_)
-    return fit_touching(gap[:, some], _traits(packing, snapshots, series)[some], reach, float(np.sqrt(noise.noise)))
-
-
 def _shared_error(packing: Packing, snapshots: Sequence[Snapshot], series: GapSeries, touching: TouchingGaps) -> Array:
     """How much too large the gap of every pair (c,) [m] is; a wall has no radius that could be wrong."""
-    trait = _traits(packing, snapshots, series)
+    trait = traits_of(packing, snapshots, series)
     wall = series.with_wall
     trait[wall, 1:] *= 0.5  # the size of a grain on a wall is its own already
     return touching.mean_at(trait) - np.where(wall, 0.5 * touching.offset, 0.0)
@@ -197,39 +159,18 @@ def _error_scatter(
 ) -> ErrorScatter:
     """Tell errors of radii from errors of centres in some of the frames; smoothed gaps (f, c) [m]."""
     between = np.flatnonzero(~series.with_wall)
-    trait = _traits(packing, snapshots, series)[between]
-    rest = gap[:, between] - touching.mean_at(trait)
-    weight = touching.probability(gap[:, between], trait, reach)
+    trait = traits_of(packing, snapshots, series)[between]
+    rows = np.unique(np.linspace(0, len(snapshots) - 1, min(SCATTER_FRAMES, len(snapshots))).astype(int))
+    gap = gap[np.ix_(rows, between)]
+    rest = gap - touching.mean_at(trait)
+    weight = replace(touching, share=touching.share[rows]).probability(gap, trait, reach)
     frames = []
-    for k in np.unique(np.linspace(0, len(snapshots) - 1, min(SCATTER_FRAMES, len(snapshots))).astype(int)):
-        seen = weight[k] > 0.0
+    for row, k in enumerate(rows):
+        seen = weight[row] > 0.0
         walls = packing.walls_of(snapshots[k])
         contacts = measure_pairs(packing.grains, snapshots[k].position, walls, series.key[between[seen]])
-        frames.append((contacts, rest[k, seen], weight[k, seen]))
+        frames.append((contacts, rest[row, seen], weight[row, seen]))
     return scatter_of(frames)
-
-
-def _traits(packing: Packing, snapshots: Sequence[Snapshot], series: GapSeries) -> Array:
-    """What an error that the gaps share may depend on (c, 6): size of the pair, its place, squares of that.
-
-    Size in mean radii beyond the mean of two; place from the middle of the packing, over its half width.
-    """
-    radius, n = packing.grains.radius, packing.grains.count
-    i, j = split_keys(series.key, series.body_count)
-    position = _mean_position(snapshots)
-    size = radius[i] + np.where(j < n, radius[np.minimum(j, n - 1)], radius.mean()) - 2.0 * radius.mean()
-    place = np.where((j < n)[:, None], 0.5 * (position[i] + position[np.minimum(j, n - 1)]), position[i])
-    place = place - place.mean(axis=0)
-    x, y = (place / max(float(np.abs(place).max()), 1e-30)).T
-    trait = np.column_stack([size / radius.mean(), x, y, x * x, x * y, y * y])
-    return trait - trait.mean(axis=0)
-
-
-def _mean_position(snapshots: Sequence[Snapshot]) -> Array:
-    """Mean place of every grain over the frames that show it (n, 2) [m]; the origin if none does."""
-    here = np.stack([each.present for each in snapshots])
-    position = np.where(here[:, :, None], np.stack([each.position for each in snapshots]), 0.0)
-    return position.sum(axis=0) / np.maximum(here.sum(axis=0), 1)[:, None]
 
 
 def _radius_correction(packing: Packing, touching: TouchingGaps, corrected: bool) -> Array:

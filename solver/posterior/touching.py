@@ -7,23 +7,25 @@ differs from the overlap of touching surfaces is an error that all gaps share.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr
 
 from solver.bodies.grains import Array
+from solver.posterior.touching_kernels import add_gaps, weigh_gaps
 from solver.together import work_together
 
+SEARCHED = 8  # frames, spread evenly, that tell where to climb; then all do
 ROUNDS = 60  # at most
-SETTLED = 1e-7  # by which a round raises the logarithm of the likelihood when nothing that matters changes
+SETTLED = 1e-5  # by which a round raises the logarithm of the likelihood when nothing that matters changes
+NEARLY = 1e-2  # the same of a search whose end is climbed from again
 START = 0.2  # quantile of all gaps near which those of touching pairs are looked for first
+FIRST_SHARE = 0.6  # that touches
 LEAST_SHARE = 0.3  # that touches: strong friction with the ground would drive it to zero otherwise
 MOST_SHARE = 0.97
 WIDEST = 0.4  # scatter of touching gaps over the reach: open ones must be told from them
-NO_DENSITY = 1e-300
 ENOUGH = 30  # touching pairs to fit the mean by
 FLAT = 1e-13  # share of the greatest variance below which a trait does not vary
 
@@ -44,12 +46,9 @@ class TouchingGaps:
 
     def probability(self, gap: Array, trait: Array, reach: float) -> Array:
         """P(touch) (f, c) of gaps (f, c) [m]; 0 where a gap is not known or beyond the reach [m]."""
-        mean = self.mean_at(trait)
-        with np.errstate(invalid="ignore"):
-            near = gap < reach
-        rest = np.where(near, gap - mean, 0.0)
-        touching, opened = _densities(rest, self.deviation, reach - mean, self.share[:, None])
-        return np.where(near, touching / np.maximum(touching + opened, NO_DENSITY), 0.0)
+        mean, touch = self.mean_at(trait), np.empty(gap.shape)
+        weigh_gaps(gap, mean, reach - mean, self.deviation, self.share, touch)
+        return touch
 
 
 def fit_touching(gap: Array, trait: Array, reach: float, narrow: float) -> TouchingGaps:
@@ -65,43 +64,56 @@ def fit_touching(gap: Array, trait: Array, reach: float, narrow: float) -> Touch
     g = gap[known]
     low, high = np.quantile(g, [0.25, 0.75])
     starts = ((float(np.quantile(g, START)), narrow), (float(np.median(g)), max(0.75 * float(high - low), narrow)))
-    found = work_together([partial(_maximise, gap, trait, reach, *start) for start in starts], None)
-    return max(found, key=lambda each: each[0])[1]
+    some = np.unique(np.linspace(0, len(gap) - 1, min(SEARCHED, len(gap))).astype(int))
+    thinned = len(some) < len(gap)
+    tasks = [
+        partial(_maximise, gap[some], trait, reach, _start(a, s, trait, len(some)), NEARLY if thinned else SETTLED)
+        for a, s in starts
+    ]
+    found = max(work_together(tasks, None), key=lambda each: each[0])[1]
+    if not thinned:
+        return found
+    found = replace(found, share=np.full(len(gap), found.share.mean()))
+    return _maximise(gap, trait, reach, found, SETTLED)[1]
 
 
-def _maximise(gap: Array, trait: Array, reach: float, a: float, s: float) -> tuple[float, TouchingGaps]:
-    """Climb from a mean and a scatter [m]; gives the logarithm of the likelihood with what was found."""
-    frame, column = np.nonzero(np.isfinite(gap))
-    g, x = gap[frame, column], trait[column]
-    per_frame = np.maximum(np.bincount(frame, minlength=len(gap)), 1)
-    share, slope = np.full(len(gap), 0.6), np.zeros(trait.shape[1])
-    plane = np.asfortranarray(np.column_stack([np.ones(len(g)), x]))
-    least, total, likelihood = s, 0.0, -np.inf
+def _start(a: float, s: float, trait: Array, frames: int) -> TouchingGaps:
+    return TouchingGaps(a, np.zeros(trait.shape[1]), s, np.full(frames, FIRST_SHARE), np.inf)
+
+
+def _maximise(
+    gap: Array, trait: Array, reach: float, start: TouchingGaps, settled: float
+) -> tuple[float, TouchingGaps]:
+    """Climb from a mixture; gives the logarithm of the likelihood with what was found.
+
+    settled: by which a round raises the likelihood when it is the last.
+    """
+    frames, pairs = gap.shape
+    known = np.maximum(np.isfinite(gap).sum(axis=1), 1)
+    plane, found = np.column_stack([np.ones(pairs), trait]), np.append(start.offset, start.slope)
+    s, share, least = start.deviation, start.share, start.deviation
+    total, likelihood = 0.0, -np.inf
+    by_pair, touched = np.empty((3, pairs)), np.empty(frames)
     for _ in range(ROUNDS):
-        mean, former = a + x @ slope, likelihood
-        touching, opened = _densities(g - mean, s, reach - mean, share[frame])
-        density = np.maximum(touching + opened, NO_DENSITY)
-        likelihood, weight = float(np.log(density).sum()), touching / density
-        total = float(weight.sum())
-        if total < ENOUGH or abs(likelihood - former) < SETTLED:
+        mean, former = plane @ found, likelihood
+        likelihood = add_gaps(gap, mean, reach - mean, s, share, by_pair, touched)
+        total = float(touched.sum())
+        if total < ENOUGH or abs(likelihood - former) < settled:
             break
-        a, slope = _fit_mean(g, plane, weight)
-        s = min(float(np.sqrt(weight @ (g - a - x @ slope) ** 2 / total)), WIDEST * max(reach - a, least))
-        share = np.clip(np.bincount(frame, weight, minlength=len(gap)) / per_frame, LEAST_SHARE, MOST_SHARE)
-    pairs = max(total / max(len(gap), 1), 1.0)  # frames tell of the same pairs again
-    return likelihood, TouchingGaps(a, slope, s, share, s / np.sqrt(pairs))
+        weight, first, second = by_pair
+        change = _fit_plane(plane, weight, first)
+        found, moved = found + change, plane @ change
+        square = float(np.sum(second + moved * (moved * weight - 2.0 * first)))
+        s = min(float(np.sqrt(max(square, 0.0) / total)), WIDEST * max(reach - float(found[0]), least))
+        share = np.clip(touched / known, LEAST_SHARE, MOST_SHARE)
+    often = max(total / max(frames, 1), 1.0)  # frames tell of the same pairs again
+    return likelihood, TouchingGaps(float(found[0]), found[1:], s, share, s / np.sqrt(often))
 
 
-def _densities(rest: Array, s: float, room: Array, share: Array) -> tuple[Array, Array]:
-    """Densities of touching and of open gaps that exceed the mean by `rest` [m], at most by room [m]."""
-    scaled = rest / s
-    touching = share * np.exp(-0.5 * scaled**2) / (s * np.sqrt(2.0 * np.pi))
-    opened = (1.0 - share) * (ndtr(scaled) - ndtr((rest - room) / s)) / np.maximum(room, s)
-    return touching, opened
+def _fit_plane(plane: Array, weight: Array, sum_: Array) -> Array:
+    """The plane over ones and traits (c, 1 + t) through values of weighted sum `sum_` (c,), by weight (c,).
 
-
-def _fit_mean(g: Array, plane: Array, weight: Array) -> tuple[float, Array]:
-    """Weighted plane through the gaps, over ones and traits (c, 1 + t); flat along traits that do not vary."""
-    weighted = plane * weight[:, None]
-    found = np.linalg.lstsq(weighted.T @ plane, weighted.T @ g, rcond=FLAT)[0]
-    return float(found[0]), np.asarray(found[1:], dtype=np.float64)
+    Flat along traits that do not vary.
+    """
+    normal = plane.T @ (plane * weight[:, None])
+    return np.asarray(np.linalg.lstsq(normal, plane.T @ sum_, rcond=FLAT)[0], dtype=np.float64)

@@ -25,6 +25,14 @@ def test_mean_scatter_and_share_of_touching_gaps_are_found(share: float) -> None
     np.testing.assert_allclose(found.share, share, atol=0.06)
 
 
+def test_every_frame_of_many_has_its_own_share() -> None:
+    less, trait = gaps_of(0.5, frames=10, slope=0.4)
+    more, _ = gaps_of(0.8, frames=10, slope=0.4)
+    found = fit_touching(np.concatenate([less, more]), trait, REACH, narrow=0.3)
+    np.testing.assert_allclose(found.share, np.repeat([0.5, 0.8], 10), atol=0.07)
+    assert found.slope[0] == pytest.approx(0.4, abs=0.04)
+
+
 def test_the_share_that_touches_has_a_floor() -> None:
     gap, trait = gaps_of(0.15)
     assert fit_touching(gap, trait, REACH, narrow=0.3).share.min() == LEAST_SHARE
