@@ -19,7 +19,7 @@ from solver.nlgs.sweeping.contact_law import project_on_cone
 from solver.nlgs.sweeping.kernels import apply_forces, measure_forces, measure_natural_map, workspace
 from solver.nlgs.sweeping.ordering import GROUP
 
-PERIOD = 20  # sweeps between two steps: shorter ones gain less than they cost
+PERIOD = 60  # sweeps between two steps: shorter ones gain less than they cost in large packings
 REGULARISATION = 1e-10  # of the squared residuals' differences
 
 
