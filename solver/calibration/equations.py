@@ -17,11 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from solver.bodies.grains import Array
 from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, circle_ends, circle_of, outward_normals
+from solver.calibration.derivatives import Derivatives
 from solver.calibration.gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps
+
+SHARED = 5  # unknowns that a gap shares with others, at most: a wall and its tilt, or classes, scale and lens
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +77,12 @@ class Layout:
 def rotate_offsets(sequence: MeasuredSequence, offset: Array) -> Array:
     """Turn body-fixed offsets (n, 2) [m] with their grains: (f, n, 2) [m], zero where a grain is not present."""
     angle = _angle_since_first_seen(sequence)
-    c, s = np.cos(angle), np.sin(angle)
+    return _turn(offset, np.cos(angle), np.sin(angle), sequence.present)
+
+
+def _turn(offset: Array, c: Array, s: Array, present: NDArray[np.bool_]) -> Array:
     turned = np.stack([c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0] + c * offset[:, 1]], axis=2)
-    return np.where(sequence.present[..., None], turned, 0.0)
+    return np.where(present[..., None], turned, 0.0)
 
 
 def move_walls(endpoints: Array, outward: Array, tilt: Array, side: Sides = None) -> Array:
@@ -139,7 +144,8 @@ class GapEquations:
         """Corrected centres (f, n, 2) [m]."""
         offset = unknowns[self.layout.offset].reshape(-1, 2)
         scaled = (1.0 + unknowns[self.layout.scale]) * self.sequence.position
-        return scaled + unknowns[self.layout.lens] * self._bulge + rotate_offsets(self.sequence, offset)
+        turned = _turn(offset, self._cosine, self._sine, self.sequence.present)
+        return scaled + unknowns[self.layout.lens] * self._bulge + turned
 
     def endpoints(self, unknowns: Array) -> Array:
         """Corrected ends of the walls (f, w, 2, 2) [m]."""
@@ -152,34 +158,33 @@ class GapEquations:
         radius, side, cell = self.radius(unknowns), self.sequence.side, self.sequence.cell
         return measure_gaps(rows, self.position(unknowns), self.endpoints(unknowns), radius, side, cell)
 
-    def derive(self, rows: GapRows, geometry: GapGeometry) -> sparse.csr_matrix:
-        """Derivatives (m, unknowns) of the corrected gaps of `rows`, whose geometry is `geometry`."""
-        n, layout = self.sequence.grain_count, self.layout
-        i, j, grain = rows.i.astype(np.int64), rows.j.astype(np.int64), rows.second_grain(n).astype(np.int64)
-        wall = rows.with_wall(n)
-        of_grain = np.where(wall, 0.0, 1.0)
+    def derive(self, rows: GapRows, geometry: GapGeometry, free: NDArray[np.bool_] | None = None) -> Derivatives:
+        """Derivatives (m, unknowns) of the corrected gaps of `rows`, whose geometry is `geometry`.
+
+        free (u,): unknowns that are asked for; those of others may be zero. None: all.
+        """
+        n, layout, count = self.sequence.grain_count, self.layout, rows.count
+        i, grain, wall = rows.i.astype(np.int64), rows.second_grain(n).astype(np.int64), rows.with_wall(n)
         ix, iy = self._in_body_frame(rows.frame, i, geometry.normal)
         jx, jy = self._in_body_frame(rows.frame, grain, geometry.normal)
-        one = np.ones(rows.count)
-        entries = [
-            (2 * i, -ix),
-            (2 * i + 1, -iy),
-            (2 * grain, of_grain * jx),
-            (2 * grain + 1, of_grain * jy),
-            (layout.radius.start + i, -one),
-            (np.where(wall, layout.wall.start + j - n, layout.radius.start + grain), np.where(wall, one, -one)),
-            (np.full(rows.count, layout.scale.start), self._stretch(rows, geometry)),
-            (np.full(rows.count, layout.lens.start), self._bend(rows, geometry)),
-        ]
-        if layout.wall_count:
-            entries += [(np.where(wall, layout.wall_tilt.start + j - n, layout.wall_tilt.start), -geometry.along)]
+        minus = np.full(count, -1.0)
+        own, other = np.stack([-ix, -iy, minus], axis=1), np.stack([jx, jy, minus], axis=1)
+        other[wall] = 0.0
+        column, value = np.zeros((count, SHARED), np.int64), np.zeros((count, SHARED))
+        start = layout.wall.start
         if self.radius_class is not None:
-            start = layout.radius_class.start
-            entries += [(start + self.radius_class[i], -one), (start + self.radius_class[grain], -of_grain)]
-        columns = np.stack([column for column, _ in entries], axis=1)
-        values = np.stack([value for _, value in entries], axis=1)
-        ends = np.arange(rows.count + 1) * len(entries)
-        return sparse.csr_matrix((values.ravel(), columns.ravel(), ends), shape=(rows.count, layout.count))
+            of_class = layout.radius_class.start - start + self.radius_class
+            column[:, 0], column[:, 2] = of_class[i], of_class[grain]
+            value[:, 0], value[:, 2] = -1.0, -1.0
+        met = rows.j[wall] - n
+        column[wall, 1], value[wall, 1] = layout.wall_tilt.start - start + met, -geometry.along[wall]
+        column[wall, 2], value[wall, 2] = met, 1.0
+        of_all = (layout.scale.start, self._stretch), (layout.lens.start, self._bend)
+        for k, (place, measure) in enumerate(of_all, start=3):
+            column[:, k] = place - start
+            if free is None or free[place]:
+                value[:, k] = measure(rows, geometry)
+        return Derivatives(i, grain, own, other, column, value, n, layout.count - start)
 
     def _stretch(self, rows: GapRows, geometry: GapGeometry) -> Array:
         """What the pixel size does to the gaps (m,) [m]."""

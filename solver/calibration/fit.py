@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import SuperLU
 
 from solver.bodies.grains import Array
 from solver.calibration.equations import GapEquations
 from solver.calibration.gap_noise import GapNoise
-from solver.calibration.normal_equations import factor_normal
+from solver.calibration.normal_equations import Couplings, NormalEquations
 from solver.calibration.priors import CalibrationPriors, Candidates, find_candidates, prior_vector, reduce_priors
 from solver.calibration.weights import FINAL_SCALE, weigh_gaps, weighting_bias
 
@@ -57,18 +56,20 @@ def fit_gaps(
     candidates = find_candidates(equations.sequence, priors, overlap)
     rows, limits = candidates.rows, priors
     before = equations.measure(rows, unknowns).gap
+    n = equations.sequence.grain_count
+    couplings = Couplings.of(n, rows.i, rows.second_grain(n))
     end = FINAL_SCALE * candidates.noise
     for number in range(ANNEALING_ROUNDS):
         annealed = number / ANNEALING_ROUNDS
         s = np.maximum(candidates.scale ** (1.0 - annealed) * end**annealed, end)
-        unknowns = _LinearStep(equations, candidates, unknowns, s, priors).solution()
-    step = _LinearStep(equations, candidates, unknowns, end, priors)
+        unknowns = _LinearStep(equations, candidates, couplings, unknowns, s, priors).solution()
+    step = _LinearStep(equations, candidates, couplings, unknowns, end, priors)
     for _ in range(REFINING_ROUNDS - 1):
         unknowns = step.solution()
         # Overlaps of contacts show in the estimates already: drawn again, they would widen the priors twice.
         priors = reduce_priors(limits, equations, unknowns, step.draw(PRIOR_SAMPLES, rng, surfaces=False))
         candidates = candidates.judge_noise(equations.measure(rows, unknowns).gap)
-        step = _LinearStep(equations, candidates, unknowns, FINAL_SCALE * candidates.noise, priors)
+        step = _LinearStep(equations, candidates, couplings, unknowns, FINAL_SCALE * candidates.noise, priors)
     unknowns = step.solution()
     draws = SD_FACTOR * step.draw(samples, rng)
     sd = np.minimum(np.sqrt(np.mean(draws**2, axis=0)), prior_vector(equations, priors))
@@ -83,6 +84,7 @@ class _LinearStep:
         self,
         equations: GapEquations,
         candidates: Candidates,
+        couplings: Couplings,
         unknowns: Array,
         s: Array,
         priors: CalibrationPriors,
@@ -98,27 +100,28 @@ class _LinearStep:
         self._weight = weight[kept]
         self.touching = weight > TOUCHING_WEIGHT
         self._precision = self._weight / np.maximum(candidates.noise[kept] ** 2, ANNEALED_VARIANCE * s[kept] ** 2)
-        self._matrix = equations.derive(self._rows, self._geometry)[:, self._free]
+        self._matrix = equations.derive(self._rows, self._geometry, self._free).of_unknowns(self._free)
         self._shift = weighting_bias(s[kept], candidates.position_noise[kept])
         residual = self._geometry.gap + overlap + self._shift
-        self._target = self._matrix @ unknowns[self._free] - residual
-        self._factor: SuperLU | None = None
+        self._target = self._matrix.times(unknowns) - residual
+        self._normal: NormalEquations | None = None
         if np.any(self._free):
-            self._factor = factor_normal(self._matrix, self._precision, self._prior_sd[self._free] ** -2.0)
+            with np.errstate(divide="ignore"):
+                penalty = self._prior_sd**-2.0  # infinite of what is held
+            self._normal = NormalEquations(self._matrix, couplings.select(kept), self._precision, penalty)
 
     def solution(self) -> Array:
-        unknowns = np.zeros(len(self._free))
-        if self._factor is None:
-            return unknowns
-        unknowns[self._free] = self._factor.solve(self._matrix.T @ (self._precision * self._target))
-        return unknowns
+        if self._normal is None:
+            return np.zeros(len(self._free))
+        return self._normal.solve(self._matrix.transposed_times(self._precision * self._target))
 
     def gap_spread(self, errors: Array) -> float:
         """Root mean square [m] of what errors (count, u) of the unknowns do to the gaps of touching pairs."""
         touching = self._weight > TOUCHING_WEIGHT
         if not np.any(touching):
             return 0.0
-        return float(np.sqrt(np.mean((self._matrix[touching] @ errors[:, self._free].T) ** 2)))
+        matrix = self._matrix.select(touching)
+        return float(np.sqrt(np.mean([np.mean(matrix.times(each) ** 2) for each in errors])))
 
     def draw(self, count: int, rng: np.random.Generator, *, surfaces: bool = True) -> Array:
         """Draw errors of the solution (count, u); surfaces: with what is not known of overlaps and of the weights.
@@ -128,18 +131,19 @@ class _LinearStep:
         """
         sequence, rows, overlap = self._equations.sequence, self._rows, self._candidates.overlap
         wall = rows.with_wall(sequence.grain_count).astype(np.int64)
-        episode = rows.pair.astype(np.int64) * sequence.frame_count + rows.frame // OVERLAP_FRAMES
-        block = np.unique(episode, return_inverse=True)[1]
+        episode = rows.pair.astype(np.int64) * sequence.frame_count + rows.frame // OVERLAP_FRAMES  # ascending
+        block = np.cumsum(np.diff(episode, prepend=episode[:1]) != 0)
         errors = np.zeros((count, len(self._free)))
-        if self._factor is None:
+        if self._normal is None:
             return errors
         noise = GapNoise(sequence, rows, self._geometry.normal, self._candidates.noise_factor)
+        freedom = np.count_nonzero(self._free)
         for row in errors:
             error = noise.draw(rng)
             if surfaces:
                 error += overlap * rng.standard_normal(block.max(initial=-1) + 1)[block]
                 error += DOUBT * (overlap * rng.standard_normal(2)[wall] + self._shift * rng.standard_normal())
-            right = self._matrix.T @ (self._precision * error)
-            right += rng.standard_normal(len(right)) / self._prior_sd[self._free]
-            row[self._free] = self._factor.solve(right)
+            right = self._matrix.transposed_times(self._precision * error)
+            right[self._free] += rng.standard_normal(freedom) / self._prior_sd[self._free]
+            row[:] = self._normal.solve(right)
         return errors

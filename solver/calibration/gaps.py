@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.bodies.cell import Cell
+from solver.bodies.cell import Cell, reduce_vectors
 from solver.bodies.grains import Array
 from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, beside_wall, reach_of_wall
+
+TINY = 1e-300  # [m] lest a distance of zero have no direction at all
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,13 +131,10 @@ def measure_gaps(
     side (w,): which walls are circles.
     """
     n = len(radius)
-    k, i, grain, wall = rows.frame, rows.i, rows.second_grain(n), rows.with_wall(n)
-    branch = position[k, grain] - position[k, i]
-    if cell is not None:
-        for each in np.unique(k):
-            branch[k == each] += Cell.at_rest(cell[each]).shift(branch[k == each])
-    normal = branch / np.maximum(np.linalg.norm(branch, axis=1, keepdims=True), np.finfo(float).tiny)
-    along = np.zeros(rows.count)
+    k, i, wall = rows.frame, rows.i, rows.with_wall(n)
+    gap, normal, along = np.empty(rows.count), np.empty((rows.count, 2)), np.zeros(rows.count)
+    lattice = np.empty((0, 2, 2)) if cell is None else np.stack([reduce_vectors(each)[1] for each in cell])
+    _measure_pairs(k, i, rows.j, position, radius, lattice, np.linalg.inv(lattice), gap, normal)
     kw, w, at = k[wall], rows.j[wall] - n, position[k[wall], i[wall]]
     shape = all_sides(side, endpoints.shape[1])[w]
     curved = shape != STRAIGHT
@@ -141,9 +142,27 @@ def measure_gaps(
     direction = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
     # A circle that is turned about its middle stays where it is.
     along[wall] = np.where(curved, 0.0, np.einsum("mk,mk->m", at - endpoints[kw, w].mean(axis=1), direction))
-    distance = np.einsum("mk,mk->m", branch, normal)
-    distance[wall], normal[wall] = depth, outward
-    return GapGeometry(distance - radius[i] - np.where(wall, 0.0, radius[grain]), normal, along)
+    gap[wall], normal[wall] = depth - radius[i[wall]], outward
+    return GapGeometry(gap, normal, along)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measure_pairs(frame, first, second, position, radius, lattice, inverse, gap, normal):  # type: ignore[no-untyped-def]
+    """Set gaps (m,) and normals (m, 2) of pairs of grains; lattice (f, 2, 2): the cell's shortest vectors, if any."""
+    for c in range(len(gap)):
+        k, i, j = frame[c], first[c], second[c]
+        if j >= len(radius):
+            continue
+        x, y = position[k, j, 0] - position[k, i, 0], position[k, j, 1] - position[k, i, 1]
+        if len(lattice):
+            a = np.rint(x * inverse[k, 0, 0] + y * inverse[k, 1, 0])
+            b = np.rint(x * inverse[k, 0, 1] + y * inverse[k, 1, 1])
+            x -= a * lattice[k, 0, 0] + b * lattice[k, 1, 0]
+            y -= a * lattice[k, 0, 1] + b * lattice[k, 1, 1]
+        distance = math.sqrt(x * x + y * y)
+        gap[c] = distance - radius[i] - radius[j]
+        far = max(distance, TINY)
+        normal[c, 0], normal[c, 1] = x / far, y / far
 
 
 def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach: float) -> tuple[NDArray, NDArray]:

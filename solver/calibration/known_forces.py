@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import SuperLU
 
 from solver.bodies.grains import Array
+from solver.calibration.derivatives import Derivatives
 from solver.calibration.equations import GapEquations
 from solver.calibration.gap_noise import GapNoise
 from solver.calibration.gaps import GapRows, MeasuredSequence
-from solver.calibration.normal_equations import factor_normal
+from solver.calibration.normal_equations import Couplings, NormalEquations
 from solver.calibration.weights import FINAL_SCALE, NORMAL_MEDIAN
 
 ROUNDS = 6  # of weights and noise
@@ -38,7 +37,7 @@ class GrainErrors:
         """Standard deviation (m,) [m] of what is left in the gaps of `rows`, noise of their frame apart."""
         equations = GapEquations(sequence)
         derivatives = _of_grains(equations, rows, np.zeros(equations.layout.count))
-        return np.sqrt(np.mean((derivatives @ self.draws.T) ** 2, axis=1))
+        return np.sqrt(np.mean([derivatives.times(each) ** 2 for each in self.draws], axis=0))
 
 
 def find_grain_errors(
@@ -64,51 +63,57 @@ def find_grain_errors(
     unit = float(np.mean(force))
     geometry = equations.measure(rows, unknowns)
     gap = geometry.gap
-    of_grains = _of_grains(equations, rows, unknowns)[:, free]
-    matrix = sparse.csr_matrix(sparse.hstack([of_grains, force[:, None] / unit]))
-    penalty = np.append(prior[free] ** -2.0, 0.0)
+    of_grains = _of_grains(equations, rows, unknowns)
+    matrix = of_grains._replace(
+        column=np.zeros((rows.count, 1), np.int64), value=force[:, None] / unit, shared_count=1
+    )  # fmt: skip
+    with np.errstate(divide="ignore"):
+        penalty = np.append(prior**-2.0, 0.0)  # infinite of what is exact
+    matrix, couplings = matrix.of_unknowns(np.isfinite(penalty)), Couplings.of(n, of_grains.first, of_grains.second)
     stated = _stated_noise(sequence, rows)
-    factor, step = 1.0, _Step.of(matrix, gap, penalty, stated**-2.0)
+    factor, step = 1.0, _Step.of(matrix, couplings, gap, penalty, stated**-2.0)
     for _ in range(ROUNDS - 1):
         factor = max(float(np.median(np.abs(step.left) / stated)) / NORMAL_MEDIAN, LEAST_NOISE)
         noise = factor * stated
         weight = (1.0 + (step.left / (2.0 * FINAL_SCALE * noise)) ** 2) ** -2.0  # a pair with a wrong force says little
-        step = _Step.of(matrix, gap, penalty, weight / noise**2)
+        step = _Step.of(matrix, couplings, gap, penalty, weight / noise**2)
     noise_of_gaps = GapNoise(sequence, rows, geometry.normal, factor)
     errors = step.draw(np.array([noise_of_gaps.draw(rng) for _ in range(DRAWS)]), rng)
-    unknowns, draws = np.zeros(3 * n), np.zeros((DRAWS, 3 * n))
-    unknowns[free], draws[:, free] = step.found[:-1], errors[:, :-1]
-    return GrainErrors(unknowns[: 2 * n].reshape(n, 2), unknowns[2 * n :], float(step.found[-1]) / unit, draws)
+    offset, radii = step.found[: 2 * n].reshape(n, 2), step.found[2 * n : -1]
+    return GrainErrors(offset, radii, float(step.found[-1]) / unit, errors[:, :-1])
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
     """Penalised least squares of one round: |gap + A x|² by precision, |x|² by penalty."""
 
-    matrix: sparse.csr_matrix  # A (m, u)
+    matrix: Derivatives  # A (m, u)
     penalty: Array  # (u,)
     precision: Array  # (m,)
-    factor: SuperLU
+    normal: NormalEquations
     found: Array  # x (u,)
     left: Array  # (m,) [m]
 
     @classmethod
-    def of(cls, matrix: sparse.csr_matrix, gap: Array, penalty: Array, precision: Array) -> _Step:
-        factor = factor_normal(matrix, precision, penalty)
-        found = factor.solve(-matrix.T @ (precision * gap))
-        return cls(matrix, penalty, precision, factor, found, gap + matrix @ found)
+    def of(cls, matrix: Derivatives, couplings: Couplings, gap: Array, penalty: Array, precision: Array) -> _Step:
+        normal = NormalEquations(matrix, couplings, precision, penalty)
+        found = normal.solve(-matrix.transposed_times(precision * gap))
+        return cls(matrix, penalty, precision, normal, found, gap + matrix.times(found))
 
     def draw(self, noise: Array, rng: np.random.Generator) -> Array:
         """Draw errors of x (d, u) from errors of the gaps (d, m) and what was thought beforehand."""
-        right = self.matrix.T @ (self.precision * noise).T
-        right += np.sqrt(self.penalty)[:, None] * rng.standard_normal(right.shape)
-        return self.factor.solve(right).T
+        before = np.sqrt(np.where(np.isfinite(self.penalty), self.penalty, 0.0))
+        draws = []
+        for each in noise:
+            right = self.matrix.transposed_times(self.precision * each) + before * rng.standard_normal(len(before))
+            draws.append(self.normal.solve(right))
+        return np.array(draws)
 
 
-def _of_grains(equations: GapEquations, rows: GapRows, unknowns: Array) -> sparse.csr_matrix:
+def _of_grains(equations: GapEquations, rows: GapRows, unknowns: Array) -> Derivatives:
     """Derivatives (m, 3 n) of the gaps by offsets and radii."""
-    columns = slice(equations.layout.offset.start, equations.layout.radius.stop)
-    return equations.derive(rows, equations.measure(rows, unknowns))[:, columns]
+    every = equations.derive(rows, equations.measure(rows, unknowns), np.zeros(equations.layout.count, np.bool_))
+    return every._replace(column=every.column[:, :0], value=every.value[:, :0], shared_count=0)
 
 
 def _stated_noise(sequence: MeasuredSequence, rows: GapRows) -> Array:

@@ -16,9 +16,9 @@ MUTANTS = [
     *mutants_of(
         "solver/calibration/equations.py",
         CALIBRATE,
-        ("(2 * grain, of_grain * jx)", "(2 * grain, -of_grain * jx)"),
-        ("(layout.radius.start + i, -one)", "(layout.radius.start + i, one)"),
-        ("-geometry.along)]", "geometry.along)]"),
+        ("np.stack([jx, jy, minus], axis=1)", "np.stack([-jx, jy, minus], axis=1)"),
+        ("np.stack([-ix, -iy, minus], axis=1)", "np.stack([-ix, -iy, -minus], axis=1)"),
+        ("-geometry.along[wall]", "geometry.along[wall]"),
         (
             "[c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0]",
             "[c * offset[:, 0] + s * offset[:, 1], s * offset[:, 0]",
@@ -29,8 +29,21 @@ MUTANTS = [
     *mutants_of(
         "solver/calibration/gaps.py",
         (*CALIBRATE, SCALE),
-        ("distance - radius[i] - np.where(wall, 0.0, radius[grain])", "distance - radius[i] - radius[grain]"),
+        ("gap[c] = distance - radius[i] - radius[j]", "gap[c] = distance - radius[i]"),
         ("endpoints[kw, w].mean(axis=1)", "endpoints[kw, w, 0]"),
+    ),
+    *mutants_of(
+        "solver/calibration/normal_equations.py",
+        "tests/solver/calibration/test_normal_equations.py",
+        ("x * other[c, b] if i > j else y * own[c, b]", "x * other[c, b]"),
+        ("corner - solved @ border", "corner + solved @ border"),
+        ("shared - self._solved @ flat", "shared"),
+    ),
+    *mutants_of(
+        "solver/calibration/gap_noise.py",
+        "tests/solver/calibration/test_gap_noise.py",
+        ("error[c] += sigma[j]", "error[c] -= sigma[j]"),
+        ("if j != i:", "if True:"),
     ),
     *mutants_of(
         "solver/calibration/priors.py",

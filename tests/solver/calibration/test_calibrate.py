@@ -116,7 +116,7 @@ def test_derivatives_match_finite_differences(true, rng):
     step = 1e-6  # truncation ~ step² / RADIUS, rounding ~ 1e-16 / step: both far below the tolerance
     ahead = equations.measure(rows, unknowns + step * direction).gap
     behind = equations.measure(rows, unknowns - step * direction).gap
-    derivative = equations.derive(rows, equations.measure(rows, unknowns)) @ direction
+    derivative = equations.derive(rows, equations.measure(rows, unknowns)).times(direction)
     np.testing.assert_allclose(derivative, (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-6)
 
 

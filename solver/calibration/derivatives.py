@@ -1,0 +1,90 @@
+"""Derivatives of gaps by constant errors: of its two grains for themselves, and of few that many gaps share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from solver.bodies.grains import Array
+
+OF_GRAIN = 3  # unknowns of a grain: x and y of its centre, its radius
+
+
+class Derivatives(NamedTuple):
+    """A (m, u), a row for each gap; unknowns: x and y of every grain's centre, radii, then what gaps share."""
+
+    first: NDArray[np.int64]  # (m,) a grain
+    second: NDArray[np.int64]  # (m,) another, or the same where the gap is to a wall
+    own: Array  # (m, 3) by what is wrong of the first
+    other: Array  # (m, 3) of the second, zero where there is none
+    column: NDArray[np.int64]  # (m, s) which of the shared ones
+    value: Array  # (m, s) by these
+    grain_count: int
+    shared_count: int
+
+    @property
+    def unknown_count(self) -> int:
+        return OF_GRAIN * self.grain_count + self.shared_count
+
+    def of_unknowns(self, free: NDArray[np.bool_]) -> Derivatives:
+        """The same with zeros for unknowns (u,) that are not free."""
+        if free.all():
+            return self
+        by_grain, shared = by_grains(free.astype(np.float64), self.grain_count)
+        found = self if shared.all() else self._replace(value=self.value * shared[self.column])
+        if by_grain.all():
+            return found
+        return found._replace(own=self.own * by_grain[self.first], other=self.other * by_grain[self.second])
+
+    def select(self, rows: NDArray) -> Derivatives:
+        """Keep some rows (mask, or ascending indices)."""
+        return Derivatives(*(each[rows] for each in self[:6]), *self[6:])
+
+    def times(self, x: Array) -> Array:
+        """A x (m,)."""
+        out = np.empty(len(self.first))
+        _multiply(*self[:6], *by_grains(x, self.grain_count), out)
+        return out
+
+    def transposed_times(self, v: Array) -> Array:
+        """Aᵀ v (u,)."""
+        grains, shared = np.zeros((self.grain_count, OF_GRAIN)), np.zeros(self.shared_count)
+        _multiply_transposed(*self[:6], v, grains, shared)
+        return in_order(grains, shared)
+
+
+def by_grains(x: Array, grain_count: int) -> tuple[Array, Array]:
+    """What is asked of every grain (n, 3), and of what is shared (q,), from the one vector of unknowns (u,)."""
+    n = grain_count
+    grains = np.concatenate([x[: 2 * n].reshape(n, 2), x[2 * n : 3 * n, None]], axis=1)
+    return np.ascontiguousarray(grains), np.ascontiguousarray(x[OF_GRAIN * n :])
+
+
+def in_order(grains: Array, shared: Array) -> Array:
+    """The one vector (u,) again."""
+    return np.concatenate([grains[:, :2].ravel(), grains[:, 2], shared])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _multiply(first, second, own, other, column, value, grains, shared, out):  # type: ignore[no-untyped-def]
+    for c in range(len(out)):
+        i, j, total = first[c], second[c], 0.0
+        for a in range(OF_GRAIN):
+            total += own[c, a] * grains[i, a] + other[c, a] * grains[j, a]
+        for s in range(column.shape[1]):
+            total += value[c, s] * shared[column[c, s]]
+        out[c] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _multiply_transposed(first, second, own, other, column, value, v, grains, shared):  # type: ignore[no-untyped-def]
+    for c in range(len(v)):
+        i, j = first[c], second[c]
+        for a in range(OF_GRAIN):
+            grains[i, a] += own[c, a] * v[c]
+            grains[j, a] += other[c, a] * v[c]
+        for s in range(column.shape[1]):
+            shared[column[c, s]] += value[c, s] * v[c]
