@@ -164,7 +164,7 @@ def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5p
     size = int(np.prod(shape)) * entry.dtype.itemsize
     if size >= COMPRESSED and entry.dtype.kind != "O":
         rows = max(min(BLOCK * shape[0] // size, shape[0]), 1)
-        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": 4, "shuffle": True}
+        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": 1, "shuffle": True}
     dataset = store.create_dataset(entry.path, shape, kind, **options)
     for axis, name in enumerate(entry.dims):
         dataset.dims[axis].label = name
