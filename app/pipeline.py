@@ -28,7 +28,7 @@ from .experiment.config.experiment_file import as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
 from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
-from .experiment.photographs import EightBits, ReadAhead
+from .experiment.photographs import ReadAhead
 from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
@@ -52,7 +52,7 @@ from .run_truth import load_truth, refuse_unnamed_truth
 from .sensitivity.error_budget import budget_cases, measure_budget
 from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
 from .sensitivity.study import Nominal
-from .tracking import DETECTIONS
+from .tracking import DETECTIONS, PICTURES
 from .tracks import Tracks, WallTracks
 from .verdicts.decisions import Bodies, decide
 from .verdicts.log import VERDICTS, Flag, VerdictLog
@@ -62,6 +62,7 @@ FORCES_FROM = (
     "photographs", "tracking", "tracks", "walls", "boundary", "calibration", "material", "contacts", "solver",
     "recording",
 )  # fmt: skip
+PICTURES_FROM = ("photographs",)  # likewise, photographs as they are shown
 
 
 def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
@@ -112,7 +113,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     sections = ("photographs", "tracking", "walls", "boundary")
     origin = run.origin(sections)
     if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
-        run.forget("tracking", "walls")
+        run.forget("tracking", "walls", PICTURES)
         return load_tracks(run.file(TRACKS))
     from .tracking.corrected_frames import keep_frames_before
     from .tracking.stage import track_photographs, write_found_tables  # not where rods are tracked already
@@ -120,11 +121,11 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     check(run)
     since = time.perf_counter()
     start, stop = run.frame_range(len(experiment.photographs()))
-    uncorrected = run.origin(sections, corrected=False).fingerprint
+    uncorrected, of_pictures = (run.origin(each, corrected=False).fingerprint for each in (sections, PICTURES_FROM))
     kept: list[str] = []
 
     def keep(stage: str) -> Checkpoint:
-        checkpoint = run.checkpoint(stage, uncorrected)
+        checkpoint = run.checkpoint(stage, of_pictures if stage == PICTURES else uncorrected)
         if stage == "tracking":  # walls are followed by themselves, whatever is told of rods
             keep_frames_before(checkpoint, read_corrections(experiment, None, len(experiment.photographs())))
         kept.append(stage)
@@ -353,6 +354,7 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     """Write the recording of finished results, the truth beside them where there is one."""
     from .recording.files.finished_run import write_recording
     from .recording.files.side_file import write_side_file
+    from .tracking.kept_pictures import KeptPictures
 
     since = time.perf_counter()
     section, scale, file = run.experiment.config.photographs, None, run.file(RECORDING)
@@ -361,7 +363,8 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
         if section is not None:
             photographs = run.experiment.photographs()
             scale = make_scale(section, photographs.shape[0], results.calibration)
-            shown = EightBits(photographs, run.frames[0])
+            kept = run.aside(PICTURES, run.origin(PICTURES_FROM, corrected=False).fingerprint)
+            shown = KeptPictures(photographs, run.frames[0], kept)
             pictures = opened.enter_context(ReadAhead(shown, len(results.frames)))
         report = write_recording(
             results,
@@ -373,6 +376,7 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
             truth=truth,
             progress=lambda done, total: run.progress("recording", done, total),
         )
+    run.drop_aside(PICTURES)  # the recording holds them
     run.notes.extend(report.notes)
     run.file(SIDE).unlink(missing_ok=True)  # of a former recording
     if run.full_frames:

@@ -163,6 +163,14 @@ class Run:
             place.rename(aside)
         self.forget(stage)
 
+    def aside(self, stage: str, fingerprint: str) -> Checkpoint:
+        """What is set aside of a stage that was made from this, to look at."""
+        return Checkpoint(self.folder / TRACKED / stage, fingerprint, looks_on=True)
+
+    def drop_aside(self, stage: str) -> None:
+        """Remove what is set aside of a stage."""
+        shutil.rmtree(self.folder / TRACKED / stage, ignore_errors=True)
+
     def checkpoint(self, stage: str, fingerprint: str) -> Checkpoint:
         """Finished frames of an unfinished stage that is made from this; of a stage not begun, those set aside."""
         aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage

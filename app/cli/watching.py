@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from ..experiment.photographs import EightBits
 from ..experiment.scaling import make_scale
+from ..experiment.shown import ShownPhotographs
 from ..run_folder import Run
 from .terminal import tell
 
@@ -50,7 +50,7 @@ def _watch(run: Run, viewer: str, say: Callable[[str], None]) -> LiveProcess:
     photograph = scale = None
     if config.photographs is not None:
         photographs = run.experiment.photographs()
-        photograph = EightBits(photographs, run.frames[0]).__getitem__
+        photograph = ShownPhotographs(photographs, run.frames[0]).__getitem__
         scale = make_scale(config.photographs, photographs.shape[0])
     sweeps = "none" if config.recording.sweeps == "none" else "log"
     return LiveProcess(run.file(LIVE), say, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)

@@ -171,17 +171,6 @@ class Readable(Protocol[P]):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class EightBits:
-    """The photographs of a run's frames as they are shown, in whole levels; read where and when they are asked for."""
-
-    photographs: Readable[Image]  # of the whole experiment, 255 is white
-    first: int  # photograph of the run's frame 0
-
-    def __getitem__(self, frame: int) -> NDArray[np.uint8]:
-        return np.clip(np.rint(self.photographs[self.first + frame]), 0, 255).astype(np.uint8)
-
-
 class ReadAhead(Generic[P]):
     """Photographs that are asked for one after the other: the next is read while one is worked at.
 

@@ -71,6 +71,15 @@ class Checkpoint:
         arrays = unpack(content)
         return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
 
+    def has(self, frame: int) -> bool:
+        """Whether something was kept of a frame."""
+        return self._file(frame).exists()
+
+    def find(self, frame: int, kind: type[T]) -> T | None:
+        """What was kept of one frame; None where nothing is, or nothing whole."""
+        content = self._content(frame) if self.has(frame) else None
+        return None if content is None else restore(kind, unpack(content), "0.")
+
     def lazily(self, count: int, *kinds: type) -> tuple[Lazily[Any], ...]:
         """The first frames, read whenever they are asked for: a sequence for each kind."""
         loaded = Remembered(count, lambda frame: self.load(frame, *kinds), _bytes_of, ROOM)

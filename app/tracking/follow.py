@@ -24,6 +24,7 @@ from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
 from .correlation.correlator import Rows
 from .detection.detect import Detection
+from .kept_pictures import KeepingPictures
 from .outline.outline_tracker import OutlineTracker
 from .registration.manual_poses import ManualPoses
 from .registration.poses import FramePoses, no_poses
@@ -71,6 +72,7 @@ class Execution:
     checkpoint: Checkpoint
     progress: Progress = silent
     observer: Observer = unheard  # hears what failed a photograph
+    pictures: Checkpoint | None = None  # where photographs are kept as recordings show them
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +107,8 @@ def follow_photographs(
     ]
     for k in range(1, len(poses)):
         _renew(tracker, photographs, poses[:k], np.flatnonzero(poses[k].reference != poses[k - 1].reference))
-    with ReadAhead(photographs, frame_count) as coming:
+    seen = photographs if execution.pictures is None else KeepingPictures(photographs, execution.pictures)
+    with ReadAhead(seen, frame_count) as coming:
         for k in range(len(poses), frame_count):
             progress("tracking", k, frame_count)
             image = coming[k]

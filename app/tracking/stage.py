@@ -28,7 +28,7 @@ from ..experiment.walls import read_walls
 from ..progress import Observer, Progress, silent, unheard
 from ..results.checkpoint import Checkpoint
 from ..tracks import Tracks, WallTracks
-from . import DETECTIONS
+from . import DETECTIONS, PICTURES
 from .detection.channels import count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from .detection.strangers import describe_channels, describe_strangers
@@ -100,7 +100,7 @@ def track_photographs(
             unfound = _name_unfound(walls, photographs)
             tables[WALLS] = _walls_table(followed)
     tracks = follow_photographs(
-        series, grains, Execution(workers, keep("tracking"), progress, observer),
+        series, grains, Execution(workers, keep("tracking"), progress, observer, keep(PICTURES)),
         TrackingSettings(section.follow, search_window=tuning.search_window),
         _manual_poses(experiment, grains.id, scale, count),
     )  # fmt: skip

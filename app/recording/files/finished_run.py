@@ -75,7 +75,7 @@ def write_recording(
 
     part_frames: photographs in one file; more make files beside the first that open alone, and with it as one.
 
-    photograph: frame → grey picture (H, W) or None; needs `scale`. sweeps: see SweepChoice.
+    photograph: frame → how it is shown, or None; needs `scale`. sweeps: see SweepChoice.
     tolerance: stopping level of the residual, drawn into the plot. max_size [bytes]: fewer sweeps are
     written where the file would be larger; what was left out is said in the report and the summary.
     """
@@ -86,7 +86,7 @@ def write_recording(
     _ask_for_room(path.parent, survey.contact_count, SweepChoice(sweeps), max_size)
     first = photograph(0) if photograph else None
     tracks = tracks_in_cell(results.tracks, results.walls)
-    canvas = Canvas.around(tracks, scale, None if first is None else (first.shape[0], first.shape[1]))
+    canvas = Canvas.around(tracks, scale, None if first is None else first.shape)
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, survey.force_range), truth, tolerance, results.radius_tuning,

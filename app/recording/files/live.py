@@ -16,14 +16,11 @@ import socket
 import subprocess
 import threading
 import webbrowser
-from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.frame_statistics import FrameStatistics
@@ -40,14 +37,12 @@ from ..tabs.layout_property import send_layout
 from ..viewing.headless import free_port
 from ..viewing.recording_server import RecordingServer, grown
 from ..viewing.viewer import ViewerKind, has_display, viewer_binary, viewer_environment
-from .recorder import BATCHES, Recorder
+from .recorder import BATCHES, PhotographSource, Recorder
 from .writing import WrittenFile, writing
 
 PAGE_PORT = 9090  # where it is free
 SWEEPS_KEPT = 20  # per frame: the pictures must keep up with the solve
 HEADROOM = 1.3  # of the drawn range over the greatest forces of the first frame: those of the run are not known yet
-
-Photograph = Callable[[int], NDArray[np.uint8] | None]
 
 
 class LiveRecording:
@@ -58,7 +53,7 @@ class LiveRecording:
         path: Path | str,
         viewer: ViewerKind | str = ViewerKind.NONE,
         *,
-        photograph: Photograph | None = None,
+        photograph: PhotographSource | None = None,
         scale: Scale | None = None,
         sweeps: SweepChoice | str = SweepChoice.LOG,
     ) -> None:
@@ -85,7 +80,7 @@ class LiveRecording:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         stream = rr.RecordingStream(entities.APPLICATION_ID, batcher_config=BATCHES)
         first = self._photograph(0) if self._photograph else None
-        canvas = Canvas.around(run.tracks, self._scale, None if first is None else (first.shape[0], first.shape[1]))
+        canvas = Canvas.around(run.tracks, self._scale, None if first is None else first.shape)
         self._canvas = canvas
         blueprint = make_blueprint(self._layout(run, canvas), following=True)
         self._written = self._open.enter_context(writing(stream, self.path, blueprint))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from solver.sequence.frame_forces import FrameForces
 from solver.statistics.frame_statistics import FrameStatistics
 
+from ...experiment.shown import ShownPhotograph
 from ..curve_layers.convergence import (
     log_residual_styles,
     log_residuals,
@@ -42,8 +41,7 @@ from ..packing_layers.unconverged import log_unconverged
 from ..tabs.summary_tab import FrameFacts, log_summary
 from .properties import send_experiment, send_outcome
 
-Photograph = NDArray[np.uint8]  # (H, W) grey
-PhotographSource = Callable[[int], Photograph | None]
+PhotographSource = Callable[[int], ShownPhotograph | None]
 
 # Messages are cut by size, never by the clock: the same run makes the same file.
 BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
@@ -126,7 +124,9 @@ class Recorder:
         if self._truth is not None:
             self._truth.log_axes(stream)
 
-    def frame(self, forces: FrameForces, statistics: FrameStatistics, photograph: Photograph | None = None) -> None:
+    def frame(
+        self, forces: FrameForces, statistics: FrameStatistics, photograph: ShownPhotograph | None = None
+    ) -> None:
         """Write one frame."""
         scene = self._running()
         span = forces.history.count + 1  # the reported field has a place of its own

@@ -9,10 +9,10 @@ import numpy as np
 
 from solver.bodies.grains import Array
 
+from ...experiment.shown import shrink_of
 from ...experiment.units import Scale
 from ...tracks import Tracks
 
-LARGEST_PHOTOGRAPH = 4_000_000  # px; above it a photograph is recorded at half size
 NOMINAL_RADIUS = 30.0  # px, of the mean grain, where there is no photograph
 
 
@@ -41,8 +41,7 @@ class Canvas:
         if scale is None:
             pixel_size = mean_radius / NOMINAL_RADIUS
             scale = Scale(pixel_size, math.ceil(points[:, 1].max() / pixel_size) + 1)
-        large = photograph_shape is not None and math.prod(photograph_shape) > LARGEST_PHOTOGRAPH
-        shrink = 2 if large else 1
+        shrink = 1 if photograph_shape is None else shrink_of(photograph_shape)
         radius = mean_radius / scale.pixel_size / shrink
         pixels = (scale.to_pixels(points) + 0.5) / shrink
         margin = 2.2 * radius

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from rodsight.experiment.shown import ShownPhotograph, show
 
 from tests.app.recording.fake_results import RADIUS
 
@@ -10,5 +11,5 @@ PIXEL = RADIUS / 12.0  # [m]
 SHAPE = (240, 300)
 
 
-def photograph(frame: int) -> np.ndarray:
-    return np.random.default_rng(frame).integers(40, 220, SHAPE, dtype=np.uint8)
+def photograph(frame: int) -> ShownPhotograph:
+    return show(np.random.default_rng(frame).integers(40, 220, SHAPE, dtype=np.uint8).astype(np.float32))

@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rodsight.experiment.shown import LARGEST, show
 from rodsight.experiment.units import Scale
-from rodsight.recording.look.canvas import LARGEST_PHOTOGRAPH, NOMINAL_RADIUS, Canvas
+from rodsight.recording.look.canvas import NOMINAL_RADIUS, Canvas
 from rodsight.recording.look.colours import (
     _DIFFERENCE_WAY,
     _DOUBT_WAY,
@@ -18,7 +19,6 @@ from rodsight.recording.look.colours import (
     packed,
 )
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
-from rodsight.recording.packing_layers.backdrop import encode_photograph
 from rodsight.recording.packing_layers.forces.network import SweepChoice, chosen_sweeps, visible_sweeps
 
 from tests.app.recording.fake_results import RADIUS, make_results
@@ -87,13 +87,13 @@ def test_points_lie_where_the_photograph_shows_them():
     tracks, height = make_results(1).tracks, 3000
     canvas = Canvas.around(tracks, Scale(RADIUS / 40.0, height), (height, 2001))
     assert canvas.shrink == 2
-    assert height * 2001 > LARGEST_PHOTOGRAPH
-    picture = np.zeros((height, 2001), np.uint8)
-    picture[1000:1008, 500:508] = 255
+    assert height * 2001 > LARGEST
+    picture = np.zeros((height, 2001), np.float32)
+    picture[1000:1008, 500:508] = 254.6
     middle = Scale(RADIUS / 40.0, height).to_world(np.array([503.5, 1003.5]))
     import cv2
 
-    shown = cv2.imdecode(np.frombuffer(encode_photograph(picture, 2), np.uint8), cv2.IMREAD_GRAYSCALE)
+    shown = cv2.imdecode(show(picture).jpeg, cv2.IMREAD_GRAYSCALE)
     row, column = np.argwhere(shown > 128).mean(axis=0) + 0.5  # centres of pixels in the viewer's coordinates
     assert np.allclose(canvas.points(middle), [column, row], atol=0.05)  # [px], what JPEG does to an edge
 
