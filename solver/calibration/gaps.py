@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from solver.bodies.cell import Cell, reduce_vectors
 from solver.bodies.grains import Array
+from solver.bodies.near_discs import find_near_discs
 from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, beside_wall, reach_of_wall
 
 TINY = 1e-300  # [m] lest a distance of zero have no direction at all
@@ -170,13 +170,10 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
     position, radius = sequence.position[k], sequence.radius
     if len(rows) == 0:
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    # A tree takes a negative distance for one without bounds.
-    widest = max(2.0 * radius[rows].max() + reach, 0.0)
     if sequence.cell is not None:
+        widest = 2.0 * radius[rows].max() + reach
         return _pairs_of_cell(Cell.at_rest(sequence.cell[k]), position[rows], radius[rows], rows, widest, reach)
-    pairs = KDTree(position[rows]).query_pairs(widest, output_type="ndarray")
-    i, j = rows[pairs[:, 0]], rows[pairs[:, 1]]
-    near = np.linalg.norm(position[j] - position[i], axis=1) - radius[i] - radius[j] < reach
+    i, j = rows[find_near_discs(position[rows], radius[rows], reach)].T
 
     walls, side = sequence.endpoints[k][None], all_sides(sequence.side, sequence.wall_count)[None]
     place, margin = position[rows, None], radius[rows, None]
@@ -184,7 +181,7 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
     # A grain meets a straight wall only beside it, give or take its radius.
     beside = beside_wall(walls, side, place, margin) & (gap > -margin)
     grain, wall = np.nonzero(beside & (gap < wall_reach))
-    return np.concatenate([i[near], rows[grain]]), np.concatenate([j[near], wall + sequence.grain_count])
+    return np.concatenate([i, rows[grain]]), np.concatenate([j, wall + sequence.grain_count])
 
 
 def _pairs_of_cell(
@@ -192,9 +189,7 @@ def _pairs_of_cell(
 ) -> tuple[NDArray, NDArray]:
     """The same across the edges of a cell, without walls; widest [m]: distance of centres that is looked at."""
     place, owner = cell.with_surroundings(position, widest)
-    pairs = KDTree(place).query_pairs(widest, output_type="ndarray")
-    apart = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
-    pairs = np.sort(owner[pairs], axis=1)
-    near = (apart - radius[pairs].sum(axis=1) < reach) & (pairs[:, 0] < pairs[:, 1])
-    once = np.unique(pairs[near], axis=0)
-    return rows[once[:, 0]], rows[once[:, 1]]
+    pairs = find_near_discs(place, radius[owner], reach)
+    i, j = owner[pairs[pairs[:, 0] < len(rows)]].T  # of each pair and its images one lies in the cell by its first disc
+    once = np.unique(i[i < j] * len(rows) + j[i < j])
+    return rows[once // len(rows)], rows[once % len(rows)]

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float, Int32
+from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from solver.bodies.cell import Cell
 from solver.bodies.grains import Array, Grains
+from solver.bodies.near_discs import find_near_discs
 from solver.bodies.quantity import Quantity
 from solver.bodies.wall_shapes import Sides, beside_wall, reach_of_wall
 from solver.bodies.walls import Walls
@@ -116,33 +118,42 @@ def measure_contacts(
     grains: Grains, position: Array, walls: Walls, i: NDArray[np.integer], j: NDArray[np.integer]
 ) -> Contacts:
     """Measure normal, gap and point of the named pairs i, j (c,), whatever their distance."""
-    n = grains.count
-    order = np.argsort(make_keys(i, j, n + walls.count), kind="stable")
-    i, j = i[order].astype(np.int32), j[order].astype(np.int32)
-    wall = j >= n
-    normal = np.empty((len(i), 2))
-    gap = np.empty(len(i))
-
-    a, b = i[~wall], j[~wall]
-    branch = position[b] - position[a]
-    shift = None
+    n, key = grains.count, make_keys(i, j, grains.count + walls.count)
+    i, j = i.astype(np.int32), j.astype(np.int32)
+    if np.any(key[1:] < key[:-1]):
+        order = np.argsort(key, kind="stable")
+        i, j = i[order], j[order]
+    normal, gap, point, shift = np.empty((len(i), 2)), np.empty(len(i)), np.empty((len(i), 2)), None
+    wall = np.flatnonzero(j >= n)
+    distance, normal[wall] = walls.reach(j[wall] - n, position[i[wall]])
+    gap[wall] = distance - grains.radius[i[wall]]
     if walls.cell is not None:
-        shift = np.zeros((len(i), 2))
-        shift[~wall] = walls.cell.shift(branch)
-        branch += shift[~wall]
-    distance = np.linalg.norm(branch, axis=1)
-    if np.any(distance == 0.0):
-        row = int(np.argmin(distance))
-        raise ValueError(f"grains {a[row]} and {b[row]} have the same centre")
-    normal[~wall] = branch / distance[:, None]
-    gap[~wall] = distance - grains.radius[a] - grains.radius[b]
-
-    a, w = i[wall], j[wall] - n
-    distance, normal[wall] = walls.reach(w, position[a])
-    gap[wall] = distance - grains.radius[a]
-
-    point = position[i] + normal * (grains.radius[i] + 0.5 * gap)[:, None]
+        pair, shift = j < n, np.zeros((len(i), 2))
+        shift[pair] = walls.cell.shift(position[j[pair]] - position[i[pair]])
+    row = _measure(i, j, position, grains.radius, np.empty((0, 2)) if shift is None else shift, gap, normal, point)
+    if row >= 0:
+        raise ValueError(f"grains {i[row]} and {j[row]} have the same centre")
     return Contacts(i, j, gap, normal, point, n, walls.count, shift)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measure(i, j, position, radius, shift, gap, normal, point):  # type: ignore[no-untyped-def]
+    """Set gap, normal and point of all pairs, of walls the point alone; gives a row of a distance of zero, or −1."""
+    for c in range(len(i)):
+        a, b = i[c], j[c]
+        if b < len(radius):
+            x, y = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1]
+            if len(shift):
+                x += shift[c, 0]
+                y += shift[c, 1]
+            distance = math.sqrt(x * x + y * y)
+            if distance == 0.0:
+                return c
+            normal[c, 0], normal[c, 1] = x / distance, y / distance
+            gap[c] = distance - radius[a] - radius[b]
+        out = radius[a] + 0.5 * gap[c]
+        point[c, 0], point[c, 1] = position[a, 0] + normal[c, 0] * out, position[a, 1] + normal[c, 1] * out
+    return -1
 
 
 def measure_pairs(grains: Grains, position: Array, walls: Walls, key: Keys) -> Contacts:
@@ -156,16 +167,13 @@ def _grain_pairs(
     rows = np.flatnonzero(present)
     if len(rows) < 2:
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    reach = 2.0 * radius[rows].max() + threshold
-    place, owner = (position[rows], rows) if cell is None else _surroundings(cell, position, rows, reach)
-    pairs = KDTree(place).query_pairs(reach, output_type="ndarray")
-    i, j = owner[pairs].min(axis=1), owner[pairs].max(axis=1)
-    gap = np.linalg.norm(place[pairs[:, 1]] - place[pairs[:, 0]], axis=1) - radius[i] - radius[j]
-    near = gap < threshold
-    i, j = i[near], j[near]
     if cell is None:
-        return i, j
-    once = np.unique(i[i < j] * len(radius) + j[i < j])  # a pair and its image are one
+        pairs = rows[find_near_discs(position[rows], radius[rows], threshold)]
+        return pairs[:, 0], pairs[:, 1]
+    place, owner = _surroundings(cell, position, rows, 2.0 * radius[rows].max() + threshold)
+    pairs = find_near_discs(place, radius[owner], threshold)
+    i, j = owner[pairs[pairs[:, 0] < len(rows)]].T  # of each pair and its images one lies in the cell by its first disc
+    once = np.unique(i[i < j] * len(radius) + j[i < j])
     return once // len(radius), once % len(radius)
 
 
@@ -179,9 +187,10 @@ def _wall_pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """A grain meets a straight wall only beside it: its centre must project onto it, give or take one radius."""
     gap = reach_of_wall(walls.endpoints[None], _row(walls.side), position[:, None])[0] - radius[:, None]
-    beside = beside_wall(walls.endpoints[None], _row(walls.side), position[:, None], radius[:, None])
-    i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & beside & present[:, None])
-    return i, w
+    i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & present[:, None])
+    side = None if walls.side is None else walls.side[w]
+    beside = beside_wall(walls.endpoints[w], side, position[i], radius[i])
+    return i[beside], w[beside]
 
 
 def _row(side: Sides) -> Sides:

@@ -9,15 +9,15 @@ MUTANTS = [
         "solver/contacts/contacts.py",
         TESTS,
         ("np.stack([-self.normal[:, 1], self.normal[:, 0]]", "np.stack([self.normal[:, 1], -self.normal[:, 0]]"),
-        ("(grains.radius[i] + 0.5 * gap)", "grains.radius[i]"),
-        (
-            "gap[~wall] = distance - grains.radius[a] - grains.radius[b]",
-            "gap[~wall] = distance - 2.0 * grains.radius[a]",
-        ),
-        ("(gap > -radius[:, None]) & beside", "(gap > -radius[:, None])"),
+        ("out = radius[a] + 0.5 * gap[c]", "out = radius[a]"),
+        ("gap[c] = distance - radius[a] - radius[b]", "gap[c] = distance - 2.0 * radius[a]"),
+        ("return i[beside], w[beside]", "return i, w"),
         ("some = ~(grains.boundary[i] & grains.boundary[j])", "some = ~(grains.boundary[i] | grains.boundary[j])"),
-        ("branch += shift[~wall]", "branch -= shift[~wall]"),
-        ("near = gap < threshold", "near = gap < 0.5 * threshold"),
+        ("x += shift[c, 0]", "x -= shift[c, 0]"),
+        (
+            "find_near_discs(position[rows], radius[rows], threshold)",
+            "find_near_discs(position[rows], radius[rows], 0.5 * threshold)",
+        ),
         ("threshold if wall_threshold is None else wall_threshold", "threshold"),
     ),
     *mutants_of(
