@@ -93,7 +93,7 @@ def test_points_lie_where_the_photograph_shows_them():
     middle = Scale(RADIUS / 40.0, height).to_world(np.array([503.5, 1003.5]))
     import cv2
 
-    shown = cv2.imdecode(show(picture).jpeg, cv2.IMREAD_GRAYSCALE)
+    shown = np.asarray(cv2.imdecode(show(picture).jpeg, cv2.IMREAD_GRAYSCALE))
     row, column = np.argwhere(shown > 128).mean(axis=0) + 0.5  # centres of pixels in the viewer's coordinates
     assert np.allclose(canvas.points(middle), [column, row], atol=0.05)  # [px], what JPEG does to an edge
 
