@@ -8,7 +8,9 @@ the errors is taken off, and with better forces it is found again.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from ..inference import CorrectedSequence
 
 FRAMES = 8  # that are solved beforehand: enough for each rod to be pressed from several sides
+LOOK = 4  # of them after which it is seen whether errors may be told at all …
+HOPEFUL = 0.8  # … by errors found over what is not known of them: there .2 to .6 of rods that are as they were told
 FEWEST = 3
 PASSES = 2
 WORTH = 0.8  # scatter of errors over the noise of a position below which there is nothing to gain
@@ -50,7 +54,7 @@ def correct_soft(sequence: CorrectedSequence) -> CorrectedSequence:
     cautious = replace(sequence.settings, soft_trust=min(sequence.settings.soft_trust, TRUST_AT_MOST))
     better = sequence
     for _ in range(PASSES):
-        found = _find_errors(measured, _solve_first(better), error, STANDS_OUT * noise)
+        found = _find_errors(measured, better, error, STANDS_OUT * noise)
         if found is None:
             break
         better = with_tracks(sequence, without_errors(sequence.tracks, measured, found))
@@ -58,30 +62,45 @@ def correct_soft(sequence: CorrectedSequence) -> CorrectedSequence:
     return better
 
 
-def _solve_first(sequence: CorrectedSequence) -> list[FrameForces]:
-    solved = solve_sequence(
-        sequence.packing, sequence.snapshots[:FRAMES], sequence.settings.without_sweeps(),
-        verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
-    )  # fmt: skip
-    return [forces for forces, _ in solved]
-
-
 def _find_errors(
-    measured: MeasuredSequence, frames: list[FrameForces], error: float, least: float
+    measured: MeasuredSequence, sequence: CorrectedSequence, error: float, least: float
 ) -> GrainErrors | None:
     """Errors of this size [m] of what was measured; None where rods overlap by less than `least` [m]."""
+    solved = _solve_first(sequence)
+    frames = list(islice(solved, LOOK))
+    force, found = _errors_by_forces(measured, frames, error)
+    if found is not None and not _is_told(found, HOPEFUL):
+        return None
+    frames += solved
+    force, found = _errors_by_forces(measured, frames, error)
+    return found if found is not None and found.overlap * force > least and _is_told(found, TOLD) else None
+
+
+def _solve_first(sequence: CorrectedSequence) -> Iterator[FrameForces]:
+    # Nobody asks for the forces of the very first, which lead to those of the others.
+    settings = replace(sequence.settings.without_sweeps(), first_again=True)
+    solved = solve_sequence(
+        sequence.packing, sequence.snapshots[:FRAMES], settings,
+        verdicts=sequence.verdicts, failed={k: why for k, why in sequence.failed.items() if k < FRAMES},
+    )  # fmt: skip
+    return (forces for forces, _ in solved)
+
+
+def _errors_by_forces(
+    measured: MeasuredSequence, frames: list[FrameForces], error: float
+) -> tuple[float, GrainErrors | None]:
+    """Mean force [N] and the errors that forces tell; None of too few frames."""
     # No motion leads to the first one: its forces rest on the very gaps that are asked about.
     rows, force = known_pairs(each for each in frames[1:] if each.status is not FrameStatus.FAILED)
     if len(np.unique(rows.frame)) < FEWEST:
-        return None
-    found = find_grain_errors(
-        measured, rows, force, centre=error, radius=error, rng=np.random.default_rng(SEED)
-    )  # fmt: skip
-    return found if found.overlap * float(force.mean()) > least and _is_told(found) else None
+        return 0.0, None
+    rng = np.random.default_rng(SEED)
+    return float(force.mean()), find_grain_errors(measured, rows, force, centre=error, radius=error, rng=rng)
 
 
-def _is_told(found: GrainErrors) -> bool:
+def _is_told(found: GrainErrors, least: float) -> bool:
+    """Whether errors of centres or of radii are so many times what is not known of them."""
     n = len(found.radius)
     left = found.draws.std(axis=0)
     kinds = ((found.offset, left[: 2 * n]), (found.radius - found.radius.mean(), left[2 * n :]))
-    return any(float(np.sqrt(np.mean(error**2) / np.mean(unknown**2))) > TOLD for error, unknown in kinds)
+    return any(float(np.sqrt(np.mean(error**2) / np.mean(unknown**2))) > least for error, unknown in kinds)

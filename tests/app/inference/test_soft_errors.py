@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.inference.inference import CorrectedSequence, solve_all
+from rodsight.inference.known_forces import soft_errors
 from rodsight.inference.known_forces.soft_errors import TRUST_AT_MOST, correct_soft
 from rodsight.study.worlds.world_score import correct_world, true_forces
 from rodsight.synthetic.worlds.making import make_world
 from rodsight.synthetic.worlds.names import WorldName
 
+from solver.sequence.frames import solve_sequence
 from solver.statistics.agreement import compare_forces
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
@@ -42,6 +44,20 @@ def test_radii_that_are_right_stay_as_they_are_told(tmp_path):
     assert sequence.settings.soft_trust > TRUST_AT_MOST
     hard = replace(sequence, settings=replace(sequence.settings, soft=False))
     assert correct_soft(hard) is hard
+
+
+def test_where_few_frames_tell_nothing_no_more_are_solved_beforehand(tmp_path, monkeypatch):
+    solved = []
+
+    def counted(*args, **told):
+        for each in solve_sequence(*args, **told):
+            solved.append(each[0].frame)
+            yield each
+
+    monkeypatch.setattr(soft_errors, "solve_sequence", counted)
+    sequence, told, _ = corrected(tmp_path, "soft", 1, 150)
+    assert solved == list(range(soft_errors.LOOK))
+    np.testing.assert_array_equal(sequence.tracks.radius, told)
 
 
 @pytest.mark.slow
