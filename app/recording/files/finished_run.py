@@ -19,6 +19,7 @@ from ...experiment.units import Scale
 from ...results.results import Results, TruthContacts
 from ..look import entities
 from ..look.canvas import Canvas
+from ..look.detail import describe_detail
 from ..look.force_style import ForceStyle
 from ..look.scene import Scene, tracks_in_cell
 from ..packing_layers.forces.network import SweepChoice
@@ -94,13 +95,17 @@ def write_recording(
     run = _Run(results, survey, scene, photograph, active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
     unfinished = [each.with_name(each.name + ".part") for each in parts]
-    notes: tuple[str, ...] = ()
+    left_out = describe_detail(results.grains.count, survey.most_contacts)
+    notes: tuple[str, ...] = (left_out,) if left_out else ()
     plans = _plans(SweepChoice(sweeps), limited=max_size is not None)
     try:
         for number, plan in enumerate(plans):
             if number:
                 shown = f"{plan.kept} sweeps per frame" if plan.kept else "the reported fields only"
-                notes = (f"Limited to {_megabytes(max_size or 0)}: {shown} instead of sweeps = {sweeps}.",)
+                notes = (
+                    *notes[: bool(left_out)],
+                    f"Limited to {_megabytes(max_size or 0)}: {shown} instead of sweeps = {sweeps}.",
+                )
             last = number == len(plans) - 1
             recorder = _write(run, unfinished, plan, notes, None if last else max_size)
             if recorder is not None and (max_size is None or _size(unfinished) <= max_size or last):

@@ -24,6 +24,7 @@ from ..curve_layers.starts import log_start_styles, log_starts
 from ..curve_layers.statistic_curves import log_statistics, log_statistics_styles
 from ..curve_layers.stress_and_fabric import log_polar_axes, log_rose, log_stress
 from ..look.clock import Clock, StrainWay
+from ..look.detail import drawn_contacts, kept_sweeps
 from ..look.scene import Scene
 from ..look.texts import printable
 from ..packing_layers.backdrop import log_photograph
@@ -133,25 +134,26 @@ class Recorder:
         time, strain = float(scene.tracks.time[forces.frame]), self._way.go(forces.strain)
         clock = Clock(self._stream, forces.frame, self._next_sweep, self._next_sweep + span - 1, time, strain)
         self._next_sweep += span
+        drawn, kept = drawn_contacts(forces), kept_sweeps(self._kept, scene.grains.count)
         if photograph is not None:
             log_photograph(clock, scene.canvas, photograph)
         log_grains_and_walls(clock, scene, forces)
-        self.network_rows += log_network(clock, scene, forces, self._former, self._sweeps, self._kept)
-        log_force_doubt(clock, scene, forces)
+        self.network_rows += log_network(clock, scene, drawn, self._former, self._sweeps, kept)
+        log_force_doubt(clock, scene, drawn)
         log_starts(clock, forces)
         self._log_solve(clock, scene, forces)
-        log_unconverged(clock, scene, forces, self._sweeps, self._kept)
+        log_unconverged(clock, scene, forces, drawn, self._sweeps, kept)
         log_touching(clock, forces)
         log_reviewed(clock, scene, forces)
-        log_changes(clock, scene, forces, self._former)
+        log_changes(clock, scene, forces, self._former, drawn.contacts)
         log_settling(clock, scene, forces)
         log_statistics(clock, scene, statistics)
         log_stress(clock, statistics)
         log_rose(clock, forces)
         self._density.log(clock, forces.fn, statistics.tail_exponent)
-        log_rods(clock, scene, forces)
+        log_rods(clock, scene, drawn)
         if self._film is not None:
-            self._film.log(clock, forces)
+            self._film.log(clock, drawn)
         agreement = self._truth.log(clock, forces) if self._truth else None
         self._former = forces
         self._clipped += scene.style.clipped(forces.fn)

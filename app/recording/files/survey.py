@@ -15,6 +15,7 @@ class Survey:
     """Of all frames together."""
 
     contact_count: int  # a contact of several frames counts in each
+    most_contacts: int  # of one frame
     force_range: ForceRange
     extremes: Mapping[str, tuple[float, float]]  # least and greatest value, by path of a curve
     has_error_budget: bool
@@ -27,4 +28,6 @@ def survey_frames(results: Results) -> Survey:
         forces.append(each.fn)
         extremes.add(frame, each, statistics)
         budget = budget or each.error_budget is not None
-    return Survey(sum(map(len, forces)), ForceRange.of_forces(forces), extremes.found, budget)
+    return Survey(
+        sum(map(len, forces)), max(map(len, forces), default=0), ForceRange.of_forces(forces), extremes.found, budget
+    )

@@ -22,10 +22,12 @@ GAP_RANGE_SHARE = 0.004  # of the mean radius: the gap at which colour no longer
 _RAMP = packed(GAP_RAMP)
 
 
-def log_changes(clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None) -> None:
-    """Log gaps and changes of one frame; the first frame has no former one."""
+def log_changes(
+    clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None, drawn: Contacts | None = None
+) -> None:
+    """Log gaps and changes of one frame; the first frame has no former one. drawn: contacts whose gaps are shown."""
     clock.start()
-    _log_gaps(clock, scene, forces.contacts)
+    _log_gaps(clock, scene, forces.contacts if drawn is None else drawn)
     contacts = forces.contacts
     if former is None:
         gained, parted = contacts.select(np.zeros(contacts.count, bool)), np.empty((0, 2, 2), np.float32)

@@ -13,9 +13,13 @@ from ...tracks import TrackStatus, WallTracks
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
+from ..look.detail import is_outlined
 from ..look.scene import Scene, cell_corners
 from ..look.texts import printable
 from ..look.values import known
+
+SEAM = 0.94  # of a radius, of discs without outlines: a dark seam shows where one ends
+DISC = 0.55  # of the colour of an outline, for a whole disc
 
 
 def log_grains_and_walls(clock: Clock, scene: Scene, forces: FrameForces) -> None:
@@ -84,13 +88,21 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     unbalance = np.full(tracks.grain_count, np.nan) if forces.grain_unbalance is None else forces.grain_unbalance
     plain = present & ~np.isin(status, (TrackStatus.SUSPECT, TrackStatus.INFERRED))
     line = np.where(plain, 0.02, 0.05) * canvas.grain_radius
+    outlined, colours = is_outlined(tracks.grain_count), grain_colours(status, present, tracks.boundary)
     clock.stream.log(
         entities.GRAINS,
         rr.Ellipses2D(
             centers=centre.astype(np.float32),
             half_sizes=np.repeat(radius[:, None], 2, axis=1).astype(np.float32),
             line_radii=line.astype(np.float32),
-            colors=grain_colours(status, present, tracks.boundary),
+            colors=colours,
+            draw_order=10.0,
+        )
+        if outlined
+        else rr.Points2D(
+            centre.astype(np.float32),
+            radii=(SEAM * radius).astype(np.float32),
+            colors=dimmed(colours),
             draw_order=10.0,
         ),
         rr.AnyValues(
@@ -105,7 +117,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         ),
     )
     turned = tracks.rotation[frame] - _first_rotation(tracks.rotation)
-    shown = present & np.isfinite(turned)
+    shown = present & np.isfinite(turned) & outlined
     clock.stream.log(
         entities.GRAIN_SPINS,
         rr.LineStrips2D(
@@ -136,6 +148,13 @@ def grain_colours(
     colours = np.where(status == TrackStatus.SUSPECT, packed_one(SUSPECT), usual)
     colours = np.where(status == TrackStatus.INFERRED, packed_one(INFERRED), colours)
     return np.where(present, colours, packed_one(LOST)).astype(np.uint32)
+
+
+def dimmed(colours: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Outline colours (n,) for whole discs, over which forces must stand out."""
+    parts = np.stack([(colours >> shift) & 0xFF for shift in (24, 16, 8)], axis=-1).astype(np.float64)
+    red, green, blue = np.rint(DISC * parts).astype(np.uint32).T
+    return (red << 24) | (green << 16) | (blue << 8) | (colours & 0xFF)
 
 
 def _first_rotation(rotation: Array) -> Array:

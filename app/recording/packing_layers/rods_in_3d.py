@@ -13,6 +13,7 @@ from ...tracks import TrackStatus
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, LOST, SUSPECT, packed_one
+from ..look.detail import is_outlined
 from ..look.scene import Scene
 
 ALUMINIUM = (34, 39, 48, 255)  # dark: forces before the rods stand out in grey, too
@@ -31,16 +32,20 @@ def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         shade = np.where(tracks.boundary, packed_one(BOUNDARY), shade)
     shade = np.where(status == TrackStatus.INFERRED, packed_one(INFERRED), shade)
     shade = np.where(status == TrackStatus.LOST, packed_one(LOST), shade)
-    centre = np.column_stack([position, np.full(len(position), -0.5 * scene.rod_length)])
+    outlined = is_outlined(tracks.grain_count)
+    centre = np.column_stack([position, np.full(len(position), -0.5 * scene.rod_length if outlined else 0.0)])
+    size = (0.97 * radius[present]).astype(np.float32)  # a dark seam shows where one ends
     clock.stream.log(
         entities.RODS,
         rr.Cylinders3D(
             lengths=np.full(int(present.sum()), scene.rod_length, np.float32),
-            radii=(0.97 * radius[present]).astype(np.float32),  # a dark seam shows where one ends
+            radii=size,
             centers=centre[present].astype(np.float32),
             colors=shade[present].astype(np.uint32),
             fill_mode=rr.components.FillMode.Solid,
-        ),
+        )
+        if outlined
+        else rr.Points3D(centre[present].astype(np.float32), radii=size, colors=shade[present].astype(np.uint32)),
     )
     _log_chains(clock, scene, forces)
 

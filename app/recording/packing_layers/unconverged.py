@@ -31,12 +31,19 @@ _RAMP = packed(DOUBT_RAMP)[np.round(np.linspace(0, len(DOUBT_RAMP) - 1, LEVELS))
 _OPEN = packed_one(OPEN)
 
 
-def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: SweepChoice, kept: int) -> None:
-    """Log both maps of one frame at no more than `kept` of its sweeps, and of the reported field."""
+def log_unconverged(
+    clock: Clock, scene: Scene, forces: FrameForces, drawn: FrameForces, choice: SweepChoice, kept: int
+) -> None:
+    """Log both maps of one frame at no more than `kept` of its sweeps, and of the reported field.
+
+    drawn: the frame with the contacts whose change is shown; every contact counts in the unbalance.
+    """
     thinned = SweepChoice.NONE if choice is SweepChoice.NONE else SweepChoice.LOG
     rows, fn, ft = visible_sweeps(forces, clock.last - clock.first, thinned, kept)
     mean = mean_normal_force(forces.fn)  # of the reported field: what every row is measured by
     unbalance = unbalances(forces.contacts, fn, ft, scene.weight) / mean
+    if drawn is not forces:
+        rows, fn, ft = visible_sweeps(drawn, clock.last - clock.first, thinned, kept)
     change = np.full(fn.shape, np.nan)
     if len(rows) > 2:
         change[1:-1] = changes_per_sweep(rows[:-1], fn[:-1], ft[:-1]) / (SWEEP_SHARE * mean)
@@ -56,7 +63,7 @@ def log_unconverged(clock: Clock, scene: Scene, forces: FrameForces, choice: Swe
     clock.stream.log(
         entities.CHANGE_MAP,
         rr.LineStrips2D(
-            scene.branches(clock.frame, forces.contacts),
+            scene.branches(clock.frame, drawn.contacts),
             radii=np.float32(0.1 * scene.canvas.grain_radius),
             colors=doubt_colours(change[0]),
             draw_order=20.0,
