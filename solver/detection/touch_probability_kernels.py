@@ -14,6 +14,7 @@ from solver.bodies.grains import Array
 # Rows of a transition, by state: what is left of Laplace's law from the state below to this one; probability that a
 # contact opens to this state; that it closes from it; and that it does not, over the law's sum over all open states.
 DECAY, OPENS, CLOSES, SPREADS = range(4)
+E2, E3, E4, E5, E6, E7, E8 = 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, 1 / 5040, 1 / 40320  # of the exponential's series
 
 
 @njit(cache=True, error_model="numpy")
@@ -39,7 +40,7 @@ def smooth_candidates(
 ) -> None:
     frames, candidates = gap.shape
     states = len(state_gap)
-    farthest = -2.0 * np.log(floor) + 1e-6
+    farthest = -np.log(floor) + 1e-6
     value, up, down = moved[0], moved[1], moved[2]
     for c in range(candidates):
         for f in range(frames):
@@ -50,9 +51,7 @@ def smooth_candidates(
                 continue
             s = sigma[f, c]
             measured = min(max(measured, lowest * s), state_gap[states - 1])
-            for q in range(states):
-                z = (measured - state_gap[q]) / s
-                emission[f, q] = max(np.exp(-0.5 * z * z), floor) if z * z < farthest else floor
+            _bell(state_gap, measured, 1.0 / s, farthest, floor, emission[f])
 
         total = 0.0
         for q in range(states):
@@ -108,14 +107,63 @@ def smooth_candidates(
             mean[f, c], variance[f, c] = _moments(alpha[f], beta[0], gap[f, c], error[f, c], state_gap, width)
 
 
+@njit(cache=True, error_model="numpy")
+def _bell(state_gap, measured, sharp, farthest, floor, out):  # type: ignore[no-untyped-def]
+    """Set out to exp(−z²/2) of every state, or the floor, z being its distance from what was measured times `sharp`.
+
+    The exponential is that of a 128th, by its series, squared seven times: right to 1e-9, and the compiler takes
+    several states at once.
+    """
+    for q in range(len(out)):
+        z = (measured - state_gap[q]) * sharp
+        x = -min(0.5 * z * z, farthest) / 128.0
+        low = 1.0 + x * (1.0 + x * (E2 + x * E3))
+        e = low + x**4 * (E4 + x * (E5 + x * (E6 + x * (E7 + x * E8))))
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        e *= e
+        out[q] = max(e, floor)
+
+
 @njit(inline="always")
 def _blur(value, decay, up, down):  # type: ignore[no-untyped-def]
     """Set up + down to Σ_q value_q exp(−|g − g_q| / scale) for every open state, the first one being 1.
 
-    Both ways at once: each step of one waits for the step before it.
+    Both ways at once and by fours: what one four adds is known before what comes to it from those before, so that not
+    every step waits for the last.
     """
     above, below, states = 0.0, 0.0, len(value)
-    for k in range(1, states):
+    fours = (states - 1) // 4
+    for n in range(fours):
+        k = 4 * n + 1
+        d1, d2, d3, d4 = decay[k], decay[k + 1], decay[k + 2], decay[k + 3]
+        s1 = value[k]
+        s2 = s1 * d2 + value[k + 1]
+        s3 = s2 * d3 + value[k + 2]
+        s4 = s3 * d4 + value[k + 3]
+        d2 *= d1
+        d3 *= d2
+        d4 *= d3
+        up[k], up[k + 1], up[k + 2] = above * d1 + s1, above * d2 + s2, above * d3 + s3
+        above = above * d4 + s4
+        up[k + 3] = above
+
+        k = states - 1 - 4 * n
+        d1, d2, d3, d4 = decay[k], decay[k - 1], decay[k - 2], decay[k - 3]
+        s1 = value[k] * d1
+        s2 = (s1 + value[k - 1]) * d2
+        s3 = (s2 + value[k - 2]) * d3
+        s4 = (s3 + value[k - 3]) * d4
+        d2 *= d1
+        d3 *= d2
+        d4 *= d3
+        down[k], down[k - 1], down[k - 2], down[k - 3] = below, below * d1 + s1, below * d2 + s2, below * d3 + s3
+        below = below * d4 + s4
+    for k in range(4 * fours + 1, states):
         above = above * decay[k] + value[k]
         up[k] = above
         down[states - k] = below
