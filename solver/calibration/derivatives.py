@@ -41,7 +41,10 @@ class Derivatives(NamedTuple):
 
     def select(self, rows: NDArray) -> Derivatives:
         """Keep some rows (mask, or ascending indices)."""
-        return Derivatives(*(each[rows] for each in self[:6]), *self[6:])
+        return self._replace(
+            first=self.first[rows], second=self.second[rows], own=self.own[rows], other=self.other[rows],
+            column=self.column[rows], value=self.value[rows],
+        )  # fmt: skip
 
     def times(self, x: Array) -> Array:
         """A x (m,)."""
