@@ -1,7 +1,8 @@
 """Mehrotra's predictor and corrector for a convex program, written for its structure.
 
 Every step solves for the grains' velocities v alone: contacts are eliminated one by one, in closed form, which leaves
-I/ρ + H E Hᵀ, a matrix of 3 × 3 blocks between neighbours. (Nocedal & Wright, Numerical Optimization, 2006, ch. 16.6.)
+I/ρ + H E Hᵀ, a matrix of 3 × 3 blocks between neighbours (Nocedal & Wright, Numerical Optimization, 2006, ch. 16.6).
+Steps that single contacts keep short are corrected once to three times (Gondzio 1996), with the same factor.
 """
 
 from __future__ import annotations
@@ -82,5 +83,6 @@ def _make_room(grains: GrainBlocks, contacts: int) -> Room:
 
     return Room(
         pairs(), velocity(), pairs(), pairs(3), pairs(), np.zeros(ROWS**2 * grains.pattern.entry_count),
-        np.zeros(grains.node_count, np.int64), Iterate(pairs(), pairs(), velocity()), pairs(),
+        np.zeros(grains.node_count, np.int64), Iterate(pairs(), pairs(), velocity()),
+        Iterate(pairs(), pairs(), velocity()), pairs(),
     )  # fmt: skip

@@ -16,6 +16,11 @@ from solver.factor.cholesky import TRIPLE, factorize, solve
 from solver.factor.pattern import Ids
 
 LONGEST = 0.99  # of the step to the boundary
+# Corrections of the centre in a step: as many as entries of the factor over so many a grain, for they cost solutions.
+ENTRIES, MOST_CORRECTIONS = 7, 3
+LONG_ENOUGH = 1.8  # shares of w and z together, from which on none is tried
+FARTHER, GAIN = 0.3, 0.03  # shares: how much longer a step is tried to be made, and how much longer it must become
+LEAST_PRODUCT, MOST_PRODUCT = 0.3, 5.0  # of w z over the centre
 RESIDUAL = 1e-3  # rms of what a step leaves of gradient or balance, in units of sliding and of force
 REACHED, ENOUGH, BROKEN = range(3)  # how it ends
 
@@ -49,6 +54,7 @@ class Room(NamedTuple):
     blocks: Array  # (k,) I/ρ + H E Hᵀ, then its factor
     where: Ids  # (n,) scratch of the factorisation
     move: Iterate  # the step
+    other: Iterate  # one that may be longer
     best: Array  # (c, 2)
 
 
@@ -60,7 +66,7 @@ def iterate(grains, program, at, room, tolerance, most):  # type: ignore[no-unty
     mean of w z and worst rms of the best.
     """
     best_gap, best_residual = np.inf, np.inf
-    steps = 0
+    steps, corrections = 0, min(grains.pattern.start[-1] // (ENTRIES * len(room.where)), MOST_CORRECTIONS)
     while True:
         gap, residual = _measure(grains, program, at, room)
         # Rounding may spoil late iterates: of those that leave no residual the one nearest to the end is kept.
@@ -77,11 +83,21 @@ def iterate(grains, program, at, room, tolerance, most):  # type: ignore[no-unty
         if not factorize(grains.pattern, room.blocks, room.where, TRIPLE):
             return BROKEN, steps, best_gap, best_residual
         _aim(at, room, 0.0, False)
-        primal, dual = _find_step(grains, program, at, room)
+        primal, dual = _find_step(grains, program, at, room, room.move)
         # What the plain step would leave of w z says how much of it the true one may aim at.
         left = _foresee(at, room.move, primal, dual)
-        _aim(at, room, gap * (left / gap) ** 3, True)
-        primal, dual = _find_step(grains, program, at, room)
+        centre = gap * (left / gap) ** 3
+        _aim(at, room, centre, True)
+        primal, dual = _find_step(grains, program, at, room, room.move)
+        for _ in range(corrections):
+            if primal + dual > LONG_ENOUGH:
+                break
+            _recentre(at, room, min(1.0, primal + FARTHER), min(1.0, dual + FARTHER), centre)
+            longer_primal, longer_dual = _find_step(grains, program, at, room, room.other)
+            if longer_primal + longer_dual < primal + dual + GAIN:
+                break
+            primal, dual = longer_primal, longer_dual
+            _copy(room.other, room.move)
         _advance(at, room.move, LONGEST * primal, LONGEST * dual)
         steps += 1
 
@@ -162,9 +178,8 @@ def _aim(at, room, centre, corrected):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _find_step(grains, program, at, room):  # type: ignore[no-untyped-def]
+def _find_step(grains, program, at, room, move):  # type: ignore[no-untyped-def]
     """The Newton step to residuals of zero and w z less by the excess; gives the longest shares of w and of z."""
-    move = room.move
     v = move.velocity
     v[:] = room.balance
     for c in range(len(at.part)):
@@ -201,6 +216,30 @@ def _find_step(grains, program, at, room):  # type: ignore[no-untyped-def]
             if z + dual * dz < 0.0:
                 dual = -z / dz
     return primal, dual
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _recentre(at, room, primal, dual, centre):  # type: ignore[no-untyped-def]
+    """Aim at other products where a step of these shares would leave w z far from the centre.
+
+    After Gondzio (1996): single contacts whose w or z would vanish long before the others keep every step short.
+    """
+    move, low, high = room.move, LEAST_PRODUCT * centre, MOST_PRODUCT * centre
+    for c in range(len(at.part)):
+        for k in range(2):
+            w = at.part[c, k] + primal * move.part[c, k]
+            left = w * (at.multiplier[c, k] + dual * move.multiplier[c, k])
+            if left < low:
+                room.excess[c, k] -= low - left
+            elif left > high:
+                room.excess[c, k] += min(left - high, high)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _copy(move, to):  # type: ignore[no-untyped-def]
+    to.part[:] = move.part
+    to.multiplier[:] = move.multiplier
+    to.velocity[:] = move.velocity
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
