@@ -92,7 +92,7 @@ def iterate(grains, program, at, room, tolerance, most):  # type: ignore[no-unty
         for _ in range(corrections):
             if primal + dual > LONG_ENOUGH:
                 break
-            _recentre(at, room, min(1.0, primal + FARTHER), min(1.0, dual + FARTHER), centre)
+            recentre(at, room, min(1.0, primal + FARTHER), min(1.0, dual + FARTHER), centre)
             longer_primal, longer_dual = _find_step(grains, program, at, room, room.other)
             if longer_primal + longer_dual < primal + dual + GAIN:
                 break
@@ -219,7 +219,7 @@ def _find_step(grains, program, at, room, move):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _recentre(at, room, primal, dual, centre):  # type: ignore[no-untyped-def]
+def recentre(at, room, primal, dual, centre):  # type: ignore[no-untyped-def]
     """Aim at other products where a step of these shares would leave w z far from the centre.
 
     After Gondzio (1996): single contacts whose w or z would vanish long before the others keep every step short.
