@@ -142,6 +142,14 @@ class Photographs(Sequence[Image]):
         image = read_photograph(self.files[frame], self._inputs, self._max_pixels, self._look.channel)
         return self._look.cut(self._of_one_size(frame, image))
 
+    def in_channels(self, frame: int) -> dict[str, Image]:
+        """One photograph in each of CHANNELS, decoded once."""
+        file = self.files[frame]
+        pixels = _pixels_of(file, _content_of(file, self._inputs, self._max_pixels))
+        names = CHANNELS if pixels.ndim == 3 and pixels.shape[2] > 2 else {"grey": LUMA}
+        images = {name: self._of_one_size(frame, _to_grey(file, pixels, weight)) for name, weight in names.items()}
+        return {name: self._look.cut(images.get(name, images["grey"])) for name in CHANNELS}
+
     def _of_one_size(self, frame: int, image: Image) -> Image:
         """The image, if it has the size of the first. Raises InputError."""
         file = self.files[frame]
@@ -218,12 +226,15 @@ def read_photograph(
 
 
 def _grey_of(file: Path, content: bytes, channel: Channel) -> Image:
-    if file.suffix.lower() in RAW_SUFFIXES:
-        return _to_grey(file, _develop(file, content), CHANNELS[channel])
-    pixels = _decode(content)
+    return _to_grey(file, _pixels_of(file, content), CHANNELS[channel])
+
+
+def _pixels_of(file: Path, content: bytes) -> NDArray:
+    """The pixels of a file, of whatever depth and number of channels. Raises InputError where it holds none."""
+    pixels = _develop(file, content) if file.suffix.lower() in RAW_SUFFIXES else _decode(content)
     if pixels is None:
         raise InputError(file, "", "is not a photograph that can be read (PNG, TIFF or JPEG)")
-    return _to_grey(file, pixels, CHANNELS[channel])
+    return pixels
 
 
 def _content_of(file: Path, inputs: InputFiles | None, max_pixels: int) -> bytes:

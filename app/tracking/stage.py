@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..experiment.boundary import bound_tracks
 from ..experiment.corrections import read_corrections
 from ..experiment.experiment import Experiment, read_grain_guess, read_times
-from ..experiment.photographs import CHANNELS, FULL_SCALE, Image, Photographs
+from ..experiment.photographs import FULL_SCALE, Image, Photographs
 from ..experiment.reading.tables import read_table, write_table
 from ..experiment.scaling import make_scale
 from ..experiment.units import Scale
@@ -199,7 +199,7 @@ def _about_channels(experiment: Experiment, settings: DetectionSettings) -> list
     """Whether discs of a colour photograph stand out better in another channel."""
     section = experiment.config.photographs
     assert section is not None
-    channels: dict[str, Image] = {name: experiment.photographs(name)[0] for name in CHANNELS}
+    channels = experiment.photographs().in_channels(0)
     if not is_coloured(channels):
         return []
     return describe_channels(count_discs(channels, settings), section.channel)

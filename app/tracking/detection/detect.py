@@ -11,16 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from solver.bodies.grains import Array
+from solver.together import available_cores, work_together
 
 from ...experiment.photographs import Image
 from .discs import OVERLAP, Discs, find_discs
-from .outlines import Measured, Outliner
+from .outlines import TOGETHER, Measured, Outliner
 from .rings import Circles, find_circles, without_overlap
 
 # Rings leave the centre uncertain by this much [px], besides the difference of two classes' radii.
@@ -277,7 +279,14 @@ def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -
 
 
 def _each(count: int, one: Callable[[int], Measured]) -> list[Measured]:
-    return [one(k) for k in range(count)]
+    """What is measured of each grain, on all cores."""
+    parts = np.array_split(np.arange(count), max(min(available_cores(), count // TOGETHER), 1))
+
+    def some(part: NDArray[np.intp]) -> list[Measured]:
+        return [one(k) for k in part.tolist()]
+
+    found = work_together([partial(some, part) for part in parts], None)
+    return [each for part in found for each in part]
 
 
 def _detection(measured: list[Measured], radius: Array) -> Detection:

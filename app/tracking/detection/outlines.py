@@ -179,7 +179,7 @@ def _best_width(outlines: list[tuple[Outline, NDArray[np.bool_]]], widths: Array
     for k, width in enumerate(widths):
         if not width > 0.2:
             continue
-        misfits = [_fit_profiles(outline, seen, width, extent)[2][seen] for outline, seen in outlines]
+        misfits = work_together([partial(_misfits, *one, float(width), extent) for one in outlines], None)
         total[k] = np.median(np.nan_to_num(np.concatenate(misfits), nan=np.inf))
     best = int(np.argmin(total))
     if not np.isfinite(total[best]):
@@ -189,6 +189,11 @@ def _best_width(outlines: list[tuple[Outline, NDArray[np.bool_]]], widths: Array
     before, at, after = total[best - 1 : best + 2]
     step, bend = float(widths[1] - widths[0]), before - 2.0 * at + after
     return float(widths[best] + (0.5 * step * (before - after) / bend if bend > 0.0 else 0.0))
+
+
+def _misfits(outline: Outline, seen: NDArray[np.bool_], width: float, extent: float) -> Array:
+    """How badly each ray that sees an edge is fitted by a profile of this width."""
+    return _fit_profiles(outline, seen, width, extent)[2][seen]
 
 
 def _fit_profiles(

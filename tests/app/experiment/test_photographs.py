@@ -224,6 +224,26 @@ def test_one_colour_alone_is_looked_at(coloured, channel, level):
     assert image[0, 3] == 200
 
 
+def test_all_channels_come_of_one_decoding(coloured, monkeypatch):
+    alone = {name: Photographs([coloured], look=Look(name))[0] for name in ("grey", "red", "green", "blue")}
+    photographs = Photographs([coloured], look=Look("red"))
+    assert photographs.shape == (6, 8)
+    decoded = []
+    monkeypatch.setattr(cv2, "imdecode", lambda *given, really=cv2.imdecode: decoded.append(1) or really(*given))
+    together = photographs.in_channels(0)
+    assert len(decoded) == 1
+    assert list(together) == list(alone)
+    assert all(np.array_equal(together[name], alone[name]) for name in alone)
+
+
+def test_all_channels_of_a_grey_photograph_are_alike(tmp_path):
+    file = write(tmp_path, "a.png", np.arange(12, dtype=np.uint8).reshape(3, 4))
+    together = Photographs([file], look=Look("red", (1, 0, 2, 2))).in_channels(0)
+    assert all(
+        np.array_equal(each, Photographs([file], look=Look("grey", (1, 0, 2, 2)))[0]) for each in together.values()
+    )
+
+
 def test_nothing_outside_the_region_is_seen(coloured):
     image = Photographs([coloured], look=Look("red", (3, 1, 6, 4)))[0]
     assert image.shape == (6, 8)
