@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.benchmarks import history
+from tests.benchmarks import growth, history
 from tests.benchmarks.timing import Row, Took, in_processor_time, shares
 
 
@@ -29,3 +29,20 @@ def test_the_page_shows_the_history_as_it_is(tmp_path):
     assert all(entry.least <= entry.median <= entry.greatest for entry in entries)
     history.draw(entries, tmp_path / "drawn.svg")
     assert (tmp_path / "drawn.svg").read_text() == history.PICTURE.read_text(), "python -m tests.benchmarks.history"
+
+
+def test_the_page_shows_the_growth_as_it_is(tmp_path):
+    jobs = growth.read()
+    assert {each.kind for each in jobs} == set(growth.COLOURS)
+    growth.draw(jobs, tmp_path / "drawn.svg")
+    assert (tmp_path / "drawn.svg").read_text() == growth.DRAWN.read_text(), "python -m tests.benchmarks.growth"
+
+
+def test_growth_is_told_as_a_power_of_the_rods():
+    small, large = (
+        growth.Job("2026-01-01", "a machine", growth.IN_A_CELL, rods, frames, solving, 1.0, 1.0, 1.0, 100.0)
+        for rods, frames, solving in ((100, 6, 6.0), (400, 3, 24.0))
+    )
+    (solving, *_), aim = growth._rows_of(large, growth._power([small, large])), "growth n^1.50"
+    assert solving.found.endswith(aim)
+    assert growth._power([small]) == ""
