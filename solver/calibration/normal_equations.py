@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array
 from solver.calibration.derivatives import OF_GRAIN, Derivatives, by_grains, in_order
-from solver.factor.cholesky import TRIPLE, factorize, solve
+from solver.factor.blocks import TRIPLE, area_of, lanes_of
+from solver.factor.cholesky import factorize, solve
 from solver.factor.pattern import Ids, Pattern, find_pattern
+
+AREA, FILLED = area_of(TRIPLE), lanes_of(TRIPLE)  # numbers of a block, and of a node beside the matrix
 
 
 class Couplings(NamedTuple):
@@ -50,53 +53,53 @@ class NormalEquations:
         d, pattern = derivatives, couplings.pattern
         n, q = d.grain_count, d.shared_count
         of_grain, of_shared = by_grains(np.where(self._free, penalty, 1.0), n)
-        blocks, corner = np.zeros(OF_GRAIN**2 * pattern.entry_count), np.diag(of_shared)
-        border = np.zeros((n, OF_GRAIN, q))  # nodes in the order of elimination
+        blocks, corner = np.zeros(AREA * pattern.entry_count), np.diag(of_shared)
+        border = np.zeros((n, FILLED, q))  # nodes in the order of elimination
         _assemble(
             d.first, d.second, d.own, d.other, d.column, d.value, couplings.entry, pattern.place, pattern.start,
             precision, of_grain, blocks, border, corner,
         )  # fmt: skip
         if not factorize(pattern, blocks, np.empty(n, np.int64), TRIPLE):
             raise np.linalg.LinAlgError("what is wrong of some grain is not determined")
-        solved = np.empty((q, OF_GRAIN * n))
+        solved = np.empty((q, FILLED * n))
         for k in range(q):
             solved[k] = border[:, :, k].ravel()
             if solved[k].any():
                 solve(pattern, blocks, solved[k], TRIPLE)
         self._pattern, self._blocks, self._solved, self._grains = pattern, blocks, solved, n
-        self._corner = np.linalg.inv(corner - solved @ border.reshape(OF_GRAIN * n, q))
+        self._corner = np.linalg.inv(corner - solved @ border.reshape(FILLED * n, q))
 
     def solve(self, right: Array) -> Array:
         """(Aᵀ P A + D)⁻¹ of a right side (u,)."""
         of_grain, shared = by_grains(np.where(self._free, right, 0.0), self._grains)
-        x = np.empty_like(of_grain)
-        x[self._pattern.place] = of_grain
+        x = np.zeros((self._grains, FILLED))
+        x[self._pattern.place, :OF_GRAIN] = of_grain
         flat = x.ravel()
         rest = self._corner @ (shared - self._solved @ flat)
         solve(self._pattern, self._blocks, flat, TRIPLE)
         flat -= rest @ self._solved
-        return np.where(self._free, in_order(flat.reshape(-1, OF_GRAIN)[self._pattern.place], rest), 0.0)
+        return np.where(self._free, in_order(flat.reshape(-1, FILLED)[self._pattern.place, :OF_GRAIN], rest), 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _assemble(  # type: ignore[no-untyped-def]
     first, second, own, other, column, value, entry, place, start, precision, penalty, blocks, border, corner
 ):
-    """Add Σ p a aᵀ of the rows and the penalties (n, 3) of grains; border (n, 3, q) by node, corner (q, q)."""
+    """Add Σ p a aᵀ of the rows and the penalties (n, 3) of grains; border (n, 4, q) by node, corner (q, q)."""
     for g in range(len(place)):
         for a in range(OF_GRAIN):
-            blocks[OF_GRAIN**2 * start[place[g]] + (OF_GRAIN + 1) * a] += penalty[g, a]
+            blocks[AREA * start[place[g]] + (FILLED + 1) * a] += penalty[g, a]
     for c in range(len(precision)):
         i, j, p = place[first[c]], place[second[c]], precision[c]
         for a in range(OF_GRAIN):
             x, y = p * own[c, a], p * other[c, a]
-            here, there = OF_GRAIN**2 * start[i] + OF_GRAIN * a, OF_GRAIN**2 * start[j] + OF_GRAIN * a
+            here, there = AREA * start[i] + a, AREA * start[j] + a
             for b in range(OF_GRAIN):
-                blocks[here + b] += x * own[c, b]
-                blocks[there + b] += y * other[c, b]
-            between = OF_GRAIN**2 * entry[c] + OF_GRAIN * a  # of a wall's row the diagonal: the other is zero
+                blocks[here + FILLED * b] += x * own[c, b]
+                blocks[there + FILLED * b] += y * other[c, b]
+            between = AREA * entry[c] + a  # of a wall's row the diagonal: the other is zero
             for b in range(OF_GRAIN):
-                blocks[between + b] += x * other[c, b] if i > j else y * own[c, b]
+                blocks[between + FILLED * b] += x * other[c, b] if i > j else y * own[c, b]
             for s in range(column.shape[1]):
                 v = value[c, s]
                 if v != 0.0:

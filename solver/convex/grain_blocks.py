@@ -12,9 +12,11 @@ import numpy as np
 from scipy import sparse
 
 from solver.bodies.grains import Array
+from solver.factor.blocks import TRIPLE, lanes_of
 from solver.factor.pattern import Ids, Pattern, find_pattern
 
-ROWS = 3  # of a node
+ROWS = len(TRIPLE)  # of a node
+FILLED = lanes_of(TRIPLE)  # numbers of a node in what stands beside the matrix, those included that fill it up
 
 
 class GrainBlocks(NamedTuple):
@@ -28,7 +30,7 @@ class GrainBlocks(NamedTuple):
     leg: Array  # (l, 6)
     entry_start: Ids  # (c + 1,) where the entries of every contact begin in `entry`
     entry: Ids  # (e,) of the pattern: leg by leg, with the contact's first leg … with itself
-    load: Array  # (3 n,) b by nodes, 0 in rows that fill up the last node
+    load: Array  # (4 n,) b by nodes, 0 in rows that fill up a node
     pattern: Pattern
 
     @property
@@ -64,7 +66,7 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
         for y in range(x + 1):
             at = entry_start[having] + x * (x + 1) // 2 + y
             entry[at] = pattern.locate(of[leg_start[having] + x], of[leg_start[having] + y])
-    by_node = np.zeros((count, ROWS))
+    by_node = np.zeros((count, FILLED))
     by_node[pattern.place[node], component] = load
     return GrainBlocks(leg_start, pattern.place[of], leg, entry_start, entry, by_node.ravel(), pattern)
 

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.bodies.grains import Array
-from solver.convex.grain_blocks import ROWS, GrainBlocks
+from solver.convex.grain_blocks import FILLED, GrainBlocks
 from solver.convex.interior_point_kernels import ENOUGH, REACHED, RESIDUAL, Iterate, Program, Room, iterate
+from solver.factor.blocks import TRIPLE, area_of
 
 # The former forces lead near the solution but lie on their cones: from nearer to the surface it takes more steps.
 LEAST_PART = 0.4  # [force units] of a force along an edge of its cone
@@ -66,7 +67,7 @@ def _start(grains: GrainBlocks, program: Program) -> Iterate:
     half, friction = 0.5 * program.centre[:, 0], program.friction
     lean = np.divide(0.5 * program.centre[:, 1], friction, out=np.zeros_like(half), where=friction > 0.0)
     part = np.maximum(np.column_stack([half - lean, half + lean]), LEAST_PART)
-    return Iterate(part, PRODUCT / part, np.zeros(ROWS * grains.node_count))
+    return Iterate(part, PRODUCT / part, np.zeros(FILLED * grains.node_count))
 
 
 def _forces(part: Array, friction: Array) -> Array:
@@ -79,10 +80,10 @@ def _make_room(grains: GrainBlocks, contacts: int) -> Room:
         return np.zeros((contacts, width))
 
     def velocity() -> Array:
-        return np.zeros(ROWS * grains.node_count)
+        return np.zeros(FILLED * grains.node_count)
 
     return Room(
-        pairs(), velocity(), pairs(), pairs(3), pairs(), np.zeros(ROWS**2 * grains.pattern.entry_count),
+        pairs(), velocity(), pairs(), pairs(3), pairs(), np.zeros(area_of(TRIPLE) * grains.pattern.entry_count),
         np.zeros(grains.node_count, np.int64), Iterate(pairs(), pairs(), velocity()),
         Iterate(pairs(), pairs(), velocity()), pairs(),
     )  # fmt: skip

@@ -12,9 +12,12 @@ import numpy as np
 from numba import njit
 
 from solver.bodies.grains import Array
-from solver.factor.cholesky import TRIPLE, factorize, solve
+from solver.convex.grain_blocks import FILLED, ROWS
+from solver.factor.blocks import TRIPLE, area_of
+from solver.factor.cholesky import factorize, solve
 from solver.factor.pattern import Ids
 
+AREA = area_of(TRIPLE)
 LONGEST = 0.99  # of the step to the boundary
 # Corrections of the centre in a step: as many as entries of the factor over so many a grain, for they cost solutions.
 ENTRIES, MOST_CORRECTIONS = 7, 3
@@ -40,14 +43,14 @@ class Iterate(NamedTuple):
 
     part: Array  # (c, 2) w > 0
     multiplier: Array  # (c, 2) z > 0 of w
-    velocity: Array  # (3 n,) v = ρ (H f − b), by nodes
+    velocity: Array  # (4 n,) v = ρ (H f − b), by nodes
 
 
 class Room(NamedTuple):
     """What a step needs besides; no number lasts from one step to the next, but for the best parts."""
 
     gradient: Array  # (c, 2) residual of the gradient
-    balance: Array  # (3 n,) H f − b − v/ρ
+    balance: Array  # (4 n,) H f − b − v/ρ
     excess: Array  # (c, 2) of w z over what the step aims at
     flexibility: Array  # (c, 3) E: 00, 01, 11
     right: Array  # (c, 2) of the contacts' own equations
@@ -117,8 +120,8 @@ def _measure(grains, program, at, room):  # type: ignore[no-untyped-def]
         un = program.cost[c, 0] + program.pull * (fn - program.centre[c, 0])
         ut = program.cost[c, 1] + program.pull * (ft - program.centre[c, 1])
         for q in range(grains.leg_start[c], grains.leg_start[c + 1]):
-            x = 3 * grains.node[q]
-            for a in range(3):
+            x = FILLED * grains.node[q]
+            for a in range(ROWS):
                 hn, ht = grains.leg[q, 2 * a], grains.leg[q, 2 * a + 1]
                 room.balance[x + a] += hn * fn + ht * ft
                 un += hn * at.velocity[x + a]
@@ -130,7 +133,7 @@ def _measure(grains, program, at, room):  # type: ignore[no-untyped-def]
         gradient += r0 * r0 + r1 * r1
     for k in range(len(at.velocity)):
         balance += room.balance[k] ** 2
-    return gap / (2 * count), max(np.sqrt(gradient / (2 * count)), np.sqrt(balance / len(at.velocity)))
+    return gap / (2 * count), max(np.sqrt(gradient / (2 * count)), np.sqrt(balance / (ROWS * len(room.where))))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -140,8 +143,8 @@ def _assemble(grains, program, at, room):  # type: ignore[no-untyped-def]
     for k in range(len(blocks)):
         blocks[k] = 0.0
     for j in range(len(start) - 1):
-        for a in range(3):
-            blocks[9 * start[j] + 4 * a] = 1.0 / program.price
+        for a in range(ROWS):
+            blocks[AREA * start[j] + (FILLED + 1) * a] = 1.0 / program.price
     for c in range(len(at.part)):
         mu, square = program.friction[c], program.friction[c] ** 2
         own, mixed = program.pull * (1.0 + square), program.pull * (1.0 - square)
@@ -156,13 +159,13 @@ def _assemble(grains, program, at, room):  # type: ignore[no-untyped-def]
         e = grains.entry_start[c]
         for p in range(grains.leg_start[c], grains.leg_start[c + 1]):
             for q in range(grains.leg_start[c], p + 1):
-                o = 9 * grains.entry[e]
+                o = AREA * grains.entry[e]
                 e += 1
-                for a in range(3):
+                for a in range(ROWS):
                     hn, ht = grains.leg[p, 2 * a], grains.leg[p, 2 * a + 1]
                     n, t = hn * nn + ht * nt, hn * nt + ht * tt
-                    for b in range(3):
-                        blocks[o + 3 * a + b] += n * grains.leg[q, 2 * b] + t * grains.leg[q, 2 * b + 1]
+                    for b in range(ROWS):
+                        blocks[o + FILLED * b + a] += n * grains.leg[q, 2 * b] + t * grains.leg[q, 2 * b + 1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -191,16 +194,16 @@ def _find_step(grains, program, at, room, move):  # type: ignore[no-untyped-def]
         fn, ft = w0 + w1, mu * (w1 - w0)
         room.right[c, 0], room.right[c, 1] = r0, r1
         for q in range(grains.leg_start[c], grains.leg_start[c + 1]):
-            x = 3 * grains.node[q]
-            for a in range(3):
+            x = FILLED * grains.node[q]
+            for a in range(ROWS):
                 v[x + a] += grains.leg[q, 2 * a] * fn + grains.leg[q, 2 * a + 1] * ft
     solve(grains.pattern, room.blocks, v, TRIPLE)
     primal, dual = 1.0, 1.0
     for c in range(len(at.part)):
         un, ut = 0.0, 0.0
         for q in range(grains.leg_start[c], grains.leg_start[c + 1]):
-            x = 3 * grains.node[q]
-            for a in range(3):
+            x = FILLED * grains.node[q]
+            for a in range(ROWS):
                 un += grains.leg[q, 2 * a] * v[x + a]
                 ut += grains.leg[q, 2 * a + 1] * v[x + a]
         ut *= program.friction[c]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from solver.bodies.grains import Array, Grains
 from solver.detection.touch_probability import Candidates
-from solver.factor.cholesky import PAIR, factorize, solve
+from solver.factor.blocks import PAIR
+from solver.factor.cholesky import factorize, solve
 from solver.factor.inverse import invert_on_pattern
 from solver.factor.pattern import Ids, Pattern, find_pattern
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from numba import njit
 
+from solver.factor.blocks import area_of, lanes_of
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def invert_on_pattern(pattern, blocks, inverse, unit, where, block):  # type: ignore[no-untyped-def]
     """Set inverse to the blocks of A⁻¹ on the pattern of A's factor, as blocks, whole ones on the diagonal.
 
-    blocks: the factor, of `factorize`; unit: scratch of the same size; where (n,) integers: scratch. After
-    Takahashi, Fagan & Chen 1973: what lies on the pattern follows from the factor alone, last column first.
+    blocks: the factor, of `factorize`, laid out as `blocks` says, like the inverse; unit: scratch of the same size;
+    where (n,) integers: scratch. After Takahashi, Fagan & Chen 1973: what lies on the pattern follows from the factor
+    alone, last column first.
     """
-    size = len(block)
-    area = size * size
+    size, lanes, area = len(block), lanes_of(block), area_of(block)
     start, row = pattern.start, pattern.row
     for k in range(len(where)):
         where[k] = -1
@@ -26,46 +28,48 @@ def invert_on_pattern(pattern, blocks, inverse, unit, where, block):  # type: ig
                 for b in range(size):
                     total = 0.0
                     for m in range(b, size):
-                        total += blocks[p * area + a * size + m] * blocks[d + m * size + b]
-                    unit[p * area + a * size + b] = total
-                    inverse[p * area + a * size + b] = 0.0
+                        total += blocks[p * area + m * lanes + a] * blocks[d + b * lanes + m]
+                    unit[p * area + b * lanes + a] = total
+                    inverse[p * area + b * lanes + a] = 0.0
         # Z_ij = −Σ_k Z_ik U_kj; each known block of the symmetric Z serves both of its rows.
         for q in range(start[j] + 1, start[j + 1]):
             u, first = q * area, start[row[q]]
-            _subtract_product(inverse, u, first * area, unit, u, size)
+            _subtract_product(inverse, u, first * area, unit, u, block)
             for e in range(first + 1, start[row[q] + 1]):
                 t = where[row[e]]
                 if t >= 0:
-                    _subtract_product(inverse, t, e * area, unit, u, size)
-                    _subtract_transposed_product(inverse, u, inverse, e * area, unit, t, size)
+                    _subtract_product(inverse, t, e * area, unit, u, block)
+                    _subtract_transposed_product(inverse, u, inverse, e * area, unit, t, block)
         for a in range(size):
             for b in range(size):
                 total = 0.0
                 for m in range(max(a, b), size):
-                    total += blocks[d + m * size + a] * blocks[d + m * size + b]
-                inverse[d + a * size + b] = total
+                    total += blocks[d + a * lanes + m] * blocks[d + b * lanes + m]
+                inverse[d + b * lanes + a] = total
         for p in range(start[j] + 1, start[j + 1]):
-            _subtract_transposed_product(inverse, d, unit, p * area, inverse, p * area, size)
+            _subtract_transposed_product(inverse, d, unit, p * area, inverse, p * area, block)
             where[row[p]] = -1
 
 
 @njit(inline="always")
-def _subtract_product(inverse, t, e, unit, u, size):  # type: ignore[no-untyped-def]
+def _subtract_product(inverse, t, e, unit, u, block):  # type: ignore[no-untyped-def]
     """From the block at t take that at e times the unit block at u."""
+    size, lanes = len(block), lanes_of(block)
     for a in range(size):
         for b in range(size):
             total = 0.0
             for m in range(size):
-                total += inverse[e + a * size + m] * unit[u + m * size + b]
-            inverse[t + a * size + b] -= total
+                total += inverse[e + m * lanes + a] * unit[u + b * lanes + m]
+            inverse[t + b * lanes + a] -= total
 
 
 @njit(inline="always")
-def _subtract_transposed_product(inverse, t, first, e, second, u, size):  # type: ignore[no-untyped-def]
+def _subtract_transposed_product(inverse, t, first, e, second, u, block):  # type: ignore[no-untyped-def]
     """From the block at t take the transposed first block at e times the second at u."""
+    size, lanes = len(block), lanes_of(block)
     for a in range(size):
         for b in range(size):
             total = 0.0
             for m in range(size):
-                total += first[e + m * size + a] * second[u + m * size + b]
-            inverse[t + a * size + b] -= total
+                total += first[e + a * lanes + m] * second[u + b * lanes + m]
+            inverse[t + b * lanes + a] -= total

@@ -1,4 +1,4 @@
-"""Records of eight grains at a time, in and out of rows: the one place that speaks to the compiler in its own tongue.
+"""Records of eight grains at a time, in and out of rows.
 
 A grain's record is four numbers that lie together: vx, vy, ω R, 1/Z. Vectors want them apart, one row per quantity.
 Number by number the moves between the two take longer than the mechanics; here every record is loaded and stored at
@@ -9,15 +9,14 @@ The functions say in Python what they do; compiled code takes the vectors instea
 
 from __future__ import annotations
 
-from llvmlite import ir  # of numba, whose only way to such vectors it is
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic, overload
+
+from solver.vectors import INDEX, load, pointers, shuffle, store
 
 RECORD = 4  # numbers
 WIDTH = 8  # grains
 
-_NUMBER, _INDEX, _LANE = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
 _EVEN, _ODD = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
 _LOW, _HIGH = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
 
@@ -89,12 +88,12 @@ def _compiled_scatter(rows, at, stride, body, ids, first):  # type: ignore[no-un
 @intrinsic
 def _gather(typing, body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        body, ids, first, rows, at, stride = _pointers(context, builder, signature, values)
-        records = [_load(builder, place, RECORD) for place in _records(builder, body, ids, first)]
+        body, ids, first, rows, at, stride = pointers(context, builder, signature, values)
+        records = [load(builder, place, RECORD) for place in _records(builder, body, ids, first)]
         halves = range(RECORD)  # of a vector of eight: grains k and k + 4
-        pairs = [_shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in halves]
+        pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in halves]
         for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
-            _store(builder, row, place)
+            store(builder, row, place)
         return context.get_dummy_value()
 
     return types.void(body, ids, first, rows, at, stride), generate
@@ -103,18 +102,18 @@ def _gather(typing, body, ids, first, rows, at, stride):  # type: ignore[no-unty
 @intrinsic
 def _differences(typing, body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        body, ids, first, second, rows, at, stride = _pointers(context, builder, signature, values)
+        body, ids, first, second, rows, at, stride = pointers(context, builder, signature, values)
         both = zip(_records(builder, body, ids, first), _records(builder, body, ids, second), strict=True)
         records = []
         for one, other in both:
-            a, b = _load(builder, one, RECORD), _load(builder, other, RECORD)
+            a, b = load(builder, one, RECORD), load(builder, other, RECORD)
             more, sum_ = builder.fsub(b, a), builder.fadd(b, a)
-            records.append(_shuffle(builder, more, sum_, [0, 1, RECORD + 2, 3]))
-        pairs = [_shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+            records.append(shuffle(builder, more, sum_, [0, 1, RECORD + 2, 3]))
+        pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
         for row, place in zip(
             _transposed(builder, pairs)[: RECORD - 1], _rows(builder, rows, at, stride), strict=False
         ):
-            _store(builder, row, place)
+            store(builder, row, place)
         return context.get_dummy_value()
 
     return types.void(body, ids, first, second, rows, at, stride), generate
@@ -123,12 +122,12 @@ def _differences(typing, body, ids, first, second, rows, at, stride):  # type: i
 @intrinsic
 def _transpose(typing, body, first, rows, at, stride):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        body, first, rows, at, stride = _pointers(context, builder, signature, values)
-        places = [builder.gep(body, [builder.add(first, _INDEX(RECORD * k))]) for k in range(WIDTH)]
-        records = [_load(builder, place, RECORD) for place in places]
-        pairs = [_shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+        body, first, rows, at, stride = pointers(context, builder, signature, values)
+        places = [builder.gep(body, [builder.add(first, INDEX(RECORD * k))]) for k in range(WIDTH)]
+        records = [load(builder, place, RECORD) for place in places]
+        pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
         for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
-            _store(builder, row, place)
+            store(builder, row, place)
         return context.get_dummy_value()
 
     return types.void(body, first, rows, at, stride), generate
@@ -137,57 +136,32 @@ def _transpose(typing, body, first, rows, at, stride):  # type: ignore[no-untype
 @intrinsic
 def _scatter(typing, rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        rows, at, stride, body, ids, first = _pointers(context, builder, signature, values)
-        pairs = _transposed(builder, [_load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)])
-        records = [_shuffle(builder, pair, pair, range(RECORD)) for pair in pairs]
-        records += [_shuffle(builder, pair, pair, range(RECORD, WIDTH)) for pair in pairs]
+        rows, at, stride, body, ids, first = pointers(context, builder, signature, values)
+        pairs = _transposed(builder, [load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)])
+        records = [shuffle(builder, pair, pair, range(RECORD)) for pair in pairs]
+        records += [shuffle(builder, pair, pair, range(RECORD, WIDTH)) for pair in pairs]
         for record, place in zip(records, _records(builder, body, ids, first), strict=True):
-            _store(builder, record, place)
+            store(builder, record, place)
         return context.get_dummy_value()
 
     return types.void(rows, at, stride, body, ids, first), generate
 
 
-def _pointers(context, builder, signature, values):  # type: ignore[no-untyped-def]
-    """Arrays as pointers to their first number, all else as it is."""
-    return [
-        cgutils.create_struct_proxy(kind)(context, builder, value=value).data
-        if isinstance(kind, types.Array)
-        else value
-        for kind, value in zip(signature.args, values, strict=True)
-    ]
-
-
 def _records(builder, body, ids, first):  # type: ignore[no-untyped-def]
     """Where the records of eight grains begin."""
     for k in range(WIDTH):
-        grain = builder.load(builder.gep(ids, [builder.add(first, _INDEX(k))]))
-        yield builder.gep(body, [builder.mul(builder.zext(grain, _INDEX), _INDEX(RECORD))])
+        grain = builder.load(builder.gep(ids, [builder.add(first, INDEX(k))]))
+        yield builder.gep(body, [builder.mul(builder.zext(grain, INDEX), INDEX(RECORD))])
 
 
 def _rows(builder, rows, at, stride):  # type: ignore[no-untyped-def]
     """Where the rows of the four quantities begin."""
     for q in range(RECORD):
-        yield builder.gep(rows, [builder.add(at, builder.mul(stride, _INDEX(q)))])
+        yield builder.gep(rows, [builder.add(at, builder.mul(stride, INDEX(q)))])
 
 
 def _transposed(builder, rows):  # type: ignore[no-untyped-def]
     """Transpose both halves, 4 × 4 each, of four vectors of eight."""
-    even = [_shuffle(builder, rows[k], rows[k + 1], _EVEN) for k in (0, 2)]
-    odd = [_shuffle(builder, rows[k], rows[k + 1], _ODD) for k in (0, 2)]
-    return [_shuffle(builder, pair[0], pair[1], half) for half in (_LOW, _HIGH) for pair in (even, odd)]
-
-
-def _shuffle(builder, a, b, lanes):  # type: ignore[no-untyped-def]
-    lanes = list(lanes)
-    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_LANE, len(lanes)), lanes))
-
-
-def _load(builder, place, count):  # type: ignore[no-untyped-def]
-    loaded = builder.load(builder.bitcast(place, ir.VectorType(_NUMBER, count).as_pointer()))
-    loaded.align = 8  # of a number: an array need not lie on the bounds of a vector
-    return loaded
-
-
-def _store(builder, vector, place):  # type: ignore[no-untyped-def]
-    builder.store(vector, builder.bitcast(place, vector.type.as_pointer())).align = 8
+    even = [shuffle(builder, rows[k], rows[k + 1], _EVEN) for k in (0, 2)]
+    odd = [shuffle(builder, rows[k], rows[k + 1], _ODD) for k in (0, 2)]
+    return [shuffle(builder, pair[0], pair[1], half) for half in (_LOW, _HIGH) for pair in (even, odd)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from solver.convex.grain_blocks import ROWS, block_balance
+from solver.convex.grain_blocks import FILLED, ROWS, block_balance
 
 GRAINS = 60_000  # pairs of grains and contacts have numbers beyond 32 bits
 
@@ -24,4 +24,4 @@ def test_a_packing_of_many_grains_has_the_legs_of_its_balance():
     legs = {int(blocks.node[q]): blocks.leg[q] for q in range(blocks.leg_start[last], blocks.leg_start[last + 1])}
     assert np.array_equal(legs[int(place[GRAINS - 2])], [1.0, 0.0, 0.0, 1.0 + last, 0.0, 0.0])
     assert np.array_equal(legs[int(place[GRAINS - 1])], [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert blocks.load.reshape(-1, ROWS)[place[7]].tolist() == [7.0, GRAINS + 7.0, 2 * GRAINS + 7.0]
+    assert blocks.load.reshape(-1, FILLED)[place[7]].tolist() == [7.0, GRAINS + 7.0, 2 * GRAINS + 7.0, 0.0]

@@ -25,7 +25,21 @@ def definite(pattern: Pattern, a: np.ndarray, b: np.ndarray, size: int, seed: in
         pull[:, second * size : (second + 1) * size] += rng.normal(size=(2, size))
         whole += pull.T @ pull
     blocks = whole.reshape(n, size, n, size).swapaxes(1, 2)
-    return blocks[pattern.row, pattern.column].ravel(), whole
+    return flat(blocks[pattern.row, pattern.column]), whole
+
+
+def flat(blocks: np.ndarray) -> np.ndarray:
+    """Blocks (k, b, b) as the factorisation lays them out."""
+    filled = np.zeros((len(blocks), blocks.shape[2], blocks.shape[1] + blocks.shape[1] % 2))
+    filled[:, :, : blocks.shape[1]] = blocks.swapaxes(1, 2)
+    return filled.ravel()
+
+
+def square(flat_blocks: np.ndarray, size: int) -> np.ndarray:
+    """What `flat` was made of, and that nothing but zeros fills it up."""
+    filled = flat_blocks.reshape(-1, size, size + size % 2)
+    assert not filled[:, :, size:].any()
+    return filled[:, :, :size].swapaxes(1, 2)
 
 
 def lattice(side: int, size: int, far: int = 0) -> tuple[Pattern, np.ndarray, np.ndarray]:

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from solver.factor.cholesky import PAIR, TRIPLE, factorize, solve
+from solver.factor.blocks import PAIR, TRIPLE
+from solver.factor.cholesky import factorize, solve
 from solver.factor.pattern import find_pattern
-from tests.solver.factor.matrices import lattice
+from tests.solver.factor.matrices import flat, lattice, square
 
 BLOCK = {2: PAIR, 3: TRIPLE}
 EXACT = 1e-10  # relative, of matrices whose eigenvalues span a few hundred
@@ -16,7 +17,11 @@ def test_it_solves_as_the_whole_matrix_does(size: int, side: int, far: int):
     right = np.random.default_rng(1).normal(size=len(whole))
     expected = np.linalg.solve(whole, right)
     assert factorize(pattern, blocks, np.empty(pattern.node_count, np.int64), BLOCK[size])
-    solve(pattern, blocks, right, BLOCK[size])
+    filled = np.zeros((pattern.node_count, size + size % 2))
+    filled[:, :size] = right.reshape(-1, size)
+    solve(pattern, blocks, filled.reshape(-1), BLOCK[size])
+    assert not filled[:, size:].any()
+    right = filled[:, :size].ravel()
     np.testing.assert_allclose(right, expected, rtol=0, atol=EXACT * np.abs(expected).max())
 
 
@@ -25,7 +30,7 @@ def test_the_factor_is_that_of_the_whole_matrix(size: int):
     pattern, blocks, whole = lattice(5, size)
     factorize(pattern, blocks, np.empty(25, np.int64), BLOCK[size])
     factor = np.linalg.cholesky(whole)
-    for k, found in enumerate(blocks.reshape(-1, size, size)):
+    for k, found in enumerate(square(blocks, size)):
         i, j = pattern.row[k] * size, pattern.column[k] * size
         expected = factor[i : i + size, j : j + size]
         expected = np.linalg.inv(expected) if i == j else expected
@@ -39,4 +44,4 @@ def test_a_matrix_that_is_not_positive_definite_is_refused(size: int, wrong: flo
     blocks = np.zeros((3, size, size))
     blocks[[0, 2]] = np.eye(size)
     blocks[2, -1, -1] = wrong
-    assert not factorize(pattern, blocks.ravel(), np.empty(2, np.int64), BLOCK[size])
+    assert not factorize(pattern, flat(blocks), np.empty(2, np.int64), BLOCK[size])

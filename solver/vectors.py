@@ -1,0 +1,63 @@
+"""What generates vector instructions, for kernels that the compiler would not turn into any by itself.
+
+LLVM makes of a vector what the processor has: AVX-512, AVX2, NEON. Modules that use this say in Python what their
+functions do; compiled code takes the vectors instead.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir  # of numba, whose only way to such vectors it is
+from numba import types
+from numba.core import cgutils
+
+NUMBER, INDEX = ir.DoubleType(), ir.IntType(64)
+_LANE = ir.IntType(32)
+_FUSED = ("contract",)  # a product and a sum may be rounded once, where the processor does so
+
+
+def pointers(context, builder, signature, values):  # type: ignore[no-untyped-def]
+    """Arrays as pointers to their first number, all else as it is."""
+    return [
+        cgutils.create_struct_proxy(kind)(context, builder, value=value).data
+        if isinstance(kind, types.Array)
+        else value
+        for kind, value in zip(signature.args, values, strict=True)
+    ]
+
+
+def load(builder, place, count):  # type: ignore[no-untyped-def]
+    loaded = builder.load(builder.bitcast(place, ir.VectorType(NUMBER, count).as_pointer()))
+    loaded.align = 8  # of a number: an array need not lie on the bounds of a vector
+    return loaded
+
+
+def store(builder, vector, place):  # type: ignore[no-untyped-def]
+    builder.store(vector, builder.bitcast(place, vector.type.as_pointer())).align = 8
+
+
+def shuffle(builder, a, b, lanes):  # type: ignore[no-untyped-def]
+    lanes = list(lanes)
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_LANE, len(lanes)), lanes))
+
+
+def spread(builder, number, count):  # type: ignore[no-untyped-def]
+    """A vector of one number."""
+    empty = ir.Constant(ir.VectorType(NUMBER, count), ir.Undefined)
+    first = builder.insert_element(empty, number, _LANE(0))
+    return shuffle(builder, first, empty, [0] * count)
+
+
+def add_product(builder, to, a, b):  # type: ignore[no-untyped-def]
+    return builder.fadd(to, builder.fmul(a, b, flags=_FUSED), flags=_FUSED)
+
+
+def subtract_product(builder, to, a, b):  # type: ignore[no-untyped-def]
+    return builder.fsub(to, builder.fmul(a, b, flags=_FUSED), flags=_FUSED)
+
+
+def total(builder, vector):  # type: ignore[no-untyped-def]
+    """Sum of the numbers of a vector, neighbours first."""
+    parts = [builder.extract_element(vector, _LANE(k)) for k in range(vector.type.count)]
+    while len(parts) > 1:
+        parts = [builder.fadd(parts[k], parts[k + 1]) for k in range(0, len(parts), 2)]
+    return parts[0]
