@@ -53,24 +53,31 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
         bright, _enlarged(found[:, 0], factor), _enlarged(found[:, 1], factor), factor * (found[:, 2] + RIM), 0
     )
     # The distance from a pixel's centre to that of the nearest dark one is half a pixel more than that to the edge.
-    distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) - 0.5
+    distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     least = factor * smallest
-    peak = (distance == cv2.dilate(distance, np.ones((3, 3), np.uint8))) & (distance >= least)
-    row, column = np.nonzero(peak)
-    radius = distance[peak].astype(np.float64)
+    inner = cv2.compare(distance, least + 0.5, cv2.CMP_GE)
+    peak = cv2.compare(distance, cv2.dilate(distance, np.ones((3, 3), np.uint8)), cv2.CMP_EQ) & inner
+    column, row = cv2.findNonZero(peak).reshape(-1, 2).T if peak.any() else np.empty((2, 0), np.int64)
+    radius = distance[row, column].astype(np.float64) - 0.5
     order = np.argsort(-radius, kind="stable")
     column, row, radius = column[order].astype(np.float64), row[order].astype(np.float64), radius[order]
     kept = without_overlap(column, row, radius, allowed=OVERLAP)
     column, row, radius = column[kept], row[kept], radius[kept]
-    middle = level[distance >= least]
+    middle = level[::factor, ::factor][inner[::factor, ::factor] > 0]  # the other pixels were interpolated
     spread = float(np.ptp(np.percentile(middle, [5.0, 95.0]))) if len(middle) else np.inf
-    wide = cv2.distanceTransform((distance < least).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= least
-    area = int(wide.sum())
+    wide = cv2.dilate(inner, _full_disc(least)) > 0
+    area = int(np.count_nonzero(wide))
     _paint_discs(bright, column, row, radius, 2)
-    covered = int((wide & (bright == 2)).sum())
+    covered = int(np.count_nonzero(wide & (bright == 2)))
     place = [(axis + 0.5) / factor - 0.5 for axis in (column, row)]
     candidates = Circles(place[0], place[1], radius / factor, np.ones(len(radius)))
     return Discs(candidates, area / factor**2, covered / max(area, 1), spread)
+
+
+def _full_disc(radius: float) -> np.ndarray:
+    """The pixels no farther than that from the middle one."""
+    reach = np.arange(-int(radius), int(radius) + 1)
+    return (np.hypot(*np.meshgrid(reach, reach)) <= radius).astype(np.uint8)
 
 
 def _enlarged(place: Array, factor: int) -> Array:
