@@ -55,7 +55,7 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     # The distance from a pixel's centre to that of the nearest dark one is half a pixel more than that to the edge.
     distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     least = factor * smallest
-    inner = cv2.compare(distance, least + 0.5, cv2.CMP_GE)
+    inner = (distance >= least + 0.5).view(np.uint8)
     peak = cv2.compare(distance, cv2.dilate(distance, np.ones((3, 3), np.uint8)), cv2.CMP_EQ) & inner
     column, row = cv2.findNonZero(peak).reshape(-1, 2).T if peak.any() else np.empty((2, 0), np.int64)
     radius = distance[row, column].astype(np.float64) - 0.5
