@@ -56,8 +56,10 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     least = factor * smallest
     inner = (distance >= least + 0.5).view(np.uint8)
-    peak = cv2.compare(distance, cv2.dilate(distance, np.ones((3, 3), np.uint8)), cv2.CMP_EQ) & inner
-    column, row = cv2.findNonZero(peak).reshape(-1, 2).T if peak.any() else np.empty((2, 0), np.int64)
+    highest = cv2.compare(distance, cv2.dilate(distance, np.ones((3, 3), np.uint8)), cv2.CMP_EQ)
+    peak = cv2.bitwise_and(highest, inner)
+    peaks = np.asarray(cv2.findNonZero(peak) if peak.any() else [], np.int64).reshape(-1, 2)
+    column, row = peaks[:, 0], peaks[:, 1]
     radius = distance[row, column].astype(np.float64) - 0.5
     order = np.argsort(-radius, kind="stable")
     column, row, radius = column[order].astype(np.float64), row[order].astype(np.float64), radius[order]
