@@ -16,6 +16,7 @@ from solver.bodies.grains import Array
 from solver.convex.grain_blocks import FILLED, GrainBlocks
 from solver.convex.interior_point_kernels import ENOUGH, REACHED, RESIDUAL, Iterate, Program, Room, iterate
 from solver.factor.blocks import TRIPLE, area_of
+from solver.nlgs.problem import aligned_zeros
 
 # The former forces lead near the solution but lie on their cones: from nearer to the surface it takes more steps.
 LEAST_PART = 0.4  # [force units] of a force along an edge of its cone
@@ -83,7 +84,7 @@ def _make_room(grains: GrainBlocks, contacts: int) -> Room:
         return np.zeros(FILLED * grains.node_count)
 
     return Room(
-        pairs(), velocity(), pairs(), pairs(3), pairs(), np.zeros(area_of(TRIPLE) * grains.pattern.entry_count),
+        pairs(), velocity(), pairs(), pairs(3), pairs(), aligned_zeros((area_of(TRIPLE) * grains.pattern.entry_count,)),
         np.zeros(grains.node_count, np.int64), Iterate(pairs(), pairs(), velocity()),
         Iterate(pairs(), pairs(), velocity()), pairs(),
     )  # fmt: skip
