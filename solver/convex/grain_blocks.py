@@ -12,22 +12,19 @@ import numpy as np
 from scipy import sparse
 
 from solver.bodies.grains import Array
-from solver.factor.blocks import TRIPLE, lanes_of
+from solver.convex.legs import FILLED, LEG, ROWS
 from solver.factor.pattern import Ids, Pattern, find_pattern
-
-ROWS = len(TRIPLE)  # of a node
-FILLED = lanes_of(TRIPLE)  # numbers of a node in what stands beside the matrix, those included that fill it up
 
 
 class GrainBlocks(NamedTuple):
     """H and b of a balance, contact by contact; nodes are rows in threes, named by their order of elimination.
 
-    A leg is what a contact does to a node: f_n and f_t to its three rows, row by row.
+    A leg is what a contact does to a node: f_n to its rows, then f_t.
     """
 
     leg_start: Ids  # (c + 1,) first leg of every contact; its legs ascend by node
     node: Ids  # (l,) that each leg stands on
-    leg: Array  # (l, 6)
+    leg: Array  # (8 l,)
     entry_start: Ids  # (c + 1,) where the entries of every contact begin in `entry`
     entry: Ids  # (e,) of the pattern: leg by leg, with the contact's first leg … with itself
     load: Array  # (4 n,) b by nodes, 0 in rows that fill up a node
@@ -48,8 +45,8 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
     pair = entries.col.astype(np.int64) % contacts * count + node[entries.row]  # beyond 32 bits from 50 000 grains on
     which, place = np.unique(pair, return_inverse=True)
     contact, of = which // count, which % count
-    leg = np.zeros((len(which), 2 * ROWS))
-    np.add.at(leg, (place, 2 * component[entries.row] + entries.col // contacts), entries.data)
+    leg = np.zeros((len(which), LEG))
+    np.add.at(leg, (place, entries.col // contacts * FILLED + component[entries.row]), entries.data)
 
     legs = np.bincount(contact, minlength=contacts)
     couples = [np.flatnonzero(contact[d:] == contact[: len(contact) - d]) for d in range(1, legs.max(initial=1))]
@@ -68,7 +65,7 @@ def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, cont
             entry[at] = pattern.locate(of[leg_start[having] + x], of[leg_start[having] + y])
     by_node = np.zeros((count, FILLED))
     by_node[pattern.place[node], component] = load
-    return GrainBlocks(leg_start, pattern.place[of], leg, entry_start, entry, by_node.ravel(), pattern)
+    return GrainBlocks(leg_start, pattern.place[of], leg.ravel(), entry_start, entry, by_node.ravel(), pattern)
 
 
 def _nodes_of_rows(row_count: int, grain_count: int) -> tuple[Ids, Ids]:

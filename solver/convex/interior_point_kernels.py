@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from solver.bodies.grains import Array
-from solver.convex.grain_blocks import FILLED, ROWS
+from solver.convex.legs import FILLED, LEG, ROWS, couple_nodes, push_node
 from solver.factor.blocks import TRIPLE, area_of
 from solver.factor.cholesky import factorize, solve
 from solver.factor.pattern import Ids
@@ -121,9 +121,9 @@ def _measure(grains, program, at, room):  # type: ignore[no-untyped-def]
         ut = program.cost[c, 1] + program.pull * (ft - program.centre[c, 1])
         for q in range(grains.leg_start[c], grains.leg_start[c + 1]):
             x = FILLED * grains.node[q]
+            push_node(room.balance, x, grains.leg, q, fn, ft)
             for a in range(ROWS):
-                hn, ht = grains.leg[q, 2 * a], grains.leg[q, 2 * a + 1]
-                room.balance[x + a] += hn * fn + ht * ft
+                hn, ht = grains.leg[LEG * q + a], grains.leg[LEG * q + FILLED + a]
                 un += hn * at.velocity[x + a]
                 ut += ht * at.velocity[x + a]
         z0, z1 = at.multiplier[c, 0], at.multiplier[c, 1]
@@ -161,11 +161,7 @@ def _assemble(grains, program, at, room):  # type: ignore[no-untyped-def]
             for q in range(grains.leg_start[c], p + 1):
                 o = AREA * grains.entry[e]
                 e += 1
-                for a in range(ROWS):
-                    hn, ht = grains.leg[p, 2 * a], grains.leg[p, 2 * a + 1]
-                    n, t = hn * nn + ht * nt, hn * nt + ht * tt
-                    for b in range(ROWS):
-                        blocks[o + FILLED * b + a] += n * grains.leg[q, 2 * b] + t * grains.leg[q, 2 * b + 1]
+                couple_nodes(blocks, o, grains.leg, p, q, nn, nt, tt)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -195,8 +191,7 @@ def _find_step(grains, program, at, room, move):  # type: ignore[no-untyped-def]
         room.right[c, 0], room.right[c, 1] = r0, r1
         for q in range(grains.leg_start[c], grains.leg_start[c + 1]):
             x = FILLED * grains.node[q]
-            for a in range(ROWS):
-                v[x + a] += grains.leg[q, 2 * a] * fn + grains.leg[q, 2 * a + 1] * ft
+            push_node(v, x, grains.leg, q, fn, ft)
     solve(grains.pattern, room.blocks, v, TRIPLE)
     primal, dual = 1.0, 1.0
     for c in range(len(at.part)):
@@ -204,8 +199,8 @@ def _find_step(grains, program, at, room, move):  # type: ignore[no-untyped-def]
         for q in range(grains.leg_start[c], grains.leg_start[c + 1]):
             x = FILLED * grains.node[q]
             for a in range(ROWS):
-                un += grains.leg[q, 2 * a] * v[x + a]
-                ut += grains.leg[q, 2 * a + 1] * v[x + a]
+                un += grains.leg[LEG * q + a] * v[x + a]
+                ut += grains.leg[LEG * q + FILLED + a] * v[x + a]
         ut *= program.friction[c]
         r0, r1 = room.right[c, 0] - un + ut, room.right[c, 1] - un - ut
         e00, e01, e11 = room.flexibility[c, 0], room.flexibility[c, 1], room.flexibility[c, 2]

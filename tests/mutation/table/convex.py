@@ -24,7 +24,7 @@ MUTANTS = [
     *mutants_of(
         "solver/convex/grain_blocks.py",
         (PROGRAM, TWIN),
-        ("2 * component[entries.row] + entries.col // contacts", "2 * component[entries.row]"),
+        ("entries.col // contacts * FILLED + component[entries.row]", "component[entries.row]"),
         ("for d in range(1, legs.max(initial=1))]", "for d in range(1, min(2, legs.max(initial=1)))]"),
         ("np.lexsort((pattern.place[of], contact))", "np.arange(len(of))"),
         ("by_node[pattern.place[node], component] = load", "by_node[node, component] = load"),
@@ -40,6 +40,12 @@ MUTANTS = [
         ("if gap <= tolerance and residual <= RESIDUAL:", "if gap <= 1e4 * tolerance and residual <= RESIDUAL:"),
         ("room.best[:] = at.part", "pass"),
         ("nn, nt = (4.0 * program.pull * square + d0 + d1) * whole", "nn, nt = (d0 + d1) * whole"),
+    ),
+    *mutants_of(
+        "solver/convex/legs.py",
+        "tests/solver/convex/test_legs.py",
+        ("nn * hn + nt * ht, nt * hn + tt * ht)", "nn * hn + nt * ht, nt * hn + nn * ht)"),
+        ("for k, force in enumerate((fn, ft)):", "for k, force in enumerate((fn, fn)):"),
     ),
     *mutants_of(
         "solver/convex/interior_point.py",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from solver.convex.grain_blocks import FILLED, ROWS, block_balance
+from solver.convex.grain_blocks import block_balance
+from solver.convex.legs import FILLED, LEG, ROWS
 
 GRAINS = 60_000  # pairs of grains and contacts have numbers beyond 32 bits
 
@@ -21,7 +22,10 @@ def test_a_packing_of_many_grains_has_the_legs_of_its_balance():
     assert np.array_equal(np.diff(blocks.leg_start), np.full(contacts, 2))
     place = blocks.pattern.place
     last = contacts - 1
-    legs = {int(blocks.node[q]): blocks.leg[q] for q in range(blocks.leg_start[last], blocks.leg_start[last + 1])}
-    assert np.array_equal(legs[int(place[GRAINS - 2])], [1.0, 0.0, 0.0, 1.0 + last, 0.0, 0.0])
-    assert np.array_equal(legs[int(place[GRAINS - 1])], [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    legs = {
+        int(blocks.node[q]): blocks.leg[LEG * q : LEG * (q + 1)]
+        for q in range(blocks.leg_start[last], blocks.leg_start[last + 1])
+    }
+    assert np.array_equal(legs[int(place[GRAINS - 2])], [1.0, 0.0, 0.0, 0.0, 0.0, 1.0 + last, 0.0, 0.0])
+    assert np.array_equal(legs[int(place[GRAINS - 1])], [-1.0] + 7 * [0.0])
     assert blocks.load.reshape(-1, FILLED)[place[7]].tolist() == [7.0, GRAINS + 7.0, 2 * GRAINS + 7.0, 0.0]
