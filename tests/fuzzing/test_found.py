@@ -26,6 +26,7 @@ def first_lines(file, **replaced: str) -> None:
     ("file", "cell", "told"),
     [
         ("grains.csv", {"radius": "7000.0"}, "larger than the packing"),
+        ("walls.csv", {"x1": "1e300"}, "is larger than any length, time or force"),
         ("truth_contacts.csv", {"j": "9" * 30}, "is not the id of a grain"),
         ("truth_contacts.csv", {"j": "²"}, "neither a grain's id nor the name of a wall"),
         ("truth_contacts.csv", {"j": "9" * 5000}, "neither a grain's id nor the name of a wall"),

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 from rodsight.recording.files.readback import read_forces
+from rodsight.run_folder import TRACKED
 
 from .attempt import attempt, attempt_in_a_fork, in_a_fork
 from .table import KILLS, note
@@ -82,6 +83,16 @@ def content_of(out: Path) -> dict[str, str]:
     return {name: hashlib.sha256(content).hexdigest() for name, content in found.items()}
 
 
+def left_in(out: Path) -> list[str]:
+    """What a run that came to its end should have cleared away; finished tracks are kept for other corrections."""
+    kept = out / TRACKED / "tracking"
+    return [
+        str(file.relative_to(out))
+        for file in out.rglob("*")
+        if (file.suffix in (".part", ".piece") and file.parent != kept) or file.name == ".lock"
+    ]
+
+
 def kill_and_resume(experiment: Path, out: Path, count: int, chance: random.Random) -> tuple[int, list[str]]:
     """Chains of kills, each brought to its end; gives kills that fell before an end, and what went wrong."""
     whole = out.with_name("whole")
@@ -102,9 +113,7 @@ def kill_and_resume(experiment: Path, out: Path, count: int, chance: random.Rand
             wrong.append(f"{chain}: {ended}")
         elif in_a_fork(lambda: content_of(out)) != expected:
             wrong.append(f"{chain}: other bits")
-        elif left := [
-            file.name for file in out.rglob("*") if file.suffix in (".part", ".piece") or file.name == ".lock"
-        ]:
+        elif left := left_in(out):
             wrong.append(f"{chain}: left {left}")
     return killed, wrong
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...experiment.reading.tables import Table
+from ...experiment.reading.tables import GREATEST, Table
 from .foreign_table import column_names, read_foreign
 from .observations import Observations
 
@@ -118,7 +118,7 @@ def read_rodtracker(file: Path, columns: Mapping[str, str]) -> Observations:
 def whole_frames(table: Table, column: str) -> np.ndarray:
     """Numbers of frames (m,), also where they are written as 3.0."""
     values = table.numbers(column)
-    broken = np.flatnonzero(values != np.rint(values))
+    broken = np.flatnonzero((values != np.rint(values)) | (np.abs(values) > GREATEST))
     if len(broken):
         raise table.error(int(broken[0]), column, "is not the whole number of a frame")
     return values.astype(np.int64)

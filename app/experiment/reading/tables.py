@@ -14,6 +14,7 @@ from ...errors import InputError
 from .input_files import InputFiles
 from .plain_rows import split_plain
 
+LARGEST = 1e50  # in SI units no length, time or force is larger; its square and its cube are still numbers
 GREATEST = 2**53  # beyond it a number with a point no longer tells two whole ones apart
 
 
@@ -59,9 +60,7 @@ class Table:
             values = np.array(list(map(float, self._columns[column])), np.float64)
         except ValueError:  # one by one, to name it
             values = np.array([self._number(float, column, row) for row in range(len(self))], np.float64)
-        bad = np.flatnonzero(~np.isfinite(values))
-        if len(bad):
-            raise self.error(int(bad[0]), column, "is not a finite number")
+        self._refuse_large(values, np.arange(len(self)), column)
         return values
 
     def numbers_if_told(self, column: str) -> NDArray[np.float64]:
@@ -71,13 +70,19 @@ class Table:
         told = np.flatnonzero([text != "" for text in self._columns[column]])
         values = np.full(len(self), np.nan)
         values[told] = [self._number(float, column, int(row)) for row in told]
-        bad = told[~np.isfinite(values[told])]
-        if len(bad):
-            raise self.error(int(bad[0]), column, "is not a finite number")
+        self._refuse_large(values[told], told, column)
         return values
 
     def error(self, row: int, column: str, problem: str) -> InputError:
         return InputError(self.file, f"{self.where(row)}, {column} = {self._columns[column][row]!r}", problem)
+
+    def _refuse_large(self, values: NDArray[np.float64], row: NDArray[np.integer], column: str) -> None:
+        """Raise where one of the values, of these rows, is not a number that anything here can have."""
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        if len(bad):
+            finite = np.isfinite(values[bad[0]])
+            what = "is larger than any length, time or force" if finite else "is not a finite number"
+            raise self.error(int(row[bad[0]]), column, what)
 
     def _number(self, kind: type[int] | type[float], column: str, row: int) -> int | float:
         text = self._columns[column][row]

@@ -33,6 +33,7 @@ TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
 GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
 AROUND = 3.0  # radii about a clicked rod in which its rim is looked for
+OVERLAP = 0.15  # share of its radius by which a rod added by hand may reach over others: clicks and fits err
 SEEN = 0.34  # share of a line's profiles that must show the edge for it to be snapped
 NAMES = ("bottom", "right", "top", "left")
 # Densities of what rods are made of [kg/m³], and friction of dry, clean rods as textbooks have it: to begin with.
@@ -234,17 +235,26 @@ def fit_rod(image: Image, found: Understood, x: float, y: float, radius: float) 
     image = image[top : int(y + AROUND * largest) + 1, left : int(x + AROUND * largest) + 1]
     if min(image.shape) < 2:
         return x, y, radius
-    fitted = _fit_here(image, found, classes, (x - left, y - top, radius))
+    fitted = _fit_here(image, found, classes, (x - left, y - top, radius), _room_at(found.rods, x, y))
     return fitted[0] + left, fitted[1] + top, fitted[2]
 
 
+def _room_at(rods: GrainGuess | None, x: float, y: float) -> float:
+    """Radius [px] of the largest circle about x, y that touches no rod."""
+    if rods is None or len(rods.id) == 0:
+        return np.inf
+    return float((np.hypot(rods.x - x, rods.y - y) - rods.radius).min())
+
+
 def _fit_here(
-    image: Image, found: Understood, classes: Sequence[float], circle: tuple[float, float, float]
+    image: Image, found: Understood, classes: Sequence[float], circle: tuple[float, float, float], room: float
 ) -> tuple[float, float, float]:
-    """The same in a part of the photograph."""
+    """The same in a part of the photograph; room: radius [px] that its neighbours leave."""
     x, y, radius = circle
     if classes and found.scale is not None:
         sizes = np.array(classes) / found.scale.mean_size
+        # Of a rod that detection missed little is seen, and a circle through its neighbours' rims may be seen better.
+        sizes = sizes[sizes <= max((1.0 + OVERLAP) * room, sizes.min())]
         tried = [refine_grains(image, np.array([x]), np.array([y]), np.array([size])) for size in sizes]
         best = max(tried, key=lambda each: float(each.quality[0]))
         if best.quality[0] > 0.0 and np.isfinite(best.sigma[0]):

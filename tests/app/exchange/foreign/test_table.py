@@ -137,6 +137,7 @@ def test_walls_of_a_file_are_turned_so_that_the_packing_lies_to_their_left(tmp_p
         ("t,rod,X,Y\n0,1,2\n", "frame=t,id=rod,x=X,y=Y", "row 2: has 3 cells"),
         ("t,rod,X,Y\n0,1,two,3\n", "frame=t,id=rod,x=X,y=Y", "row 2, X = 'two': is not a number"),
         ("t,rod,X,Y\n0.5,1,2,3\n", "frame=t,id=rod,x=X,y=Y", "row 2, t = '0.5'"),
+        ("t,rod,X,Y\n1e30,1,2,3\n", "frame=t,id=rod,x=X,y=Y", "row 2, t = '1e30'"),
         ("t,rod,X,Y\n0,1,2,3\n0,1.0,4,3\n", "frame=t,id=rod,x=X,y=Y", "row 3, rod = '1.0': stands twice in frame 0"),
         ("t;rod;X;Y\n0;1;2,5;3\n0;2;1.234,5;3\n0;3;1,5;3.5\n", "frame=t,id=rod,x=X,y=Y", "row 2, X = '2,5'"),
         ("t,rod,X,Y\n0,,2,3\n", "frame=t,id=rod,x=X,y=Y", "is empty: no row belongs to a grain"),
