@@ -101,7 +101,7 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
     smallest = SMALLEST if settings.radius_range is None else settings.radius_range[0]
     outliner = Outliner(image, float(radii.max()))
     table, complete = np.empty((0, 4)), False
-    whole = find_discs(outliner.level(), table, min(smallest, SMALLEST)) if not known else None
+    whole = find_discs(outliner.level, table, min(smallest, SMALLEST)) if not known else None
     if whole is not None and whole.covered > CLEAN and whole.spread < EVEN:
         # Nothing is painted on the grains, so a little of an outline tells, and gaps may be as narrow as they like.
         outliner.plain = True
@@ -181,7 +181,7 @@ def _judge_discs(
     Discs that leave much of the bright uncovered are not taken for grains. first: the discs of the first pass, where
     they are known. Returns also whether next to nothing of the bright is left.
     """
-    level = outliner.level()
+    level = outliner.level
     whole, left = 0.0, np.inf
     for k in range(DISC_PASSES + 1):
         discs = first if k == 0 and first is not None else find_discs(level, table, smallest)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,7 @@ class Outliner:
         self._dark, contrast = local_contrast(image, tile_size(radius))
         self._contrast = np.maximum(contrast, NOISE_CONTRAST * image_noise(image))
 
+    @cached_property
     def level(self) -> Image:
         """Light of every pixel (H, W): 0 where it is the dark about it, 1 where it is the bright."""
         return np.asarray((self._image - self._dark) / self._contrast, dtype=np.float32)
