@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rodsight.errors import InputError
 from rodsight.experiment.lens import BrownLens
-from rodsight.experiment.reading.tables import check_frames, check_unique, read_table, write_table
+from rodsight.experiment.reading.tables import LARGEST, check_frames, check_unique, read_table, write_table
 from rodsight.experiment.units import Scale, pixel_size_between
 from rodsight.verdicts.log import Entry, Flag, Origin, Verdict, VerdictLog
 
-NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+NUMBERS = st.floats(-LARGEST, LARGEST)
 # What a spreadsheet can hold: no control characters, and no blanks about it, which a reader takes off.
 WORDS = st.text(st.characters(exclude_categories=("Cc", "Cs", "Z")), min_size=1, max_size=8)
 LENGTHS = st.floats(1e-5, 1e-2)
