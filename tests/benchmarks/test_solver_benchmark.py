@@ -3,7 +3,8 @@
 pytest tests/benchmarks/test_solver_benchmark.py -o addopts= -s
 
 Contenders take turns in one process and each is judged by its fastest turn, so that what else the machine does
-weighs on all alike. pymunk is looked for in this environment, siconos in Debian's own Python (python3-siconos).
+weighs on all alike. pymunk is looked for in this environment, siconos in Debian's own Python (python3-siconos,
+python3-scipy).
 """
 
 from __future__ import annotations
@@ -268,9 +269,9 @@ def test_a_sweep_beside_an_iteration_of_pymunk(benchmark: Benchmark, table: list
 @pytest.mark.benchmark(group="others")
 def test_a_sweep_beside_an_iteration_of_siconos(benchmark: Benchmark, table: list[str], tmp_path: Path) -> None:
     try:
-        subprocess.run([DEBIAN_PYTHON, "-c", "import siconos.numerics"], check=True, capture_output=True)
+        subprocess.run([DEBIAN_PYTHON, "-c", "import siconos.numerics, scipy.sparse"], check=True, capture_output=True)
     except (OSError, subprocess.CalledProcessError):
-        pytest.skip("siconos is not installed: apt-get install python3-siconos")
+        pytest.skip("siconos is not installed: apt-get install python3-siconos python3-scipy")
     case = packing(1000)
     problem = static_problem(case)
     turn = solver_turn(problem)
