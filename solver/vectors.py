@@ -6,22 +6,49 @@ functions do; compiled code takes the vectors instead.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from inspect import signature
+
 from llvmlite import ir  # of numba, whose only way to such vectors it is
 from numba import types
 from numba.core import cgutils
+from numba.extending import lower_builtin, type_callable
 
 NUMBER, INDEX = ir.DoubleType(), ir.IntType(64)
 _LANE = ir.IntType(32)
 _FUSED = ("contract",)  # a product and a sum may be rounded once, where the processor does so
 
 
-def pointers(context, builder, signature, values):  # type: ignore[no-untyped-def]
+def compiled(plain: Callable) -> Callable:
+    """Have compiled code take what the decorated function generates in place of a plain one, which returns nothing.
+
+    It is given LLVM's builder, the types of the arguments and their values, arrays as pointers to their first number.
+    """
+
+    def register(generate):  # type: ignore[no-untyped-def]
+        def returns_nothing(*arguments):  # type: ignore[no-untyped-def]
+            return types.void
+
+        returns_nothing.__signature__ = signature(plain)  # type: ignore[attr-defined]
+        type_callable(plain)(lambda context: returns_nothing)
+
+        def lower(context, builder, call, values):  # type: ignore[no-untyped-def]
+            generate(builder, call.args, _pointers(context, builder, call.args, values))
+            return context.get_dummy_value()
+
+        lower_builtin(plain, types.VarArg(types.Any))(lower)
+        return generate
+
+    return register
+
+
+def _pointers(context, builder, kinds, values):  # type: ignore[no-untyped-def]
     """Arrays as pointers to their first number, all else as it is."""
     return [
         cgutils.create_struct_proxy(kind)(context, builder, value=value).data
         if isinstance(kind, types.Array)
         else value
-        for kind, value in zip(signature.args, values, strict=True)
+        for kind, value in zip(kinds, values, strict=True)
     ]
 
 

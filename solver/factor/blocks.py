@@ -9,11 +9,10 @@ The functions say in Python what they do; compiled code takes the vectors instea
 from __future__ import annotations
 
 from llvmlite import ir
-from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload, register_jitable
+from numba.extending import register_jitable
 
-from solver.vectors import INDEX, NUMBER, add_product, load, pointers, spread, store, subtract_product, total
+from solver.vectors import INDEX, NUMBER, add_product, compiled, load, spread, store, subtract_product, total
 
 # The size of the blocks is the length of a tuple, which is part of its type: the compiler unrolls what loops over it.
 PAIR, TRIPLE = (0, 0), (0, 0, 0)
@@ -77,128 +76,83 @@ def take_rows(row, blocks, first, end, right, at, block):  # type: ignore[no-unt
                 right[at + m] -= blocks[(p * size + m) * lanes + a] * right[row[p] * lanes + a]
 
 
-@overload(take_products, inline="always")
-def _compiled_products(row, blocks, where, first, end, block):  # type: ignore[no-untyped-def]
-    def take(row, blocks, where, first, end, block):  # type: ignore[no-untyped-def]
-        _take_products(row, blocks, where, first, end, block)  # pyright: ignore[reportCallIssue]
-
-    return take
-
-
-@overload(scale_column, inline="always")
-def _compiled_scaling(blocks, first, end, block):  # type: ignore[no-untyped-def]
-    def scale(blocks, first, end, block):  # type: ignore[no-untyped-def]
-        _scale_column(blocks, first, end, block)  # pyright: ignore[reportCallIssue]
-
-    return scale
-
-
-@overload(take_from_rows, inline="always")
-def _compiled_from_rows(row, blocks, first, end, right, at, block):  # type: ignore[no-untyped-def]
-    def take(row, blocks, first, end, right, at, block):  # type: ignore[no-untyped-def]
-        _take_from_rows(row, blocks, first, end, right, at, block)  # pyright: ignore[reportCallIssue]
-
-    return take
+@compiled(take_products)
+def _take_products(builder, kinds, values):  # type: ignore[no-untyped-def]
+    size, lanes = _shape(kinds)
+    row, blocks, where, first, end, _ = values
+    of_column = _numbers(builder, blocks, first, size, lanes)
+    with cgutils.for_range(builder, end, first) as loop:
+        p = loop.index
+        of_row = [load(builder, place, lanes) for place in _columns(builder, blocks, p, size, lanes)]
+        target = builder.gep(blocks, [builder.load(builder.gep(where, [builder.load(builder.gep(row, [p]))]))])
+        for b in range(size):
+            place = _at(builder, target, b * lanes)
+            column = load(builder, place, lanes)
+            for m in range(size):
+                column = subtract_product(builder, column, of_row[m], of_column[m][b])
+            store(builder, column, place)
 
 
-@overload(take_rows, inline="always")
-def _compiled_rows(row, blocks, first, end, right, at, block):  # type: ignore[no-untyped-def]
-    def take(row, blocks, first, end, right, at, block):  # type: ignore[no-untyped-def]
-        _take_rows(row, blocks, first, end, right, at, block)  # pyright: ignore[reportCallIssue]
-
-    return take
-
-
-@intrinsic
-def _take_products(typing, row, blocks, where, first, end, block):  # type: ignore[no-untyped-def]
-    size, lanes = len(block), lanes_of(block)
-
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        row, blocks, where, first, end, _ = pointers(context, builder, signature, values)
-        of_column = [
-            [spread(builder, builder.load(_at(builder, place, b)), lanes) for b in range(size)]
-            for place in _columns(builder, blocks, first, size, lanes)
-        ]
-        with cgutils.for_range(builder, end, first) as loop:
-            p = loop.index
-            of_row = [load(builder, place, lanes) for place in _columns(builder, blocks, p, size, lanes)]
-            target = builder.gep(blocks, [builder.load(builder.gep(where, [builder.load(builder.gep(row, [p]))]))])
-            for b in range(size):
-                place = _at(builder, target, b * lanes)
-                column = load(builder, place, lanes)
-                for m in range(size):
-                    column = subtract_product(builder, column, of_row[m], of_column[m][b])
-                store(builder, column, place)
-        return context.get_dummy_value()
-
-    return types.void(row, blocks, where, first, end, block), generate
+@compiled(scale_column)
+def _scale_column(builder, kinds, values):  # type: ignore[no-untyped-def]
+    size, lanes = _shape(kinds)
+    blocks, first, end, _ = values
+    triangle = _numbers(builder, blocks, first, size, lanes)
+    with cgutils.for_range(builder, end, builder.add(first, INDEX(1))) as loop:
+        p = loop.index
+        places = list(_columns(builder, blocks, p, size, lanes))
+        columns = [load(builder, place, lanes) for place in places]
+        for b in range(size):
+            scaled = builder.fmul(columns[0], triangle[0][b])
+            for m in range(1, b + 1):
+                scaled = add_product(builder, scaled, columns[m], triangle[m][b])
+            store(builder, scaled, places[b])
 
 
-@intrinsic
-def _scale_column(typing, blocks, first, end, block):  # type: ignore[no-untyped-def]
-    size, lanes = len(block), lanes_of(block)
-
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        blocks, first, end, _ = pointers(context, builder, signature, values)
-        triangle = [
-            [spread(builder, builder.load(_at(builder, place, b)), lanes) for b in range(size)]
-            for place in _columns(builder, blocks, first, size, lanes)
-        ]
-        with cgutils.for_range(builder, end, builder.add(first, INDEX(1))) as loop:
-            p = loop.index
-            places = list(_columns(builder, blocks, p, size, lanes))
-            columns = [load(builder, place, lanes) for place in places]
-            for b in range(size):
-                scaled = builder.fmul(columns[0], triangle[0][b])
-                for m in range(1, b + 1):
-                    scaled = add_product(builder, scaled, columns[m], triangle[m][b])
-                store(builder, scaled, places[b])
-        return context.get_dummy_value()
-
-    return types.void(blocks, first, end, block), generate
+@compiled(take_from_rows)
+def _take_from_rows(builder, kinds, values):  # type: ignore[no-untyped-def]
+    size, lanes = _shape(kinds)
+    row, blocks, first, end, right, at, _ = values
+    own = builder.gep(right, [at])
+    numbers = [spread(builder, builder.load(_at(builder, own, m)), lanes) for m in range(size)]
+    with cgutils.for_range(builder, end, first) as loop:
+        p = loop.index
+        place = _row(builder, row, right, p, lanes)
+        there = load(builder, place, lanes)
+        for m, column in enumerate(_columns(builder, blocks, p, size, lanes)):
+            there = subtract_product(builder, there, load(builder, column, lanes), numbers[m])
+        store(builder, there, place)
 
 
-@intrinsic
-def _take_from_rows(typing, row, blocks, first, end, right, at, block):  # type: ignore[no-untyped-def]
-    size, lanes = len(block), lanes_of(block)
-
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        row, blocks, first, end, right, at, _ = pointers(context, builder, signature, values)
-        own = builder.gep(right, [at])
-        numbers = [spread(builder, builder.load(_at(builder, own, m)), lanes) for m in range(size)]
-        with cgutils.for_range(builder, end, first) as loop:
-            p = loop.index
-            place = _row(builder, row, right, p, lanes)
-            there = load(builder, place, lanes)
-            for m, column in enumerate(_columns(builder, blocks, p, size, lanes)):
-                there = subtract_product(builder, there, load(builder, column, lanes), numbers[m])
-            store(builder, there, place)
-        return context.get_dummy_value()
-
-    return types.void(row, blocks, first, end, right, at, block), generate
+@compiled(take_rows)
+def _take_rows(builder, kinds, values):  # type: ignore[no-untyped-def]
+    size, lanes = _shape(kinds)
+    row, blocks, first, end, right, at, _ = values
+    nothing = ir.Constant(ir.VectorType(NUMBER, lanes), None)
+    sums = [cgutils.alloca_once_value(builder, nothing) for _ in range(size)]
+    with cgutils.for_range(builder, end, first) as loop:
+        p = loop.index
+        there = load(builder, _row(builder, row, right, p, lanes), lanes)
+        for so_far, column in zip(sums, _columns(builder, blocks, p, size, lanes), strict=True):
+            more = add_product(builder, builder.load(so_far), load(builder, column, lanes), there)
+            builder.store(more, so_far)
+    own = builder.gep(right, [at])
+    for m, sum_ in enumerate(sums):
+        place = _at(builder, own, m)
+        builder.store(builder.fsub(builder.load(place), total(builder, builder.load(sum_))), place)
 
 
-@intrinsic
-def _take_rows(typing, row, blocks, first, end, right, at, block):  # type: ignore[no-untyped-def]
-    size, lanes = len(block), lanes_of(block)
+def _shape(kinds):  # type: ignore[no-untyped-def]
+    """Rows of a block and numbers of its column; the last argument is the kind of block."""
+    return len(kinds[-1]), lanes_of(kinds[-1])
 
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        row, blocks, first, end, right, at, _ = pointers(context, builder, signature, values)
-        nothing = ir.Constant(ir.VectorType(NUMBER, lanes), None)
-        sums = [cgutils.alloca_once_value(builder, nothing) for _ in range(size)]
-        with cgutils.for_range(builder, end, first) as loop:
-            p = loop.index
-            there = load(builder, _row(builder, row, right, p, lanes), lanes)
-            for so_far, column in zip(sums, _columns(builder, blocks, p, size, lanes), strict=True):
-                more = add_product(builder, builder.load(so_far), load(builder, column, lanes), there)
-                builder.store(more, so_far)
-        own = builder.gep(right, [at])
-        for m, sum_ in enumerate(sums):
-            place = _at(builder, own, m)
-            builder.store(builder.fsub(builder.load(place), total(builder, builder.load(sum_))), place)
-        return context.get_dummy_value()
 
-    return types.void(row, blocks, first, end, right, at, block), generate
+def _numbers(builder, blocks, entry, size, lanes):  # type: ignore[no-untyped-def]
+    """Every number of an entry's block, spread over a vector, column by column."""
+    return [
+        [spread(builder, builder.load(_at(builder, place, b)), lanes) for b in range(size)]
+        for place in _columns(builder, blocks, entry, size, lanes)
+    ]
 
 
 def _columns(builder, blocks, entry, size, lanes):  # type: ignore[no-untyped-def]

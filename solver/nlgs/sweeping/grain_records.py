@@ -9,10 +9,7 @@ The functions say in Python what they do; compiled code takes the vectors instea
 
 from __future__ import annotations
 
-from numba import types
-from numba.extending import intrinsic, overload
-
-from solver.vectors import INDEX, load, pointers, shuffle, store
+from solver.vectors import INDEX, compiled, load, shuffle, store
 
 RECORD = 4  # numbers
 WIDTH = 8  # grains
@@ -53,98 +50,48 @@ def scatter_records(rows, at, stride, body, ids, first):  # type: ignore[no-unty
             body[RECORD * ids[first + k] + q] = rows[at + q * stride + k]
 
 
-@overload(gather_records, inline="always")
-def _compiled_gather(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
-    def gather(body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
-        _gather(body, ids, first, rows, at, stride)  # pyright: ignore[reportCallIssue]
-
-    return gather
-
-
-@overload(gather_differences, inline="always")
-def _compiled_differences(body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
-    def gather(body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
-        _differences(body, ids, first, second, rows, at, stride)  # pyright: ignore[reportCallIssue]
-
-    return gather
+@compiled(gather_records)
+def _gather(builder, kinds, values):  # type: ignore[no-untyped-def]
+    body, ids, first, rows, at, stride = values
+    records = [load(builder, place, RECORD) for place in _records(builder, body, ids, first)]
+    halves = range(RECORD)  # of a vector of eight: grains k and k + 4
+    pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in halves]
+    for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
+        store(builder, row, place)
 
 
-@overload(transpose_records, inline="always")
-def _compiled_transpose(body, first, rows, at, stride):  # type: ignore[no-untyped-def]
-    def transpose(body, first, rows, at, stride):  # type: ignore[no-untyped-def]
-        _transpose(body, first, rows, at, stride)  # pyright: ignore[reportCallIssue]
-
-    return transpose
-
-
-@overload(scatter_records, inline="always")
-def _compiled_scatter(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
-    def scatter(rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
-        _scatter(rows, at, stride, body, ids, first)  # pyright: ignore[reportCallIssue]
-
-    return scatter
+@compiled(gather_differences)
+def _differences(builder, kinds, values):  # type: ignore[no-untyped-def]
+    body, ids, first, second, rows, at, stride = values
+    both = zip(_records(builder, body, ids, first), _records(builder, body, ids, second), strict=True)
+    records = []
+    for one, other in both:
+        a, b = load(builder, one, RECORD), load(builder, other, RECORD)
+        more, sum_ = builder.fsub(b, a), builder.fadd(b, a)
+        records.append(shuffle(builder, more, sum_, [0, 1, RECORD + 2, 3]))
+    pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+    for row, place in zip(_transposed(builder, pairs)[: RECORD - 1], _rows(builder, rows, at, stride), strict=False):
+        store(builder, row, place)
 
 
-@intrinsic
-def _gather(typing, body, ids, first, rows, at, stride):  # type: ignore[no-untyped-def]
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        body, ids, first, rows, at, stride = pointers(context, builder, signature, values)
-        records = [load(builder, place, RECORD) for place in _records(builder, body, ids, first)]
-        halves = range(RECORD)  # of a vector of eight: grains k and k + 4
-        pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in halves]
-        for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
-            store(builder, row, place)
-        return context.get_dummy_value()
-
-    return types.void(body, ids, first, rows, at, stride), generate
+@compiled(transpose_records)
+def _transpose(builder, kinds, values):  # type: ignore[no-untyped-def]
+    body, first, rows, at, stride = values
+    places = [builder.gep(body, [builder.add(first, INDEX(RECORD * k))]) for k in range(WIDTH)]
+    records = [load(builder, place, RECORD) for place in places]
+    pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
+    for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
+        store(builder, row, place)
 
 
-@intrinsic
-def _differences(typing, body, ids, first, second, rows, at, stride):  # type: ignore[no-untyped-def]
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        body, ids, first, second, rows, at, stride = pointers(context, builder, signature, values)
-        both = zip(_records(builder, body, ids, first), _records(builder, body, ids, second), strict=True)
-        records = []
-        for one, other in both:
-            a, b = load(builder, one, RECORD), load(builder, other, RECORD)
-            more, sum_ = builder.fsub(b, a), builder.fadd(b, a)
-            records.append(shuffle(builder, more, sum_, [0, 1, RECORD + 2, 3]))
-        pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
-        for row, place in zip(
-            _transposed(builder, pairs)[: RECORD - 1], _rows(builder, rows, at, stride), strict=False
-        ):
-            store(builder, row, place)
-        return context.get_dummy_value()
-
-    return types.void(body, ids, first, second, rows, at, stride), generate
-
-
-@intrinsic
-def _transpose(typing, body, first, rows, at, stride):  # type: ignore[no-untyped-def]
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        body, first, rows, at, stride = pointers(context, builder, signature, values)
-        places = [builder.gep(body, [builder.add(first, INDEX(RECORD * k))]) for k in range(WIDTH)]
-        records = [load(builder, place, RECORD) for place in places]
-        pairs = [shuffle(builder, records[k], records[k + RECORD], range(WIDTH)) for k in range(RECORD)]
-        for row, place in zip(_transposed(builder, pairs), _rows(builder, rows, at, stride), strict=True):
-            store(builder, row, place)
-        return context.get_dummy_value()
-
-    return types.void(body, first, rows, at, stride), generate
-
-
-@intrinsic
-def _scatter(typing, rows, at, stride, body, ids, first):  # type: ignore[no-untyped-def]
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
-        rows, at, stride, body, ids, first = pointers(context, builder, signature, values)
-        pairs = _transposed(builder, [load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)])
-        records = [shuffle(builder, pair, pair, range(RECORD)) for pair in pairs]
-        records += [shuffle(builder, pair, pair, range(RECORD, WIDTH)) for pair in pairs]
-        for record, place in zip(records, _records(builder, body, ids, first), strict=True):
-            store(builder, record, place)
-        return context.get_dummy_value()
-
-    return types.void(rows, at, stride, body, ids, first), generate
+@compiled(scatter_records)
+def _scatter(builder, kinds, values):  # type: ignore[no-untyped-def]
+    rows, at, stride, body, ids, first = values
+    pairs = _transposed(builder, [load(builder, place, WIDTH) for place in _rows(builder, rows, at, stride)])
+    records = [shuffle(builder, pair, pair, range(RECORD)) for pair in pairs]
+    records += [shuffle(builder, pair, pair, range(RECORD, WIDTH)) for pair in pairs]
+    for record, place in zip(records, _records(builder, body, ids, first), strict=True):
+        store(builder, record, place)
 
 
 def _records(builder, body, ids, first):  # type: ignore[no-untyped-def]
