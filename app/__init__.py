@@ -1,59 +1,62 @@
 """Rodsight: contact forces inside a granular packing of rods, from photographs.
 
-This folder is installed as the package `rodsight`, the one import that is promised. Imports inside it are relative,
-so that a user's own app.py is never taken for it.
+The folder app/ is installed as the package `rodsight` and solver/ as `rodsight.solver`. All imports inside are
+relative, so a user's own app.py or solver.py can neither replace them nor be replaced by them.
 """
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .kernel_cache import find_room_for_kernels
+from .process.kernel_cache import choose_kernel_cache
 
 if TYPE_CHECKING:
     __version__: str
-    from .errors import InputError
+    from .notebook.comparisons import compare, review, score
+    from .notebook.experiments import check, follow, init, track
+    from .notebook.files import export, import_table
     from .notebook.run import Run, run
     from .notebook.run import open_run as open
     from .notebook.solve import solve
+    from .notebook.studies import campaign, sensitivity
+    from .notebook.what_if import what_if
+    from .process.errors import InputError, RunError
 
-__all__ = ["InputError", "Run", "__version__", "open", "run", "solve"]
-
-
-def _load_own_solver() -> None:
-    """Load the solver that lies beside this folder: a user's own solver.py must not be taken for it."""
-    room = Path(__file__).resolve().parent.parent / "solver"
-    known = sys.modules.get("solver")
-    if known is not None and Path(known.__file__ or "").resolve().parent != room:
-        raise ImportError(f"another module is loaded as 'solver' ({known.__file__}): import rodsight before it")
-    if known is None:
-        spec = spec_from_file_location("solver", room / "__init__.py", submodule_search_locations=[str(room)])
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["solver"] = solver = module_from_spec(spec)
-        spec.loader.exec_module(solver)
+__all__ = [
+    "InputError", "Run", "RunError", "__version__", "campaign", "check", "compare", "export", "follow", "import_table",
+    "init", "open", "review", "run", "score", "sensitivity", "solve", "track", "what_if",
+]  # fmt: skip
 
 
-_load_own_solver()
-find_room_for_kernels(Path(sys.modules["solver"].__file__ or "").parent)
+choose_kernel_cache()
 
-# Public names, loaded when they are first asked for: their module, and what they are called there.
+# Public names, loaded at first access: their module, and their name there.
 _LAZY = {
-    "InputError": ("errors", "InputError"),
+    "InputError": ("process.errors", "InputError"),
     "Run": ("notebook.run", "Run"),
+    "RunError": ("process.errors", "RunError"),
+    "campaign": ("notebook.studies", "campaign"),
+    "check": ("notebook.experiments", "check"),
+    "compare": ("notebook.comparisons", "compare"),
+    "export": ("notebook.files", "export"),
+    "follow": ("notebook.experiments", "follow"),
+    "import_table": ("notebook.files", "import_table"),
+    "init": ("notebook.experiments", "init"),
     "open": ("notebook.run", "open_run"),
+    "review": ("notebook.comparisons", "review"),
     "run": ("notebook.run", "run"),
+    "score": ("notebook.comparisons", "score"),
+    "sensitivity": ("notebook.studies", "sensitivity"),
     "solve": ("notebook.solve", "solve"),
+    "track": ("notebook.experiments", "track"),
+    "what_if": ("notebook.what_if", "what_if"),
 }
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from .version import version_in_use
+        from .process.version import version_in_use
 
         value = version_in_use()
     elif name in _LAZY:

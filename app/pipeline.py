@@ -1,14 +1,13 @@
-"""The stages in order: photographs → tracks → contacts and forces → statistics → recording.
+"""Stages of a run in order: photographs → tracks → contacts and forces → statistics → recording.
 
-The only file that knows the order. Every stage leaves its result in the run's folder under the fingerprint of what
-it was made from; a stage whose result is already there is not done again, and an unfinished one goes on at the
-frame where it stopped.
+The only file that knows the order. Every stage stores its result in the run's folder under the fingerprint of its
+input; a finished stage is not repeated, and an unfinished one continues at the frame where it stopped.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+import tomllib
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -16,53 +15,41 @@ from typing import Any
 
 import numpy as np
 
-from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.state import SequenceState
-from solver.statistics.frame_statistics import FrameStatistics
-from solver.together import available_cores
-
-from .atomic import write_atomically
-from .errors import InputError, RunError, UndeterminedError
-from .experiment.boundary import bound_tracks
-from .experiment.config.experiment_file import as_toml
+from .experiment.boundary import apply_boundary
+from .experiment.config.experiment_file import ExperimentFile, as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
 from .experiment.corrections import read_corrections
-from .experiment.experiment import POSE_COLUMNS, read_grain_guess, read_times, read_tracks
-from .experiment.photographs import ReadAhead
+from .experiment.experiment import POSE_COLUMNS, checksums, load_experiment, read_grain_guess, read_times, read_tracks
+from .experiment.photographs import PrefetchedPhotographs
 from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
-from .inference.inference import (
-    CorrectedSequence,
-    Inputs,
-    SolvedFrame,
-    correct_sequence,
-    renew_first,
-    solve_frames,
-)
-from .inference.settings import material_of, settings_of
+from .inference.corrected_sequence import CorrectedSequence
+from .inference.frame_store import CheckpointStore, FrameStore, SolvedFrame
+from .inference.infer_sequence import FIRST_FRAME, InferenceObserver, infer_sequence
+from .inference.inference_settings import material_of, settings_of
+from .inference.inputs import Inputs
+from .out_of_date import out_of_date
+from .process.atomic import write_atomically
+from .process.errors import InputError, RunError, UndeterminedError
 from .results.checkpoint import Checkpoint
-from .results.hdf5.lazy import Lazily
-from .results.hdf5.store import Provenance, load_results, load_tracks, save_results, save_tracks
+from .results.hdf5.lazy_sequences import LazySequence
+from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
 from .results.results import Results, TruthContacts
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, read_truth, score, true_ids
-from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run
+from .robustness.ensemble_sd import calibrated_inputs, frame_with_ensemble_sd, solve_members
+from .robustness.error_budget import budget_cases, measure_budget
+from .robustness.study import Nominal
+from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
 from .run_truth import load_truth, refuse_unnamed_truth
-from .sensitivity.error_budget import budget_cases, measure_budget
-from .sensitivity.spread import calibrated_inputs, frame_with_spread, solve_members
-from .sensitivity.study import Nominal
+from .solver.frame_forces import FrameStatus
+from .solver.parallel import available_cores
+from .stages import FORCES, PHOTOGRAPHS_SHOWN, TRACKING
 from .tracking import DETECTIONS, PICTURES
 from .tracks import Tracks, WallTracks
-from .verdicts.decisions import Bodies, decide
+from .verdicts.decisions import BodyNames, decide
 from .verdicts.log import VERDICTS, Flag, VerdictLog
-
-# Sections of the experiment file on which forces depend.
-FORCES_FROM = (
-    "photographs", "tracking", "tracks", "walls", "boundary", "calibration", "material", "contacts", "solver",
-    "recording",
-)  # fmt: skip
-PICTURES_FROM = ("photographs",)  # likewise, photographs as they are shown
 
 
 def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
@@ -71,7 +58,7 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
     if experiment.config.tracks is not None:
         tracks = read_tracks(experiment)
         walls = read_walls(experiment, tracks.frame_count)
-        tracks = bound_tracks(experiment, tracks, walls)
+        tracks = apply_boundary(experiment, tracks, walls)
         if walls is not None:
             run.notes.extend(check_packing(experiment, tracks, walls))
         ids, count = tracks.id, tracks.frame_count
@@ -97,8 +84,21 @@ def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
         poses, names = experiment.config.truth_tracks, walls.name if walls else ()
         unseen = None if poses is None else true_ids(experiment.folder / poses)
         read_truth(
-            file, ids, names, first_frame=0, frame_count=count, unseen=unseen, inputs=experiment.inputs
+            file, ids, names, frame_count=count, unseen=unseen, inputs=experiment.inputs
         )  # fmt: skip
+    return tracks, walls
+
+
+def check_first_photographs(run: Run, count: int) -> tuple[Tracks, WallTracks | None]:
+    """Track the first photographs without storing anything, and check their rods against walls and loads.
+
+    Raises InputError where no grain is found, or where rods and walls cannot be right.
+    """
+    from .tracking.stage import track_first  # given tracks do not need it
+
+    tracks, walls = track_first(run.experiment, count, run.progress, run.notes.append)
+    if walls is not None:
+        run.notes.extend(check_packing(run.experiment, tracks, walls))
     return tracks, walls
 
 
@@ -108,42 +108,41 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     if experiment.config.tracks is not None:
         tracks, walls = check(run)
         assert tracks is not None
-        start, stop = run.frame_range(tracks.frame_count)
-        return tracks.frames(start, stop), walls.frames(start, stop) if walls is not None else None
-    sections = ("photographs", "tracking", "walls", "boundary")
-    origin = run.origin(sections)
+        part = run.frame_range(tracks.frame_count)
+        return tracks.frames(*part), walls.frames(*part) if walls is not None else None
+    origin = run.origin(TRACKING)
     if run.has(TRACKS, origin) and run.has(DETECTIONS, origin):
         run.forget("tracking", "walls", PICTURES)
         return load_tracks(run.file(TRACKS))
-    from .tracking.corrected_frames import keep_frames_before
+    from .tracking.corrected_frames import drop_outdated_frames
     from .tracking.stage import track_photographs, write_found_tables  # not where rods are tracked already
 
     check(run)
     since = time.perf_counter()
-    start, stop = run.frame_range(len(experiment.photographs()))
-    uncorrected, of_pictures = (run.origin(each, corrected=False).fingerprint for each in (sections, PICTURES_FROM))
+    start, stop, step = run.frame_range(len(experiment.photographs()))
+    uncorrected, of_pictures = (run.origin(each, corrected=False).fingerprint for each in (TRACKING, PHOTOGRAPHS_SHOWN))
     kept: list[str] = []
 
     def keep(stage: str) -> Checkpoint:
         checkpoint = run.checkpoint(stage, of_pictures if stage == PICTURES else uncorrected)
-        if stage == "tracking":  # walls are followed by themselves, whatever is told of rods
-            keep_frames_before(checkpoint, read_corrections(experiment, None, len(experiment.photographs())))
+        if stage == "tracking":  # walls are followed independently of corrected rods
+            drop_outdated_frames(checkpoint, read_corrections(experiment, None, len(experiment.photographs())))
         kept.append(stage)
         return checkpoint
 
     tracks, walls, tables = track_photographs(
-        experiment, stop, keep, run.progress, run.note_failure, tell=run.notes.append
+        experiment, stop, keep, run.progress, notify=run.notes.append
     )  # fmt: skip
-    tracks = bound_tracks(experiment, tracks, walls)
+    tracks = apply_boundary(experiment, tracks, walls)
     if walls is not None:
         run.notes.extend(check_packing(experiment, tracks, walls))
-        walls = walls.frames(start, stop)
-    tracks = tracks.frames(start, stop)
+        walls = walls.frames(start, stop, step)
+    tracks = tracks.frames(start, stop, step)
     write_found_tables(run.folder, tables)
     save_tracks(run.file(TRACKS), experiment.name, tracks, walls, origin)
-    run.tell_manifest()
+    run.write_manifest()
     for name in (DETECTIONS, TRACKS):
-        run.manifest.add(name, origin.fingerprint)
+        run.manifest.add(name, origin.fingerprint, origin.program)
     for stage in kept:
         run.set_aside(stage)
     run.timings.add("tracking", since)
@@ -156,7 +155,7 @@ def report_tracking(run: Run, tracks: Tracks, walls: WallTracks | None) -> Path:
     from .tracking.stage import gather_report
 
     run.progress("report", 0, 1)
-    tracked = gather_report(run.experiment, run.folder, tracks, walls, run.frames[0])
+    tracked = gather_report(run.experiment, run.folder, tracks, walls, run.frames)
     write_atomically(run.file(REPORT), tracking_report(tracked).encode())
     run.progress("report", 1, 1)
     return run.file(REPORT)
@@ -168,19 +167,42 @@ def solve(run: Run) -> Results:
     if experiment.config.walls is None and experiment.config.boundary is None:
         missing = "is missing: without walls grains can be tracked but not solved; or give a [boundary]"
         raise InputError(experiment.file, "key walls", missing)
-    return _solve(run, VerdictLog(run.file(VERDICTS)).as_of_now())
+    return _solve(run, VerdictLog(run.file(VERDICTS)).snapshot())
 
 
 def nominal_run(run: Run) -> tuple[Nominal, str]:
-    """What the robustness study varies and compares with: the run as it was given, and its fingerprint."""
-    log = VerdictLog(run.file(VERDICTS)).as_of_now()
+    """Nominal run of the robustness study, with its fingerprint."""
+    log = VerdictLog(run.file(VERDICTS)).snapshot()
     results, inputs = _solve_with_inputs(run, log)
-    return Nominal.of(inputs, results, load_truth(run, results)), run.origin(FORCES_FROM, log).fingerprint
+    return Nominal.of(inputs, results, load_truth(run, results)), run.origin(FORCES, log).fingerprint
+
+
+def stored_inputs(file: Path) -> tuple[Inputs, Results]:
+    """Return the inputs and the results of a finished run, for analyses that solve it again with other inputs.
+
+    Raises
+    ------
+    InputError
+        The experiment is missing, or the input changed since the run was solved.
+    """
+    results, origin = load_results(file), origin_of(file)
+    experiment = load_experiment(find_experiment(file, origin))
+    config = ExperimentFile.model_validate(tomllib.loads(results.configuration))
+    run = Run(replace(experiment, config=config), file.parent, origin.frames)
+    changed = [name for name, sum_ in checksums(run.experiment).items() if origin.checksums.get(name) != sum_]
+    if changed:
+        raise InputError(file, ", ".join(changed[:3]), "changed since this run was solved: run it again")
+    photographed = config.photographs is not None
+    tracks, walls = load_tracks(run.file(TRACKS)) if photographed else track(run)
+    assert walls is not None
+    log = VerdictLog(run.file(VERDICTS)).snapshot()
+    inputs = _inputs_of_solved(run, log, results, tracks, walls)
+    return replace(inputs, settings=inputs.settings.without_sweeps()), results
 
 
 def solved_inputs(run: Run) -> tuple[Inputs, Results, TruthContacts | None]:
-    """What the forces of a run follow from, with the forces and their truth, for whoever changes it a little."""
-    results, inputs = _solve_with_inputs(run, VerdictLog(run.file(VERDICTS)).as_of_now())
+    """Inputs of a solved run, its results and their truth, for analyses that vary the inputs."""
+    results, inputs = _solve_with_inputs(run, VerdictLog(run.file(VERDICTS)).snapshot())
     return replace(inputs, settings=inputs.settings.without_sweeps()), results, load_truth(run, results)
 
 
@@ -192,17 +214,19 @@ def _solve_with_inputs(run: Run, log: VerdictLog) -> tuple[Results, Inputs]:
 
 
 def _solve(run: Run, log: VerdictLog) -> Results:
-    """The results of a run that obeys what has been said until now, and nothing that is said meanwhile."""
-    origin = run.origin(FORCES_FROM, log)
+    """Results of a run with the verdicts given until now; verdicts given meanwhile do not count."""
+    origin = run.origin(FORCES, log)
     results = None
     if run.has(RESULTS, origin):
         run.forget("solving")
         results = load_results(run.file(RESULTS))
+        if not run.manifest.lists(RESULTS, origin.fingerprint):  # of other code: nothing of this one is added
+            return results
         if run.experiment.config.solver.ensemble_size in (0, results.ensemble_size):
             run.forget("ensemble")
             return results
         if results.ensemble_size:
-            results = None  # the free formula is part of new error bars, and the former ones took its place
+            results = None  # new error bars need the formula's, which the previous ones replaced
     if results is None:
         results = _solve_nominal(run, origin, log)
     if run.experiment.config.solver.ensemble_size:
@@ -211,9 +235,9 @@ def _solve(run: Run, log: VerdictLog) -> Results:
 
 
 def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inputs:
-    """What the forces of a run follow from."""
-    config, bodies = run.experiment.config, Bodies.of(tracks, walls)
-    decisions = decide(log, bodies, first_frame=run.frames[0], frame_count=tracks.frame_count)
+    """Inputs of the forces of a run."""
+    config, bodies = run.experiment.config, BodyNames.of(tracks, walls)
+    decisions = decide(log, bodies, frames=run.frames, frame_count=tracks.frame_count)
     if decisions.flags and all(Flag.IGNORE in decisions.flags.get(k, ()) for k in range(tracks.frame_count)):
         raise InputError(log.file, "flag ignore", "is set on every frame: nothing is left to solve")
     refuse_unused_keys(config, run.experiment.file)
@@ -221,94 +245,71 @@ def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inp
 
 
 def _inputs_of_solved(run: Run, log: VerdictLog, results: Results, tracks: Tracks, walls: WallTracks) -> Inputs:
-    """The same with the friction that was found, for sequences that are solved again."""
+    """The same with the friction that was measured, for sequences that are solved again."""
     return _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
 
 
 def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
-    """Solve the sequence as it was given, and store it."""
+    """Infer the forces of the sequence as it was given, and store them."""
     tracks, walls = track(run)
     assert walls is not None
     since = time.perf_counter()
+    inputs = _inputs(run, log, tracks, walls)
+    store = CheckpointStore(lambda: run.checkpoint("solving", origin.fingerprint))
     try:
-        sequence = correct_sequence(_inputs(run, log, tracks, walls)).with_first_renewed()
+        results = infer_sequence(inputs, _RunObserver(run, log), store)
     except UndeterminedError as error:
         raise InputError(run.experiment.file, f"key {error.key}", str(error)) from None
-    run.tell_manifest(log)
-    checkpoint = run.checkpoint("solving", origin.fingerprint)
-    packing, configuration = sequence.packing, as_toml(run.experiment.config)
-    unsolved = Results(
-        run.experiment.name, sequence.tracks, sequence.walls, packing.grains, packing.material.friction, (), (),
-        configuration, calibration=sequence.calibration, radius_tuning=sequence.tuning,
-        boundary=sequence.boundary,
-    )  # fmt: skip
-    if run.watch is not None:
-        run.watch.start(unsolved)
-    _solve_frames(run, sequence, checkpoint)
-    frames, statistics = checkpoint.lazily(len(sequence.snapshots), FrameForces, FrameStatistics)
-    _refuse_nothing(run, frames)
-    frames, statistics = _with_first_renewed(run, sequence, frames, statistics)
-    check = sequence.find_friction(frames)
-    judged = Lazily(len(frames), lambda k: sequence.doubt_friction(frames[k], check))
-    restated = Lazily(len(frames), lambda k: sequence.restate(statistics[k], judged[k], check))
-    results = replace(unsolved, frames=judged, statistics=restated, friction_check=check)
-    results = _store(run, results, origin)
-    checkpoint.clear()
+    if all(frame.status is FrameStatus.FAILED for frame in results.frames):
+        log_file = f"; see {run.file(FAILURES)}" if run.file(FAILURES).exists() else ""
+        first = results.frames[0].reason
+        raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {first}{log_file}")
+    results = _store(run, _named(run, results), origin, log)
+    store.checkpoint.clear()
     run.timings.add("solving", since)
     return results
 
 
-def _with_first_renewed(
-    run: Run,
-    sequence: CorrectedSequence,
-    frames: Sequence[FrameForces],
-    statistics: Sequence[FrameStatistics],
-) -> tuple[Sequence[FrameForces], Sequence[FrameStatistics]]:
-    """The same with the first frame as it is seen from the others; as it was, where that is impossible."""
-    try:
-        first = renew_first(sequence, frames)
-    except MemoryError:  # not the frame's fault
-        raise
-    except Exception as error:
-        run.note_failure("first photograph", 0, error)
-        run.notes.append("The first photograph could not be solved again when all were known (failures.log).")
-        return frames, statistics
-    if first is None:
-        return frames, statistics
-    return (
-        Lazily(len(frames), lambda k: first.forces if k == 0 else frames[k]),
-        Lazily(len(frames), lambda k: first.statistics if k == 0 else statistics[k]),
-    )
+def _named(run: Run, results: Results) -> Results:
+    """Results with the name and the resolved configuration of the experiment."""
+    return replace(results, name=run.experiment.name, configuration=as_toml(run.experiment.config))
 
 
-def _store(run: Run, results: Results, origin: Provenance) -> Results:
+class _RunObserver(InferenceObserver):
+    """Forwards events of the inference to progress, live recording, failure log and notes of a run."""
+
+    def __init__(self, run: Run, log: VerdictLog) -> None:
+        super().__init__(run.progress)
+        self._run, self._log = run, log
+
+    def corrected(self, sequence: CorrectedSequence) -> None:
+        self._run.write_manifest(self._log)
+        if self._run.watch is not None:
+            self._run.watch.start(_named(self._run, sequence.unsolved_results()))
+
+    def restored(self, store: FrameStore, count: int) -> None:
+        if self._run.watch is not None:
+            for k in range(count):
+                frame = store.load(k)
+                self._run.watch.frame(frame.forces, frame.statistics)
+
+    def solved(self, frame: SolvedFrame) -> None:
+        if self._run.watch is not None:
+            self._run.watch.frame(frame.forces, frame.statistics)
+
+    def failed(self, stage: str, frame: int, error: Exception) -> None:
+        self._run.note_failure(stage, frame, error)
+        if stage == FIRST_FRAME:
+            self._run.notes.append(
+                "The first photograph could not be estimated from all others (failures.log); it stays as solved first."
+            )
+
+
+def _store(run: Run, results: Results, origin: Provenance, log: VerdictLog) -> Results:
     """Results as they are read back from their file: a frame at a time."""
     save_results(run.file(RESULTS), results, origin)
-    run.manifest.add(RESULTS, origin.fingerprint)
+    run.manifest.add(RESULTS, origin.fingerprint, origin.program | run.state_of_input(log))
     return load_results(run.file(RESULTS))
-
-
-def _solve_frames(run: Run, sequence: CorrectedSequence, checkpoint: Checkpoint) -> None:
-    """Have every frame in the checkpoint: those that are there stay as they are, the others are kept as they come."""
-    total, last = len(sequence.snapshots), None
-    done = min(checkpoint.finished(), total)
-    if run.watch is not None:
-        for k in range(done):
-            run.watch.frame(*checkpoint.load(k, FrameForces, FrameStatistics))
-    if done:
-        last = SolvedFrame(*checkpoint.load(done - 1, FrameForces, FrameStatistics, SequenceState))
-    run.progress("solving", done, total)
-    for frame in solve_frames(sequence, after=last, observer=run.note_failure, ahead=True):
-        checkpoint.save(frame.forces.frame, frame.forces, frame.statistics, frame.state)
-        if run.watch is not None:
-            run.watch.frame(frame.forces, frame.statistics)
-        run.progress("solving", frame.forces.frame + 1, total)
-
-
-def _refuse_nothing(run: Run, frames: Sequence[FrameForces]) -> None:
-    if all(frame.status is FrameStatus.FAILED for frame in frames):
-        log = f"; {run.file(FAILURES)} tells more" if run.file(FAILURES).exists() else ""
-        raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {frames[0].reason}{log}")
 
 
 def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Results) -> Results:
@@ -317,13 +318,14 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
     size = run.experiment.config.solver.ensemble_size
     checkpoint = run.checkpoint("ensemble", f"{origin.fingerprint} {size}")
     inputs = calibrated_inputs(_inputs_of_solved(run, log, results, results.tracks, results.walls))
-    members = solve_members(inputs, size, checkpoint, workers=available_cores(), progress=run.progress)
+    workers = inputs.settings.sequence.workers or available_cores()
+    members = solve_members(inputs, size, checkpoint, workers=workers, progress=run.progress)
     former, estimator = results.frames, inputs.settings.sequence.estimator
-    frames = Lazily(
-        len(former), lambda k: frame_with_spread(former[k], [each.at(k) for each in members], estimator)
+    frames = LazySequence(
+        len(former), lambda k: frame_with_ensemble_sd(former[k], [each.at(k) for each in members], estimator)
     )  # fmt: skip
     results = replace(results, frames=frames, ensemble_size=size, configuration=as_toml(run.experiment.config))
-    results = _store(run, results, origin)
+    results = _store(run, results, origin, log)
     checkpoint.clear()
     run.timings.add("ensemble", since)
     run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")
@@ -333,18 +335,18 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
 def add_error_budget(run: Run, workers: int) -> Results:
     """Divide the error of every frame of a run among its causes, and store that with its results and its summary."""
     since = time.perf_counter()
-    log = VerdictLog(run.file(VERDICTS)).as_of_now()
-    results, origin = _solve(run, log), run.origin(FORCES_FROM, log)
+    log = VerdictLog(run.file(VERDICTS)).snapshot()
+    results, origin = _solve(run, log), run.origin(FORCES, log)
     inputs = calibrated_inputs(_inputs_of_solved(run, log, results, results.tracks, results.walls))
     calibration = results.calibration
-    scatter = 0.0
+    radius_sd = 0.0
     if calibration is not None and calibration.applied:
-        scatter = float(np.nanmedian(calibration.radius_sd / results.tracks.radius))
-    cases = budget_cases(inputs, scatter=scatter)
+        radius_sd = float(np.nanmedian(calibration.radius_sd / results.tracks.radius))
+    cases = budget_cases(inputs, radius_sd=radius_sd)
     budget = measure_budget(inputs, results.frames, cases, workers=workers, progress=run.progress)
     former = results.frames
-    results = replace(results, frames=Lazily(len(former), lambda k: budget.told(former[k])))
-    results = _store(run, results, origin)
+    results = replace(results, frames=LazySequence(len(former), lambda k: budget.apply_to(former[k])))
+    results = _store(run, results, origin, log)
     run.timings.add("error budget", since)
     conclude(run, results, load_truth(run, results), since)
     return results
@@ -352,9 +354,9 @@ def add_error_budget(run: Run, workers: int) -> Results:
 
 def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     """Write the recording of finished results, the truth beside them where there is one."""
-    from .recording.files.finished_run import write_recording
+    from .recording.files.finished_run import RecordingOptions, write_recording
     from .recording.files.side_file import write_side_file
-    from .tracking.kept_pictures import KeptPictures
+    from .tracking.photograph_cache import CachedPhotographs
 
     since = time.perf_counter()
     section, scale, file = run.experiment.config.photographs, None, run.file(RECORDING)
@@ -363,22 +365,22 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
         if section is not None:
             photographs = run.experiment.photographs()
             scale = make_scale(section, photographs.shape[0], results.calibration)
-            kept = run.aside(PICTURES, run.origin(PICTURES_FROM, corrected=False).fingerprint)
-            shown = KeptPictures(photographs, run.frames[0], kept)
-            pictures = opened.enter_context(ReadAhead(shown, len(results.frames)))
+            kept = run.aside(PICTURES, run.origin(PHOTOGRAPHS_SHOWN, corrected=False).fingerprint)
+            shown = CachedPhotographs(photographs, run.frames, kept)
+            pictures = opened.enter_context(PrefetchedPhotographs(shown, len(results.frames)))
+        sweeps = "log" if run.full_frames else run.experiment.config.recording.sweeps
         report = write_recording(
             results,
             file,
             photograph=None if pictures is None else pictures.__getitem__,
             scale=scale,
-            sweeps="log" if run.full_frames else run.experiment.config.recording.sweeps,
-            max_size=run.max_size,
             truth=truth,
             progress=lambda done, total: run.progress("recording", done, total),
+            options=RecordingOptions(sweeps, run.max_size),
         )
     run.drop_aside(PICTURES)  # the recording holds them
     run.notes.extend(report.notes)
-    run.file(SIDE).unlink(missing_ok=True)  # of a former recording
+    run.file(SIDE).unlink(missing_ok=True)  # of a previous recording
     if run.full_frames:
         run.notes.append(write_side_file(results, file, run.file(SIDE), run.full_frames))
     run.timings.add("recording", since)
@@ -392,5 +394,6 @@ def conclude(run: Run, results: Results, truth: TruthContacts | None, since: flo
     """
     agreement = score(results, truth) if truth is not None else None
     summary = summarize(results, agreement, {**run.timings.seconds, "total": time.perf_counter() - since})
+    summary["out_of_date"] = out_of_date(run.folder)  # where old results were kept
     save_summary(run.file(SUMMARY), summary)
     return summary

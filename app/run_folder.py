@@ -1,4 +1,4 @@
-"""One run: an experiment, the folder its results go to, what lies in it, and what that was made from."""
+"""One run: an experiment, the folder of its results, the files in it and their provenance."""
 
 from __future__ import annotations
 
@@ -8,64 +8,70 @@ import os
 import re
 import shutil
 import time
+import tomllib
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
-
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
+from typing import Any, Protocol
 
 from . import __version__
-from .atomic import PART
-from .errors import InputError
 from .experiment.config.experiment_file import as_toml
-from .experiment.experiment import Experiment, checksums
-from .lock import holding
-from .progress import Progress, silent
+from .experiment.experiment import Experiment, checksums, named_inputs
+from .process.atomic import PART
+from .process.errors import InputError
+from .process.frame_range import ALL_FRAMES, FrameRange
+from .process.lock import hold_folder
+from .process.progress import Progress, no_progress
+from .process.sources import hash_of_code
+from .process.version import library_versions
 from .results.checkpoint import Checkpoint
 from .results.hdf5.store import Provenance
 from .results.manifest import MANIFEST, Manifest
 from .results.results import Results
+from .solver.frame_forces import FrameForces
+from .solver.statistics.frame_statistics import FrameStatistics
+from .stages import Stage
 from .verdicts.decisions import fingerprint
 from .verdicts.log import VerdictLog
 
 TRACKS, RESULTS, RECORDING, SUMMARY = "tracks.h5", "results.h5", "recording.rrd", "summary.json"
 REPORT = "tracking_report.html"
-LATER = re.compile(r"recording-part-\d+\.rrd")  # of a long recording, which opens as one by its first file
-SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens as one with the recording
-FAILURES = "failures.log"  # tracebacks of what failed a frame
+LATER = re.compile(r"recording-part-\d+\.rrd")  # later parts of a long recording, which opens as one by its first file
+SIDE = "recording-sweeps.rrd"  # every sweep of some frames; opens together with the recording
+FAILURES = "failures.log"  # tracebacks of failed frames
 OWN = (
     TRACKS, RESULTS, RECORDING, f"{RECORDING}.whole", SUMMARY, REPORT, SIDE, MANIFEST, "detections.csv",
     "tracked_walls.csv",
 )  # fmt: skip
 UNFINISHED = ".unfinished"  # folder of checkpoints
-TRACKED = ".tracked"  # folder of the frames of a finished tracking, for the next one, which obeys other corrections
-ERROR_BARS = {"solver": {"ensemble_size", "workers"}}  # settings that leave the forces as they are
-BY_HAND = {"photographs": {"corrections"}}  # what changes some frames of the tracks alone
+TRACKED = ".tracked"  # folder of the frames of a finished tracking, for the next one with other corrections
+# Settings that leave tracks and forces as they are.
+ERROR_BARS = {"solver": {"ensemble_size", "workers"}, "tracking": {"workers"}}
+BY_HAND = {"photographs": {"corrections"}}  # settings that change only some frames of the tracks
 
 
 @dataclass(slots=True)
 class Timings:
-    """Seconds that each stage took; 0 where its result was already there."""
+    """Duration of each stage [s]; 0 where its result existed already."""
 
     seconds: dict[str, float] = field(default_factory=dict)
 
     def add(self, stage: str, since: float) -> None:
+        """Add the time since `since`, a value of time.perf_counter, to a stage."""
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - since
 
 
-class Watch(Protocol):
-    """Somebody who is told what has been solved, while it is."""
+class RunObserver(Protocol):
+    """Receiver of the frames of a run while it is solved."""
 
     def start(self, run: Results) -> None:
-        """Bodies, motion and settings; the frames are still to come."""
+        """Receive bodies, motion and settings before the first frame."""
 
     def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
-        """The next frame is there."""
+        """Receive the next solved frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,105 +80,140 @@ class Run:
 
     experiment: Experiment
     folder: Path
-    frames: tuple[int, int | None] = (0, None)
-    progress: Progress = silent
+    frames: FrameRange = ALL_FRAMES
+    progress: Progress = no_progress
     timings: Timings = field(default_factory=Timings)
-    watch: Watch | None = None  # hears every frame as it is solved
+    watch: RunObserver | None = None  # receives every solved frame
     max_size: int | None = None  # [bytes] of the recording
-    full_frames: tuple[int, ...] = ()  # whose every sweep goes to a side file, the recording then being thinned
+    full_frames: tuple[int, ...] = ()  # frames whose every sweep is written to a side file; the recording is thinned
     notes: list[str] = field(default_factory=list)  # sentences for the user
+    keep_old: bool = False  # results of other code are used as they are
 
     def file(self, name: str) -> Path:
+        """Return the path of a file in the run's folder."""
         return self.folder / name
 
-    def frame_range(self, count: int) -> tuple[int, int]:
-        """First frame and end, of `count` that there are. Raises InputError."""
-        start, stop = self.frames
+    def frame_range(self, count: int) -> tuple[int, int, int]:
+        """Return the first frame, the end and the step, of `count` existing frames. Raises InputError."""
+        start, stop, step = self.frames
         stop = count if stop is None else stop
         if not 0 <= start < stop <= count:
             raise InputError("--frames", f"{start}:{stop}", f"is not a range of the frames 0:{count}")
-        return start, stop
+        return start, stop, step
 
     def note_failure(self, stage: str, frame: int, error: Exception) -> None:
-        """Keep the traceback of what failed a frame; frame: of the experiment's while tracking, else of the run's."""
-        frame += 0 if stage in ("tracking", "walls") else self.frames[0]
+        """Log the traceback of a failed frame; frame: of the experiment while tracking, else of the run."""
+        frame = frame if stage in ("tracking", "walls") else self.frames.number(frame)
         self.folder.mkdir(parents=True, exist_ok=True)
         with self.file(FAILURES).open("a", encoding="utf-8") as log:
             log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {stage}, frame {frame}\n")
             log.write("".join(traceback.format_exception(error)) + "\n")
 
-    def origin(self, sections: tuple[str, ...], log: VerdictLog | None = None, *, corrected: bool = True) -> Provenance:
-        """What a result is made from: these sections of the configuration, all input files, and people's verdicts.
+    def origin(self, stage: Stage, log: VerdictLog | None = None, *, corrected: bool = True) -> Provenance:
+        """Return the provenance of a result: code, configuration, all input files, and reviewers' verdicts.
 
-        corrected=False: the same whatever poses are told by hand.
+        corrected=False leaves out poses entered by hand.
         """
         without = ERROR_BARS if corrected else ERROR_BARS | BY_HAND
-        config = self.experiment.config.model_dump(mode="json", include=set(sections), exclude=without)
+        config = self.experiment.config.model_dump(mode="json", include=set(stage.sections), exclude=without)
         sums = checksums(self.experiment, corrected=corrected)
-        told = json.dumps([__version__, config, sums, self.frames], sort_keys=True)
-        digest = hashlib.sha256(told.encode()).hexdigest()
         verdicts = fingerprint(log) if log is not None else ""
-        if verdicts:  # without any the fingerprint stays what it was
-            digest = hashlib.sha256((digest + verdicts).encode()).hexdigest()
-        return Provenance(digest, self.experiment.file.name, self.frames, sums)
+        inputs = _hash_of([config, sums, self.frames.stored, verdicts])
+        code, libraries = hash_of_code(stage.code, stage.alone), library_versions()
+        whole = _hash_of([inputs, code, libraries])
+        return Provenance(whole, self.experiment.file.name, self.frames, sums, inputs, code, libraries)
+
+    def claim(self) -> None:
+        """State in the folder which experiment it belongs to, before anything is written to it."""
+        if not isinstance(self.manifest.fact("experiment"), str):
+            self.manifest.store(self._ownership())
+
+    def _ownership(self) -> dict[str, str]:
+        file = self.experiment.file.resolve()
+        place = Path(os.path.relpath(file, self.folder.resolve())).as_posix()
+        return {"name": self.experiment.name, "experiment": place}
+
+    def state_of_input(self, log: VerdictLog) -> dict[str, Any]:
+        """Return what results were made from, as the manifest stores it beside them."""
+        return {
+            "files": checksums(self.experiment),
+            "stamps": input_stamps(self.experiment),
+            "file_settings": settings_in_file(self.experiment.file),
+            "verdicts": fingerprint(log),
+        }
 
     @property
     def manifest(self) -> Manifest:
-        """What is told of the stored pieces."""
+        """The manifest of the stored files."""
         return Manifest(self.folder)
 
-    def tell_manifest(self, log: VerdictLog | None = None) -> None:
-        """Write what the run is made from beside its results; log: the verdicts that it obeys."""
+    def write_manifest(self, log: VerdictLog | None = None) -> None:
+        """Write the provenance of the run beside its results; log: the verdicts that it uses."""
         experiment = self.experiment
-        file = Path(os.path.relpath(experiment.file.resolve(), self.folder.resolve()))
         verdicts = {}
         if log is not None:
             lines = [entry.line for entry in log.entries()]
             verdicts = {"verdicts": {"sha256": fingerprint(log), "lines": lines}}
-        self.manifest.tell({
+        self.manifest.store({
             "rodsight_version": __version__,
-            "experiment": file.as_posix(),
-            "inputs": {experiment.file.name: experiment.inputs.checksum(experiment.file), **checksums(experiment)},
+            **self._ownership(),
+            "inputs": _inputs_of(experiment),
             "settings": as_toml(experiment.config),
-            "frames": list(self.frames),
+            "frames": [self.frames.start, self.frames.stop, *([self.frames.step] if self.frames.step != 1 else [])],
             **verdicts,
         })  # fmt: skip
 
     def has(self, name: str, origin: Provenance) -> bool:
-        """Whether a stored piece was made from this and is what it was then; a damaged one is told."""
-        if not self.manifest.lists(name, origin.fingerprint):
+        """Whether a stored file has this provenance and is unchanged; a note reports a damaged one, or other code."""
+        if not self.manifest.lists(name, origin.fingerprint) and not self._keeps_old(name, origin):
             return False
         if self.manifest.is_whole(name):
             return True
         self.notes.append(f"{name} is damaged or was changed: it is made again.")
         return False
 
+    def _keeps_old(self, name: str, origin: Provenance) -> bool:
+        """Whether a stored file of the same input but of another program is to be used; a note states the program."""
+        other = describe_program(self.manifest.piece(name), origin)
+        if not other:
+            return False
+        if self.keep_old:
+            note = f"The results are old, made by {other}: they are shown as they are (--keep-old)."
+        else:
+            note = (
+                f"The stored results were made by {other}: they are computed anew (--keep-old shows them as they are)."
+            )
+        if note not in self.notes:
+            self.notes.append(note)
+        return self.keep_old
+
     def forget(self, *stages: str) -> None:
-        """Remove what a process that was killed left of stages whose results are there."""
+        """Remove the checkpoints that a killed process left of stages whose results exist."""
         for stage in stages:
             shutil.rmtree(self.folder / UNFINISHED / stage, ignore_errors=True)
-        with suppress(OSError):  # not empty, or not there
+        with suppress(OSError):  # not empty, or missing
             (self.folder / UNFINISHED).rmdir()
 
     def set_aside(self, stage: str) -> None:
-        """Keep the frames of a stage that is finished, for it is to be done again where somebody corrects it."""
-        aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
+        """Keep the frames of a finished stage, which is repeated in part after corrections."""
+        aside, checkpoint = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
         shutil.rmtree(aside, ignore_errors=True)
         aside.parent.mkdir(exist_ok=True)
-        if place.is_dir():
-            place.rename(aside)
+        if checkpoint.is_dir():
+            checkpoint.rename(aside)
         self.forget(stage)
 
     def aside(self, stage: str, fingerprint: str) -> Checkpoint:
-        """What is set aside of a stage that was made from this, to look at."""
-        return Checkpoint(self.folder / TRACKED / stage, fingerprint, looks_on=True)
+        """Return the frames set aside of a stage with this fingerprint, read-only."""
+        return Checkpoint(self.folder / TRACKED / stage, fingerprint, read_only=True)
 
     def drop_aside(self, stage: str) -> None:
-        """Remove what is set aside of a stage."""
+        """Remove the frames set aside of a stage."""
         shutil.rmtree(self.folder / TRACKED / stage, ignore_errors=True)
 
     def checkpoint(self, stage: str, fingerprint: str) -> Checkpoint:
-        """Finished frames of an unfinished stage that is made from this; of a stage not begun, those set aside."""
+        """Return the finished frames of an unfinished stage with this fingerprint, or those set aside before."""
+        self.claim()
         aside, place = self.folder / TRACKED / stage, self.folder / UNFINISHED / stage
         if aside.is_dir() and not place.exists():
             place.parent.mkdir(exist_ok=True)
@@ -180,13 +221,39 @@ class Run:
         return Checkpoint(self.folder / UNFINISHED / stage, fingerprint, self.notes)
 
 
-@contextmanager
-def owned(run: Run) -> Iterator[Run]:
-    """The run, while no other process works in its folder; what a stopped one was writing is removed.
+def describe_program(stored: dict[str, Any], origin: Provenance) -> str:
+    """Describe the program that made a file from the same input, such as "other code"; empty: this one, or other input.
 
-    Raises RunError while another process does.
+    stored: the entry of the file in the manifest.
     """
-    with holding(run.folder, run.notes.append):
+    if not stored or stored.get("made_from") == origin.fingerprint:
+        return ""
+    if "inputs" not in stored:
+        return "an earlier version, which did not store its code"
+    if stored["inputs"] != origin.inputs:
+        return ""
+    parts = ["other code"] if stored.get("code") != origin.code else []
+    former = stored.get("libraries")
+    former = former if isinstance(former, dict) else {}
+    for library, version in origin.libraries.items():
+        if former.get(library) != version:
+            parts.append(f"{library} {former.get(library) or '(unknown)'} instead of {version or '(unknown)'}")
+    return ", ".join(parts)
+
+
+def _hash_of(facts: list[Any]) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+@contextmanager
+def hold_run(run: Run) -> Iterator[Run]:
+    """Give the run while no other process works in its folder; partly written files of a stopped one are removed.
+
+    Raises RunError while another process works in the folder, and InputError where it belongs to another experiment.
+    """
+    refuse_foreign_folder(run.folder, run.experiment)
+    with hold_folder(run.folder, run.notes.append):
+        refuse_foreign_folder(run.folder, run.experiment)  # claimed meanwhile
         for part in (*run.folder.glob(f"*{PART}"), *(run.folder / UNFINISHED).rglob(f"*{PART}")):
             name = part.name.removesuffix(PART)
             if part.parent != run.folder or name in OWN or LATER.fullmatch(name):
@@ -194,12 +261,70 @@ def owned(run: Run) -> Iterator[Run]:
         yield run
 
 
+def refuse_foreign_folder(folder: Path, experiment: Experiment) -> None:
+    """Raise InputError where a run's folder belongs to another experiment."""
+    owner = owner_of(folder)
+    if owner is None or is_same_file(owner, experiment.file):
+        return
+    if not owner.is_file():  # moved or renamed: the same input is the same experiment
+        inputs = Manifest(folder).fact("inputs")
+        with suppress(InputError, OSError):  # of a missing file
+            if not isinstance(inputs, dict) or inputs == _inputs_of(experiment):
+                return
+    raise InputError(
+        folder,
+        "",
+        f"holds the run of another experiment, {owner}, and not of {experiment.file.resolve()}: "
+        "choose another folder with --out, or another name",
+    )
+
+
+def owner_of(folder: Path) -> Path | None:
+    """Return the experiment file that a run's folder belongs to, whether or not it exists; None: it is free."""
+    stored = Manifest(folder).fact("experiment")
+    return Path(os.path.normpath(folder.resolve() / stored)) if isinstance(stored, str) else None
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one file, or would."""
+    if one.resolve() == other.resolve():
+        return True
+    try:
+        return one.samefile(other)
+    except OSError:  # one of them is missing
+        return False
+
+
+def input_stamps(experiment: Experiment) -> dict[str, list[int]]:
+    """Return size, number and times of every input file by its name: unchanged, its content is, too."""
+    stamps = {}
+    for file, name in named_inputs(experiment).items():
+        with suppress(OSError):  # it is missing
+            status = file.stat()
+            stamps[name] = [status.st_size, status.st_ino, status.st_mtime_ns, status.st_ctime_ns]
+    return stamps
+
+
+def settings_in_file(file: Path) -> str:
+    """Return a hash of the settings of an experiment file, without comments and order; empty where it is no TOML."""
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+        return _hash_of([json.loads(json.dumps(content, default=str))])
+    except (OSError, ValueError, RecursionError):
+        return ""
+
+
+def _inputs_of(experiment: Experiment) -> dict[str, str]:
+    """Checksums of all input by name, the experiment file included."""
+    return {experiment.file.name: experiment.inputs.checksum(experiment.file), **checksums(experiment)}
+
+
 def find_experiment(results: Path, origin: Provenance) -> Path:
-    """The experiment file that results were made from: the folder's manifest tells, else the results themselves."""
-    told = Manifest(results.parent).fact("experiment")
-    file = results.parent / told if isinstance(told, str) else Path(origin.experiment)
+    """Return the experiment file of results, by the folder's manifest or else by the results themselves."""
+    stored = Manifest(results.parent).fact("experiment")
+    file = results.parent / stored if isinstance(stored, str) else Path(origin.experiment)
     if not file.is_file():
         raise InputError(
-            results, f"experiment {file}", "is not there: its folder was moved; run it again with this --out"
+            results, f"experiment {file}", "is missing: its folder was moved; run it again with this --out"
         )
     return file.resolve()

@@ -1,19 +1,23 @@
-"""The truth that an experiment names, on the rows and frames of its results."""
+"""The true forces of an experiment, on the rows and frames of its results."""
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
-from .errors import InputError
+from pydantic import ValidationError
+
+from .experiment.config.experiment_file import ExperimentFile
 from .experiment.experiment import load_experiment
+from .process.errors import InputError
 from .results.hdf5.store import load_results, origin_of
 from .results.results import Results, TruthContacts
-from .results.truth import names_of_told, read_truth, true_ids, true_names
+from .results.truth import names_of_given, read_truth, true_ids, true_names
 from .run_folder import Run, find_experiment
 
 
 def truth_of(file: Path) -> TruthContacts | None:
-    """The truth that the experiment of finished results names; None without one, or where the experiment is gone."""
+    """Return the truth of the experiment of finished results; None without one, or where the experiment is missing."""
     origin = origin_of(file)
     try:
         experiment = find_experiment(file, origin)
@@ -23,18 +27,31 @@ def truth_of(file: Path) -> TruthContacts | None:
 
 
 def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthContacts | None:
-    """The truth on the rows and frames of the results; None if the experiment names none.
+    """Return the truth on the rows and frames of the results; None if the experiment has none.
 
-    file replaces the experiment's own. Grains that were detected have numbers of their own, so that
-    `truth_tracks` must tell which is which.
+    Detected grains have their own ids, which `truth_tracks` maps to those of the truth.
+
+    Parameters
+    ----------
+    run
+        The run with its experiment.
+    results
+        The results of the run.
+    file
+        Table of true forces to read instead of the experiment's own.
+
+    Raises
+    ------
+    InputError
+        The truth cannot be read, or its ids cannot be mapped.
     """
     config, folder = run.experiment.config, run.experiment.folder
     if file is None and config.truth is None:
         return None
-    first = run.frames[0]
+    first = run.frames.start
     ids = results.tracks.id
     if config.truth_tracks is not None:
-        find_names = true_names if config.tracks is None else names_of_told
+        find_names = true_names if config.tracks is None else names_of_given
         ids = find_names(folder / config.truth_tracks, results.tracks, first)
     else:
         refuse_unnamed_truth(run)
@@ -42,19 +59,63 @@ def load_truth(run: Run, results: Results, file: Path | None = None) -> TruthCon
         file if file is not None else folder / str(config.truth),
         ids,
         results.walls.name,
-        first_frame=first,
+        frames=run.frames,
         frame_count=len(results.frames),
         unseen=None if config.truth_tracks is None else true_ids(folder / config.truth_tracks),
     ).outside(results.tracks.boundary)
 
 
+def truth_beside(results_file: Path, results: Results, file: Path) -> TruthContacts:
+    """Return a table of true forces on the rows and frames of results whose experiment is not at hand.
+
+    Grains that were detected are named by the table `truth_tracks` of the stored configuration, which is expected
+    beside the truth. Given tracks without that table have the names of the truth.
+
+    Parameters
+    ----------
+    results_file
+        The file of the results.
+    results
+        The results.
+    file
+        Table of true forces.
+
+    Raises
+    ------
+    InputError
+        The truth cannot be read, or its ids cannot be mapped.
+    """
+    config, frames = _stored_config(results), origin_of(results_file).frames
+    ids, unseen = results.tracks.id, None
+    poses = None if config is None or config.truth_tracks is None else file.parent / Path(config.truth_tracks).name
+    if config is not None and poses is not None and (poses.is_file() or config.tracks is None):
+        find_names = true_names if config.tracks is None else names_of_given
+        ids, unseen = find_names(poses, results.tracks, frames.start), true_ids(poses)
+    elif config is not None:
+        _refuse_unnamed(config, results_file)
+    return read_truth(
+        file, ids, results.walls.name, frames=frames, frame_count=len(results.frames), unseen=unseen
+    ).outside(results.tracks.boundary)
+
+
+def _stored_config(results: Results) -> ExperimentFile | None:
+    """Return the configuration that results were computed with; None where an earlier version stored another form."""
+    try:
+        return ExperimentFile.model_validate(tomllib.loads(results.configuration))
+    except (ValidationError, tomllib.TOMLDecodeError):
+        return None
+
+
 def refuse_unnamed_truth(run: Run) -> None:
-    """Grains that are detected get names of their own, which a truth does not know."""
-    config = run.experiment.config
+    """Raise InputError where detected grains have their own ids, which a truth without truth_tracks does not have."""
+    _refuse_unnamed(run.experiment.config, run.experiment.file)
+
+
+def _refuse_unnamed(config: ExperimentFile, file: Path) -> None:
     detected = config.photographs is not None and config.photographs.grains is None
     if config.truth_tracks is None and detected:
         raise InputError(
-            run.experiment.file,
+            file,
             "key truth",
             "names grains by ids, but these grains were detected: give truth_tracks or photographs.grains",
         )

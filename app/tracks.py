@@ -1,4 +1,4 @@
-"""Tracks: where every grain is in every frame, and how well that is known."""
+"""Tracks: position, rotation and precision of every grain and wall in every frame."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import Quantity
-from solver.bodies.wall_shapes import STRAIGHT, all_sides, circle_of, outlines
+from .solver.bodies.grains import Array
+from .solver.bodies.wall_shapes import STRAIGHT, all_sides, circle_parameters, outlines
+from .solver.quantity import Quantity
 
-BAR, CORNER, NOT_TOLD = 0, 1, -1  # what the two points of a wall are
+BAR, CORNER, UNSPECIFIED = 0, 1, -1  # meaning of the two points of a wall
 
 
 class TrackStatus(IntEnum):
@@ -21,12 +21,12 @@ class TrackStatus(IntEnum):
 
     OK = 0  # correlation converged from the predicted pose
     RESCUED = 1  # found again by an exhaustive search
-    ROBUST = 2  # a part of the patch was disregarded (occlusion, damage)
-    SUSPECT = 3  # converged, but not to be relied on
+    ROBUST = 2  # a part of the patch was ignored (occlusion, damage)
+    SUSPECT = 3  # converged, but unreliable
     LOST = 4  # no pose
-    OUT_OF_FRAME = 5  # its patch leaves the photograph: no pose
+    OUT_OF_FRAME = 5  # its patch reaches beyond the photograph: no pose
     GIVEN = 6  # read from a table
-    INFERRED = 7  # no photograph shows this rod: its neighbours tell where it is
+    INFERRED = 7  # no photograph shows this rod: its position is inferred from its neighbours
 
     @property
     def has_pose(self) -> bool:
@@ -61,7 +61,8 @@ class Tracks:
         NDArray[np.int32] | None, Quantity("photograph it is compared with", dims="frame grain")
     ] = None
     failed_reason: Annotated[
-        tuple[str, ...] | None, Quantity("why a photograph shows nothing; empty where it does", dims="frame", since=2)
+        tuple[str, ...] | None,
+        Quantity("why a photograph could not be tracked; empty otherwise", dims="frame", since=2),
     ] = None
 
     inferred: Annotated[
@@ -72,12 +73,12 @@ class Tracks:
     boundary: Annotated[
         NDArray[np.bool_] | None,
         Quantity(
-            "whether the grain is the packing's boundary: it moves as it was seen, and no balance is asked of it",
+            "whether the grain is a boundary grain: its measured motion is imposed, and it need not be in equilibrium",
             dims="grain",
             since=2,
             path="grains/boundary",
         ),
-    ] = None  # none is
+    ] = None  # no boundary grains
 
     def __post_init__(self) -> None:
         f, n = len(self.time), len(self.id)
@@ -107,51 +108,56 @@ class Tracks:
 
     @property
     def position_sigma(self) -> Array:
-        """Standard deviation of a position component with the centre's own error, rms over present grains (f,) [m]."""
+        """Standard deviation of a position component with the centre's constant error (f,) [m].
+
+        Notes
+        -----
+        √(⟨σ²⟩ + ⟨σ_c²⟩), σ over the present grains, σ_c the standard deviation of a centre's constant error.
+        """
         fixed = 0.0 if self.centre_sigma is None else float(np.mean(self.centre_sigma**2))
         variance = np.where(self.present, self.sigma**2, 0.0).sum(axis=1)
         return np.sqrt(variance / np.maximum(self.present.sum(axis=1), 1) + fixed)
 
     @property
     def failed(self) -> dict[int, str]:
-        """The frames whose photographs show nothing, and why."""
+        """Frames whose photographs could not be tracked, with the reason."""
         return {k: reason for k, reason in enumerate(self.failed_reason or ()) if reason}
 
     @property
     def renewal_count(self) -> int:
-        """How many grains are compared with a later photograph than the first by the last frame, being damaged."""
+        """Number of damaged grains that are compared with a later photograph than the first."""
         if self.reference_frame is None:
             return 0
         return int((self.reference_frame > 0).any(axis=0).sum())
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Which grains have a pose (f, n)."""
+        """Whether a grain has a pose (f, n)."""
         return np.isfinite(self.position[..., 0]) & np.isfinite(self.position[..., 1])
 
     @property
     def lost(self) -> NDArray[np.bool_]:
-        """Which grains should be seen and were not found (f, n); rods that no photograph shows are none of them."""
+        """Whether a visible grain was not found (f, n); inferred grains are not counted."""
         missing = ~self.present & ~self.out_of_frame
         return missing if self.inferred is None else missing & ~self.inferred
 
     @property
     def out_of_frame(self) -> NDArray[np.bool_]:
-        """Which grains the border of the picture cuts (f, n): nothing failed there."""
+        """Whether the border of the photograph cuts a grain (f, n), which is no failure of the tracker."""
         return ~self.present & (self.status == TrackStatus.OUT_OF_FRAME)
 
     def describe_missing(self) -> str:
-        """How many poses are missing, in words: those lost, and apart from them cut and inferred ones."""
+        """Describe the missing poses in words: lost, cut and inferred ones."""
         cut = self.out_of_frame
-        words = [f"{_counted(self.lost, 'pose')} lost"]
+        parts = [f"{_counted(self.lost, 'pose')} lost"]
         if cut.any():
-            words.append(f"{_counted(cut.any(axis=0), 'rod')} cut by the picture's border ({_counted(cut, 'pose')})")
+            parts.append(f"{_counted(cut.any(axis=0), 'rod')} cut by the picture's border ({_counted(cut, 'pose')})")
         if self.inferred is not None and self.inferred.any():
-            words.append(f"{_counted(self.inferred, 'rod')} inferred")
-        return ", ".join(words)
+            parts.append(f"{_counted(self.inferred, 'rod')} inferred")
+        return ", ".join(parts)
 
     def frames(self, start: int, stop: int, step: int = 1) -> Tracks:
-        """Every step-th of the frames start … stop − 1 alone."""
+        """Return every step-th of the frames start … stop − 1."""
         part = slice(start, stop, step)
         return Tracks(
             self.id, self.radius, self.time[part], self.position[part], self.rotation[part],
@@ -163,21 +169,21 @@ class Tracks:
         )  # fmt: skip
 
 
-def _counted(which: ArrayLike, what: str) -> str:
-    count = int(np.sum(which))
-    return f"{count} {what}{'' if count == 1 else 's'}"
+def _counted(marked: ArrayLike, noun: str) -> str:
+    count = int(np.sum(marked))
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 @dataclass(frozen=True, slots=True)
 class WallTracks:
-    """The walls of f frames, with the pressure that some of them carry."""
+    """The walls of f frames, with the pressure or load on some of them."""
 
     name: Annotated[tuple[str, ...], Quantity("name of the wall", dims="wall", essential=True)]
     endpoints: Annotated[
         Array,
         Quantity(
-            "ends; packing to the left of 0 → 1; of a circle the ends of a diameter, which turns with it; of a failed "
-            "frame between its neighbours'",
+            "ends; packing to the left of 0 → 1; of a circle the ends of a diameter, which rotates with it; in a "
+            "failed frame interpolated between its neighbours",
             "m",
             "frame wall end xy",
             essential=True,
@@ -189,40 +195,53 @@ class WallTracks:
     force: Annotated[
         Array | None, Quantity("recorded force of the packing on the wall, NaN: none", "N", "frame wall xy")
     ] = None
-    # (f, w) [m] standard deviation of a followed wall's endpoint along its normal, against frame 0, rms over its two
+    # (f, w) [m] standard deviation of a tracked wall's endpoint along its normal, relative to frame 0, rms over its two
     # endpoints; NaN in frames where a table gives the wall, None where tables give all
     sigma: Annotated[
         Array | None, Quantity("standard deviation of an end along the normal; NaN: given", "m", "frame wall")
     ] = None
 
-    told: Annotated[
+    end_kind: Annotated[
         NDArray[np.int8] | None,
-        Quantity("what its ends were told to be; 0: points of the bar, 1: corners, −1: not told", dims="wall", since=2),
+        Quantity(
+            "specified meaning of its ends; 0: points of the bar, 1: corners, −1: unspecified",
+            dims="wall",
+            since=2,
+            formerly="walls/told",
+        ),
     ] = None
     side: Annotated[
         NDArray[np.int8] | None,
         Quantity(
-            "what the wall is; 0: straight, 1: a circle around the packing, −1: one within it", dims="wall", since=2
+            "shape of the wall; 0: straight, 1: a circle around the packing, −1: one within it", dims="wall", since=2
         ),
     ] = None
     load: Annotated[
-        Array | None, Quantity("normal force that was told to load the wall, NaN: none", "N", "frame wall", since=2)
+        Array | None, Quantity("specified normal load on the wall, NaN: none", "N", "frame wall", since=2)
     ] = None
-    # Whatever they are given as, these two follow from the endpoints.
+    plate: Annotated[
+        NDArray[np.int32] | None,
+        Quantity(
+            "loaded wall that this one is fixed to: both have one motion and share its load; −1: none",
+            dims="wall",
+            since=2,
+        ),
+    ] = None
+    # Derived from the endpoints, whatever values are passed.
     centre: Annotated[Array | None, Quantity("centre of a circle; NaN: straight", "m", "frame wall xy", since=2)] = None
     radius: Annotated[Array | None, Quantity("radius of a circle; NaN: straight", "m", "frame wall", since=2)] = None
 
     def __post_init__(self) -> None:
-        centre, radius, _ = circle_of(self.endpoints)
+        centre, radius, _ = circle_parameters(self.endpoints)
         straight = self.sides == STRAIGHT
-        told = self.side is not None
-        object.__setattr__(self, "centre", np.where(straight[:, None], np.nan, centre) if told else None)
-        object.__setattr__(self, "radius", np.where(straight, np.nan, radius) if told else None)
+        circular = self.side is not None
+        object.__setattr__(self, "centre", np.where(straight[:, None], np.nan, centre) if circular else None)
+        object.__setattr__(self, "radius", np.where(straight, np.nan, radius) if circular else None)
 
     cell: Annotated[
         Array | None,
         Quantity(
-            "vectors a and b of the periodic cell, in place of walls; positions are not wrapped into it",
+            "vectors a and b of the periodic cell, instead of walls; positions are not wrapped into it",
             "m",
             "frame lattice xy",
             since=2,
@@ -236,27 +255,33 @@ class WallTracks:
 
     @property
     def sides(self) -> NDArray[np.int8]:
-        """What each wall is (w,): STRAIGHT, or a circle with the packing IN or OUT of it."""
+        """Shape of each wall (w,): STRAIGHT, or a circle with the packing IN or OUT of it."""
         return all_sides(self.side, self.count)
 
     @property
     def loaded(self) -> NDArray[np.bool_]:
-        """Which walls are plates under a pressure or a load (w,)."""
+        """Whether a wall is a plate under a pressure or a load (w,)."""
         measured = False if self.load is None else np.isfinite(self.load).any(axis=0)
         return np.isfinite(self.pressure) | measured
 
     def outlines(self, frame: int) -> list[Array]:
-        """Lines (p, 2) [m] that draw the walls of a frame."""
+        """Return the lines (p, 2) [m] that draw the walls of a frame."""
         return outlines(self.endpoints[frame], self.side)
 
     def load_at(self, frame: int) -> Array | None:
-        """Load that was measured on the walls in a frame (w,) [N], NaN: none; None: on none."""
+        """Return the measured load on the walls in a frame (w,) [N], NaN: none; None: no wall has one."""
         return None if self.load is None else self.load[frame]
 
     def usual_pressure(self, length: float) -> Array:
-        """Pressure on the walls (w,) [Pa], that of a measured load on average; NaN where the motion is imposed.
+        """Return the pressure on the walls (w,) [Pa], NaN where the motion is imposed.
 
-        length [m] of the rods.
+        The pressure of a wall with a measured load is the mean over the frames of load / (face · length), where face is
+        the length of a straight wall or the circumference of a circle [m].
+
+        Parameters
+        ----------
+        length
+            Length of the rods [m].
         """
         if self.load is None:
             return self.pressure
@@ -268,28 +293,35 @@ class WallTracks:
         return np.where(known.any(axis=0), mean, self.pressure)
 
     @property
-    def ends_told(self) -> NDArray[np.int8]:
-        """What was told of the ends of each wall (w,): BAR, CORNER or NOT_TOLD."""
-        return np.full(self.count, NOT_TOLD, np.int8) if self.told is None else self.told
+    def end_kinds(self) -> NDArray[np.int8]:
+        """Specified meaning of the ends of each wall (w,): BAR, CORNER or UNSPECIFIED."""
+        return np.full(self.count, UNSPECIFIED, np.int8) if self.end_kind is None else self.end_kind
 
     def select(self, rows: NDArray[np.intp]) -> WallTracks:
-        """Some of the walls alone."""
+        """Return the walls of these rows."""
+        plate = None
+        if self.plate is not None:
+            at = np.append(np.full(self.count, -1), -1)
+            at[rows] = np.arange(len(rows))
+            plate = at[self.plate[rows]].astype(np.int32)
         return WallTracks(
             tuple(self.name[row] for row in rows), self.endpoints[:, rows], self.pressure[rows],
             None if self.force is None else self.force[:, rows],
             None if self.sigma is None else self.sigma[:, rows],
-            None if self.told is None else self.told[rows],
+            None if self.end_kind is None else self.end_kind[rows],
             None if self.side is None else self.side[rows],
             None if self.load is None else self.load[:, rows],
+            plate=plate,
         )  # fmt: skip
 
     def frames(self, start: int, stop: int, step: int = 1) -> WallTracks:
-        """Every step-th of the frames start … stop − 1 alone."""
+        """Return every step-th of the frames start … stop − 1."""
         part = slice(start, stop, step)
         force = None if self.force is None else self.force[part]
         sigma = None if self.sigma is None else self.sigma[part]
         cell = None if self.cell is None else self.cell[part]
         load = None if self.load is None else self.load[part]
         return WallTracks(
-            self.name, self.endpoints[part], self.pressure, force, sigma, self.told, self.side, load, cell=cell
-        )
+            self.name, self.endpoints[part], self.pressure, force, sigma, self.end_kind, self.side, load, cell=cell,
+            plate=self.plate,
+        )  # fmt: skip

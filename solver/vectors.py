@@ -1,7 +1,7 @@
-"""What generates vector instructions, for kernels that the compiler would not turn into any by itself.
+"""Generation of vector instructions for kernels that the compiler does not vectorise by itself.
 
-LLVM makes of a vector what the processor has: AVX-512, AVX2, NEON. Modules that use this say in Python what their
-functions do; compiled code takes the vectors instead.
+LLVM maps vectors to the instructions of the processor: AVX-512, AVX2, NEON. Modules that use this define each function
+in plain Python and register an LLVM implementation for compiled code.
 """
 
 from __future__ import annotations
@@ -9,20 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from inspect import signature
 
-from llvmlite import ir  # of numba, whose only way to such vectors it is
+from llvmlite import ir  # numba reaches such vectors only through llvmlite
 from numba import types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 
 NUMBER, INDEX = ir.DoubleType(), ir.IntType(64)
 _LANE = ir.IntType(32)
-_FUSED = ("contract",)  # a product and a sum may be rounded once, where the processor does so
+_FUSED = ("contract",)  # allows fused multiply-add
 
 
-def compiled(plain: Callable) -> Callable:
-    """Have compiled code take what the decorated function generates in place of a plain one, which returns nothing.
+def llvm_implementation_of(plain: Callable) -> Callable:
+    """Register the decorated function as the LLVM implementation of a plain function without return value.
 
-    It is given LLVM's builder, the types of the arguments and their values, arrays as pointers to their first number.
+    The decorated function receives the LLVM builder, the types of the arguments and their values; arrays are passed as
+    pointers to their first number.
     """
 
     def register(generate):  # type: ignore[no-untyped-def]
@@ -43,7 +44,7 @@ def compiled(plain: Callable) -> Callable:
 
 
 def _pointers(context, builder, kinds, values):  # type: ignore[no-untyped-def]
-    """Arrays as pointers to their first number, all else as it is."""
+    """Arrays as pointers to their first number, other values unchanged."""
     return [
         cgutils.create_struct_proxy(kind)(context, builder, value=value).data
         if isinstance(kind, types.Array)
@@ -54,7 +55,7 @@ def _pointers(context, builder, kinds, values):  # type: ignore[no-untyped-def]
 
 def load(builder, place, count):  # type: ignore[no-untyped-def]
     loaded = builder.load(builder.bitcast(place, ir.VectorType(NUMBER, count).as_pointer()))
-    loaded.align = 8  # of a number: an array need not lie on the bounds of a vector
+    loaded.align = 8  # bytes: arrays are aligned to numbers, not to vectors
     return loaded
 
 
@@ -67,8 +68,8 @@ def shuffle(builder, a, b, lanes):  # type: ignore[no-untyped-def]
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_LANE, len(lanes)), lanes))
 
 
-def spread(builder, number, count):  # type: ignore[no-untyped-def]
-    """A vector of one number."""
+def broadcast(builder, number, count):  # type: ignore[no-untyped-def]
+    """A vector of equal numbers."""
     empty = ir.Constant(ir.VectorType(NUMBER, count), ir.Undefined)
     first = builder.insert_element(empty, number, _LANE(0))
     return shuffle(builder, first, empty, [0] * count)
@@ -83,7 +84,7 @@ def subtract_product(builder, to, a, b):  # type: ignore[no-untyped-def]
 
 
 def total(builder, vector):  # type: ignore[no-untyped-def]
-    """Sum of the numbers of a vector, neighbours first."""
+    """Sum of the numbers of a vector, added pairwise."""
     parts = [builder.extract_element(vector, _LANE(k)) for k in range(vector.type.count)]
     while len(parts) > 1:
         parts = [builder.fadd(parts[k], parts[k + 1]) for k in range(0, len(parts), 2)]

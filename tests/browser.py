@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from playwright.sync_api import Error, Page
-
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
 
 # A page draws with WebGL in software.
 FLAGS = (
@@ -20,7 +19,7 @@ FLAGS = (
 SECONDS = 90.0  # for what is drawn in software on a busy machine
 PATIENCE = 90.0  # [s] until a server answers
 POLLING = 250.0  # [ms] between two looks of the browser at its own picture
-DRAWN = 0.003  # least share of a page that strong forces cover
+DRAWN = 0.003  # least fraction of a page that strong forces cover
 LEGEND_FROM = 0.8  # of the page's height: the legend of the forces, which is always drawn, lies below
 LIKE = 50  # [grey] within which two colours are about the same
 
@@ -95,8 +94,8 @@ def wait_for_forces(page: Page) -> None:
 
 def wait_for_colour(page: Page, place: Array, colour: tuple[int, int, int], *, least: int, reach: int) -> None:
     """Wait until so many pixels around a place of the page have about a colour."""
-    asked = [[float(each) for each in place], reach, list(colour), LIKE]
-    page.wait_for_function("([least, asked]) => seen.near(...asked) >= least", arg=[least, asked], polling=POLLING)
+    arguments = [[float(each) for each in place], reach, list(colour), LIKE]
+    page.wait_for_function("([least, given]) => seen.near(...given) >= least", arg=[least, arguments], polling=POLLING)
 
 
 def wait_until_still(page: Page) -> None:
@@ -115,11 +114,11 @@ def read_picture(png: bytes) -> np.ndarray:
     return cv2.cvtColor(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
 
-def warm_share(picture: np.ndarray) -> float:
-    """Share of the picture in the colours of strong forces: red to yellow."""
+def warm_fraction(picture: np.ndarray) -> float:
+    """Fraction of the picture in the colours of strong forces: red to yellow."""
     return float((picture[..., 0].astype(int) - picture[..., 2] > 80).mean())
 
 
 def forces_drawn(picture: np.ndarray) -> bool:
     """Whether a page with the force network in front shows forces, and not their legend alone."""
-    return warm_share(picture[: int(LEGEND_FROM * len(picture))]) > DRAWN
+    return warm_fraction(picture[: int(LEGEND_FROM * len(picture))]) > DRAWN

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rodsight
@@ -14,22 +16,25 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 from rodsight.synthetic.synthesis import synthesize
 
 from tests.browser import FLAGS, SECONDS, SEEN, find_chromium
+from tests.scheduling import rank_of, schedule_by_folder
 from tests.shapes import check_shapes
 
-check_shapes("solver")
+FAST = "not slow and not screen"  # the marks of the fast tests, as in pyproject.toml
+
+check_shapes("rodsight.solver")
 
 # A failure must be the same everywhere: examples are drawn without chance, and a slow machine is no failure.
 settings.register_profile(
     "rodsight", max_examples=25, deadline=None, derandomize=True, database=None,
     suppress_health_check=[HealthCheck.too_slow],
 )  # fmt: skip
-# A mutant need only be noticed: nobody asks for the least example of it.
+# A mutant need only be noticed: the smallest example of it is not needed.
 settings.register_profile("mutants", settings.get_profile("rodsight"), phases=[Phase.explicit, Phase.generate])
 settings.load_profile("rodsight")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def signals_are_heard() -> None:
+def signals_reach_children() -> None:
     """Children answer signals even where the tests were begun with these ignored: in the background, under nohup."""
     for number in (signal.SIGINT, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_IGN:
@@ -95,5 +100,17 @@ def page(browser: Browser) -> Iterator[Page]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The browser's driver keeps an event loop in this thread until the end: tests that start a loop come before."""
-    items.sort(key=lambda item: "browser" in getattr(item, "fixturenames", ()))
+    """Run tests with a browser last: its driver keeps an event loop in this thread until the end."""
+    items.sort(key=lambda item: ("browser" in getattr(item, "fixturenames", ()), rank_of(item.nodeid)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Run all fast tests in two processes; chosen tests, other lanes and benchmarks in this process alone."""
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and not config.option.benchmark_only
+    return min(2, os.cpu_count() or 1) if whole and config.option.markexpr == FAST else 0
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    return schedule_by_folder(config, log)

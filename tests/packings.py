@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from solver.bodies.grains import Array, GrainMotion, Grains
-from solver.bodies.packing import Material, Packing
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts
-from solver.nlgs.problem import ContactProblem, assemble
-from solver.nlgs.solve import NlgsSettings, solve
+from rodsight.solver.bodies.grains import Array, GrainMotion, Grains
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts, detect_contacts
+from rodsight.solver.nlgs.problem import ContactProblem, assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, solve
 
 LENGTH = 0.06  # [m]
 

@@ -15,10 +15,10 @@ ROOT = Path(__file__).parents[1]
 
 RODSIGHT = (sys.executable, "-u", "-c", "from rodsight.cli.main import main; main()")
 
-# The same, which tells on standard error what it has just put beyond its own reach: the moment to stop it.
-TELLING = (
+# The same, which reports on standard error when something is out of its reach: the moment to stop it.
+REPORTING = (
     sys.executable, "-u", "-c",
-    f"import sys; sys.path.insert(0, {str(ROOT)!r}); from tests.program import run_telling; run_telling()",
+    f"import sys; sys.path.insert(0, {str(ROOT)!r}); from tests.program import run_reporting; run_reporting()",
 )  # fmt: skip
 KEPT, DONE, SENT = "kept frame", "done case", "sent frame"  # on the disk, twice; on its way to the live recording
 
@@ -33,53 +33,53 @@ def rodsight(*arguments: object) -> int:
 def refuse(capsys: pytest.CaptureFixture, out: Path, *arguments: str) -> str:
     """Run the command on bad input, which it names in one line, writing nothing; gives that line."""
     assert rodsight(*arguments, "--out", out, "--quiet") == 2
-    told = capsys.readouterr()
-    assert told.err.count("\n") == 1
-    assert told.err.startswith("rodsight: ")
-    assert told.out == ""
+    printed = capsys.readouterr()
+    assert printed.err.count("\n") == 1
+    assert printed.err.startswith("rodsight: ")
+    assert printed.out == ""
     assert not out.exists() or not any(out.iterdir())
-    return told.err
+    return printed.err
 
 
-def wait_until_told(process: subprocess.Popen[str], what: str, times: int) -> None:
-    """Read what a TELLING process says until it has told something so many times."""
+def wait_for_report(process: subprocess.Popen[str], what: str, times: int) -> None:
+    """Read the reports of a REPORTING process until one has come so many times."""
     assert process.stderr is not None
-    said = []
-    while said.count(what) < times:
+    lines: list[str] = []
+    while lines.count(what) < times:
         line = process.stderr.readline()
-        assert line, f"the process ended, saying {said}"
-        said.append(line.strip())
+        assert line, f"the process ended after {lines}"
+        lines.append(line.strip())
 
 
-def run_telling() -> None:
-    """The process of TELLING."""
+def run_reporting() -> None:
+    """Run the command as the process of REPORTING."""
     from rodsight.recording.files import live_process
     from rodsight.results.checkpoint import Checkpoint
-    from rodsight.sensitivity.study import Diary
+    from rodsight.robustness.study import EffectLog
 
-    def tell(what: str) -> None:
+    def report(what: str) -> None:
         print(what, file=sys.stderr, flush=True)
 
-    def telling(work: Any, what: str) -> Any:
+    def reporting(work: Any, what: str) -> Any:
         def worked(*given: Any) -> None:
             work(*given)
-            tell(what)
+            report(what)
 
         return worked
 
-    class Waiting(live_process._Waiting):
-        """Says what was sent when it is asked for the next message: the one before is in the pipe."""
+    class Waiting(live_process._MessageQueue):
+        """Reports a message as sent when the next one is requested: it is in the pipe then."""
 
         before: str | None = None
 
         def get(self) -> bytes | None:
             if self.before is not None:
-                tell(f"sent {self.before}")
+                report(f"sent {self.before}")
             content = super().get()
             self.before = None if content is None else pickle.loads(content)[0]
             return content
 
-    Checkpoint.save = telling(Checkpoint.save, KEPT)
-    Diary.write = telling(Diary.write, DONE)
-    live_process._Waiting = Waiting
+    Checkpoint.save = reporting(Checkpoint.save, KEPT)
+    EffectLog.write = reporting(EffectLog.write, DONE)
+    live_process._MessageQueue = Waiting
     main()

@@ -18,8 +18,7 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 from beartype.door import is_bearable
 from jaxtyping import AbstractArray, Shaped, jaxtyped
-
-from solver.bodies.quantity import quantities
+from rodsight.solver.quantity import quantities
 
 DIMENSIONS = {"xy": "2", "axis": "2", "component": "2"}  # of quantities, whose size is known
 
@@ -43,7 +42,7 @@ def check_shapes_of(kind: type) -> bool:
 
         @wraps(initialise)
         def checked(self: Any, *values: Any, **named: Any) -> None:
-            initialise(self, *values, **named)  # what the type itself refuses, it says better
+            initialise(self, *values, **named)  # its own refusal is clearer
             _check(self, stated)
 
         kind.__init__ = checked  # type: ignore[method-assign]

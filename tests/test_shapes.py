@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.motion import LastSeen, Snapshot
+from rodsight.solver.contacts.contacts import Contacts
+from rodsight.solver.frame_forces import FrameForces
+from rodsight.solver.nlgs.problem import ContactProblem
+from rodsight.solver.nlgs.sweep_record import SweepHistory
+from rodsight.solver.statistics.frame_statistics import FrameStatistics
 
-from solver.bodies.grains import Grains
-from solver.bodies.motion import LastSeen, Snapshot
-from solver.contacts.contacts import Contacts
-from solver.nlgs.problem import ContactProblem
-from solver.nlgs.sweep_record import SweepHistory
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
 from tests.shapes import ShapeError, check_shapes_of
 
 
@@ -51,7 +51,7 @@ def test_named_tuples_are_checked_too():
             np.zeros((2, 2), np.int32), wall, np.zeros(2), np.zeros((3, 2)), np.zeros(4, np.int64),
         )  # fmt: skip
 
-    problem(np.zeros((2, 6)))
+    problem(np.zeros((2, 8)))
     with pytest.raises(ShapeError, match=r"ContactProblem\.wall"):
         problem(np.zeros((3, 6)))
 
@@ -65,7 +65,7 @@ def test_dimensions_of_quantities_are_shapes_too():
         SweepHistory(np.zeros(9), np.zeros(9), np.zeros(9), **{**none, "ft": np.zeros((2, 4), np.float32)})
 
 
-def test_what_a_type_refuses_it_says_itself():
+def test_the_refusal_of_a_type_itself_comes_first():
     with pytest.raises(ValueError, match="equal length"):
         Grains(np.ones(2), np.ones(3))
 

@@ -1,1 +1,1 @@
-"""The `rodsight` command: one layer of commands over the stages. Nothing imports it."""
+"""The `rodsight` command: commands that call the stages. No other folder imports it."""

@@ -1,4 +1,4 @@
-"""Arguments that several commands share: their names on the command line, their help, and what they mean."""
+"""Arguments that several commands share: their names on the command line and their help."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..errors import InputError
+from ..process.errors import InputError
+from ..process.frame_range import FrameRange
 
 ExperimentPath = Annotated[
     Path,
@@ -21,42 +22,81 @@ Settings = Annotated[
     tyro.conf.arg(
         name="set",
         metavar="KEY=VALUE",
-        help="lay a setting over experiment.toml, e.g. solver.kappa=0.1; rodsight settings lists them",
+        help="override a key of experiment.toml, e.g. solver.kappa=0.1; rodsight settings lists them",
     ),
 ]
-Frames = Annotated[str | None, tyro.conf.arg(metavar="A:B", help="only the frames A … B − 1")]
+KeepOld = Annotated[
+    bool,
+    tyro.conf.FlagCreatePairsOff,
+    tyro.conf.arg(help="use stored results of the same input as they are, although other code made them"),
+]
+Frames = Annotated[
+    str | None, tyro.conf.arg(metavar="A:B[:STEP]", help="only the frames A … B − 1, or every STEP-th of them")
+]
+AsJson = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="print JSON")]
 ProgressForm = Annotated[
     Literal["bars", "lines"],
     tyro.conf.arg(name="progress", help="lines: as JSON on standard error, for programs; default bars, on a terminal"),
 ]
+Workers = Annotated[int | None, tyro.conf.arg(metavar="N", help="processes; default: one per core")]
+Threads = Annotated[
+    int | None, tyro.conf.arg(metavar="N", help="threads of tracking and solving; default: one per core")
+]
+Scheduler = Annotated[
+    str | None, tyro.conf.arg(metavar="ADDRESS", help="run on the machines of this dask scheduler instead")
+]
+Port = Annotated[int, tyro.conf.arg(help="of the page on 127.0.0.1; 0: a free one")]
+Browser = Annotated[bool, tyro.conf.arg(help="open the page")]
+ResultsPath = Annotated[
+    Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder, or results.h5")
+]
 Quiet = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="show no progress and no table")]
 Sweeps = Annotated[
-    Literal["all", "log", "none"] | None, tyro.conf.arg(help="whose forces the recording holds; default log")
+    Literal["all", "log", "none"] | None, tyro.conf.arg(help="sweeps whose forces are recorded; default log")
 ]
 
 Ensemble = Annotated[
     int | None,
-    tyro.conf.arg(metavar="K", help="error bars from K sequences solved again with resampled inputs; 8 are enough"),
+    tyro.conf.arg(metavar="K", help="error bars from K solutions with resampled inputs; 8 are enough"),
 ]
 MaxSize = Annotated[
-    float | None, tyro.conf.arg(metavar="MB", help="of the recording [MB]: fewer sweeps where it would be larger")
+    float | None, tyro.conf.arg(metavar="MB", help="of the recording [MB]; sweeps are thinned to stay below it")
 ]
 FullFrames = Annotated[
     tuple[int, ...],
     tyro.conf.arg(
-        metavar="FRAME", help="with --sweeps all: every sweep of these frames to a side file, others thinned"
+        metavar="FRAME", help="with --sweeps all: every sweep of these frames in a side file, others thinned"
     ),
 ]
 
 
-def parse_frames(text: str | None) -> tuple[int, int | None]:
-    """First frame and end (None: to the last) of a range A:B; either side may be left out. Raises InputError."""
+def parse_frames(text: str | None) -> FrameRange:
+    """Parse a range A:B or A:B:STEP, all parts optional. Raises InputError."""
     if text is None:
-        return 0, None
-    first, colon, last = text.partition(":")
+        return FrameRange()
     try:
-        if not colon:
+        first, last, *steps = text.split(":")
+        step = int(steps[0]) if steps and steps[0] else 1
+        if len(steps) > 1 or step < 1:
             raise ValueError
-        return int(first or 0), int(last) if last else None
+        return FrameRange(int(first or 0), int(last) if last else None, step)
     except ValueError:
-        raise InputError("--frames", text, "is not A:B, such as 0:12") from None
+        raise InputError("--frames", text, "is not A:B or A:B:STEP, such as 0:12 or 0:60:4") from None
+
+
+def refuse_step(frames: FrameRange) -> tuple[int, int | None]:
+    """Return first frame and end of a range that may have no step. Raises InputError."""
+    if frames.step != 1:
+        raise InputError("--frames", str(frames), "has a step, which applies to run, track, solve and record only")
+    return frames.start, frames.stop
+
+
+def worker_count(workers: int | None) -> int:
+    """Return the number of processes; default: one per available core. Raises InputError."""
+    from ..solver.parallel import available_cores
+
+    if workers is None:
+        return available_cores()
+    if workers < 1:
+        raise InputError("--workers", str(workers), "must be at least one")
+    return workers

@@ -1,4 +1,4 @@
-"""All commands: in groups for a person, and as tyro's command line."""
+"""All commands, in groups, and the command line of tyro."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .. import __version__
 from .commands.campaign import campaign
 from .commands.docs import docs
 from .commands.export import export, share
-from .commands.look import compare, review, score, view
-from .commands.make import synth
+from .commands.import_commands import import_
 from .commands.run import check, record, run, solve, track
 from .commands.sensitivity import sensitivity
 from .commands.settings import settings
 from .commands.study import study
-from .commands.take_in import import_
+from .commands.synth import synth
+from .commands.view_commands import compare, review, score, view
 from .commands.workbench import init, open_
 
 Command = Callable[..., int]
@@ -39,7 +39,7 @@ Completion of commands and options: eval "$(rodsight --completion bash)" (or zsh
 
 
 def overview(title: str | None = None) -> str:
-    """What there is, in groups, a line each; title: by default the program's name and version."""
+    """Return the list of commands in groups, one line each; title: default the program's name and version."""
     title = title or f"Rodsight {__version__}"
     lines = [f"{title}: contact forces inside a granular packing, from photographs.", ""]
     lines += ["Usage: rodsight COMMAND …", "First: rodsight run sample_data/shear"]
@@ -50,7 +50,7 @@ def overview(title: str | None = None) -> str:
 
 
 def command_line() -> tyro.extras.SubcommandApp:
-    """The command line that parses arguments and calls a command."""
+    """Build the command line that parses arguments and calls a command."""
     app = tyro.extras.SubcommandApp()
     for commands in GROUPS.values():
         for command in commands:
@@ -59,17 +59,22 @@ def command_line() -> tyro.extras.SubcommandApp:
 
 
 def name_of(command: Command) -> str:
-    """What a user types."""
+    """Return the name of a command on the command line."""
     return command.__name__.rstrip("_")
 
 
+def command_names() -> list[str]:
+    """Return the names of all commands."""
+    return [name_of(command) for commands in GROUPS.values() for command in commands]
+
+
 def purpose(command: Command) -> str:
-    """The first sentence of its help."""
+    """Return the first sentence of a command's help."""
     return (inspect.getdoc(command) or "").split("\n\n")[0].replace("\n", " ").removesuffix(".")
 
 
 def _with_plain_defaults(command: Command) -> Command:
-    """The same command; its help says nothing of a default that is none, and names what may be left out by its kind."""
+    """Annotate a command so that its help omits empty defaults and names optional values by their type."""
     hints = get_type_hints(command, include_extras=True)
     result = hints.pop("return", int)
     explained = {
@@ -80,13 +85,13 @@ def _with_plain_defaults(command: Command) -> Command:
 
 
 def _named(hint: Any) -> Any:
-    """The hint, with what stands for its value in the help where nobody has said so and it may be left out."""
+    """Add a name of the value for the help to the type hint of an optional argument."""
     bare = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     kinds = [each for each in get_args(bare) if each is not type(None)]
     if type(None) not in get_args(bare) or len(kinds) != 1:
         return hint
     word = "|".join(get_args(kinds[0])) if get_origin(kinds[0]) is Literal else METAVARS.get(kinds[0])
-    # First of all, so that what was said goes before it.
+    # Inserted first, so that an explicit metavar takes precedence.
     return hint if word is None else Annotated[(bare, tyro.conf.arg(metavar=word), *get_args(hint)[1:])]  # type: ignore[misc]
 
 

@@ -1,4 +1,4 @@
-"""app/docs/commands.md: the help of all commands; `python -m rodsight.cli.commands_page` writes it."""
+"""Generator of app/docs/commands.md, the help of all commands: `python -m rodsight.cli.commands_page`."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import textwrap
 from contextlib import redirect_stdout, suppress
 from unittest.mock import patch
 
-from ..atomic import write_atomically
 from ..manual.contents import FOLDER
+from ..process.atomic import write_atomically
 from .command_list import GROUPS, Command, command_line, name_of, overview
 
 PAGE = FOLDER / "commands.md"
-FIRST_LINE = "<!-- Generated: run `python -m rodsight.cli.commands_page` to write it anew. -->"
-TITLE = "Rodsight"  # without its version: the page is the same in all
+FIRST_LINE = "<!-- Generated: run `python -m rodsight.cli.commands_page` to write it again. -->"
+TITLE = "Rodsight"  # without version, so that the page does not change with it
 NAMES, WIDTH = 26, 100  # [columns] of names, and of a line
 ROW = re.compile(r"^(?:│ |  )(.*?) *│?$")  # of the tables of options, with their frames on a terminal
 
 
 def commands_page() -> str:
-    """The whole page, Markdown."""
+    """Return the page as Markdown."""
     parts = [FIRST_LINE, "# Commands", f"```text\n{overview(TITLE)}\n```"]
     for group, commands in GROUPS.items():
         parts.append(f"## {group}")
@@ -42,7 +42,7 @@ def _section(command: Command) -> list[str]:
 
 
 def _row(name: str, meaning: str) -> str:
-    """A line for a short name, its meaning below a long one."""
+    """Format one option; the meaning of a long name goes below it."""
     name = name.replace(",", ", ") if len(name) > NAMES else name
     head = textwrap.fill(name, WIDTH, subsequent_indent=" ", break_long_words=False, break_on_hyphens=False)
     below = textwrap.fill(
@@ -53,13 +53,13 @@ def _row(name: str, meaning: str) -> str:
 
 
 def _options(command: Command) -> list[tuple[str, str]]:
-    """Arguments and options, and what the help says of each."""
-    said = io.StringIO()
-    # So wide that nothing is broken: a word in pieces could not be put together again.
-    with patch.dict(os.environ, COLUMNS="4000"), redirect_stdout(said), suppress(SystemExit):
+    """Return arguments and options with their meaning in the help."""
+    output = io.StringIO()
+    # A wide terminal avoids line breaks within words.
+    with patch.dict(os.environ, COLUMNS="4000"), redirect_stdout(output), suppress(SystemExit):
         command_line().cli(prog="rodsight", args=[name_of(command), "--help"])
     found: list[tuple[str, str]] = []
-    for line in said.getvalue().splitlines():
+    for line in output.getvalue().splitlines():
         row = ROW.match(line)
         if row is None or not row[1].strip():
             continue

@@ -1,4 +1,4 @@
-"""Who waits for the first command after an install is told why: kernels are compiled for the machine, once."""
+"""Count of kernels under compilation, to explain the wait of the first command after an installation."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-SENTENCE = "Kernels are compiled for this machine, once: the first commands after an install take minutes longer."
+COMPILATION_NOTE = "Kernels are compiled once for this machine: the first commands take some minutes longer."
 
 
 @contextmanager
-def hearing_of_compilation(heard: Callable[[int], None]) -> Iterator[None]:
-    """While this lasts, tell how many kernels were not found compiled, each as its compilation begins."""
-    from numba.core import event  # not for every start
+def count_compilations(report: Callable[[int], None]) -> Iterator[None]:
+    """In this context, report the number of compiled kernels at the start of every compilation."""
+    from numba.core import event  # imported only where needed
 
     class Counter(event.Listener):
         count = 0
 
         def on_start(self, event: Any) -> None:
             self.count += 1
-            heard(self.count)
+            report(self.count)
 
         def on_end(self, event: Any) -> None:
-            """Nothing is told of it."""
+            """Required by numba; ends are not counted."""
 
     with event.install_listener("numba:compile", Counter()):
         yield

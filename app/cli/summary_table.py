@@ -1,4 +1,4 @@
-"""What a person reads at the end of a run: the summary's frames as a table, and what they are worth in sentences."""
+"""The summary at the end of a run: frames as a table, and their accuracy in sentences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from solver.sequence.frame_forces import FrameStatus
+from ..solver.frame_forces import FrameStatus
 
 STATUS_STYLE = {
     FrameStatus.SETTLED: "green",
@@ -19,19 +19,21 @@ STATUS_STYLE = {
     FrameStatus.RESET: "cyan",
     FrameStatus.FAILED: "bold red",
 }
-NOTICEABLE = 1.0  # standard deviations: a correction of a wall or of the scale below this is not worth words
-MOST_ROWS = 40  # frames shown in the terminal's table; more are thinned evenly
+NOTICEABLE = 1.0  # [standard deviation]: smaller corrections of a wall are not reported
+MAX_ROWS = 40  # frames in the terminal's table; more are thinned evenly
 
 
 def print_summary(console: Console, summary: dict[str, Any]) -> None:
-    """Print the frames as a table, and below it how far they may be trusted."""
+    """Print the frames as a table, and the accuracy below it."""
     console.print(_frame_table(summary))
+    if summary.get("out_of_date"):
+        console.print(f"[bold red]Out of date:[/] {escape('; '.join(summary['out_of_date']))}.", highlight=False)
     for line in trust_lines(summary):
         console.print(line, highlight=False)
 
 
 def trust_lines(summary: dict[str, Any]) -> list[str]:
-    """The verdict in a few sentences."""
+    """Describe accuracy, events and corrections in sentences."""
     count = summary["status_count"]
     settled, total = count.get("settled", 0), summary["frame_count"]
     after = summary["settled_after"]
@@ -48,23 +50,24 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         lines.append("Events: " + "; ".join(events) + ".")
     lines += _failure_lines(summary["failures"])
     lost = f"{summary['lost_poses']} poses of {summary['lost_grains']} grains lost" if summary["lost_poses"] else ""
-    doubtful = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
+    suspect = f"{summary['suspect_poses']} poses suspect" if summary["suspect_poses"] else ""
     cut = f"{summary['cut_grains']} rods cut by the picture's border" if summary.get("cut_grains") else ""
-    tracked = ", ".join(part for part in (lost, doubtful, cut) if part) or "every grain has a pose in every frame"
+    tracked = ", ".join(part for part in (lost, suspect, cut) if part) or "every grain has a pose in every frame"
     worst = _cell(summary["worst_unbalance"], ".3f")
     lines.append(
-        f"Worst grain unbalance {worst} of the mean force (frame {summary['worst_unbalance_frame']}); {tracked}."
+        f"Greatest force residual of a grain {worst} of the mean force "
+        f"(frame {summary['worst_unbalance_frame']}); {tracked}."
     )
     trusted = [t for t, s in zip(summary["trust"], summary["status"], strict=True) if s == "settled" and t is not None]
     if trusted:
         lines.append(
-            f"Trust (a lower bound of the correlation with the true forces): {min(trusted):.2f} to "
+            f"Trust (lower bound of the correlation with the true forces): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
         )
-    lines += _deviation_line(summary) + budget_lines(summary) + _doubt_line(summary)
+    lines += _sd_line(summary) + budget_lines(summary) + _penalty_line(summary)
     if not summary["loaded_walls"]:
         lines.append(
-            "[bold]No wall carries a given pressure:[/] forces are known up to a scale, which differs between frames."
+            "[bold]No wall has a given pressure:[/] forces are known up to a scale, which differs between frames."
         )
     friction = summary["friction"]
     if friction is not None and friction["enclosed"]:
@@ -77,17 +80,17 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         measured, low, high = (_cell(value, ".2f") for value in friction["walls"])
         lines.append(f"Friction of the walls from the motion: {measured} ({low} to {high}), which was used.")
     if summary["wall_force_error"]:
-        told = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
-        lines.append(f"Inferred against recorded wall forces, rms difference over settled frames: {told}.")
+        errors = ", ".join(f"{name} {100 * error:.0f} %" for name, error in summary["wall_force_error"].items())
+        lines.append(f"Inferred against recorded wall forces, rms difference over settled frames: {errors}.")
     if summary["corrections"] is not None:
         lines += calibration_lines(summary["corrections"])
     lines += [f"Boundary: {each}." for each in summary.get("boundary") or []]
     if summary.get("inferred_grains"):
-        lines += [f"{summary['inferred_grains']} rods that no photograph shows were inferred from their neighbours."]
+        lines += [f"{summary['inferred_grains']} rods that are in no photograph were inferred from their neighbours."]
     if summary["radius_change"] is not None:
         lines.append(_curve_line(summary["radius_curve"]))
         lines.append(
-            f"All radii changed by {summary['radius_change'] * 1e6:+.1f} µm for the wanted coordination number."
+            f"All radii changed by {summary['radius_change'] * 1e6:+.1f} µm for the specified coordination number."
         )
     if "accuracy" in summary:
         first = min(5, total - 1)
@@ -101,68 +104,71 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-# Of the statistics whose deviation is told: their name, a factor, what stands behind the number, and its form.
-TOLD_DEVIATIONS = (
+# Statistics with a reported standard deviation: name, label, factor, unit, format.
+REPORTED_SDS = (
     ("friction_angle", "friction angle", 180.0 / np.pi, "°", ".1f"),
     ("principal_direction", "direction of σ₁", 180.0 / np.pi, "°", ".1f"),
     ("coordination_number", "z", 1.0, "", ".2f"),
-    ("sliding_fraction", "share of sliding contacts", 1.0, "", ".2f"),
+    ("sliding_fraction", "fraction of sliding contacts", 1.0, "", ".2f"),
 )
 
 
-def _deviation_line(summary: dict[str, Any]) -> list[str]:
-    """How far what is stated errs: one standard deviation, median of the frames that have one."""
-    told = []
-    for name, label, factor, unit, form in TOLD_DEVIATIONS:
+def _sd_line(summary: dict[str, Any]) -> list[str]:
+    """Report one standard deviation of statistics and forces, median of the frames that have one."""
+    parts = []
+    for name, label, factor, unit, form in REPORTED_SDS:
         known = [value for value in summary.get("deviations", {}).get(name, []) if value is not None]
         if known:
-            told.append(f"{label} ± {factor * np.median(known):{form}}{unit}")
+            parts.append(f"{label} ± {factor * np.median(known):{form}}{unit}")
     forces = [value for value in summary.get("fn_deviation", []) if value is not None]
     if forces:
-        told.append(f"one f_n ± {np.median(forces):.2f} of the mean f_n")
-    return [f"One standard deviation, median of the frames: {', '.join(told)}."] if told else []
+        parts.append(f"one f_n ± {np.median(forces):.2f} of the mean f_n")
+    return [f"One standard deviation, median of the frames: {', '.join(parts)}."] if parts else []
 
 
-HALVED = {
+LARGEST_CAUSE = {
     "positions": "positions and rotations", "radii": "radii and centres", "friction": "the coefficient of friction",
-    "contacts": "the surfaces' roughness, which decides of doubtful contacts", "steps": "the step between photographs",
+    "contacts": "the roughness of surfaces, which decides on uncertain contacts",
+    "steps": "the step between photographs",
 }  # fmt: skip
 
 
 def budget_lines(summary: dict[str, Any]) -> list[str]:
-    """What the forces err by, from where, and what halving the greatest cause would do; means over the frames."""
+    """Describe the error of the forces, its causes and the effect of halving the largest one; means over frames."""
     budget = summary.get("error_budget")
     if not budget:
         return []
     known = [each for each in budget["relative_error"] if each is not None]
     if not known:
         return []
-    share = {
+    fraction = {
         name: float(np.mean([each for each in values if each is not None])) for name, values in budget["share"].items()
     }
     error = 100.0 * float(np.mean(known))
-    told = ", ".join(f"{name} {100.0 * part:.0f} %" for name, part in share.items())
-    worst = max(HALVED, key=lambda name: share.get(name, 0.0))
-    after = error * float(np.sqrt(1.0 - 0.75 * share[worst]))
+    causes = ", ".join(f"{name} {100.0 * part:.0f} %" for name, part in fraction.items())
+    worst = max(LARGEST_CAUSE, key=lambda name: fraction.get(name, 0.0))
+    after = error * float(np.sqrt(1.0 - 0.75 * fraction[worst]))
     return [
-        f"Error budget: the forces err by {error:.0f} % (relative L2); of the variance {told}.",
-        f"Halving the error of {HALVED[worst]} would make it {after:.1f} % instead of {error:.1f} %.",
+        f"Error budget: the forces have an error of {error:.0f} % (relative L2); of the variance {causes}.",
+        f"Halving the error of {LARGEST_CAUSE[worst]} would reduce it to {after:.1f} % from {error:.1f} %.",
     ]
 
 
-def _doubt_line(summary: dict[str, Any]) -> list[str]:
-    """Why the least trusted frame is not trusted more."""
-    doubted = [
-        (t, k) for k, t in enumerate(summary["trust"]) if t is not None and summary.get("doubts", [])[k : k + 1] != [""]
+def _penalty_line(summary: dict[str, Any]) -> list[str]:
+    """Name the largest penalty of the frame with the lowest trust."""
+    penalised = [
+        (t, k)
+        for k, t in enumerate(summary["trust"])
+        if t is not None and summary.get("trust_penalties", [])[k : k + 1] != [""]
     ]
-    if not doubted:
+    if not penalised:
         return []
-    trust, frame = min(doubted)
-    return [f"What lowers it most, in frame {frame} (T = {trust:.2f}): {escape(summary['doubts'][frame])}."]
+    trust, frame = min(penalised)
+    return [f"Lowest trust {trust:.2f} in frame {frame}: {escape(summary['trust_penalties'][frame])}."]
 
 
 def _failure_lines(failures: dict[int, str]) -> list[str]:
-    """The frames that failed, those for the same reason together."""
+    """List the failed frames by reason."""
     frames: dict[str, list[int]] = {}
     for frame, reason in failures.items():
         frames.setdefault(reason, []).append(frame)
@@ -173,23 +179,23 @@ def _failure_lines(failures: dict[int, str]) -> list[str]:
 
 
 def calibration_lines(facts: dict[str, Any]) -> list[str]:
-    """The same in a few sentences."""
+    """Describe the self-calibration in sentences."""
     lines = [f"Self-calibration {facts['verdict']}."]
     if not facts["applied"]:
         return [*lines, *_scale_line(facts)]
     centre, radius = _pair(facts, "centre"), _pair(facts, "radius")
     lines.append(
-        f"Corrected (rms ± standard deviation of what is left): centres by {centre} µm, radii by {radius} µm"
+        f"Corrected (rms ± residual standard deviation): centres by {centre} µm, radii by {radius} µm"
         f"{_walls(facts['wall'])}."
     )
     lines += _scale_line(facts)
     if facts["lens"] != 0.0:
         lines.append(
-            f"Lens: what is left of its radial distortion moves the farthest corner by {1e6 * facts['lens']:+.0f} ± "
-            f"{1e6 * facts['lens_sd']:.0f} µm outward of where it was seen."
+            f"Lens: the residual radial distortion moves the farthest corner by {1e6 * facts['lens']:+.0f} ± "
+            f"{1e6 * facts['lens_sd']:.0f} µm outward."
         )
     lines.append(
-        f"Distance of touching surfaces from contact, before → after: between grains "
+        f"Gap of touching surfaces, before → after: between grains "
         f"{_micro(facts['gap_rms_before'])} → {_micro(facts['gap_rms_after'])} µm rms, at walls "
         f"{_micro(facts['wall_gap_rms_before'])} → {_micro(facts['wall_gap_rms_after'])} µm rms."
     )
@@ -207,7 +213,7 @@ def _frame_table(summary: dict[str, Any]) -> Table:
         table.add_column("r(f_n)", justify="right", no_wrap=True)
         table.add_column("r(f_t)", justify="right", no_wrap=True)
     total = summary["frame_count"]
-    shown = np.unique(np.linspace(0, total - 1, min(total, MOST_ROWS)).round().astype(int))
+    shown = np.unique(np.linspace(0, total - 1, min(total, MAX_ROWS)).round().astype(int))
     for k in shown:
         status = summary["status"][k]
         cells = [
@@ -232,7 +238,7 @@ def _cell(value: float | None, form: str) -> str:
 
 
 def _curve_line(curve: dict[str, list[float]]) -> str:
-    """The curve in one line, thinned to nine points."""
+    """Describe the curve in one line, thinned to nine points."""
     shown = np.linspace(0, len(curve["change"]) - 1, 9).round().astype(int)
     points = (f"{curve['change'][k] * 1e6:+.0f}: {curve['coordination_number'][k]:.2f}" for k in shown)
     return "Coordination number without rattlers against the change of all radii [µm]: " + ", ".join(points) + "."
@@ -245,7 +251,7 @@ def _listed(frames: list[int]) -> str:
 def _scale_line(facts: dict[str, Any]) -> list[str]:
     value, sd = 100 * facts["pixel_size"], 100 * facts["pixel_size_sd"]
     if sd == 0.0:
-        return []  # it was not asked for: nothing to say
+        return []  # not estimated
     if value == 0.0:
         return [f"Pixel size: as given, in agreement with the known radii within ± {sd:.2f} %."]
     walls = "the walls were measured with it and follow" if facts["walls_follow_pixel_size"] else "the walls stay"
@@ -253,16 +259,16 @@ def _scale_line(facts: dict[str, Any]) -> list[str]:
 
 
 def _walls(walls: dict[str, dict[str, float]]) -> str:
-    said = []
+    parts = []
     for name, wall in walls.items():
         words = []
         if abs(wall["outward"]) > NOTICEABLE * wall["outward_sd"]:
             words.append(f"{1e6 * wall['outward']:+.0f} ± {1e6 * wall['outward_sd']:.0f} µm outward")
         if abs(wall["tilt"]) > NOTICEABLE * wall["tilt_sd"]:
-            words.append(f"turned by {1e3 * wall['tilt']:+.2f} ± {1e3 * wall['tilt_sd']:.2f} mrad")
+            words.append(f"rotated by {1e3 * wall['tilt']:+.2f} ± {1e3 * wall['tilt_sd']:.2f} mrad")
         if words:
-            said.append(f"wall {name} {' and '.join(words)}")
-    return "".join(f", {words}" for words in said)
+            parts.append(f"wall {name} {' and '.join(words)}")
+    return "".join(f", {words}" for words in parts)
 
 
 def _pair(facts: dict[str, Any], part: str) -> str:

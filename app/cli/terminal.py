@@ -1,4 +1,4 @@
-"""The terminal: tables as wide as it is, sentences that may be copied, progress with the time left."""
+"""Terminal output: tables, lines for copying, progress with the remaining time."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from rich.progress import (
 )
 from rich.progress import Progress as Bars
 
-from ..progress import Progress, silent
-from .compiling import SENTENCE, hearing_of_compilation
+from ..process.progress import Progress, no_progress
+from .compiling import COMPILATION_NOTE, count_compilations
 
 Form = Literal["bars", "lines"]
-WIDE = 120  # columns of a table that goes to a file
+FILE_WIDTH = 120  # columns of a table in a file
 
 
 @contextmanager
 def progress_bars() -> Iterator[Progress]:
-    """Give a callable that draws one bar per stage on standard error, and one while kernels are compiled."""
+    """Yield a callable that draws one bar per stage on standard error, and one for the compilation of kernels."""
     bars = Bars(
         TextColumn("{task.description:<10}"),
         BarColumn(bar_width=36),
@@ -47,35 +47,35 @@ def progress_bars() -> Iterator[Progress]:
 
     def compiling(count: int) -> None:
         if count == 1:
-            bars.console.print(SENTENCE)
+            bars.console.print(COMPILATION_NOTE)
         show("compiling", count, count)
 
-    with bars, hearing_of_compilation(compiling):
+    with bars, count_compilations(compiling):
         yield show
 
 
 def progress_lines(stage: str, done: int, total: int) -> None:
-    """Tell progress on standard error as lines of JSON, for a program that reads them."""
+    """Write progress to standard error as lines of JSON, for other programs."""
     print(json.dumps({"stage": stage, "done": done, "total": total}), file=sys.stderr, flush=True)
 
 
 @contextmanager
 def progress_of(quiet: bool, form: Form = "bars") -> Iterator[Progress]:
-    """Bars on a terminal, silence elsewhere and where it was asked for; lines wherever they were asked for."""
+    """Yield a progress callable: JSON lines on request, bars on a terminal, otherwise nothing."""
     if form == "lines":
         yield progress_lines
     elif quiet or not sys.stderr.isatty():
-        yield silent
+        yield no_progress
     else:
         with progress_bars() as progress:
             yield progress
 
 
-def table_console(width: int = WIDE, *, quiet: bool = False) -> Console:
-    """A console for tables: as wide as the terminal, or `width` columns where the output goes to a file."""
+def table_console(width: int = FILE_WIDTH, *, quiet: bool = False) -> Console:
+    """Return a console for tables, as wide as the terminal, or `width` columns in a file."""
     return Console(quiet=quiet) if sys.stdout.isatty() else Console(width=width, quiet=quiet)
 
 
-def tell(console: Console, sentence: str) -> None:
-    """Print a sentence as it is: no markup, no colours, no line break in a path or command to be copied."""
+def print_line(console: Console, sentence: str) -> None:
+    """Print a sentence without markup, colours or line breaks, so that paths and commands can be copied."""
     console.print(sentence, markup=False, highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Watching a run while it is solved: the run tells what it has finished, a live recording shows it."""
+"""Live display of a run: finished frames are written to a live recording."""
 
 from __future__ import annotations
 
@@ -10,47 +10,47 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from ..experiment.jpeg_photographs import JpegPhotographs
 from ..experiment.scaling import make_scale
-from ..experiment.shown import ShownPhotographs
 from ..run_folder import Run
-from .terminal import tell
+from .terminal import print_line
 
 if TYPE_CHECKING:
     from ..recording.files.live_process import LiveProcess
 
-LIVE = "recording-live.rrd"  # what has been solved so far; the full recording takes its place
+LIVE = "recording-live.rrd"  # the frames solved so far; replaced by the full recording
 
 
 @contextmanager
 def watching(run: Run, viewer: str, console: Console) -> Iterator[tuple[Run, LiveProcess | None]]:
-    """Give the run with somebody who watches it, or as it is with the viewer `none`.
+    """Yield the run with an observer that writes a live recording, or unchanged for the viewer `none`.
 
-    The live recording is removed at the end, when the full one is there. If the run ends early, it stays.
+    The live recording is removed after the full one was written; it is kept if the run ends early.
     """
     if viewer == "none":
         yield run, None
         return
 
-    watch = _watch(run, viewer, partial(tell, console))
+    watch = _watch(run, viewer, partial(print_line, console))
     try:
         yield replace(run, watch=watch), watch
-        watch.close(whole=True)
+        watch.close(complete=True)
         watch.path.unlink(missing_ok=True)
     except BaseException:
-        watch.close(whole=False)
+        watch.close(complete=False)
         if watch.started and watch.path.is_file():
-            tell(console, f"What was solved so far: rodsight view {watch.path}")
+            print_line(console, f"The frames solved so far: rodsight view {watch.path}")
         raise
 
 
-def _watch(run: Run, viewer: str, say: Callable[[str], None]) -> LiveProcess:
+def _watch(run: Run, viewer: str, report: Callable[[str], None]) -> LiveProcess:
     from ..recording.files.live_process import LiveProcess
 
     config = run.experiment.config
     photograph = scale = None
     if config.photographs is not None:
         photographs = run.experiment.photographs()
-        photograph = ShownPhotographs(photographs, run.frames[0]).__getitem__
+        photograph = JpegPhotographs(photographs, run.frames).__getitem__
         scale = make_scale(config.photographs, photographs.shape[0])
     sweeps = "none" if config.recording.sweeps == "none" else "log"
-    return LiveProcess(run.file(LIVE), say, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)
+    return LiveProcess(run.file(LIVE), report, viewer=viewer, photograph=photograph, scale=scale, sweeps=sweeps)

@@ -1,7 +1,6 @@
-"""The contacts of a frame as a graph: GraphML files, which networkx, Gephi, igraph and yEd read, or a networkx.Graph.
+"""The contacts of a frame as a graph: GraphML files for networkx, Gephi, igraph and yEd, or a networkx.Graph.
 
-Nodes are grains, by their ids, and walls, by their names; edges are contacts with their forces. Numbers that are not
-known are left out.
+Nodes are grains, named by their ids, and walls; edges are contacts with their forces. Unknown numbers are left out.
 """
 
 from __future__ import annotations
@@ -13,11 +12,10 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from solver.bodies.quantity import quantities
-
-from ..atomic import write_atomically
-from ..errors import InputError
+from ..process.atomic import write_atomically
+from ..process.errors import InputError
 from ..results.results import Results
+from ..solver.quantity import quantities
 
 HEAD = (
     '<?xml version="1.0" encoding="UTF-8"?>\n<graphml xmlns="http://graphml.graphdrawing.org/xmlns">\n'
@@ -30,9 +28,22 @@ Row = Mapping[str, bool | int | float | str]
 
 
 def make_graph(results: Results, frame: int) -> Any:
-    """The contacts of one frame as a networkx.Graph; units of its attributes are in graph["units"].
+    """Build the contact graph of one frame.
 
-    Raises InputError where networkx is not installed.
+    Parameters
+    ----------
+    results : Results
+    frame : int
+
+    Returns
+    -------
+    networkx.Graph
+        The units of its attributes are in graph["units"].
+
+    Raises
+    ------
+    InputError
+        If networkx is not installed.
     """
     try:
         import networkx  # pyright: ignore[reportMissingImports]
@@ -46,7 +57,7 @@ def make_graph(results: Results, frame: int) -> Any:
 
 
 def write_graphs(results: Results, folder: Path) -> list[Path]:
-    """Write a GraphML file for every frame; returns the files."""
+    """Write a GraphML file for every frame; return the files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for frame in range(len(results.frames)):
@@ -57,7 +68,7 @@ def write_graphs(results: Results, folder: Path) -> list[Path]:
 
 
 def nodes(results: Results, frame: int) -> Iterator[tuple[str, Row]]:
-    """Names of grains and walls with what is known of them in a frame; a grain that is lost has no place."""
+    """Yield names of grains and walls with their attributes in a frame; a lost grain has no position."""
     tracks, walls = results.tracks, results.walls
     for k, name in enumerate(tracks.id.tolist()):
         x, y = tracks.position[frame, k].tolist()
@@ -68,7 +79,7 @@ def nodes(results: Results, frame: int) -> Iterator[tuple[str, Row]]:
 
 
 def edges(results: Results, frame: int) -> Iterator[tuple[str, str, Row]]:
-    """Contacts of a frame: both bodies, and everything that is known of the contact."""
+    """Yield the contacts of a frame: names of both bodies and attributes."""
     forces = results.frames[frame]
     names = [*map(str, results.tracks.id.tolist()), *results.walls.name]
     columns = _contact_columns(results, frame)
@@ -77,20 +88,20 @@ def edges(results: Results, frame: int) -> Iterator[tuple[str, str, Row]]:
 
 
 def units_of_graph(results: Results, frame: int) -> dict[str, str]:
-    """Units of the attributes of nodes and edges."""
+    """Return the units of the attributes of nodes and edges."""
     units = dict(UNITS)
-    for whole in (results.frames[frame].contacts, results.frames[frame]):
-        units |= {each.name: each.quantity.unit for each in quantities(type(whole)) if each.quantity.unit}
+    for record in (results.frames[frame].contacts, results.frames[frame]):
+        units |= {each.name: each.quantity.unit for each in quantities(type(record)) if each.quantity.unit}
     return {name: unit for name, unit in units.items() if name in UNITS or name in _contact_columns(results, frame)}
 
 
 def _contact_columns(results: Results, frame: int) -> dict[str, list[Any]]:
-    """What there is one value of for every contact, enumerations by name."""
+    """Return the attributes with one value per contact, enumerations by name."""
     columns = {}
     forces = results.frames[frame]
-    for whole in (forces.contacts, forces):
-        for each in quantities(type(whole)):
-            values = getattr(whole, each.name)
+    for record in (forces.contacts, forces):
+        for each in quantities(type(record)):
+            values = getattr(record, each.name)
             if each.quantity.dims != "contact" or values is None or each.name in ("i", "j"):
                 continue
             columns[each.name] = values.tolist()
@@ -105,11 +116,11 @@ def _known(row: dict[str, Any]) -> Row:
 
 
 def _graphml(results: Results, frame: int) -> str:
-    """A frame as GraphML: the keys, then nodes and edges with their values."""
-    there = [("node", name, data) for name, data in nodes(results, frame)]
-    between = list(edges(results, frame))
+    """Write a frame as GraphML: keys, then nodes and edges with their values."""
+    node_rows = [("node", name, data) for name, data in nodes(results, frame)]
+    edge_rows = list(edges(results, frame))
     kinds: dict[tuple[str, str], str] = {}
-    for of, data in [("node", data) for _, _, data in there] + [("edge", data) for _, _, data in between]:
+    for of, data in [("node", data) for _, _, data in node_rows] + [("edge", data) for _, _, data in edge_rows]:
         kinds |= {(of, key): KINDS[type(value)] for key, value in data.items()}
     units = units_of_graph(results, frame)
     keys = [
@@ -117,9 +128,9 @@ def _graphml(results: Results, frame: int) -> str:
         + (f"<desc>{escape(units[name])}</desc>" if name in units else "") + "</key>"
         for (of, name), kind in kinds.items()
     ]  # fmt: skip
-    rows = [f"<node id={quoteattr(name)}>{_data('node', data)}</node>" for _, name, data in there]
+    rows = [f"<node id={quoteattr(name)}>{_data('node', data)}</node>" for _, name, data in node_rows]
     rows += [
-        f"<edge source={quoteattr(i)} target={quoteattr(j)}>{_data('edge', data)}</edge>" for i, j, data in between
+        f"<edge source={quoteattr(i)} target={quoteattr(j)}>{_data('edge', data)}</edge>" for i, j, data in edge_rows
     ]
     return "\n".join([HEAD, *keys, '<graph edgedefault="undirected">', *rows, "</graph>", "</graphml>", ""])
 

@@ -1,4 +1,4 @@
-"""What is in a folder of tables: a dictionary of columns for people, and a Frictionless data package for repositories.
+"""Description of a folder of tables: a dictionary of columns, and a Frictionless data package for repositories.
 
 Format: Data Package and Table Schema, version 1 (specs.frictionlessdata.io). Tables carry unit and meaning of their
 columns as metadata.
@@ -19,16 +19,30 @@ from typing import Any
 import pyarrow as pa
 
 from .. import __version__
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 
 DICTIONARY, PACKAGE = "columns.csv", "datapackage.json"
 SOURCE = "Richefeu, Combe, Maurin: An Attempt in Assessing Contact Forces From a Kinematic Field, Powders & Grains 2013"
 
 
 def write_description(folder: Path, tables: Mapping[str, pa.Table], *, name: str, configuration: str) -> list[Path]:
-    """Write columns.csv and datapackage.json beside tables that are in the folder, by their file names.
+    """Write columns.csv and datapackage.json beside tables.
 
-    name: of the experiment; configuration: how it was solved, TOML.
+    Parameters
+    ----------
+    folder : Path
+        Folder of the tables.
+    tables : mapping of str to pyarrow.Table
+        By file name.
+    name : str
+        Of the experiment.
+    configuration : str
+        Settings of the solution, TOML.
+
+    Returns
+    -------
+    list of Path
+        The two files.
     """
     package = _package(folder, tables, name, configuration)
     write_atomically(folder / DICTIONARY, _dictionary(tables).encode())
@@ -41,7 +55,7 @@ def _dictionary(tables: Mapping[str, pa.Table]) -> str:
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("table", "column", "type", "unit", "meaning"))
     for file, table in tables.items():
-        rows.writerows((file, each.name, _kind(each.type), _told(each, "unit"), _told(each, "meaning"))
+        rows.writerows((file, each.name, _kind(each.type), _metadata(each, "unit"), _metadata(each, "meaning"))
                        for each in table.schema)  # fmt: skip
     return text.getvalue()
 
@@ -51,8 +65,8 @@ def _package(folder: Path, tables: Mapping[str, pa.Table], name: str, configurat
         "profile": "data-package",
         "name": _slug(name),
         "title": f"Contact forces inferred from photographs: {name}",
-        "description": "SI units; y points up. Forces are those that i exerts on j, compression positive. What is not "
-        "known is empty. Columns fn_sd and ft_sd are standard deviations; see status and trust of the frames.",
+        "description": "SI units; y points up. Forces are those that i exerts on j, compression positive. Unknown "
+        "values are empty. Columns fn_sd and ft_sd are standard deviations; see status and trust of the frames.",
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "sources": [{"title": SOURCE}],
         "rodsight": {"version": __version__, "configuration": configuration},
@@ -77,12 +91,12 @@ def _resource(file: Path, table: pa.Table) -> dict[str, Any]:
 
 
 def _field(field: pa.Field) -> dict[str, str]:
-    told = {"description": _told(field, "meaning"), "unit": _told(field, "unit")}
-    return {"name": field.name, "type": _kind(field.type)} | {key: text for key, text in told.items() if text}
+    texts = {"description": _metadata(field, "meaning"), "unit": _metadata(field, "unit")}
+    return {"name": field.name, "type": _kind(field.type)} | {key: text for key, text in texts.items() if text}
 
 
 def _kind(kind: pa.DataType) -> str:
-    """The type, as table schemas call it."""
+    """Return the type in the words of table schemas."""
     if pa.types.is_boolean(kind):
         return "boolean"
     if pa.types.is_integer(kind):
@@ -90,7 +104,7 @@ def _kind(kind: pa.DataType) -> str:
     return "number" if pa.types.is_floating(kind) else "string"
 
 
-def _told(field: pa.Field, key: str) -> str:
+def _metadata(field: pa.Field, key: str) -> str:
     return ((field.metadata or {}).get(key.encode()) or b"").decode()
 
 

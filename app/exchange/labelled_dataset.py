@@ -1,4 +1,4 @@
-"""Results as xarray holds them: a tree of datasets with named dimensions, labels and units, as results.h5 opens."""
+"""Results as an xarray.DataTree with named dimensions, labels and units."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..results.schema import DIMENSIONS, SCHEMA, SCHEMA_VERSION, Entry, entries
 
 
 def make_dataset(results: Results) -> xarray.DataTree:
-    """Everything that results.h5 holds of these results, under the same paths, in SI units (attribute `units`).
+    """Return the contents of results.h5 under the same paths, in SI units (attribute `units`).
 
-    Enumerations are whole numbers with `flag_values` and `flag_meanings`; what is not known is NaN or not there.
-    Rows of contacts carry the frame that they belong to, as the coordinate `frame_of_contact`.
+    Enumerations are integers with `flag_values` and `flag_meanings`; unknown values are NaN or absent. Rows of contacts
+    have their frame as the coordinate `frame_of_contact`.
     """
     columns = columns_of_results(results)
     present = [each for each in entries() if each.path in columns]
@@ -38,17 +38,17 @@ def make_dataset(results: Results) -> xarray.DataTree:
 
 def _attributes(entry: Entry) -> dict[str, Any]:
     quantity = entry.quantity
-    told: dict[str, Any] = {"long_name": quantity.meaning}
+    found: dict[str, Any] = {"long_name": quantity.meaning}
     if quantity.unit:
-        told["units"] = quantity.unit
+        found["units"] = quantity.unit
     if quantity.names is not None:
-        told["flag_values"] = np.array([member.value for member in quantity.names], np.uint8)
-        told["flag_meanings"] = " ".join(member.name.lower() for member in quantity.names)
-    return told
+        found["flag_values"] = np.array([member.value for member in quantity.names], np.uint8)
+        found["flag_meanings"] = " ".join(member.name.lower() for member in quantity.names)
+    return found
 
 
 def _labels(sizes: dict[str, int], columns: dict[str, np.ndarray]) -> dict[str, xarray.Variable]:
-    """Labels of the dimensions that have some."""
+    """Return the labels of labelled dimensions."""
     found: dict[str, xarray.Variable] = {}
     for name, size in sizes.items():
         dimension = DIMENSIONS[name]

@@ -1,8 +1,8 @@
 """Results for OVITO: a multi-block VTK file (.vtm) per frame, grains as particles and contacts as bonds between them.
 
-OVITO wants the two particles of every bond, id1 and id2, among the particles: where a grain touches a wall there is a
-particle of next to no size, of `wall_contact` 1. The lines of contacts lie in front of the spheres that stand for rods,
-higher by the largest radius. Lengths in metres, forces in newtons.
+OVITO requires the two particles id1 and id2 of every bond: a contact with a wall gets a very small particle with
+`wall_contact` 1. The lines of contacts lie in front of the spheres of the rods, higher by the largest radius. Lengths
+in metres, forces in newtons.
 
 Format: the reader of contact networks in OVITO's user manual, "ParaView VTM".
 """
@@ -13,19 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.contacts.contacts import Contacts
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.stress import contact_force_vectors
-
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 from ..results.results import Results
+from ..solver.contacts.contacts import Contacts
+from ..solver.frame_forces import FrameForces
+from ..solver.statistics.stress import contact_force_vectors
 from .vtk_polydata import blocks, columns, polydata, spatial
 
-POINT = 1e-3  # of the mean radius: size of a point on a wall
+POINT_SIZE = 1e-3  # [mean radius], of a particle on a wall
 
 
 def write_ovito(results: Results, folder: Path) -> list[Path]:
-    """Write frame_NNNN.vtm and the files that it shows, for every frame; returns the .vtm files."""
+    """Write frame_NNNN.vtm and its parts for every frame; return the .vtm files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for frame in range(len(results.frames)):
@@ -38,12 +37,12 @@ def write_ovito(results: Results, folder: Path) -> list[Path]:
 
 
 def _particles(results: Results, frame: int) -> str:
-    """Grains that have a place, and the points on walls."""
+    """Write the grains that have a position, and the points on walls."""
     tracks, forces = results.tracks, results.frames[frame]
     here = _shown(results, frame)
     points = forces.contacts.point[forces.contacts.with_wall]
     known = columns(forces, "grain", here)
-    size = np.full(len(points), POINT * tracks.radius.mean())
+    size = np.full(len(points), POINT_SIZE * tracks.radius.mean())
     data = {
         "id": np.concatenate([tracks.id[here], _point_ids(results, forces.contacts)]),
         "radius": np.concatenate([tracks.radius[here], size]),
@@ -55,7 +54,7 @@ def _particles(results: Results, frame: int) -> str:
 
 
 def _contacts(results: Results, frame: int) -> str:
-    """Lines between particles, with everything that is known of the contacts."""
+    """Write lines between particles, with the attributes of the contacts."""
     forces, tracks = results.frames[frame], results.tracks
     rows = _between_shown(results, frame)
     contacts = forces.contacts.select(rows)
@@ -80,13 +79,13 @@ def _shown(results: Results, frame: int) -> np.ndarray:
 
 
 def _between_shown(results: Results, frame: int) -> np.ndarray:
-    """Contacts whose grains have a place (c,)."""
+    """Return a mask (c,) of contacts whose grains have a position."""
     forces: FrameForces = results.frames[frame]
     present = np.append(results.tracks.present[frame], np.ones(results.walls.count, np.bool_))
     return present[forces.contacts.i] & present[forces.contacts.j]
 
 
 def _point_ids(results: Results, contacts: Contacts) -> np.ndarray:
-    """Ids of the points on walls, which no grain has."""
+    """Return ids for the points on walls, above those of grains."""
     first = int(results.tracks.id.max()) + 1
     return first + np.arange(int(contacts.with_wall.sum()))

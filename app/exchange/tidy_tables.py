@@ -14,36 +14,37 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from ..atomic import replacing
+from ..process.atomic import replacing
 from ..results.hdf5.writer import columns_of_results
 from ..results.results import Results
 from ..results.schema import DIMENSIONS, entries
 from .data_package import write_description
+from .grain_quantities import GRAIN_COLUMNS, measure_grains
 
 Kind = Literal["csv", "parquet"]
 TableName = Literal["contacts", "grains", "frames", "walls"]
 
-# Units and meanings of the columns that every table begins with.
+# Units and meanings of the first columns of the tables.
 IDENTITY = {
     "frame": ("", "frame, from 0"),
     "time": ("s", "time of the photograph"),
     "id": ("", "name of the grain"),
     "i": ("", "name of the first grain"),
-    "j": ("", "name of the second grain, or of the wall"),
-    "with_wall": ("", "whether j is a wall"),
-    "wall": ("", "name of the wall"),
-    "x": ("m", "place: of a contact its point, of a grain its centre; to the right"),
-    "y": ("m", "place: of a contact its point, of a grain its centre; upwards"),
+    "j": ("", "name of the second grain; -1 at a wall"),
+    "wall": ("", "name of the wall; empty between grains"),
+    "x": ("m", "position of the contact point or the grain centre, to the right"),
+    "y": ("m", "position of the contact point or the grain centre, upward"),
     "nx": ("", "normal from i to j"),
     "ny": ("", "normal from i to j"),
     "theta": ("rad", "rotation since frame 0, counter-clockwise"),
     "radius": ("m", "radius"),
     **{name: ("m", f"vector {name[0]} of the periodic cell") for name in ("ax", "ay", "bx", "by")},
     **{f"{axis}{end}": ("m", f"end {end} of the wall; of a circle, of a diameter") for end in "12" for axis in "xy"},
-    "pressure": ("Pa", "pressure that loads the wall"),
 }
-SAID = ("time", "i", "j", "point", "normal", "position", "rotation")  # among these, or by other names
-SPREAD = ("xy", "axis", "wall", "anisotropy", "member", "component", "error_part")  # dimensions that become columns
+OF_WALLS = {"wall": ("", "name of the wall"), "pressure": ("Pa", "pressure on the wall")}
+AT_WALL = -1  # j of a contact with a wall
+IDENTIFIED = ("time", "i", "j", "point", "normal", "position", "rotation")  # quantities in the columns of IDENTITY
+SPLIT_DIMENSIONS = ("xy", "axis", "wall", "anisotropy", "member", "component", "error_part")  # these become columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +55,12 @@ class Column:
 
 
 def make_tables(results: Results) -> dict[TableName, pa.Table]:
-    """The tables by name. What is not known is null; columns carry unit and meaning as metadata (Parquet keeps it)."""
+    """Return the tables by name. Unknown values are null; columns have unit and meaning as metadata, for Parquet."""
     return {name: make_table(results, name) for name in get_args(TableName)}
 
 
 def make_table(results: Results, name: TableName) -> pa.Table:
-    """One of the tables."""
+    """Return one of the tables."""
     identity, rows = {
         "contacts": (_contacts, ("contact",)),
         "grains": (_grains, ("frame", "grain")),
@@ -70,7 +71,7 @@ def make_table(results: Results, name: TableName) -> pa.Table:
 
 
 def write_tables(results: Results, folder: Path, kind: Kind = "csv") -> list[Path]:
-    """Write contacts, grains, frames and walls to a folder, and what is in them; returns the files.
+    """Write contacts, grains, frames and walls with a description to a folder; return the files.
 
     columns.csv is the dictionary of all columns, datapackage.json the same as a Frictionless data package.
     """
@@ -91,14 +92,16 @@ def write_tables(results: Results, folder: Path, kind: Kind = "csv") -> list[Pat
 def _contacts(results: Results) -> dict[str, Column]:
     frames, time = results.frames, results.tracks.time
     counts = [forces.contacts.count for forces in frames]
-    names = [*map(str, results.tracks.id.tolist()), *results.walls.name]
+    # Grains come first among the bodies; unseen ones, which are inferred, have ids, too.
+    ids = np.append(results.tracks.id, np.full(len(results.walls.name), AT_WALL))
+    names = [*[""] * len(results.tracks.id), *results.walls.name]
     point, normal = (np.concatenate([getattr(f.contacts, name) for f in frames]) for name in ("point", "normal"))
     return _identity(
         frame=np.repeat(np.arange(len(frames)), counts),
         time=np.repeat(time, counts),
         i=np.concatenate([results.tracks.id[f.contacts.i] for f in frames]),
-        j=[names[body] for f in frames for body in f.contacts.j.tolist()],
-        with_wall=np.concatenate([f.contacts.with_wall for f in frames]),
+        j=np.concatenate([ids[f.contacts.j] for f in frames]),
+        wall=[names[body] for f in frames for body in f.contacts.j.tolist()],
         x=point[:, 0], y=point[:, 1], nx=normal[:, 0], ny=normal[:, 1],
     )  # fmt: skip
 
@@ -114,7 +117,7 @@ def _grains(results: Results) -> dict[str, Column]:
         x=tracks.position[:, :, 0].ravel(),
         y=tracks.position[:, :, 1].ravel(),
         theta=tracks.rotation.ravel(),
-    )
+    ) | {name: Column(values, *GRAIN_COLUMNS[name]) for name, values in measure_grains(results).items()}
 
 
 def _frames(results: Results) -> dict[str, Column]:
@@ -127,13 +130,14 @@ def _walls(results: Results) -> dict[str, Column]:
     walls = results.walls
     f, w = walls.endpoints.shape[:2]
     ends = walls.endpoints.reshape(f * w, 4)
-    return _identity(
+    known = _identity(
         frame=np.repeat(np.arange(f), w),
         time=np.repeat(results.tracks.time, w),
-        wall=list(walls.name) * f,
         x1=ends[:, 0], y1=ends[:, 1], x2=ends[:, 2], y2=ends[:, 3],
-        pressure=np.tile(walls.pressure, f),
     )  # fmt: skip
+    of_walls = {"wall": list(walls.name) * f, "pressure": np.tile(walls.pressure, f)}
+    named = {name: Column(values, *OF_WALLS[name]) for name, values in of_walls.items()}
+    return {"frame": known.pop("frame"), "time": known.pop("time"), "wall": named["wall"], **known, **named}
 
 
 def _identity(**values: object) -> dict[str, Column]:
@@ -141,22 +145,26 @@ def _identity(**values: object) -> dict[str, Column]:
 
 
 def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tuple[str, ...]) -> dict[str, Column]:
-    """Everything in results.h5 that has one value, or a few with names, for each of these rows."""
-    labels = {name: tuple(map(str, DIMENSIONS[name].labels or ())) for name in SPREAD} | {"wall": results.walls.name}
+    """Return all quantities of results.h5 with one value, or several named ones, for each of these rows."""
+    labels = {name: tuple(map(str, DIMENSIONS[name].labels or ())) for name in SPLIT_DIMENSIONS}
+    labels["wall"] = results.walls.name
     columns: dict[str, Column] = {}
-    # What sensors of the walls said has a table of its own; in that of frames it would be taken for what was inferred.
+    # Recorded wall forces belong to the table of walls; in that of frames they would look like inferred ones.
     for each in entries("tracks", *(["walls"] if "wall" in rows else []), "frames", "statistics"):
         rest = each.dims[len(rows) :]
-        if each.name in SAID or each.path not in stored or each.dims != rows + rest or not set(rest) <= set(SPREAD):
+        fits = each.dims == rows + rest and set(rest) <= set(SPLIT_DIMENSIONS)
+        if each.name in IDENTIFIED or each.path not in stored or not fits:
             continue
-        whole = stored[each.path]
-        values = whole.reshape(int(np.prod(whole.shape[: len(rows)])), int(np.prod(whole.shape[len(rows) :])))
+        stored_values = stored[each.path]
+        values = stored_values.reshape(
+            int(np.prod(stored_values.shape[: len(rows)])), int(np.prod(stored_values.shape[len(rows) :]))
+        )
         for k, named in enumerate(itertools.product(*(labels[name] for name in rest))):
-            said = values[:, k]
+            column = values[:, k]
             if each.quantity.names is not None:
-                said = _names(each.quantity.names, said)
+                column = _names(each.quantity.names, column)
             parts = ("".join(named),) if rest == ("xy", "axis") else named  # stress_xy, but wall_force_top_x
-            columns["_".join((each.name, *parts))] = Column(said, each.quantity.unit, each.quantity.meaning)
+            columns["_".join((each.name, *parts))] = Column(column, each.quantity.unit, each.quantity.meaning)
     return columns
 
 
@@ -170,8 +178,8 @@ def _table(columns: Mapping[str, Column]) -> pa.Table:
 
 
 def _metadata(column: Column) -> dict[str, str]:
-    told = {"unit": column.unit, "meaning": column.meaning}
-    return {key: text for key, text in told.items() if text}
+    texts = {"unit": column.unit, "meaning": column.meaning}
+    return {key: text for key, text in texts.items() if text}
 
 
 def _array(values: object) -> pa.Array:

@@ -1,7 +1,7 @@
 """Results for ParaView: VTK PolyData files (.vtp, XML, ASCII) of grains, contacts and walls for every frame.
 
-packing.pvd is all of them as one animation with its times; grains.pvd and contacts.pvd are parts of it. The single
-numbers of a frame are field data of grains and contacts.
+packing.pvd is the animation of all of them with its times; grains.pvd and contacts.pvd are parts of it. The scalars of
+a frame are field data of grains and contacts.
 
 Format: The VTK User's Guide, "VTK File Formats". Lengths in metres, forces in newtons, stresses in pascals; z = 0, and
 the largest radius for contacts.
@@ -17,26 +17,25 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import quantities
-from solver.bodies.wall_shapes import STRAIGHT
-from solver.contacts.contacts import Contacts
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.stress import contact_force_vectors, grain_stresses
-
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 from ..results.results import Results
+from ..solver.bodies.grains import Array
+from ..solver.bodies.wall_shapes import STRAIGHT
+from ..solver.contacts.contacts import Contacts
+from ..solver.frame_forces import FrameForces
+from ..solver.quantity import quantities
+from ..solver.statistics.stress import contact_force_vectors, grain_stresses
 
-UNKNOWN = -1.0  # a probability that was not computed
+UNKNOWN = -1.0  # probability that was not computed
 
-CORNERS = 96  # of the polygon that is drawn for a circle
-TOPOLOGY = ("connectivity", "offsets")  # lists, whatever their shape
+CORNERS = 96  # of the polygon of a circle
+TOPOLOGY = ("connectivity", "offsets")  # written without number of components
 
 _TYPES = {"f": "Float64", "i": "Int64", "u": "Int64"}
 
 
 def write_polydata(results: Results, folder: Path) -> list[Path]:
-    """Write packing.pvd, grains.pvd, contacts.pvd and the files that they name; returns the collections."""
+    """Write packing.pvd, grains.pvd, contacts.pvd and their parts; return the collections."""
     folder.mkdir(parents=True, exist_ok=True)
     names: dict[str, list[str]] = {"packing": [], "grains": [], "contacts": []}
     for frame in range(len(results.frames)):
@@ -77,9 +76,9 @@ def _grains(results: Results, frame: int) -> str:
 
 
 def _contacts(results: Results, frame: int) -> str:
-    """Lines from centre to centre, or from centre to contact point on a wall, in front of the spheres of rods.
+    """Write lines from centre to centre, or from centre to wall contact point, in front of the spheres of rods.
 
-    Forces are those of a line and of its ends, too: a tube is as thick as numbers of points say.
+    Forces are also point data, since ParaView scales tubes by point data.
     """
     forces, position = results.frames[frame], results.tracks.position[frame]
     contacts = forces.contacts
@@ -105,13 +104,13 @@ def _contacts(results: Results, frame: int) -> str:
 
 
 def _walls(results: Results, frame: int) -> str:
-    """Lines from end to end, with what the packing exerts on them; circles as polygons."""
+    """Write walls as lines, circles as polygons, with the force that the packing exerts on them."""
     walls, ends = results.walls, results.walls.endpoints[frame]
-    turn = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
     lines = [ends[w] for w in range(walls.count)]
     for w in np.flatnonzero(walls.sides != STRAIGHT):
         centre, radius = ends[w].mean(axis=0), 0.5 * np.linalg.norm(ends[w, 1] - ends[w, 0])
-        lines[w] = centre + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        lines[w] = centre + radius * np.column_stack([np.cos(angle), np.sin(angle)])
     points = np.concatenate(lines)
     starts = np.cumsum([0, *map(len, lines)])
     pairs = [np.column_stack([np.arange(a, b - 1), np.arange(a + 1, b)]) for a, b in pairwise(starts)]
@@ -122,7 +121,7 @@ def _walls(results: Results, frame: int) -> str:
 
 
 def _stresses(results: Results, frame: int) -> Array:
-    """Stress of every grain (n, 9) [Pa], as a tensor in space; zero where nothing bears."""
+    """Return the stress of every grain (n, 9) [Pa] as a tensor in space; zero without forces."""
     forces, length = results.frames[frame], tomllib.loads(results.configuration)["material"]["length"]
     found = np.nan_to_num(grain_stresses(forces.contacts, forces.fn, forces.ft, results.grains.radius, length))
     spatial = np.zeros((len(found), 3, 3))
@@ -131,7 +130,7 @@ def _stresses(results: Results, frame: int) -> Array:
 
 
 def columns(forces: FrameForces, dimension: str, rows: np.ndarray | slice) -> dict[str, np.ndarray]:
-    """What the frame has a number of for every contact, or for every grain, on some rows of these."""
+    """Return the quantities of a frame with one number per contact or grain, on some of their rows."""
     found = {}
     for each in quantities(type(forces)):
         if each.quantity.dims != dimension or getattr(forces, each.name) is None:
@@ -139,17 +138,17 @@ def columns(forces: FrameForces, dimension: str, rows: np.ndarray | slice) -> di
         values = getattr(forces, each.name)[rows]
         if each.name == "probability":
             values = np.nan_to_num(values, nan=UNKNOWN)
-        if not np.isnan(values).any():  # readers of ASCII files stumble over NaN
+        if not np.isnan(values).any():  # readers of ASCII files reject NaN
             found[each.name] = values
     return found
 
 
 def _numbers(results: Results, frame: int) -> dict[str, np.ndarray]:
-    """The single numbers of a frame, those that are known."""
+    """Return the known scalars of a frame."""
     found = {}
-    for whole in (results.frames[frame], results.statistics[frame]):
-        for each in quantities(type(whole)):
-            value = np.asarray(getattr(whole, each.name))
+    for record in (results.frames[frame], results.statistics[frame]):
+        for each in quantities(type(record)):
+            value = np.asarray(getattr(record, each.name))
             if not each.quantity.dims and each.dtype.kind != "O" and np.isfinite(value):
                 found[each.name] = value.reshape(1)
     return found
@@ -169,12 +168,23 @@ def polydata(
     field_data: Mapping[str, np.ndarray] | None = None,
     height: float = 0.0,
 ) -> str:
-    """One piece: points (p, 2) [m], cells (k, s) of point numbers as Verts or Lines, data by name.
+    """Write one piece of PolyData.
 
-    field_data: single numbers of the whole; height [m]: z of the points.
+    Parameters
+    ----------
+    points : ndarray
+        (p, 2) [m].
+    kind : {'Verts', 'Lines'}
+    cells : ndarray of int
+        (k, s) point numbers.
+    point_data, cell_data : mapping of str to ndarray, optional
+    field_data : mapping of str to ndarray, optional
+        Scalars of the whole piece.
+    height : float
+        z of the points [m].
     """
     offsets = (np.arange(len(cells)) + 1) * cells.shape[1]
-    places = np.add(spatial(points), [0.0, 0.0, height])
+    coordinates = np.add(spatial(points), [0.0, 0.0, height])
     count = {name: len(cells) if name == kind else 0 for name in ("Verts", "Lines")}
     parts = [
         '<?xml version="1.0"?>',
@@ -183,7 +193,7 @@ def polydata(
         *_data("FieldData", field_data),
         f'<Piece NumberOfPoints="{len(points)}" NumberOfVerts="{count["Verts"]}" NumberOfLines="{count["Lines"]}" '
         'NumberOfStrips="0" NumberOfPolys="0">',
-        "<Points>", _array("points", places), "</Points>",
+        "<Points>", _array("points", coordinates), "</Points>",
         f"<{kind}>", _array("connectivity", cells), _array("offsets", offsets), f"</{kind}>",
         *_data("PointData", point_data), *_data("CellData", cell_data),
         "</Piece>", "</PolyData>", "</VTKFile>", "",
@@ -196,22 +206,22 @@ def _data(tag: str, data: Mapping[str, np.ndarray] | None) -> list[str]:
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """All digits of floats: they read back to the same number."""
+    """Write an array with all digits of floats."""
     values = np.asarray(values)
     kind = _TYPES[values.dtype.kind]
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 and name not in TOPOLOGY else ""
-    count = f' NumberOfTuples="{len(values)}"' if values.ndim == 1 else ""  # nobody else says it of field data
+    count = f' NumberOfTuples="{len(values)}"' if values.ndim == 1 else ""  # required for field data
     text = " ".join(map(repr, values.astype(float if kind == "Float64" else int).ravel().tolist()))
     return f'<DataArray type="{kind}" Name={quoteattr(name)}{width}{count} format="ascii">{text}</DataArray>'
 
 
 def spatial(vectors: Array) -> Array:
-    """Vectors in the plane (k, 2) as vectors in space (k, 3)."""
+    """Extend vectors in the plane (k, 2) to space (k, 3)."""
     return np.column_stack([vectors, np.zeros(len(vectors))])
 
 
 def blocks(parts: Iterable[str], frame: int) -> str:
-    """A file that shows several others, PART_FRAME.vtp, as one."""
+    """Write a multi-block file of several parts, PART_FRAME.vtp."""
     rows = [f'<DataSet index="{k}" name="{kind}" file="{kind}_{frame:04d}.vtp"/>' for k, kind in enumerate(parts)]
     head = '<?xml version="1.0"?>\n<VTKFile type="vtkMultiBlockDataSet" version="1.0" byte_order="LittleEndian">'
     return "\n".join([head, "<vtkMultiBlockDataSet>", *rows, "</vtkMultiBlockDataSet>", "</VTKFile>", ""])

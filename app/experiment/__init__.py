@@ -1,1 +1,1 @@
-"""An experiment on disk, read and checked. Touches tracks and the solver, no stage."""
+"""Read and check an experiment on disk. Depends on tracks and the solver, on no processing stage."""

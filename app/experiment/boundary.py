@@ -1,4 +1,4 @@
-"""What bounds the packing where it is no wall: grains that are the boundary, or the edges of a periodic cell."""
+"""Boundaries other than walls: grains with imposed motion, or the edges of a periodic cell."""
 
 from __future__ import annotations
 
@@ -9,26 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.bodies.cell import Cell, unwrap
-from solver.bodies.outer import FreeSurface, find_outer
-from solver.bodies.walls import Walls
-
-from ..errors import InputError
+from ..process.errors import InputError
+from ..solver.bodies.cell import Cell, unwrap
+from ..solver.bodies.outer_grains import FreeSurface, find_outer_grains
+from ..solver.bodies.walls import Walls
 from ..tracks import Tracks, WallTracks
 from .config.input_sections import OUTER
 from .experiment import Experiment, rows_of
 from .reading.tables import Table, check_unique
 
 SIDES = ("at the top", "at the bottom", "at the right", "at the left")
-FACING_UP = 0.1  # cosine to gravity's opposite from which on a surface counts as one that weight keeps
-FEWEST_BARE = 4  # places between grains: fewer are a missing rod beside a wall
-WIDEST = 2.0  # largest diameters: a cell must be higher, so that a pair touches in one of its images at most
+FACING_UP = 0.1  # a surface with a larger cosine to the direction opposite to gravity may be free
+FEWEST_BARE = 4  # unbounded gaps between outer grains: fewer are a missing rod beside a wall
+WIDEST = 2.0  # largest diameters: a cell must be higher, so that a pair touches in at most one of its images
 
 
-def bound_tracks(experiment: Experiment, tracks: Tracks, walls: WallTracks | None) -> Tracks:
-    """The tracks with their boundary: its grains marked, or positions followed across the edges of the cell.
+def apply_boundary(experiment: Experiment, tracks: Tracks, walls: WallTracks | None) -> Tracks:
+    """Return tracks with boundary grains marked, or with positions unwrapped across the edges of the cell.
 
-    Raises InputError for grains that are not there, and for a cell that is too small.
+    Raises
+    ------
+    InputError
+        A boundary grain does not exist, or the cell is too small.
     """
     section = experiment.config.boundary
     if section is None:
@@ -43,7 +45,7 @@ def bound_tracks(experiment: Experiment, tracks: Tracks, walls: WallTracks | Non
 
 
 def check_cell(file: Path | str, tracks: Tracks, walls: WallTracks) -> None:
-    """A pair must not touch in two of its images. Raises InputError naming the frame."""
+    """Raise InputError with the frame in which a pair could touch in two of its images."""
     assert walls.cell is not None
     needed = WIDEST * 2.0 * float(tracks.radius.max())
     for k, vectors in enumerate(walls.cell):
@@ -56,9 +58,9 @@ def check_cell(file: Path | str, tracks: Tracks, walls: WallTracks) -> None:
 
 
 def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
-    """A sentence for every side, and for holes, where rods of frame 0 end at nothing that would hold them.
+    """Describe every side and hole of the packing of frame 0 without a wall or boundary, in one sentence each.
 
-    Where gravity acts, surfaces that face up are free by right.
+    Where gravity acts, surfaces that face up may be free and are not reported.
     """
     if walls.cell is not None:
         return []
@@ -70,28 +72,28 @@ def free_surfaces(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> 
     if tracks.boundary is not None:
         bare &= ~_near_boundary(tracks, surface)
     side = np.argmax(surface.outward @ np.array([[0.0, 0.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0]]), axis=1)
-    where = np.where(surface.inner, len(SIDES), side)
+    place = np.where(surface.inner, len(SIDES), side)
     sentences = []
     for k, name in enumerate((*SIDES, "around a hole inside")):
-        here = bare & (where == k)
+        here = bare & (place == k)
         if np.count_nonzero(here) < FEWEST_BARE:
             continue
         x, y = surface.place[here].mean(axis=0)
         sentences.append(
             f"The packing has a free surface {name}, near x = {x:.3g} m, y = {y:.3g} m, with neither wall nor boundary "
-            "there: if something holds these rods, tell it by [walls], or have them move as they were seen by "
+            "there: if something holds these rods, give it by [walls], or impose their measured motion by "
             '[boundary] grains = "outer"'
         )
     return sentences
 
 
 def _near_boundary(tracks: Tracks, surface: FreeSurface) -> NDArray[np.bool_]:
-    """At which places of a surface (s,) a boundary grain is."""
+    """Return which points of a surface (s,) have a boundary grain nearby."""
     assert tracks.boundary is not None
-    there = tracks.boundary & tracks.present[0]
-    if not there.any() or not len(surface.place):
+    present = tracks.boundary & tracks.present[0]
+    if not present.any() or not len(surface.place):
         return np.zeros(len(surface.place), np.bool_)
-    distance, _ = KDTree(tracks.position[0, there]).query(surface.place)
+    distance, _ = KDTree(tracks.position[0, present]).query(surface.place)
     return np.asarray(distance) < WIDEST * float(tracks.radius.max())
 
 
@@ -99,11 +101,11 @@ def _surface(tracks: Tracks, walls: WallTracks | None) -> FreeSurface:
     bounds = Walls.at_rest(np.empty((0, 2, 2)))
     if walls is not None and not np.isnan(walls.endpoints[0]).any():
         bounds = Walls.at_rest(walls.endpoints[0], side=walls.side)
-    return find_outer(tracks.radius, tracks.position[0], tracks.present[0], bounds)
+    return find_outer_grains(tracks.radius, tracks.position[0], tracks.present[0], bounds)
 
 
 def find_boundary(file: Path | str, tracks: Tracks, walls: WallTracks | None) -> NDArray[np.bool_]:
-    """The outermost grains (n,) of the first frame. Raises InputError if that is none or all of them."""
+    """Return the outermost grains (n,) of the first frame. Raises InputError where none or all grains are outermost."""
     outer = _surface(tracks, walls).outer
     if not outer.any() or outer[tracks.present[0]].all():
         found = "every grain" if outer.any() else "no grain: walls enclose the packing"
@@ -120,11 +122,11 @@ def _read_boundary(experiment: Experiment, tracks: Tracks) -> NDArray[np.bool_]:
 
 
 def boundary_of(table: Table, tracks: Tracks) -> NDArray[np.bool_]:
-    """Which grains (n,) a table id names."""
+    """Return which grains (n,) a table id lists. Raises InputError where it lists unknown grains or all of them."""
     ids = table.integers("id")
     check_unique(table, "id", ids)
     mask = np.zeros(tracks.grain_count, np.bool_)
     mask[rows_of(table, "id", ids, tracks.id)] = True
     if mask.all():
-        raise InputError(table.file, "", "names every grain: none is left that forces would be sought on")
+        raise InputError(table.file, "", "names every grain: no grain remains whose forces could be computed")
     return mask

@@ -1,7 +1,8 @@
-"""An experiment on disk: its configuration, and its tables as arrays, checked."""
+"""An experiment on disk: its configuration, and its checked tables as arrays."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,26 +10,25 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.cell import follow_cell
-from solver.bodies.grains import Array
-
-from ..errors import InputError
+from ..process.errors import InputError
+from ..solver.bodies.cell import unwrap_cell
+from ..solver.bodies.grains import Array
 from ..tracks import Tracks, TrackStatus
 from .config.experiment_file import ExperimentFile, load_config
-from .photographs import Channel, Look, Photographs
+from .photographs import Channel, ImageSelection, Photographs
 from .reading.input_files import InputFiles
 from .reading.tables import Table, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
-PLACE_COLUMNS = ("frame", "id", "x", "y")  # of a pose whose rotation may be unknown
+POSITION_COLUMNS = ("frame", "id", "x", "y")  # of a pose without its rotation
 GRAIN_COLUMNS, POSE_COLUMNS = ("id", "radius"), ("frame", "id", "x", "y", "theta")
 TIME_COLUMNS, CELL_COLUMNS = ("frame", "time"), ("frame", "ax", "ay", "bx", "by")
-FLAT = 1e-9  # sine of the angle between the vectors of a cell without area
+FLAT = 1e-9  # sine of the angle between the vectors of a cell, at most, that has no area
 
 
 @dataclass(frozen=True, slots=True)
 class GrainGuess:
-    """Grains named by the user on the first photograph."""
+    """Grains given by the user on the first photograph."""
 
     id: NDArray[np.int64]  # (n,)
     x: Array  # (n,) [px]
@@ -38,6 +38,8 @@ class GrainGuess:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
+    """An experiment file with its configuration and input files."""
+
     file: Path
     config: ExperimentFile
     inputs: InputFiles = field(default_factory=InputFiles, compare=False)
@@ -51,19 +53,19 @@ class Experiment:
         return self.config.name
 
     def photographs(self, channel: Channel | None = None) -> Photographs:
-        """The photographs; channel: another than the experiment's own."""
+        """Return the photographs; channel: used instead of the experiment's own."""
         section = self.config.photographs
         assert section is not None
         files = self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
-        look = Look(channel or section.channel, section.region)
-        return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, look=look)
+        selection = ImageSelection(channel or section.channel, section.region, section.mask)
+        return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, selection=selection)
 
     def table(self, name: str, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
-        """A table of the experiment's folder. Raises InputError naming file, row and value."""
+        """Read a table of the experiment's folder. Raises InputError with file, row and value."""
         return read_table(self.folder / name, columns, self.inputs, optional)
 
     def input_files(self) -> list[Path]:
-        """Every file that the experiment names, photographs included."""
+        """Return all input files of the experiment, photographs included."""
         config = self.config
         names = [config.truth, config.truth_tracks]
         if config.photographs:
@@ -71,7 +73,8 @@ class Experiment:
         if config.tracks:
             names += [config.tracks.positions, config.tracks.grains, config.tracks.times]
         if config.walls:
-            names += [config.walls.file, config.walls.arcs, config.walls.load, config.walls.forces]
+            names += [config.walls.file, config.walls.arcs, config.walls.corners]
+            names += [config.walls.load, config.walls.forces]
         if config.boundary:
             names += [config.boundary.periodic, None if config.boundary.found else config.boundary.grains]
         files = [self.folder / name for name in names if name is not None]
@@ -79,7 +82,7 @@ class Experiment:
 
 
 def load_experiment(path: Path, settings: Sequence[str] = ()) -> Experiment:
-    """Load an experiment from its folder or its experiment.toml, with KEY=VALUE settings laid over."""
+    """Load an experiment from its folder or its experiment.toml, overridden by KEY=VALUE settings."""
     file = path / CONFIG_NAME if path.is_dir() else path
     if not file.exists():
         raise InputError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
@@ -88,30 +91,47 @@ def load_experiment(path: Path, settings: Sequence[str] = ()) -> Experiment:
 
 
 def checksums(experiment: Experiment, *, corrected: bool = True) -> dict[str, str]:
-    """SHA-256 of every input file as it was read, by its path in the experiment; of one elsewhere, by its name.
+    """Return the SHA-256 of every input file as it was read, by its path in the experiment's folder.
 
-    corrected=False: without the table of poses told by hand.
+    Files outside the folder are listed by the names of their folders, which are numbered where two have the same name.
+    The path on this machine stays private. corrected=False leaves out the table of poses entered by hand.
     """
     result, photographs = {}, experiment.config.photographs
     by_hand = None if corrected or photographs is None else photographs.corrections
-    for file in experiment.input_files():
-        if by_hand is not None and file == experiment.folder / by_hand:
-            continue
+    files = [file for file in experiment.input_files() if by_hand is None or file != experiment.folder / by_hand]
+    for file, name in _names_of(files, experiment.folder).items():
         try:
-            result[_relative(file, experiment.folder)] = experiment.inputs.checksum(file)
+            result[name] = experiment.inputs.checksum(file)
         except OSError as error:
             raise InputError(file, "", f"cannot be read ({error.strerror})") from None
     return result
 
 
-def _relative(file: Path, folder: Path) -> str:
-    if file.is_relative_to(folder):
-        return file.relative_to(folder).as_posix()
-    return f"elsewhere/{file.parent.name}/{file.name}"  # where on this machine is nobody's business
+def named_inputs(experiment: Experiment) -> dict[Path, str]:
+    """Return a name of every input file, as `checksums` lists it."""
+    return _names_of(experiment.input_files(), experiment.folder)
+
+
+def _names_of(files: Sequence[Path], folder: Path) -> dict[Path, str]:
+    """Return a name of every file that no other file has: its path in a folder, or below `elsewhere`."""
+    names: dict[Path, str] = {}
+    outside: dict[str, list[Path]] = {}  # folders by name
+    base = Path(os.path.abspath(folder))
+    for file in files:
+        place = Path(os.path.abspath(file))
+        if place.is_relative_to(base):
+            names[file] = place.relative_to(base).as_posix()
+            continue
+        alike = outside.setdefault(place.parent.name, [])
+        if place.parent not in alike:
+            alike.append(place.parent)
+        number = alike.index(place.parent) + 1
+        names[file] = f"elsewhere/{place.parent.name}{f' ({number})' if number > 1 else ''}/{place.name}"
+    return names
 
 
 def read_times(experiment: Experiment, frame_count: int) -> Array:
-    """Time of every frame (f,) [s], ascending."""
+    """Return the time of every frame (f,) [s], ascending."""
     config = experiment.config
     if config.photographs is not None and config.photographs.interval is not None:
         return np.arange(frame_count, dtype=np.float64) * config.photographs.interval
@@ -121,12 +141,12 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
 
 
 def arrange_times(table: Table, frame_count: int) -> Array:
-    """Time of every frame (f,) [s], ascending, from a table frame,time."""
+    """Return the time of every frame (f,) [s], ascending, from a table frame,time."""
     frame, time = table.integers("frame"), table.numbers("time")
     check_unique(table, "frame", frame)
     found = check_frames(table, frame)
     if found != frame_count:
-        raise InputError(table.file, "frame", f"there are times of {found} frames, but {frame_count} frames")
+        raise InputError(table.file, "frame", f"has times of {found} frames, but there are {frame_count} frames")
     order = np.argsort(frame)
     late = np.flatnonzero(np.diff(time[order]) <= 0)
     if len(late):
@@ -135,11 +155,11 @@ def arrange_times(table: Table, frame_count: int) -> Array:
 
 
 def read_tracks(experiment: Experiment) -> Tracks:
-    """Grains tracked by another tool."""
+    """Read grains tracked by another tool."""
     section = experiment.config.tracks
     assert section is not None
     grains = experiment.table(section.grains, GRAIN_COLUMNS)
-    poses = experiment.table(section.positions, PLACE_COLUMNS, optional=("theta",))
+    poses = experiment.table(section.positions, POSITION_COLUMNS, optional=("theta",))
     times = experiment.table(section.times, TIME_COLUMNS)
     tracks = arrange_tracks(grains, poses, times, section.precision)
     if section.radius_offset == "estimate":
@@ -152,9 +172,9 @@ def read_tracks(experiment: Experiment) -> Tracks:
 
 
 def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) -> Tracks:
-    """Tracks of tables id,radius and frame,id,x,y,theta and frame,time; precision [m] of a position.
+    """Return tracks from tables id,radius and frame,id,x,y,theta and frame,time.
 
-    A grain that has no row in a frame is lost there.
+    A grain without a row in a frame is lost there. precision: standard deviation of a position component [m].
     """
     ids, radius = grains.integers("id"), grains.numbers("radius")
     check_unique(grains, "id", ids)
@@ -166,7 +186,7 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
     shape = (frame_count, len(ids))
     position, rotation = np.full((*shape, 2), np.nan), np.full(shape, np.nan)
     position[frame, row] = np.column_stack([poses.numbers("x"), poses.numbers("y")])
-    rotation[frame, row] = poses.numbers_if_told("theta")
+    rotation[frame, row] = poses.optional_numbers("theta")
     present = np.isfinite(position).all(axis=2)
     return Tracks(
         id=ids,
@@ -181,7 +201,7 @@ def arrange_tracks(grains: Table, poses: Table, times: Table, precision: float) 
 
 
 def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
-    """The user's grains on the first photograph, if any."""
+    """Read the grains given on the first photograph, if any."""
     section = experiment.config.photographs
     if section is None or section.grains is None:
         return None
@@ -193,18 +213,18 @@ def read_grain_guess(experiment: Experiment) -> GrainGuess | None:
 
 
 def arrange_cell(table: Table, frame_count: int) -> Array:
-    """Vectors of the cell (f, 2, 2) [m] of a table frame,ax,ay,bx,by, without jumps by whole vectors."""
+    """Return the cell's vectors (f, 2, 2) [m] from a table frame,ax,ay,bx,by, without jumps by whole vectors."""
     frame = table.integers("frame")
     check_unique(table, "frame", frame)
     found = check_frames(table, frame)
     if found != frame_count:
-        raise InputError(table.file, "frame", f"there are cells of {found} frames, but {frame_count} frames")
+        raise InputError(table.file, "frame", f"has cells of {found} frames, but there are {frame_count} frames")
     order = np.argsort(frame)
     vectors = np.column_stack([table.numbers(c) for c in CELL_COLUMNS[1:]]).reshape(-1, 2, 2)
     flat = np.flatnonzero(np.abs(np.linalg.det(vectors)) <= FLAT * np.prod(np.linalg.norm(vectors, axis=2), axis=1))
     if len(flat):
         raise table.error(int(flat[0]), "bx", "makes b parallel to a: the cell has no area")
-    return follow_cell(vectors[order])
+    return unwrap_cell(vectors[order])
 
 
 def _all_positive(table: Table, column: str, values: Array) -> None:
@@ -214,6 +234,7 @@ def _all_positive(table: Table, column: str, values: Array) -> None:
 
 
 def rows_of(table: Table, column: str, of: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the index in `ids` (n,) of every id in `of` (m,). Raises InputError for an unknown id."""
     order = np.argsort(ids)
     place = np.minimum(np.searchsorted(ids[order], of), len(ids) - 1)
     unknown = np.flatnonzero(ids[order[place]] != of)

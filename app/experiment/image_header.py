@@ -1,10 +1,10 @@
-"""How many pixels a photograph claims to have, read from its header before anything is allocated for them."""
+"""Read the size of a photograph from its header, before memory is allocated for its pixels."""
 
 from __future__ import annotations
 
 import struct
 
-# Markers of a JPEG frame, which tells its size: SOF0 … SOF15 without those that mean something else.
+# Markers of a JPEG frame, which holds the size: SOF0 … SOF15 without those of other meaning.
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 STANDALONE = frozenset((0x01, *range(0xD0, 0xD9)))  # markers without a length
 WIDTH, HEIGHT = 256, 257  # tags of a TIFF
@@ -12,7 +12,7 @@ SHORT = 3  # a TIFF's type of 16 bits
 
 
 def claimed_size(content: bytes) -> tuple[int, int] | None:
-    """Width and height [px] that the header of a PNG, JPEG or TIFF tells; None where there is none to read."""
+    """Return the width and height [px] in the header of a PNG, JPEG or TIFF; None where they cannot be read."""
     try:
         if content.startswith(b"\x89PNG\r\n\x1a\n"):
             return struct.unpack(">II", content[16:24])
@@ -20,7 +20,7 @@ def claimed_size(content: bytes) -> tuple[int, int] | None:
             return _size_of_jpeg(content)
         if content[:4] in (b"II*\0", b"MM\0*"):
             return _size_of_tiff(content)
-    except (struct.error, IndexError):  # cut short: its decoder says so
+    except (struct.error, IndexError):  # truncated: the decoder reports it
         return None
     return None
 
@@ -29,7 +29,7 @@ def _size_of_jpeg(content: bytes) -> tuple[int, int] | None:
     at = 2
     while content[at] == 0xFF:
         marker = content[at + 1]
-        if marker == 0xFF:  # filling
+        if marker == 0xFF:  # fill byte
             at += 1
         elif marker in STANDALONE:
             at += 2

@@ -1,4 +1,4 @@
-"""Photographs: a sequence of grey images, read one at a time."""
+"""Photographs as a sequence of grey images, read one at a time."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import io
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from threading import Lock
 from typing import Generic, Literal, Protocol, TypeVar
@@ -18,14 +19,14 @@ from typing import Generic, Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..process.errors import InputError
 from .image_header import claimed_size
 from .png_chunks import is_whole_png
 from .reading.input_files import InputFiles
 
 Image = NDArray[np.float32]
 
-# ITU-R BT.601 luma of blue, green, red: the order in which OpenCV hands out colours.
+# ITU-R BT.601 luma of blue, green, red: the order of OpenCV's channels.
 LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
 Channel = Literal["grey", "red", "green", "blue"]
 CHANNELS: dict[Channel, NDArray[np.float32]] = {
@@ -36,37 +37,49 @@ CHANNELS: dict[Channel, NDArray[np.float32]] = {
 }
 
 FULL_SCALE = 255.0
-MAX_PIXELS = 200_000_000  # beyond any camera in a laboratory; as float32 it takes .8 GB
+WRAPPED = 4  # numbers of a camera's counter, at most, that may be missing where it wraps
+MAX_PIXELS = 200_000_000  # more than any laboratory camera has; .8 GB as float32
 
-# What cameras call the data of their sensor; read with the optional package rawpy.
+# Suffixes of cameras' raw files, which the optional package rawpy reads.
 RAW_SUFFIXES = frozenset(
     (".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dng", ".iiq", ".nef", ".nrw", ".orf", ".pef", ".raf", ".rw2", ".srw")
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """What of a photograph is looked at."""
+class ImageSelection:
+    """The channel, the region and the mask of a photograph: the part of it that is used."""
 
     channel: Channel = "grey"
-    region: tuple[int, int, int, int] | None = None  # [px] first and last column and row; None: all of it
+    region: tuple[int, int, int, int] | None = None  # [px] first column and row, last column and row; None: all
+    mask: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons [px] that are not used
 
     def cut(self, image: Image) -> Image:
-        """The image with everything outside the region as its middle grey, so that nothing is found there."""
-        if self.region is None:
+        """Return the image with all other pixels set to the median grey of those that are used: they show no edge."""
+        if self.region is None and not self.mask:
             return image
-        left, top, right, bottom = self.region
-        inside = np.s_[max(top, 0) : bottom + 1, max(left, 0) : right + 1]
-        cut = np.full_like(image, np.median(image[inside]))
-        cut[inside] = image[inside]
-        return cut
+        used = np.ones(image.shape, np.uint8)
+        if self.region is not None:
+            left, top, right, bottom = self.region
+            used[:] = 0
+            used[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = 1
+        if self.mask:
+            import cv2  # imported late: given tracks do not need it
+
+            corners = [np.rint(np.array(polygon)).astype(np.int32) for polygon in self.mask]
+            for each in corners:  # one by one: polygons that overlap would cancel
+                cv2.fillPoly(used, [each], 0)
+        seen = used.astype(np.bool_)
+        if not seen.any():
+            return image
+        return np.where(seen, image, np.median(image[seen]).astype(image.dtype))
 
 
-EVERYTHING = Look()
+WHOLE_IMAGE = ImageSelection()
 
 
 class Photographs(Sequence[Image]):
-    """Photographs in natural order (img2 before img10); item k is read from its file when it is asked for.
+    """Photographs in natural order (img2 before img10); item k is read from its file on access.
 
     Every image is float32 (H, W), grey, on a scale where the full scale of the file's depth is 255:
     16-bit files keep all their levels as fractions. Pixels are those stored in the file: an
@@ -81,77 +94,79 @@ class Photographs(Sequence[Image]):
         source: Path | str = "photographs",
         inputs: InputFiles | None = None,
         max_pixels: int = MAX_PIXELS,
-        look: Look = EVERYTHING,
+        selection: ImageSelection = WHOLE_IMAGE,
     ) -> None:
-        self.files: tuple[Path, ...] = tuple(sorted((Path(file) for file in files), key=natural_key))
+        self.files: tuple[Path, ...] = in_order(Path(file) for file in files)
         if not self.files:
             raise InputError(source, "", "there are no photographs")
         self._shape: tuple[int, int] | None = None
-        self._inputs, self._max_pixels, self._look = inputs, max_pixels, look
+        self._inputs, self._max_pixels, self._selection = inputs, max_pixels, selection
 
     @classmethod
     def matching(cls, folder: Path, pattern: str, *, source: Path | str | None = None) -> Photographs:
-        """The files of `folder` that match the glob `pattern`, such as "photos/*.png"."""
-        whose = folder if source is None else source
+        """Return the photographs of `folder` whose names match the glob `pattern`, such as "photos/*.png"."""
+        place = folder if source is None else source
         try:
             if Path(pattern).is_absolute():
                 found = list(Path(Path(pattern).anchor).glob(str(Path(pattern).relative_to(Path(pattern).anchor))))
             else:
                 found = list(folder.glob(pattern))
         except ValueError as error:
-            raise InputError(whose, f"photographs.files = {pattern!r}", str(error)) from None
+            raise InputError(place, f"photographs.files = {pattern!r}", str(error)) from None
         except OSError as error:
             if error.errno != errno.ENAMETOOLONG:
                 raise
-            raise InputError(whose, f"photographs.files = {pattern[:60]!r} …", "is too long for a name") from None
+            raise InputError(place, f"photographs.files = {pattern[:60]!r} …", "is too long for a name") from None
         files = [file for file in found if file.is_file()]
         if not files:
-            raise InputError(whose, f"photographs.files = {pattern!r}", "no file matches")
-        return cls(files, source=whose)
+            raise InputError(place, f"photographs.files = {pattern!r}", "no file matches")
+        return cls(files, source=place)
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of every photograph [px]."""
         if self._shape is None:
-            self._shape = _shape_of(read_photograph(self.files[0], self._inputs, self._max_pixels, self._look.channel))
+            self._shape = _shape_of(
+                read_photograph(self.files[0], self._inputs, self._max_pixels, self._selection.channel)
+            )
             self.check_region(self._shape)
         return self._shape
 
     def check_region(self, shape: tuple[int, int]) -> None:
         """Raise InputError where the region reaches beyond a photograph of this many rows and columns."""
-        region = self._look.region
+        region = self._selection.region
         if region is not None and (region[2] >= shape[1] or region[3] >= shape[0]):
-            what = f"key photographs.region = {list(region)}"
-            raise InputError(self.files[0], what, f"reaches beyond its {shape[1]} x {shape[0]} pixels")
+            where = f"key photographs.region = {list(region)}"
+            raise InputError(self.files[0], where, f"reaches beyond its {shape[1]} x {shape[0]} pixels")
 
     def check(self) -> None:
-        """Look through every photograph once, so that a bad one is known before any work begins.
+        """Read every photograph once, so that a damaged one is reported before any work begins.
 
-        A PNG carries checksums: one that is whole is not decoded for this.
+        A PNG holds checksums and is not decoded for this where they are right.
         """
         for frame, file in enumerate(self.files):
             content = _content_of(file, self._inputs, self._max_pixels)
-            told = claimed_size(content) if is_whole_png(content) else None
-            if told is None or told != self.shape[::-1]:
-                self._of_one_size(frame, _grey_of(file, content, self._look.channel))
+            stated = claimed_size(content) if is_whole_png(content) else None
+            if stated is None or stated != self.shape[::-1]:
+                self._check_size(frame, _grey_of(file, content, self._selection.channel))
 
     def __len__(self) -> int:
         return len(self.files)
 
     def __getitem__(self, frame: int) -> Image:  # pyright: ignore[reportIncompatibleMethodOverride]
-        image = read_photograph(self.files[frame], self._inputs, self._max_pixels, self._look.channel)
-        return self._look.cut(self._of_one_size(frame, image))
+        image = read_photograph(self.files[frame], self._inputs, self._max_pixels, self._selection.channel)
+        return self._selection.cut(self._check_size(frame, image))
 
     def in_channels(self, frame: int) -> dict[str, Image]:
-        """One photograph in each of CHANNELS, decoded once."""
+        """Return one photograph in each of CHANNELS, decoded once."""
         file = self.files[frame]
         pixels = _pixels_of(file, _content_of(file, self._inputs, self._max_pixels))
         names = CHANNELS if pixels.ndim == 3 and pixels.shape[2] > 2 else {"grey": LUMA}
-        images = {name: self._of_one_size(frame, _to_grey(file, pixels, weight)) for name, weight in names.items()}
-        return {name: self._look.cut(images.get(name, images["grey"])) for name in CHANNELS}
+        images = {name: self._check_size(frame, _to_grey(file, pixels, weight)) for name, weight in names.items()}
+        return {name: self._selection.cut(images.get(name, images["grey"])) for name in CHANNELS}
 
-    def _of_one_size(self, frame: int, image: Image) -> Image:
-        """The image, if it has the size of the first. Raises InputError."""
+    def _check_size(self, frame: int, image: Image) -> Image:
+        """Return the image if it has the size of the first one. Raises InputError otherwise."""
         file = self.files[frame]
         if self._shape is None and file == self.files[0]:
             self._shape = _shape_of(image)
@@ -175,30 +190,32 @@ P = TypeVar("P", covariant=True)
 
 class Readable(Protocol[P]):
     def __getitem__(self, frame: int, /) -> P:
-        """Photograph `frame` (H, W)."""
+        """Return photograph `frame` (H, W)."""
         ...
 
 
-class ReadAhead(Generic[P]):
-    """Photographs that are asked for one after the other: the next is read while one is worked at.
+class PrefetchedPhotographs(Generic[P]):
+    """Photographs in sequence; a thread reads the next one while the current one is processed.
 
-    To be closed, or used as a context: the thread ends with it.
+    Use it as a context manager, which ends the thread.
     """
 
     def __init__(self, photographs: Readable[P], stop: int) -> None:
         self._photographs, self._stop = photographs, stop
         self._reader = ThreadPoolExecutor(1, "photographs")
-        self._coming: tuple[int, Future[P]] | None = None
+        self._next: tuple[int, Future[P]] | None = None
 
     def __getitem__(self, frame: int) -> P:
-        """Photograph `frame`; what reading it raised is raised here."""
-        coming, self._coming = self._coming, None
-        image = coming[1].result() if coming is not None and coming[0] == frame else self._photographs[frame]
+        """Return photograph `frame`; errors of reading it are raised here."""
+        prefetched, self._next = self._next, None
+        image = (
+            prefetched[1].result() if prefetched is not None and prefetched[0] == frame else self._photographs[frame]
+        )
         if frame + 1 < self._stop:
-            self._coming = (frame + 1, self._reader.submit(self._photographs.__getitem__, frame + 1))
+            self._next = (frame + 1, self._reader.submit(self._photographs.__getitem__, frame + 1))
         return image
 
-    def __enter__(self) -> ReadAhead[P]:
+    def __enter__(self) -> PrefetchedPhotographs[P]:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -206,9 +223,27 @@ class ReadAhead(Generic[P]):
 
 
 def natural_key(file: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
-    """Sort key in which numbers count as numbers: img2 before img10."""
+    """Return a sort key that compares numbers in names by value: img2 before img10."""
     parts = re.split(r"(\d+)", file.as_posix())
     return tuple((0, int(part)) if part.isdecimal() else (1, part.lower()) for part in parts), file.as_posix()
+
+
+def in_order(files: Iterable[Path]) -> tuple[Path, ...]:
+    """Return photographs in the natural order of their names; a camera's counter that wraps goes on.
+
+    A counter of so many digits wraps where photographs with its last and its first numbers are there, and none with
+    numbers between: DSC_9998, DSC_9999, DSC_0001.
+    """
+    ordered = sorted(files, key=natural_key)
+    names = [re.fullmatch(r"(.*?)(\d{4,})", file.stem) for file in ordered]
+    if len(ordered) < 2 or len({(name[1], len(name[2])) if name else None for name in names}) != 1 or names[0] is None:
+        return tuple(ordered)
+    counts, period = [int(name[2]) for name in names if name], 10 ** len(names[0][2])
+    steps = [after - before for before, after in pairwise(counts)]
+    widest = max(range(len(steps)), key=steps.__getitem__)
+    usual = sorted(steps)[(len(steps) - 1) // 2] if len(steps) > 1 else WRAPPED
+    wraps = counts[0] + period - counts[-1] <= max(2 * usual, WRAPPED) and steps[widest] > period // 2
+    return tuple(ordered[widest + 1 :] + ordered[: widest + 1] if wraps else ordered)
 
 
 def read_photograph(
@@ -216,11 +251,23 @@ def read_photograph(
 ) -> Image:
     """Read one 8- or 16-bit photograph, grey or colour, as float32 grey (H, W) with full scale 255.
 
-    channel: of CHANNELS, what of a colour photograph is taken for grey.
+    Cameras' raw files are developed to 16 bits, all alike.
 
-    Raw files of cameras are developed to 16 bits, all alike. inputs: what the file is read by, where it has to stay
-    what it is; max_pixels: that it may claim to have. Raises InputError for what is not a photograph, and for
-    raw files while the package that reads them is not installed.
+    Parameters
+    ----------
+    file
+        The photograph.
+    inputs
+        Reads the file and refuses it if it has changed since it was first read.
+    max_pixels
+        Largest number of pixels that the file's header may state.
+    channel
+        Channel of a colour photograph to use as grey, one of CHANNELS.
+
+    Raises
+    ------
+    InputError
+        The file is not a photograph, or a raw file without the package that reads it.
     """
     return _grey_of(file, _content_of(file, inputs, max_pixels), channel)
 
@@ -230,7 +277,7 @@ def _grey_of(file: Path, content: bytes, channel: Channel) -> Image:
 
 
 def _pixels_of(file: Path, content: bytes) -> NDArray:
-    """The pixels of a file, of whatever depth and number of channels. Raises InputError where it holds none."""
+    """Return the pixels of a file with its depth and channels. Raises InputError where it is not a photograph."""
     pixels = _develop(file, content) if file.suffix.lower() in RAW_SUFFIXES else _decode(content)
     if pixels is None:
         raise InputError(file, "", "is not a photograph that can be read (PNG, TIFF or JPEG)")
@@ -238,7 +285,7 @@ def _pixels_of(file: Path, content: bytes) -> NDArray:
 
 
 def _content_of(file: Path, inputs: InputFiles | None, max_pixels: int) -> bytes:
-    """The bytes of a photograph; raises InputError where they are cut short or claim too many pixels."""
+    """Return the bytes of a photograph. Raises InputError where they are truncated or state too many pixels."""
     try:
         content = (InputFiles() if inputs is None else inputs).read(file)
     except OSError as error:
@@ -250,7 +297,7 @@ def _content_of(file: Path, inputs: InputFiles | None, max_pixels: int) -> bytes
 
 
 def _to_grey(file: Path, pixels: NDArray, weight: NDArray[np.float32]) -> Image:
-    """Blue, green, red or grey (H, W[, c]) of either depth to grey, by the weight (3,) of each colour."""
+    """Convert blue, green, red or grey (H, W[, c]) of 8 or 16 bits to grey by the weight (3,) of each colour."""
     if pixels.dtype == np.uint8:
         scale = np.float32(1.0)
     elif pixels.dtype == np.uint16:
@@ -259,7 +306,7 @@ def _to_grey(file: Path, pixels: NDArray, weight: NDArray[np.float32]) -> Image:
         raise InputError(file, f"depth {pixels.dtype}", "must be 8 or 16 bits per channel")
     if pixels.ndim == 2:
         grey = pixels.astype(np.float32)
-    elif pixels.shape[2] <= 2:  # grey, with or without an opacity
+    elif pixels.shape[2] <= 2:  # grey, with or without opacity
         grey = pixels[:, :, 0].astype(np.float32)
     else:
         import cv2
@@ -271,7 +318,7 @@ def _to_grey(file: Path, pixels: NDArray, weight: NDArray[np.float32]) -> Image:
 
 
 def _develop(file: Path, content: bytes) -> NDArray:
-    """The sensor's data as blue, green, red (H, W, 3) uint16, exposed and coloured alike in every photograph."""
+    """Develop raw data to blue, green, red (H, W, 3) uint16, with the same exposure and colours in every photograph."""
     try:
         import rawpy  # pyright: ignore[reportMissingImports]
     except ImportError:
@@ -280,14 +327,14 @@ def _develop(file: Path, content: bytes) -> NDArray:
         ) from None
     try:
         with rawpy.imread(io.BytesIO(content)) as raw:
-            # No brightening by the picture's own content, and no turning: photographs must stay comparable.
+            # No automatic brightness and no rotation: photographs must stay comparable.
             colours = raw.postprocess(output_bps=16, no_auto_bright=True, use_camera_wb=True, user_flip=0)
     except (rawpy.LibRawError, OSError) as error:
         raise InputError(file, "", f"is not a raw file that can be read ({error})") from None
     return np.ascontiguousarray(colours[:, :, ::-1])
 
 
-# Standard error belongs to the whole process: two threads that set it aside would not both put it back.
+# Standard error belongs to the whole process: two threads that replace it at once would not restore it.
 _DECODING = Lock()
 
 
@@ -299,13 +346,13 @@ def _decode(content: bytes) -> NDArray | None:
 
 
 def _decode_alone(content: bytes) -> NDArray | None:
-    import cv2  # not where there are tracks
+    import cv2  # imported late: given tracks do not need it
 
-    # A decoder's complaints would reach standard error beside our own single line.
+    # A decoder's messages would appear on standard error beside the single line of an error.
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(0)
     try:
-        with _silenced():
+        with _without_standard_error():
             return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         return None
@@ -314,26 +361,26 @@ def _decode_alone(content: bytes) -> NDArray | None:
 
 
 @contextmanager
-def _silenced() -> Iterator[None]:
-    """Keep what C libraries write to standard error by themselves off the screen: libpng, libjpeg and libtiff do."""
+def _without_standard_error() -> Iterator[None]:
+    """Discard output of C libraries (libpng, libjpeg, libtiff) to standard error inside the block."""
     sys.stderr.flush()
     try:
         kept = os.dup(2)
-    except OSError:  # there is none
+    except OSError:  # the process has no standard error
         yield
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
+        os.dup2(null, 2)
         yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)
-        os.close(nowhere)
+        os.close(null)
 
 
 def _refuse_truncated(file: Path, content: bytes) -> None:
-    """Decoders fill the missing part of a cut PNG or JPEG with grey and call it a success."""
+    """Raise InputError for a truncated PNG or JPEG, whose missing part decoders fill with grey without an error."""
     cut = (content.startswith(b"\x89PNG") and b"IEND" not in content[-64:]) or (
         content.startswith(b"\xff\xd8") and b"\xff\xd9" not in content[-4096:]
     )
@@ -342,13 +389,13 @@ def _refuse_truncated(file: Path, content: bytes) -> None:
 
 
 def _refuse_huge(file: Path, content: bytes, most: int) -> None:
-    """A few bytes may claim any size: what is not believed is not allocated."""
+    """Raise InputError before memory is allocated for more than `most` pixels: a few bytes can state any size."""
     width, height = claimed_size(content) or (0, 0)
     if width * height > most:
         raise InputError(
             file,
             f"{width} x {height} pixels",
-            f"is more than photographs.max_pixels = {most}: raise it if that is true",
+            f"is more than photographs.max_pixels = {most}: raise it if this is correct",
         )
 
 

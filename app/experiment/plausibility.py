@@ -1,53 +1,54 @@
-"""Whether tracks, radii and walls can belong together: mistaken units, origins and directions are refused early."""
+"""Check that tracks, radii, walls and loads fit together: wrong units, origins and directions are refused early."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
+from scipy.spatial import ConvexHull, KDTree
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import IN, OUT, STRAIGHT, reach_of_wall
-
-from ..errors import InputError
+from ..process.errors import InputError
+from ..solver.bodies.grains import Array
+from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, beside_wall, wall_distance
 from ..tracks import Tracks, WallTracks
 from .boundary import free_surfaces
 from .experiment import Experiment
 
-NEIGHBOURS = 8  # of a grain, among which is the one it is closest to in radii
+NEIGHBOURS = 8  # nearest centres of a grain, which include the one closest in units of radii
 SPACING = (0.93, 1.15)  # of neighbours over their radii, median: packed rods touch, whatever the noise
 GREATEST_RADIUS = 0.5  # [m] of a rod
-GREATEST_SHARE = 2.0  # of the packing's diagonal: no radius is larger
-NEAR = 0.05  # radii from a wall's line: a rod as near as that may bear on it
+GREATEST_FRACTION = 2.0  # of the packing's diagonal: no radius is larger
+NEAR = 0.05  # radii between a rod and a wall's line, at most, for the rod to touch it
 BEYOND = 0.5  # radii past a wall's end
-LIKE = 0.15  # relative difference up to which a spacing looks like a certain mistake
-STRENGTH = 1e8  # [Pa] of the mean stress: contacts of rods then bear several times that, and metals yield
+MISTAKE_TOLERANCE = 0.15  # relative difference between a spacing and that of a known mistake, at most
+STRENGTH = 1e8  # [Pa] mean stress: contacts of rods then carry several times that, and metals yield
 OPEN = 1e-6  # [rad] two parallel walls face each other within this
-PLACE_OF_PACKING = {
+SIDE_OF_PACKING = {
     STRAIGHT: "to the left of the line from (x1, y1) to (x2, y2)",
     IN: "inside the circle (its side is in)",
     OUT: "outside the circle (its side is out)",
 }
-SPACIOUS = 1.0  # widths of the packing between it and a wall, from which on they do not belong together
+CUT = 0.5  # radii between a rod's centre and the line of a wall that cuts through it, at most
+SOLID_FRACTION, RIM_POINTS, FEWEST_ENCLOSING = 0.8, 12, 5  # of a dense packing; of a rod's outline; rods with an area
+MAX_DISTANCE = 1.0  # widths of the packing between it and a wall, at most
 
 
 def check_packing(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
-    """What is doubtful about rods, walls and loads, in sentences. Raises InputError where they cannot be right."""
+    """Return warnings about rods, walls and loads. Raises InputError where they cannot be right."""
     check_inside(experiment, tracks, walls)
     check_radii(experiment, tracks)
     sides = open_sides(walls) if walls.cell is None and tracks.boundary is None else []
     return [
         *rods_beyond_ends(tracks, walls),
-        *doubtful_loads(experiment, tracks, walls),
+        *implausible_loads(experiment, tracks, walls),
         *sides,
         *free_surfaces(experiment, tracks, walls),
     ]
 
 
 def check_radii(experiment: Experiment, tracks: Tracks) -> None:
-    """Packed rods touch: their nearest neighbours must lie about the sum of two radii away.
+    """Raise InputError where nearest neighbours are not about the sum of two radii apart, since packed rods touch.
 
-    Diameters given as radii, another unit or another scale leave nothing to compute forces from.
+    Typical causes are diameters given as radii, a wrong unit or a wrong scale.
     """
     section = experiment.config.tracks
     file = experiment.file if section is None else experiment.folder / section.grains
@@ -63,7 +64,7 @@ def check_radii(experiment: Experiment, tracks: Tracks) -> None:
         )  # fmt: skip
     here, largest = tracks.position[0][tracks.present[0]], int(np.argmax(tracks.radius))
     across = float(np.hypot(*np.ptp(here, axis=0))) if len(here) > 2 else np.inf
-    if tracks.radius[largest] > max(GREATEST_SHARE * across, middle):
+    if tracks.radius[largest] > max(GREATEST_FRACTION * across, middle):
         raise InputError(
             file, key, f"makes grain {tracks.id[largest]} larger than the packing: its radius is "
             f"{tracks.radius[largest]:g} m, and all centres lie within {across:.3g} m",
@@ -78,20 +79,20 @@ def check_radii(experiment: Experiment, tracks: Tracks) -> None:
 
 
 def _cause_of_spacing(found: float) -> str:
-    """What neighbours at so many times the sum of their radii look like."""
+    """Return the mistake that a spacing of neighbours, over the sum of their radii, suggests."""
     causes = (
         (0.5, "radii look like diameters"),
-        (2.0, "radii look like halved ones, or positions like those of every other grain"),
+        (2.0, "radii look halved, or every other grain is missing"),
         (1e3, "coordinates look like millimetres"),
         (1e-3, "radii look like millimetres"),
     )
-    return next((f": {cause}" for factor, cause in causes if abs(found / factor - 1.0) < LIKE), "")
+    return next((f": {cause}" for factor, cause in causes if abs(found / factor - 1.0) < MISTAKE_TOLERANCE), "")
 
 
-def doubtful_loads(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
-    """A sentence for every pressure or load that is possible but hardly meant: next to none, or beyond what rods bear.
+def implausible_loads(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> list[str]:
+    """Return a warning for every pressure or load that is possible but implausible: very small, or above STRENGTH.
 
-    Next to none: less than a tenth of what the rods' own weight would press with, if they lay upon one another.
+    A very small load is less than a tenth of the pressure of the rods' own weight, if they lay upon one another.
     """
     material, sentences = experiment.config.material, []
     here = tracks.present[0]
@@ -102,49 +103,77 @@ def doubtful_loads(experiment: Experiment, tracks: Tracks, walls: WallTracks) ->
     usual = walls.usual_pressure(material.length)
     for name, pressure in [(walls.name[w], usual[w]) for w in np.flatnonzero(walls.loaded & np.isnan(walls.pressure))]:
         if pressure < 0.1 * weight or pressure > STRENGTH:
-            kind = (
-                "little beside what the rods would weigh upon one another"
-                if pressure < weight
-                else "more than rods bear"
-            )
+            kind = "little beside the pressure of the rods' own weight" if pressure < weight else "more than rods carry"
             sentences.append(f"the load on wall {name!r} makes {pressure:.3g} Pa on average, {kind}: is it in newtons?")
     for name, pressure in zip(walls.name, walls.pressure, strict=True):
         if pressure < 0.1 * weight:
             sentences.append(
-                f"walls.{name}.pressure = {pressure:g} Pa is little beside the {weight:.2g} Pa that the rods would "
-                f"weigh upon one another: did you mean {pressure:g}e3 Pa?"
+                f"walls.{name}.pressure = {pressure:g} Pa is little beside the {weight:.2g} Pa of the rods' own "
+                f"weight: did you mean {pressure:g}e3 Pa?"
             )
         elif pressure > STRENGTH:
             sentences.append(
-                f"walls.{name}.pressure = {pressure:g} Pa is beyond what rods bear without yielding: did you mean "
+                f"walls.{name}.pressure = {pressure:g} Pa is more than rods carry without yielding: did you mean "
                 f"{pressure / 1e3:g} Pa?"
             )
     return sentences
 
 
+def rods_cut_by_walls(tracks: Tracks, walls: WallTracks) -> dict[str, int]:
+    """Return the number of rods of frame 0 that each straight wall cuts through, by the names of such walls.
+
+    A wall cuts through a rod whose centre is within half a radius of its line, between its ends.
+    """
+    place, radius = tracks.position[0], tracks.radius
+    found = {}
+    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
+        ends = np.broadcast_to(walls.endpoints[0, w], (len(place), 2, 2))
+        distance = np.abs(wall_distance(ends, None, place)[0])
+        cut = (distance < CUT * radius) & beside_wall(ends, None, place, np.zeros(len(place)))
+        if cut.any():
+            found[walls.name[w]] = int(cut.sum())
+    return found
+
+
+def expected_rods(tracks: Tracks) -> int:
+    """Return about how many rods fill the area that those of frame 0 enclose, from their own sizes.
+
+    Notes
+    -----
+    0.8 A / ⟨π R²⟩, with A the area of the convex hull of the rods; 0.8 is the solid fraction of a dense packing.
+    """
+    here = tracks.present[0]
+    if np.count_nonzero(here) < FEWEST_ENCLOSING:
+        return int(here.sum())
+    angle = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
+    rim = tracks.radius[here, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    hull = ConvexHull((tracks.position[0, here, None] + rim).reshape(-1, 2))
+    return round(SOLID_FRACTION * hull.volume / float(np.mean(np.pi * tracks.radius[here] ** 2)))  # volume: area in 2D
+
+
 def open_sides(walls: WallTracks) -> list[str]:
-    """A sentence where the walls of frame 0, taken as endless lines, leave a direction open."""
+    """Return a warning where the walls of frame 0, taken as infinite lines, leave a direction open."""
     if walls.count == 0 or (walls.sides == IN).any():
         return []
     straight = np.flatnonzero(walls.sides == STRAIGHT)
     if not len(straight):
-        return ["The boundary is open: nothing is around the rods but what else presses on them."]
+        return ["The boundary is open: no wall surrounds the rods."]
     along = walls.endpoints[0, straight, 1] - walls.endpoints[0, straight, 0]
     inward = np.arctan2(along[:, 0], -along[:, 1])
     order = np.argsort(inward)
-    turn = np.diff(np.concatenate([inward[order], inward[order[:1]] + 2.0 * np.pi]))
-    wide = int(np.argmax(turn))
-    if turn[wide] < np.pi - OPEN:
+    angle = np.diff(np.concatenate([inward[order], inward[order[:1]] + 2.0 * np.pi]))
+    wide = int(np.argmax(angle))
+    if angle[wide] < np.pi - OPEN:
         return []
     a, b = (walls.name[straight[order[k % len(order)]]] for k in (wide, wide + 1))
     where = f"between wall {a!r} and wall {b!r}" if a != b else f"opposite wall {a!r}"
-    return [f"The boundary is open {where}: nothing keeps the rods in there but what else presses on them."]
+    return [f"The boundary is open {where}: no wall confines the rods there."]
 
 
 def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:
-    """A sentence for every wall on whose line rods bear beyond its ends: walls are taken as endless lines.
+    """Return a warning for every wall whose line rods touch beyond its ends: walls are taken as infinite lines.
 
-    Such a wall was perhaps measured too short, which does no harm; or these rods bear on nothing, and forces are wrong.
+    Either the wall was measured too short, which does no harm, or these rods touch no wall and their forces are wrong.
     """
     start = walls.endpoints[:, :, 0]
     along = walls.endpoints[:, :, 1] - start
@@ -160,14 +189,26 @@ def rods_beyond_ends(tracks: Tracks, walls: WallTracks) -> list[str]:
         rods = int((near & past).any(axis=0).sum())
         if rods:
             sentences.append(
-                f"{rods} rod{'s' if rods > 1 else ''} may bear on the line of wall {name!r} beyond its end, and will "
-                "be taken to: the wall goes on along them, unless calibration.walls_continue is false"
+                f"{rods} rod{'s' if rods > 1 else ''} may touch the line of wall {name!r} beyond its end: the wall is "
+                "continued along them, unless calibration.walls_continue is false"
             )
     return sentences
 
 
 def neighbour_spacing(position: Array, radius: Array) -> Array:
-    """Least distance over the sum of radii to another grain (n,); position (n, 2) and radius (n,) [m]."""
+    """Return the smallest distance to another grain over the sum of their radii (n,).
+
+    Parameters
+    ----------
+    position
+        Centres (n, 2) [m].
+    radius
+        Radii (n,) [m].
+
+    Notes
+    -----
+    min_j |x_j − x_i| / (R_i + R_j) over the NEIGHBOURS nearest centres j.
+    """
     count = min(NEIGHBOURS + 1, len(radius))
     if count < 2:
         return np.empty(0)
@@ -176,27 +217,28 @@ def neighbour_spacing(position: Array, radius: Array) -> Array:
 
 
 def check_inside(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> None:
-    """No centre may lie beyond a wall by more than the grain's radius: a mistaken unit, origin or direction."""
+    """Raise InputError where a centre lies beyond a wall by more than its radius: a wrong unit, origin or direction."""
     section = experiment.config.walls
     if section is None:
         return
     for w, name in enumerate(walls.name):
-        beyond = -reach_of_wall(walls.endpoints[:, None, w], walls.sides[w : w + 1], tracks.position)[0]
+        beyond = -wall_distance(walls.endpoints[:, None, w], walls.sides[w : w + 1], tracks.position)[0]
         outside = np.argwhere(beyond > tracks.radius)  # NaN of lost grains compares false
         if len(outside):
             k, row = (int(v) for v in outside[0])
-            table = section.file if walls.sides[w] == STRAIGHT else section.arcs
+            straight = walls.sides[w] == STRAIGHT
+            table = (section.file if straight else section.arcs) or section.corners
             raise InputError(
                 experiment.folder / (table or ""),
                 f"frame {k}, wall {name!r}",
                 f"grain {tracks.id[row]} lies {float(beyond[k, row]) * 1e3:.4g} mm beyond it; "
-                f"the packing must lie {PLACE_OF_PACKING[int(walls.sides[w])]}, all in metres"
+                f"the packing must lie {SIDE_OF_PACKING[int(walls.sides[w])]}, all in metres"
                 f"{_cause_of_walls(experiment, tracks, walls)}",
             )
 
 
 def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -> str:
-    """What would put the grains of frame 0 between its walls."""
+    """Return the mistake whose correction puts the grains of frame 0 between the walls."""
     ends, side = walls.endpoints[0], walls.sides
     photographs = experiment.config.photographs
     pixel = photographs.pixel_size if photographs is not None else None
@@ -217,7 +259,7 @@ def _cause_of_walls(experiment: Experiment, tracks: Tracks, walls: WallTracks) -
 
 
 def _upside_down(ends: Array, place: Array) -> Array:
-    """The ends (w, 2, 2) with y counted the other way, about the middle of the packing (n, 2)."""
+    """Return the ends (w, 2, 2) with y reversed about the middle of the packing (n, 2)."""
     flipped = ends.copy()
     middle = 0.5 * (place[:, 1].min() + place[:, 1].max()) + 0.5 * (ends[..., 1].min() + ends[..., 1].max())
     flipped[..., 1] = middle - flipped[..., 1]
@@ -225,7 +267,7 @@ def _upside_down(ends: Array, place: Array) -> Array:
 
 
 def _all_inside(place: Array, radius: Array, ends: Array, side: NDArray[np.int8]) -> bool:
-    """Whether no centre (n, 2) lies beyond a wall (w, 2, 2) by more than its radius (n,), nor far from all of them."""
-    beyond = -reach_of_wall(ends, side, place[:, None])[0]
-    near = beyond.max(axis=0) > -SPACIOUS * np.ptp(place, axis=0).max()
+    """Whether no centre (n, 2) lies beyond a wall (w, 2, 2) by more than its radius (n,), and no wall is far away."""
+    beyond = -wall_distance(ends, side, place[:, None])[0]
+    near = beyond.max(axis=0) > -MAX_DISTANCE * np.ptp(place, axis=0).max()
     return bool((beyond <= radius[:, None]).all() and near.all())

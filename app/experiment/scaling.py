@@ -1,4 +1,4 @@
-"""What a pixel of an experiment's photographs is in the world, as its configuration says."""
+"""The scale and lens of an experiment's photographs, from its configuration."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from solver.calibration.calibrate import Calibration
-
+from ..solver.calibration.calibrate import Calibration
 from .config.experiment_file import PhotographsSection
 from .lens import BrownLens, Lens, OpenCVLens
 from .units import Scale, pixel_size_between
 
 
 def make_scale(section: PhotographsSection, height: int, calibration: Calibration | None = None) -> Scale:
-    """The scale of photographs of `height` [px] rows; calibration: what corrects the given pixel size."""
+    """Return the scale of photographs of `height` rows [px]; calibration: correction of the given pixel size."""
     given = _given_scale(section, height)
     correction = 0.0 if calibration is None else calibration.pixel_size
     pixel_height = None if given.pixel_height is None else (1.0 + correction) * given.pixel_height
@@ -34,16 +33,16 @@ def _given_scale(section: PhotographsSection, height: int) -> Scale:
 
 
 def make_lens(section: PhotographsSection) -> Lens | None:
-    """The lens of the photographs; None where none is told."""
-    told = section.lens
-    if told is None:
+    """Return the lens of the photographs; None where none is given."""
+    given = section.lens
+    if given is None:
         return None
-    if told.fx is None:
+    if given.fx is None:
         keys = ("xc", "yc", "K1", "K2", "K3", "P1", "P2", "P3")
-        return BrownLens(**_values(told, keys))
-    values = _values(told, ("fx", "cx", "cy", "k1", "k2", "p1", "p2", "k3"))
-    return OpenCVLens(fy=told.fx if told.fy is None else told.fy, **values)
+        return BrownLens(**_values(given, keys))
+    values = _values(given, ("fx", "cx", "cy", "k1", "k2", "p1", "p2", "k3"))
+    return OpenCVLens(fy=given.fx if given.fy is None else given.fy, **values)
 
 
-def _values(told: Any, keys: tuple[str, ...]) -> dict[str, float]:
-    return {key: float(getattr(told, key)) for key in keys}
+def _values(given: Any, keys: tuple[str, ...]) -> dict[str, float]:
+    return {key: float(getattr(given, key)) for key in keys}

@@ -1,20 +1,20 @@
-"""The walls of an experiment as tables tell them: bars by their ends, circles by their radius, loads by sensors."""
+"""Read the walls of an experiment from tables: bars by their ends, circles, corner discs, loads by sensors."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import IN, OUT, STRAIGHT, circle_ends
-
-from ..errors import InputError
-from ..tracks import BAR, CORNER, NOT_TOLD, WallTracks
+from ..process.errors import InputError
+from ..solver.bodies.grains import Array
+from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, circle_ends
+from ..tracks import BAR, CORNER, UNSPECIFIED, WallTracks
 from .config.input_sections import WallsSection
 from .experiment import CELL_COLUMNS, Experiment, arrange_cell
+from .reading.corners import CORNER_COLUMNS, arrange_corners, bar_of_each_corner, bars_of_corners
 from .reading.tables import Table, check_frames, check_unique
 
-ENDS = {"bar": BAR, "corner": CORNER, "auto": NOT_TOLD}
+ENDS = {"bar": BAR, "corner": CORNER, "auto": UNSPECIFIED}
 SIDES = {"in": IN, "out": OUT}
 FORCE_COLUMNS = ("frame", "wall", "fx", "fy")
 WALL_COLUMNS = ("frame", "wall", "x1", "y1", "x2", "y2")
@@ -22,36 +22,58 @@ ARC_COLUMNS, LOAD_COLUMNS = ("frame", "wall", "x", "y", "radius", "side"), ("fra
 
 
 def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
-    """The walls in every frame, bars before circles; None where nothing bounds the packing.
+    """Return the walls in every frame, bars before circles; None where the packing has no boundary.
 
-    Endpoints are NaN where they are to be followed in the photographs: with `walls.track`, wherever the table has no
-    row; without it, where the table ends with frame 0. Circles are not followed.
+    Endpoints are NaN where they are to be tracked in the photographs: with `walls.track`, wherever the table has no
+    row; without it, where the table ends with frame 0. Circles are not tracked.
     """
     section = experiment.config.walls
     if section is None:
         return None if experiment.config.boundary is None else _no_walls(experiment, frame_count)
     names, endpoints, side = _read_bars(experiment, section, frame_count)
+    bar_count = len(names)
     if section.arcs is not None:
         table = experiment.table(section.arcs, ARC_COLUMNS, optional=("theta",))
         circles, ends, its_side = arrange_arcs(table, frame_count, others=names)
         names, side = names + circles, np.concatenate([side, its_side])
         endpoints = np.concatenate([endpoints, ends], axis=1)
-    tables = " or ".join(name for name in (section.file, section.arcs) if name is not None)
+    tables = " or ".join(name for name in (section.file, section.arcs, section.corners) if name is not None)
     for unknown in section.plates.keys() - set(names):
         raise InputError(experiment.file, f"key walls.{unknown}", f"there is no such wall in {tables}")
     pressure = np.array([section.plates[n].pressure if n in section.plates else None for n in names], np.float64)
-    told = np.array([ENDS[section.plates[n].ends] if n in section.plates else NOT_TOLD for n in names], np.int8)
+    end_kind = np.array([ENDS[section.plates[n].ends] if n in section.plates else UNSPECIFIED for n in names], np.int8)
     load = None
     if section.load is not None:
         load = arrange_loads(experiment.table(section.load, LOAD_COLUMNS), names, frame_count, pressure)
+    plate = None
+    if section.corners is not None:
+        if section.file is None:  # bars between corners end where they meet
+            end_kind[:bar_count] = np.where(end_kind[:bar_count] == UNSPECIFIED, CORNER, end_kind[:bar_count])
+        measured = np.zeros(bar_count, np.bool_) if load is None else np.isfinite(load[:, :bar_count]).any(axis=0)
+        loaded = np.isfinite(pressure[:bar_count]) | measured
+        discs, ends, plate = _read_corners(experiment, section, names, endpoints[:, :bar_count], loaded)
+        added = len(discs)
+        names, side = names + discs, np.concatenate([side, np.full(added, OUT, np.int8)])
+        endpoints = np.concatenate([endpoints, ends], axis=1)
+        pressure = np.concatenate([pressure, np.full(added, np.nan)])
+        end_kind = np.concatenate([end_kind, np.full(added, UNSPECIFIED, np.int8)])
+        if load is not None:
+            load = np.concatenate([load, np.full((frame_count, added), np.nan)], axis=1)
     forces = _read_wall_forces(experiment, section, names, frame_count)
     return WallTracks(
-        names, endpoints, pressure, forces, told=told, side=side if section.arcs is not None else None, load=load
+        names,
+        endpoints,
+        pressure,
+        forces,
+        end_kind=end_kind,
+        side=None if section.arcs is None and section.corners is None else side,
+        load=load,
+        plate=plate,
     )
 
 
 def _no_walls(experiment: Experiment, frame_count: int) -> WallTracks:
-    """No walls, but the cell where there is one: grains or the cell bound the packing."""
+    """Return tracks without walls, with the periodic cell where there is one."""
     section = experiment.config.boundary
     cell = None
     if section is not None and section.periodic is not None:
@@ -60,14 +82,14 @@ def _no_walls(experiment: Experiment, frame_count: int) -> WallTracks:
 
 
 def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> tuple[tuple[str, ...], Array]:
-    """Names (w,) and endpoints (f, w, 2, 2) [m] of a table frame,wall,x1,y1,x2,y2.
+    """Return names (w,) and endpoints (f, w, 2, 2) [m] from a table frame,wall,x1,y1,x2,y2.
 
-    followed: frame 0 is enough; endpoints are NaN where the table has no row.
+    followed: frame 0 is enough, and endpoints are NaN where the table has no row.
     """
     frame, names, row = _named_rows(table)
     found = int(frame.max()) + 1 if followed and frame.min() == 0 else check_frames(table, frame)
     if found > frame_count or (found < frame_count and not followed):
-        raise InputError(table.file, "frame", f"there are walls of {found} frames, but {frame_count} frames")
+        raise InputError(table.file, "frame", f"has walls of {found} frames, but there are {frame_count} frames")
     endpoints = np.full((frame_count, len(names), 2, 2), np.nan)
     endpoints[frame, row] = np.column_stack([table.numbers(c) for c in WALL_COLUMNS[2:]]).reshape(-1, 2, 2)
     absent = np.argwhere(np.isnan(endpoints[: 1 if followed else None, :, 0, 0]))
@@ -82,20 +104,33 @@ def arrange_walls(table: Table, frame_count: int, *, followed: bool = False) -> 
 def arrange_arcs(
     table: Table, frame_count: int, *, others: tuple[str, ...] = ()
 ) -> tuple[tuple[str, ...], Array, NDArray[np.int8]]:
-    """Names (w,), diameters (f, w, 2, 2) [m] and sides (w,) of a table frame,wall,x,y,radius,side and perhaps theta.
+    """Return circular walls from a table frame,wall,x,y,radius,side and perhaps theta [rad].
 
-    A circle that is told in frame 0 alone stays as it is. others: names that bars have. Without theta [rad] a circle
-    does not turn.
+    A circle that is given in frame 0 alone does not move. Without theta a circle does not rotate.
+
+    Parameters
+    ----------
+    table
+        The table of circles.
+    frame_count
+        Number of frames f.
+    others
+        Names of the straight walls.
+
+    Returns
+    -------
+    tuple
+        Names (w,), ends of a diameter (f, w, 2, 2) [m] and sides (w,).
     """
     frame, names, row = _named_rows(table)
     for at, wall in enumerate(row):
         if names[wall] in others:
-            raise table.error(at, "wall", "is the name of a straight wall, too: every wall is told once")
+            raise table.error(at, "wall", "is the name of a straight wall, too: every wall is given once")
     text = table.text("side")
     for at, each in enumerate(text):
         if each not in SIDES:
             raise table.error(at, "side", "is neither in (the packing is inside the circle) nor out (outside it)")
-    radius, turn = table.numbers("radius"), np.nan_to_num(table.numbers_if_told("theta"))
+    radius, angle = table.numbers("radius"), np.nan_to_num(table.optional_numbers("theta"))
     for at in np.flatnonzero(radius <= 0.0).tolist():
         raise table.error(at, "radius", "is not positive")
     for at in np.flatnonzero((frame < 0) | (frame >= frame_count)).tolist():
@@ -103,38 +138,51 @@ def arrange_arcs(
     sides = np.array([SIDES[each] for each in text], np.int8)
     side = np.array([sides[row == wall][0] for wall in range(len(names))], np.int8)
     for at in np.flatnonzero(sides != side[row]).tolist():
-        raise table.error(at, "side", f"is another than before: wall {names[row[at]]!r} has the packing on one side")
-    told = np.full((frame_count, len(names), 4), np.nan)
-    told[frame, row] = np.column_stack([table.numbers("x"), table.numbers("y"), radius, turn])
+        raise table.error(
+            at, "side", f"differs from an earlier row: wall {names[row[at]]!r} has the packing on one side"
+        )
+    given = np.full((frame_count, len(names), 4), np.nan)
+    given[frame, row] = np.column_stack([table.numbers("x"), table.numbers("y"), radius, angle])
     for wall, name in enumerate(names):
-        if np.isfinite(told[0, wall, 0]) and np.isnan(told[1:, wall, 0]).all():
-            told[:, wall] = told[0, wall]
-        for k in np.flatnonzero(np.isnan(told[:, wall, 0])).tolist():
+        if np.isfinite(given[0, wall, 0]) and np.isnan(given[1:, wall, 0]).all():
+            given[:, wall] = given[0, wall]
+        for k in np.flatnonzero(np.isnan(given[:, wall, 0])).tolist():
             raise InputError(
-                table.file, f"frame {k}", f"has no row of wall {name!r}: tell it in all frames, or in frame 0 alone"
+                table.file, f"frame {k}", f"has no row of wall {name!r}: give it in all frames, or in frame 0 alone"
             )
-    return names, circle_ends(told[..., :2], told[..., 2], told[..., 3]), side
+    return names, circle_ends(given[..., :2], given[..., 2], given[..., 3]), side
 
 
 def arrange_loads(table: Table, names: tuple[str, ...], frame_count: int, pressure: Array) -> Array:
-    """Measured normal force on the walls (f, w) [N], NaN on those that the table frame,wall,force does not name.
+    """Return the measured normal force on the walls (f, w) [N] from a table frame,wall,force, NaN on other walls.
 
-    pressure (w,) [Pa], NaN on walls without: none may have both.
+    Parameters
+    ----------
+    table
+        The table of loads.
+    names
+        Names of the walls (w,).
+    frame_count
+        Number of frames f.
+    pressure
+        Pressure on the walls (w,) [Pa], NaN on walls without one. A wall with a load must have none.
     """
     frame, force = table.integers("frame"), table.numbers("force")
     wall = _wall_rows(table, names, frame, frame_count)
     for at in np.flatnonzero(np.isfinite(pressure[wall])).tolist():
         raise table.error(at, "wall", f"has a pressure of {pressure[wall[at]]:g} Pa, too: give one of them")
     for at in np.flatnonzero(force < 0.0).tolist():
-        raise table.error(at, "force", "is negative: it presses the wall against the packing")
+        raise table.error(at, "force", "is negative: a positive force presses the wall against the packing")
     load = np.full((frame_count, len(names)), np.nan)
     load[frame, wall] = force
     for w in np.unique(wall).tolist():
         for k in np.flatnonzero(np.isnan(load[:, w])).tolist():
-            raise InputError(table.file, f"frame {k}", f"has no row of wall {names[w]!r}: loads are told in all frames")
+            raise InputError(table.file, f"frame {k}", f"has no row of wall {names[w]!r}: give loads in all frames")
     if not np.isfinite(pressure).any():
         for k in np.flatnonzero(np.nansum(load, axis=1) == 0.0).tolist():
-            raise InputError(table.file, f"frame {k}", "has loads of 0 N alone: nothing tells the size of the forces")
+            raise InputError(
+                table.file, f"frame {k}", "has loads of 0 N alone: the scale of the forces is undetermined"
+            )
     return load
 
 
@@ -143,7 +191,11 @@ def _read_bars(
 ) -> tuple[tuple[str, ...], Array, NDArray[np.int8]]:
     track = section.track
     if track and experiment.config.photographs is None:
-        raise InputError(experiment.file, "key walls.track = true", "walls can be followed in photographs only")
+        raise InputError(experiment.file, "key walls.track = true", "walls can be tracked in photographs only")
+    if section.file is None and section.corners is not None and section.arcs is None:
+        table = experiment.table(section.corners, CORNER_COLUMNS, optional=("theta",))
+        names, endpoints = bars_of_corners(table.file, arrange_corners(table, frame_count))
+        return names, endpoints, np.full(len(names), STRAIGHT, np.int8)
     if section.file is None:
         return (), np.empty((frame_count, 0, 2, 2)), np.empty(0, np.int8)
     table = experiment.table(section.file, WALL_COLUMNS)
@@ -153,10 +205,27 @@ def _read_bars(
     return names, endpoints, np.full(len(names), STRAIGHT, np.int8)
 
 
+def _read_corners(
+    experiment: Experiment, section: WallsSection, others: tuple[str, ...], bars: Array, loaded: NDArray[np.bool_]
+) -> tuple[tuple[str, ...], Array, NDArray[np.int32]]:
+    """Return names (c,), ends of diameters (f, c, 2, 2) [m] and the plate of every wall (w + c,), −1: its own."""
+    assert section.corners is not None
+    table = experiment.table(section.corners, CORNER_COLUMNS, optional=("theta",))
+    corners = arrange_corners(table, len(bars))
+    for at, each in enumerate(table.text("corner")):
+        if each in others:
+            raise table.error(at, "corner", "is the name of a wall, too: every wall and corner has a name of its own")
+    bar = bar_of_each_corner(corners, bars, loaded)
+    plate = np.full(len(others) + len(bar), -1, np.int32)
+    on_plate = (bar >= 0) & np.append(loaded, np.False_)[bar]
+    plate[len(others) :][on_plate] = bar[on_plate]
+    return corners.name, corners.endpoints(bar, bars), plate
+
+
 def _read_wall_forces(
     experiment: Experiment, section: WallsSection, names: tuple[str, ...], frame_count: int
 ) -> Array | None:
-    """What sensors recorded on the walls (f, w, 2) [N], NaN where they did not; None without a table."""
+    """Return the recorded forces on the walls (f, w, 2) [N], NaN where there is none; None without a table."""
     if section.forces is None:
         return None
     table = experiment.table(section.forces, FORCE_COLUMNS)
@@ -168,7 +237,7 @@ def _read_wall_forces(
 
 
 def _named_rows(table: Table) -> tuple[NDArray[np.int64], tuple[str, ...], NDArray[np.int64]]:
-    """Frame of every row, the names of the walls in order of appearance, and which of them every row tells of."""
+    """Return the frame of every row, the names of the walls in order of appearance, and the wall of every row."""
     frame, name = table.integers("frame"), table.text("wall")
     names = tuple(dict.fromkeys(name))
     row = np.array([names.index(each) for each in name])
@@ -177,7 +246,7 @@ def _named_rows(table: Table) -> tuple[NDArray[np.int64], tuple[str, ...], NDArr
 
 
 def _wall_rows(table: Table, names: tuple[str, ...], frame: NDArray[np.int64], frame_count: int) -> NDArray[np.int64]:
-    """Which wall every row tells of; every one once in a frame, and in frames that there are."""
+    """Return the wall of every row, once in every frame. Raises InputError for unknown walls and frames."""
     for row, (k, each) in enumerate(zip(frame, table.text("wall"), strict=True)):
         if each not in names:
             raise table.error(row, "wall", "is not the name of a wall")

@@ -1,4 +1,4 @@
 """Figures for papers, drawn from results with matplotlib: light, at column width, with units and scale bars.
 
-They show what is stored and compute no mechanics; the viewer's recording knows nothing of them.
+They show stored quantities and compute no mechanics; they are independent of the recording.
 """

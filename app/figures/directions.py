@@ -1,4 +1,4 @@
-"""What depends on direction: the rose of contacts and forces, and the stress."""
+"""Quantities that depend on direction: the rose of contacts and forces, and the stress."""
 
 from __future__ import annotations
 
@@ -6,30 +6,29 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
-from solver.bodies.grains import Array
-
 from ..results.results import Results
-from .page import BLUE, DASHES, INK, VERMILION, Width, add_title, new_figure
+from ..solver.bodies.grains import Array
+from .figure_style import BLUE, DASHES, INK, VERMILION, Width, add_title, new_figure
 
 BINS = 36
 
 
 def draw_rose(results: Results, frame: int, width: Width) -> Figure:
-    """Directions of the contacts between grains and of their normal forces, over those of an even packing."""
+    """Draw the angular densities of contacts between grains and of their normal forces, over the isotropic density."""
     forces, here = results.frames[frame], results.statistics[frame]
     figure = new_figure(width, 1.12)
     axes = _polar(figure)
     between = (forces.fn > 0) & ~forces.contacts.with_wall
     normal, fn = forces.contacts.normal[between], forces.fn[between]
-    bears = np.ones(len(fn)) if forces.bearing_probability is None else forces.bearing_probability[between]
+    bearing = np.ones(len(fn)) if forces.bearing_probability is None else forces.bearing_probability[between]
     for (name, weight), colour, dash in zip(
-        (("contacts", bears), ("normal forces", bears * fn)), (BLUE, VERMILION), DASHES, strict=False
+        (("contacts", bearing), ("normal forces", bearing * fn)), (BLUE, VERMILION), DASHES, strict=False
     ):
-        share = _shares(normal, weight)
+        density = _direction_density(normal, weight)
         edges = np.linspace(0.0, 2.0 * np.pi, BINS + 1)
-        axes.stairs(share, edges, baseline=None, color=colour, linestyle=dash, label=name)
+        axes.stairs(density, edges, baseline=None, color=colour, linestyle=dash, label=name)
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    axes.plot(angle, np.ones(181), color=INK, linewidth=0.6, label="even")
+    axes.plot(angle, np.ones(181), color=INK, linewidth=0.6, label="isotropic")
     axes.axvline(here.principal_direction, color=INK, linestyle=":", linewidth=0.8)
     axes.axvline(here.principal_direction + np.pi, color=INK, linestyle=":", linewidth=0.8, label="σ$_1$")
     figure.legend(loc="outside lower center", ncols=4)
@@ -38,10 +37,10 @@ def draw_rose(results: Results, frame: int, width: Width) -> Figure:
 
 
 def draw_stress(results: Results, frame: int, width: Width) -> Figure:
-    """Mohr's circle of the stress, and how the principal stresses went."""
+    """Draw Mohr's circle of the stress of one frame, and the principal stresses over time."""
     figure = new_figure(width, 0.55 if width == "double" else 1.05)
     pair = figure.subplots(1, 2) if width == "double" else figure.subplots(2, 1)
-    circle, course = pair
+    circle, history = pair
     here = results.statistics[frame]
     major, minor = 1e-3 * here.sigma_1, 1e-3 * here.sigma_2
     angle = np.linspace(0.0, np.pi, 91)
@@ -61,10 +60,10 @@ def draw_stress(results: Results, frame: int, width: Width) -> Figure:
         ("σ$_1$", [each.sigma_1 for each in results.statistics], BLUE, DASHES[0]),
         ("σ$_2$", [each.sigma_2 for each in results.statistics], VERMILION, DASHES[1]),
     ):
-        course.plot(time, 1e-3 * np.array(values), color=colour, linestyle=dash, label=name)
-    course.axvline(time[frame], color=INK, linewidth=0.5)
-    course.set(xlabel="time [s]", ylabel="principal stress [kPa]", ylim=(0.0, None))
-    course.legend()
+        history.plot(time, 1e-3 * np.array(values), color=colour, linestyle=dash, label=name)
+    history.axvline(time[frame], color=INK, linewidth=0.5)
+    history.set(xlabel="time [s]", ylabel="principal stress [kPa]", ylim=(0.0, None))
+    history.legend()
     return figure
 
 
@@ -78,8 +77,8 @@ def _polar(figure: Figure) -> PolarAxes:
     return axes
 
 
-def _shares(normal: Array, weight: Array) -> Array:
-    """Weight of the directions of normals (c, 2) and their opposites, over an even share (BINS,)."""
+def _direction_density(normal: Array, weight: Array) -> Array:
+    """Return the angular density (BINS,) of normals (c, 2) and their opposites, over the isotropic density."""
     angle = np.arctan2(normal[:, 1], normal[:, 0])
     both = np.mod(np.concatenate([angle, angle + np.pi]), 2.0 * np.pi)
     counts, _ = np.histogram(both, BINS, (0.0, 2.0 * np.pi), weights=np.tile(weight, 2))

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from solver.bodies.grains import Array
-from solver.statistics.force_statistics import FORCE_EDGES
-
 from ..results.results import Results
-from .page import BLUE, INK, VERMILION, Width, add_title, new_figure
+from ..solver.bodies.grains import Array
+from ..solver.statistics.force_statistics import FORCE_EDGES
+from .figure_style import BLUE, INK, VERMILION, Width, add_title, new_figure
 
 
 def draw_density(results: Results, frame: int, width: Width) -> Figure:
-    """P(f_n) and P(|f_t|) of one frame and of all, each force over its mean, with the tail's exponent."""
+    """Draw P(f_n) and P(|f_t|) of one frame and of all, over the mean force, with the exponent of the tail."""
     figure = new_figure(width, 0.72)
     axes = figure.add_subplot()
     middle = 0.5 * (FORCE_EDGES[1:] + FORCE_EDGES[:-1])
@@ -30,8 +29,8 @@ def draw_density(results: Results, frame: int, width: Width) -> Figure:
     if np.isfinite(beta):
         x = np.array([1.0, 4.5])
         start = np.interp(1.0, middle, here.fn_density)
-        told = rf"$\beta$ = {beta:.2f} ± {here.tail_exponent_sd:.2f}"
-        axes.plot(x, start * np.exp(-beta * (x - 1.0)), ":", color=INK, label=told)
+        label = rf"$\beta$ = {beta:.2f} ± {here.tail_exponent_sd:.2f}"
+        axes.plot(x, start * np.exp(-beta * (x - 1.0)), ":", color=INK, label=label)
     axes.set(
         yscale="log", xlim=(0.0, 6.0), ylim=(2e-3, 3.0), xlabel="force over its mean", ylabel="probability density"
     )

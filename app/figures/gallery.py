@@ -8,14 +8,13 @@ from typing import Literal, get_args
 
 from matplotlib.figure import Figure
 
-from solver.sequence.frame_forces import FrameStatus
-
 from ..results.results import Results, TruthContacts
+from ..solver.frame_forces import FrameStatus
 from .directions import draw_rose, draw_stress
 from .distributions import draw_density
+from .figure_style import Width, paper_style
 from .force_network import draw_forces
-from .page import Width, paper_style
-from .time_lines import draw_time
+from .time_curves import draw_time
 from .truth_comparison import draw_truth
 
 FigureName = Literal["forces", "density", "rose", "stress", "time", "truth"]
@@ -34,14 +33,36 @@ def draw_figure(
     width: Width = "single",
     truth: TruthContacts | None = None,
 ) -> Figure:
-    """One figure of a run: `name` of FigureName, of a frame, by default `usual_frame`.
+    """Draw one figure of a run.
 
-    Raises ValueError for a figure that is not known, for "truth" without a truth, for a frame without forces;
-    IndexError for a frame that is not there.
+    Parameters
+    ----------
+    results : Results
+        The results of the run.
+    name : str
+        A name of FigureName.
+    frame : int, optional
+        The frame; None: `default_frame`.
+    width : str
+        "single" or "double" column.
+    truth : TruthContacts, optional
+        True forces, for the figure "truth".
+
+    Returns
+    -------
+    Figure
+        The figure.
+
+    Raises
+    ------
+    ValueError
+        If there is no such figure, no truth for "truth", or no force in the frame.
+    IndexError
+        If there is no such frame.
     """
     if name not in get_args(FigureName):
-        raise ValueError(f"there is no figure {name!r}: figures are {', '.join(get_args(FigureName))}")
-    shown = usual_frame(results) if frame is None else frame
+        raise ValueError(f"there is no figure {name!r}: the figures are {', '.join(get_args(FigureName))}")
+    shown = default_frame(results) if frame is None else frame
     if not 0 <= shown < len(results.frames):
         raise IndexError(f"there is no frame {shown}: frames go from 0 to {len(results.frames) - 1}")
     if results.frames[shown].status is FrameStatus.FAILED:
@@ -54,8 +75,8 @@ def draw_figure(
         return _DRAW[name](results, shown, width)
 
 
-def usual_frame(results: Results) -> int:
-    """The last settled frame; the last one with forces where none is."""
+def default_frame(results: Results) -> int:
+    """Return the last settled frame; if there is none, the last with forces."""
     solved = [each.frame for each in results.frames if each.status is not FrameStatus.FAILED]
     settled = [each.frame for each in results.frames if each.status is FrameStatus.SETTLED]
     return (settled or solved or [0])[-1]
@@ -70,7 +91,28 @@ def write_figures(
     width: Width = "single",
     truth: TruthContacts | None = None,
 ) -> list[Path]:
-    """Write every figure that the run has data for, in each kind of file; returns the files."""
+    """Write every figure for which the run has data.
+
+    Parameters
+    ----------
+    results : Results
+        The results of the run.
+    folder : Path
+        Folder of the figures; it is created.
+    kinds : sequence of str
+        Kinds of files: "pdf", "svg", "png".
+    frame : int, optional
+        The frame; None: `default_frame`.
+    width : str
+        "single" or "double" column.
+    truth : TruthContacts, optional
+        True forces, for the figure "truth".
+
+    Returns
+    -------
+    list of Path
+        The files.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name in get_args(FigureName):
@@ -79,6 +121,6 @@ def write_figures(
         figure = draw_figure(results, name, frame, width=width, truth=truth)
         for kind in kinds:
             files.append(folder / f"{name}.{kind}")
-            with paper_style():  # the kinds of letters in PDF and SVG are settled when they are written
+            with paper_style():  # the fonts of PDF and SVG are chosen when the file is written
                 figure.savefig(files[-1])
     return files

@@ -1,2 +1,4 @@
-"""A test that still goes on: photographs are waited for, tracked and solved as they come.
-What it finds is provisional; the ordinary run, with all photographs at hand, replaces it."""
+"""Following of a running test: photographs are tracked and solved as they arrive.
+
+The results are provisional; the ordinary run with all photographs replaces them.
+"""

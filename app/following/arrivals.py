@@ -1,8 +1,8 @@
-"""Photographs as they arrive: one counts once it is whole, and once those that belong before it are there.
+"""Arrival of photographs: a photograph is used once its file is complete and its predecessors are there.
 
-A camera's program, or a copy over a network, writes a file for a while, and files overtake one another. A file is whole
-when its size and time have stayed for a moment and it can be read; one whose number leaves a gap is held back for a
-while, for the one in between may be late.
+Cameras and network copies write a file over some time, and files may arrive out of order. A file is complete when its
+size and time have not changed for a moment and it can be read; a file after a gap in the numbers is held back for a
+while, since the missing one may be late.
 """
 
 from __future__ import annotations
@@ -14,56 +14,56 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from ..errors import InputError
-from ..experiment.photographs import natural_key, read_photograph
+from ..experiment.photographs import in_order, read_photograph
+from ..process.errors import InputError
 
-STEADY = 0.5  # [s] that a file must have stayed as it is
-LATE = 20.0  # [s] that a file is waited for whose successor is there
+STEADY_TIME = 0.5  # [s] without a change of the file
+MAX_DELAY = 20.0  # [s] to wait for a file whose successor is there
 
 
 @dataclass(slots=True)
 class Arrivals:
-    """The photographs of a folder that is being filled."""
+    """The photographs that arrive in a folder."""
 
     folder: Path
     pattern: str
-    steady: float = STEADY
-    late: float = LATE
+    steady_time: float = STEADY_TIME
+    max_delay: float = MAX_DELAY
     clock: Callable[[], float] = time.monotonic
-    _seen: dict[Path, tuple[tuple[int, int], float]] = field(default_factory=dict)  # what a file was, and since when
-    _whole: dict[Path, tuple[int, int]] = field(default_factory=dict)
+    _seen: dict[Path, tuple[tuple[int, int], float]] = field(default_factory=dict)  # state of a file, and its time
+    _complete: dict[Path, tuple[int, int]] = field(default_factory=dict)
     _gap_since: float | None = None
 
-    def look(self) -> list[Path]:
-        """The photographs that are there for good, in natural order."""
-        files = sorted((file for file in self.folder.glob(self.pattern) if file.is_file()), key=natural_key)
-        whole = [self._is_whole(file) for file in files]
-        first_torn = whole.index(False) if False in whole else len(files)
-        return self._without_gap(files[:first_torn])  # what comes after half a file waits for it
+    def complete_files(self) -> list[Path]:
+        """Return the complete photographs in natural order."""
+        files = list(in_order(file for file in self.folder.glob(self.pattern) if file.is_file()))
+        complete = [self._is_complete(file) for file in files]
+        first_incomplete = complete.index(False) if False in complete else len(files)
+        return self._without_gap(files[:first_incomplete])
 
-    def _is_whole(self, file: Path) -> bool:
+    def _is_complete(self, file: Path) -> bool:
         try:
-            told = file.stat()
-        except OSError:  # renamed meanwhile
+            state = file.stat()
+        except OSError:  # renamed or removed
             return False
-        stamp = told.st_size, told.st_mtime_ns
-        if self._whole.get(file) == stamp:
+        stamp = state.st_size, state.st_mtime_ns
+        if self._complete.get(file) == stamp:
             return True
         known = self._seen.get(file)
         if known is None or known[0] != stamp:
             self._seen[file] = stamp, self.clock()
             return False
-        if self.clock() - known[1] < self.steady:
+        if self.clock() - known[1] < self.steady_time:
             return False
         try:
             read_photograph(file)
-        except InputError:  # half of it, which may stay so for a while
+        except InputError:  # incomplete
             return False
-        self._whole[file] = stamp
+        self._complete[file] = stamp
         return True
 
     def _without_gap(self, files: list[Path]) -> list[Path]:
-        """Without what comes after a number that is missing, until that has been waited for long enough."""
+        """Leave out files after a missing number, until the maximum delay is over."""
         number = [_last_number(file) for file in files]
         step = [b - a for a, b in pairwise(number) if a is not None and b is not None]
         if len(step) < 2 or min(step) <= 0:
@@ -74,7 +74,7 @@ class Arrivals:
             return files
         if self._gap_since is None:
             self._gap_since = self.clock()
-        return files if self.clock() - self._gap_since > self.late else files[:gap]
+        return files if self.clock() - self._gap_since > self.max_delay else files[:gap]
 
 
 def _last_number(file: Path) -> int | None:

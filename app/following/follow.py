@@ -1,8 +1,8 @@
-"""Photographs tracked and frames solved as they come, every frame once, with what was known when it came.
+"""Tracking of photographs and solution of frames as they arrive, every frame once with the data available then.
 
-The rods of the first photograph are found once; a photograph that comes is correlated, all tracks so far are corrected,
-and the frames that are new are solved from the forces of the last one. Everything is kept frame by frame in the run's
-folder, so that a follower that is stopped goes on where it was.
+The rods of the first photograph are detected once; every new photograph is correlated, all tracks so far are corrected,
+and new frames are solved from the forces of the previous one. Every frame is stored in the run's folder, so that an
+interrupted follower resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -14,130 +14,163 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.state import SequenceState
-from solver.statistics.frame_statistics import FrameStatistics
-
-from ..errors import InputError
+from ..experiment.config.experiment_file import as_toml
 from ..experiment.experiment import Experiment, load_experiment
-from ..inference.inference import Inputs, SolvedFrame, correct_sequence, solve_frames
-from ..inference.settings import material_of, settings_of
+from ..inference.corrected_sequence import CorrectedSequence
+from ..inference.frame_store import CheckpointStore, SolvedFrame
+from ..inference.infer_sequence import InferenceObserver, infer_sequence
+from ..inference.inference_settings import material_of, settings_of
+from ..inference.inputs import Inputs
+from ..process.errors import InputError
+from ..process.frame_range import ALL_FRAMES
+from ..process.sources import hash_of_code
+from ..process.version import library_versions
 from ..results.checkpoint import Checkpoint
 from ..results.hdf5.store import Provenance, save_tracks
+from ..results.results import Results
 from ..run_folder import TRACKS, UNFINISHED, Run
+from ..solver.frame_forces import FrameForces, FrameStatus
+from ..stages import FORCES
 from ..tracking.follow import ReferenceGrains
 from ..tracking.stage import find_reference, track_photographs, write_found_tables
-from ..tracks import Tracks, WallTracks
+from ..tracks import Tracks
 from .arrivals import Arrivals
 
-PAUSE = 0.3  # [s] between looks into the folder
-FEWEST = 2  # photographs that forces can be found from
-Alarm = Callable[[int, str], None]  # hears of a frame what a person should know at once
+PAUSE = 0.3  # [s] between listings of the folder
+MIN_PHOTOGRAPHS = 2  # for forces
+Alarm = Callable[[int, str], None]  # called with frame and message for immediate attention
 
 
 @dataclass(slots=True)
 class _Followed:
-    """What is kept between photographs."""
+    """The state between photographs."""
 
     grains: ReferenceGrains | None = None
-    last: SolvedFrame | None = None
     files: tuple[Path, ...] = ()
-    rods: int = 0  # that the last frame was solved with, found ones included
     lost: frozenset[int] = frozenset()
 
 
 def follow(
-    run: Run, settings: tuple[str, ...], *, idle: float | None, alarm: Alarm, say: Callable[[str], None]
-) -> None:
-    """Track and solve photographs as they come, until none has come for `idle` [s]; None: until it is interrupted.
+    run: Run, settings: tuple[str, ...], *, idle: float | None, alarm: Alarm, report: Callable[[str], None]
+) -> Iterator[Results]:
+    """Track and solve photographs as they arrive, and yield the results so far whenever some were solved.
 
-    settings: KEY=VALUE, as the run has them. Raises InputError where the experiment cannot be followed.
+    Parameters
+    ----------
+    run : Run
+    settings : tuple of str
+        KEY=VALUE of the run.
+    idle : float or None
+        Time without a photograph after which to end [s]; None: never.
+    alarm : callable
+        Called with frame and message for lost rods and suspect or failed frames.
+    report : callable
+        Called with other messages.
+
+    Raises
+    ------
+    InputError
+        If the experiment has no photographs, interval or walls.
     """
     section = run.experiment.config.photographs
     if section is None or run.experiment.config.walls is None:
         raise InputError(run.experiment.file, "--follow", "needs [photographs] and [walls]")
     if section.interval is None:
-        raise InputError(run.experiment.file, "key photographs.interval", "is missing: times are not known beforehand")
+        raise InputError(
+            run.experiment.file, "key photographs.interval", "is missing: it gives the times of future photographs"
+        )
     arrivals, state = Arrivals(run.experiment.folder, section.files), _Followed()
-    say("Waiting for photographs.")
+    report("Waiting for photographs.")
     since = time.monotonic()
     while idle is None or time.monotonic() - since < idle:
-        ready = tuple(arrivals.look())
+        ready = tuple(arrivals.complete_files())
         if len(ready) <= len(state.files) and ready[: len(state.files)] == state.files[: len(ready)]:
             time.sleep(PAUSE)
             continue
         if ready[: len(state.files)] != state.files:
-            say("A photograph has come between others: the test is followed from its beginning.")
+            report("A photograph arrived between others: the test is followed from its beginning.")
             _forget(run)
             state = _Followed(state.grains if ready[:1] == state.files[:1] else None)
-        _take_in(run, settings, ready, state, alarm)
+        results = _process_new(run, settings, ready, state, alarm)
+        if results is not None:
+            yield results
         since = time.monotonic()
 
 
-def _take_in(run: Run, settings: tuple[str, ...], ready: tuple[Path, ...], state: _Followed, alarm: Alarm) -> None:
-    """Track the photographs that are new, and solve their frames."""
+def _process_new(
+    run: Run, settings: tuple[str, ...], ready: tuple[Path, ...], state: _Followed, alarm: Alarm
+) -> Results | None:
+    """Track the new photographs and solve their frames; None as long as there are too few for forces."""
     experiment = load_experiment(run.experiment.file, settings)
     section = experiment.config.photographs
     assert section is not None
     experiment.inputs.listed(section.files, lambda: ready)
-    here = replace(run, experiment=experiment)
-    mark = _fingerprint(experiment, ready[0])
+    current = replace(run, experiment=experiment)
+    fingerprint = _fingerprint(experiment, ready[0])
     if state.grains is None:
         run.progress("detection", 0, 1)
         state.grains = find_reference(experiment)
         run.progress("detection", 1, 1)
 
-    def keep(stage: str) -> Checkpoint:
-        return Checkpoint(run.folder / UNFINISHED / f"following-{stage}", mark, run.notes)
+    def checkpoint_of(stage: str) -> Checkpoint:
+        return Checkpoint(run.folder / UNFINISHED / f"following-{stage}", fingerprint, run.notes)
 
-    tracks, walls, tables = track_photographs(
-        experiment, len(ready), keep, run.progress, run.note_failure, grains=state.grains
-    )
+    tracks, walls, tables = track_photographs(experiment, len(ready), checkpoint_of, run.progress, grains=state.grains)
     write_found_tables(run.folder, tables)
-    save_tracks(run.file(TRACKS), experiment.name, tracks, walls, Provenance(mark, experiment.file.name, (0, None), {}))
+    save_tracks(
+        run.file(TRACKS),
+        experiment.name,
+        tracks,
+        walls,
+        Provenance(fingerprint, experiment.file.name, ALL_FRAMES, {}),
+    )
     for name in (TRACKS, *tables):
-        run.manifest.add(name, mark)
+        run.manifest.add(name, fingerprint)
     for k in range(len(state.files), len(ready)):
-        state.lost = _tell_lost(tracks, k, state.lost, alarm)
+        state.lost = _report_lost(tracks, k, state.lost, alarm)
     state.files = ready
-    if len(ready) < FEWEST or walls is None:
-        return
-    for frame in _solve(here, tracks, walls, state, Checkpoint(run.folder / UNFINISHED / "solving", mark, run.notes)):
-        run.progress("solving", frame.forces.frame + 1, len(ready))
-        told_already = frame.forces.frame in tracks.failed
-        if frame.forces.status in (FrameStatus.SUSPECT, FrameStatus.FAILED) and not told_already:
-            alarm(frame.forces.frame, f"{frame.forces.status.name.lower()}: {_reason(frame.forces)}")
+    if len(ready) < MIN_PHOTOGRAPHS or walls is None:
+        return None
+    config = current.experiment.config
+    store = CheckpointStore(lambda: Checkpoint(run.folder / UNFINISHED / "solving", fingerprint, run.notes))
+    observer = _FollowObserver(current, tracks, store, alarm)
+    inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
+    results = infer_sequence(inputs, observer, store, complete=False)
+    return replace(results, name=experiment.name, configuration=as_toml(config))
 
 
-def _solve(run: Run, tracks: Tracks, walls: WallTracks, state: _Followed, kept: Checkpoint) -> Iterator[SolvedFrame]:
-    """The frames that are new, from the last one on; all of them where the packing is another."""
-    config = run.experiment.config
-    sequence = correct_sequence(Inputs(tracks, walls, material_of(config), settings_of(config)))
-    rods = sequence.packing.grains.count
-    done = min(kept.finished(), tracks.frame_count)
-    if state.last is None and done:
-        state.last = SolvedFrame(*kept.load(done - 1, FrameForces, FrameStatistics, SequenceState))
-        state.rods = state.last.forces.contacts.grain_count
-    if state.rods != rods:
-        state.last = None
-    if state.last is not None and state.last.forces.frame + 1 >= tracks.frame_count:
-        return
-    for frame in solve_frames(sequence, after=state.last, observer=run.note_failure):
-        kept.save(frame.forces.frame, frame.forces, frame.statistics, frame.state)
-        state.last, state.rods = frame, rods
-        yield frame
+class _FollowObserver(InferenceObserver):
+    """Raises an alarm for new frames that need attention; restarts if the set of rods has changed."""
+
+    def __init__(self, run: Run, tracks: Tracks, store: CheckpointStore, alarm: Alarm) -> None:
+        super().__init__(run.progress)
+        self._run, self._tracks, self._store, self._alarm = run, tracks, store, alarm
+
+    def corrected(self, sequence: CorrectedSequence) -> None:
+        done = self._store.finished()
+        if done and self._store.load(done - 1).forces.contacts.grain_count != sequence.packing.grains.count:
+            self._store.checkpoint.drop(0)
+
+    def solved(self, frame: SolvedFrame) -> None:
+        forces = frame.forces
+        lost_photograph = forces.frame in self._tracks.failed  # reported when it was tracked
+        if forces.status in (FrameStatus.SUSPECT, FrameStatus.FAILED) and not lost_photograph:
+            self._alarm(forces.frame, f"{forces.status.name.lower()}: {_reason(forces)}")
+
+    def failed(self, stage: str, frame: int, error: Exception) -> None:
+        self._run.note_failure(stage, frame, error)
 
 
-def _tell_lost(tracks: Tracks, frame: int, before: frozenset[int], alarm: Alarm) -> frozenset[int]:
-    """Raise an alarm for rods that are lost in a frame and were not before; gives those that are."""
+def _report_lost(tracks: Tracks, frame: int, before: frozenset[int], alarm: Alarm) -> frozenset[int]:
+    """Raise an alarm for newly lost rods of a frame; return all lost ones."""
     lost = frozenset(tracks.id[~tracks.present[frame]].tolist())
-    fresh = sorted(lost - before)
+    newly_lost = sorted(lost - before)
     reason = tracks.failed.get(frame)
     if reason is not None:
         alarm(frame, reason)
-    elif fresh:
-        names = ", ".join(str(each) for each in fresh[:5]) + (" …" if len(fresh) > 5 else "")
-        alarm(frame, f"{len(fresh)} rod{'s' if len(fresh) > 1 else ''} lost: {names}")
+    elif newly_lost:
+        names = ", ".join(str(each) for each in newly_lost[:5]) + (" …" if len(newly_lost) > 5 else "")
+        alarm(frame, f"{len(newly_lost)} rod{'s' if len(newly_lost) > 1 else ''} lost: {names}")
     return lost
 
 
@@ -146,11 +179,12 @@ def _reason(forces: FrameForces) -> str:
 
 
 def _fingerprint(experiment: Experiment, first: Path) -> str:
-    """Of what frames are made from: everything but the photographs that are still to come."""
+    """Return a fingerprint of the inputs of the frames, without photographs that have not arrived."""
     photographs = set(experiment.photographs().files) - {first}
     sums = {file.name: experiment.inputs.checksum(file) for file in experiment.input_files() if file not in photographs}
-    told = ["following", experiment.config.model_dump(mode="json"), sums]
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    program = [hash_of_code(FORCES.code, (*FORCES.alone, "following/follow.py")), library_versions()]
+    inputs = ["following", experiment.config.model_dump(mode="json"), sums, program]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 def _forget(run: Run) -> None:

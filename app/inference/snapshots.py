@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.calibration.gaps import MeasuredSequence
-from solver.inferred.rolling import roll_unknown
-
+from ..solver.bodies.grains import Array
+from ..solver.bodies.motion import Snapshot
+from ..solver.calibration.gaps import MeasuredSequence
+from ..solver.inferred.unknown_rotations import fill_unknown_rotations
 from ..tracks import Tracks, WallTracks
 
 
@@ -18,6 +17,7 @@ def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
         Snapshot(
             float(tracks.time[k]), tracks.position[k], rotation[k], present[k], walls.endpoints[k],
             float(sigma[k]), walls.side, walls.load_at(k), None if walls.cell is None else walls.cell[k],
+            walls.plate,
         )
         for k in range(tracks.frame_count)
     ]  # fmt: skip
@@ -35,7 +35,7 @@ def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:
 
 
 def _rotations(tracks: Tracks, walls: WallTracks) -> Array:
-    return roll_unknown(
+    return fill_unknown_rotations(
         tracks.radius, tracks.position, tracks.rotation, tracks.present, walls.endpoints, side=walls.side,
         cell=walls.cell,
     )  # fmt: skip

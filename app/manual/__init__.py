@@ -1,1 +1,1 @@
-"""The documentation as it is shipped: pages of app/docs made readable without a network; lists made from the code."""
+"""The shipped documentation: pages of app/docs as HTML for reading offline, and lists generated from the code."""

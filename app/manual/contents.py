@@ -1,4 +1,4 @@
-"""The pages of the documentation, in their order, under the headings they are found by."""
+"""The pages of the documentation in their order, grouped under headings."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ FOLDER = Path(__file__).parent.parent / "docs"
 CONTENTS: dict[str, dict[str, str]] = {
     "Begin": {
         "index.md": "Start",
+        "install.md": "Install, update, cite",
         "photographs.md": "Your own photographs",
         "workbench.md": "The workbench",
         "views.md": "What the views show",
@@ -32,17 +33,18 @@ CONTENTS: dict[str, dict[str, str]] = {
         "settings.md": "Settings",
         "schema.md": "results.h5",
         "api.md": "Python, name by name",
+        "glossary.md": "Glossary",
     },
     "Take part": {
         "contributing.md": "Contributing",
         "architecture.md": "Architecture",
         "conventions.md": "Conventions",
         "robustness.md": "Robustness, counted",
-        "threats.md": "Strangers",
+        "threats.md": "Threat model",
     },
 }
 
 
 def pages() -> dict[str, str]:
-    """Titles of all pages, by file name."""
+    """Return the titles of all pages by file name."""
     return {file: title for group in CONTENTS.values() for file, title in group.items()}

@@ -1,4 +1,4 @@
-"""Every error and warning that a user may read, found in the source itself."""
+"""Find every error and warning for users in the source code."""
 
 from __future__ import annotations
 
@@ -9,36 +9,38 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from .. import solver
+
 APP = Path(__file__).parent.parent
-SOLVER = APP.parent / "solver"
-# What ends a command in one line; the arguments before the last two name the file and the place.
+SOLVER = Path(str(solver.__file__)).parent
+# Errors that end a command; the arguments before the last two are the file and the place in it.
 ERRORS = {
     "InputError", "RunError", "NoPictureError", "DifferentPackingError", "FrictionError", "CoordinationError",
     "UnbalancedError", "UnreadableError",
 }  # fmt: skip
-COMPLAINTS = ("error", "_error")  # methods that make an InputError of a problem, their last argument
-VALIDATED = "experiment/config/"  # where a ValueError is what is wrong with a key
-# Functions whose sentences are warnings: of a frame, of a run, of an experiment.
+ERROR_METHODS = ("error", "_error")  # they make an InputError of their last argument, a problem
+VALIDATED = "experiment/config/"  # folder where a ValueError reports a wrong key
+# Functions whose texts are warnings of a frame, a run or an experiment.
 WARNINGS = {
-    "solver/sequence/judging/doubts.py": (
-        "_stillness", "_noise", "_spacing", "_radii", "_boundary", "_softness", "_unseen", "_disagreement",
-        "_correction", "doubt_friction",
+    "solver/assessment/penalties.py": (
+        "_sliding", "_noise", "_spacing", "_radii", "_boundary", "_softness", "_unseen", "_disagreement",
+        "_correction", "penalise_friction",
     ),
-    "solver/sequence/judging/judgement.py": ("judge", "_judge", "find_faults", "_tell_change"),
+    "solver/assessment/status.py": ("decide_status", "_decide", "find_faults", "_describe_change"),
     "solver/calibration/calibrate.py": ("_verdict", "_track_warning", "_prior_warning"),
-    "solver/boundary/boundary.py": ("describe",),
-    "app/experiment/plausibility.py": ("doubtful_loads", "open_sides", "rods_beyond_ends"),
+    "solver/boundary/boundary_correction.py": ("describe",),
+    "app/experiment/plausibility.py": ("implausible_loads", "open_sides", "rods_beyond_ends"),
     "app/experiment/boundary.py": ("free_surfaces",),
-    "app/inference/data_budget.py": ("describe", "_advice"),
+    "app/inference/predicted_accuracy.py": ("describe", "_advice"),
 }  # fmt: skip
-SAYING = re.compile(r"Error\(|\.error\(|_error\(|notes\.append\(")  # what code must hold to be looked at more closely
+RAISES = re.compile(r"Error\(|\.error\(|_error\(|notes\.append\(")  # code without a match is not parsed
 UNKNOWN = "…"
-WORDS = 4  # of a warning, at least
+MIN_WORDS = 4  # of a warning
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What a user reads, with … for what differs from case to case."""
+    """An error or warning, with … for its variable parts."""
 
     kind: str  # error or warning
     source: str  # file that it comes from: app/… or solver/…
@@ -47,13 +49,15 @@ class Message:
 
 @cache
 def find_messages() -> tuple[Message, ...]:
-    """All of them, each once, in the order of their files."""
+    """Return all messages, each once, in the order of their files."""
     found: dict[tuple[str, str], Message] = {}
-    for room, folder in (("app", APP), ("solver", SOLVER)):
+    for package, folder in (("app", APP), ("solver", SOLVER)):
         for file in sorted(folder.rglob("*.py")):
-            source = f"{room}/{file.relative_to(folder).as_posix()}"
+            if package == "app" and file.is_relative_to(SOLVER):  # an installed package contains the solver
+                continue
+            source = f"{package}/{file.relative_to(folder).as_posix()}"
             code = file.read_text(encoding="utf-8")
-            if source not in WARNINGS and not SAYING.search(code):
+            if source not in WARNINGS and not RAISES.search(code):
                 continue
             for message in _messages_of(source, ast.parse(code)):
                 found.setdefault((message.source, message.text), message)
@@ -69,12 +73,12 @@ def _messages_of(source: str, tree: ast.Module) -> Iterator[Message]:
         for call in (node for node in _own(scope) if isinstance(node, ast.Call)):
             text = _text_of_call(source, call, named)
             if text.replace(UNKNOWN, "").strip(" :.'\"?()"):
-                kind = "warning" if _called(call) in ("append", "tell") else "error"
+                kind = "warning" if _called(call) == "append" else "error"
                 yield Message(kind, source, " ".join(text.split()))
 
 
 def _own(scope: ast.AST) -> Iterator[ast.AST]:
-    """What stands in a scope, and not in a function within it."""
+    """Yield the nodes of a scope without those of its inner functions."""
     for child in ast.iter_child_nodes(scope):
         if not isinstance(child, ast.FunctionDef):
             yield child
@@ -85,7 +89,7 @@ def _text_of_call(source: str, call: ast.Call, named: dict[str, str]) -> str:
     name = _called(call)
     if name in ERRORS and call.args:
         return ": ".join(part for part in (_text(each, named) for each in call.args[-2:]) if part)
-    if name in COMPLAINTS and isinstance(call.func, ast.Attribute) and len(call.args) > 1:
+    if name in ERROR_METHODS and isinstance(call.func, ast.Attribute) and len(call.args) > 1:
         return _text(call.args[-1], named)
     if name == "ValueError" and VALIDATED in source and call.args:
         return _text(call.args[0], named)
@@ -100,7 +104,7 @@ def _called(call: ast.Call) -> str:
 
 
 def _assigned(function: ast.AST) -> dict[str, str]:
-    """Texts that names of a function stand for."""
+    """Return the texts that are assigned to names in a function."""
     found: dict[str, str] = {}
     for node in _own(function):
         if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
@@ -111,7 +115,7 @@ def _assigned(function: ast.AST) -> dict[str, str]:
 
 
 def _sentences(function: ast.FunctionDef) -> Iterator[str]:
-    """The texts of some words in a function, its docstring left out."""
+    """Yield the texts of at least MIN_WORDS words in a function, without its docstring."""
     inner: set[int] = set()
     docstring = ast.get_docstring(function, clean=False)
     for node in ast.walk(function):
@@ -120,12 +124,12 @@ def _sentences(function: ast.FunctionDef) -> Iterator[str]:
         if isinstance(node, ast.JoinedStr):
             inner.update(id(part) for part in ast.walk(node))
         text = _text(node, {})
-        if text != docstring and len([word for word in text.split() if word.strip(UNKNOWN + ":;,()")]) >= WORDS:
+        if text != docstring and len([word for word in text.split() if word.strip(UNKNOWN + ":;,()")]) >= MIN_WORDS:
             yield " ".join(text.split())
 
 
 def _text(node: ast.AST, named: dict[str, str]) -> str:
-    """What a piece of code says, … for what is not known before it runs."""
+    """Return the text of an expression, with … for parts that are known at run time only."""
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, str) else UNKNOWN
     if isinstance(node, ast.JoinedStr):

@@ -1,4 +1,4 @@
-"""The documentation as plain HTML files, made of the shipped Markdown: read from the disk, nothing is loaded."""
+"""Convert the shipped Markdown pages to plain HTML files, which are read offline."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 from .contents import CONTENTS, FOLDER, pages
 
-# What mkdocstrings fills in: a name below this folder, and the name that users know it by.
-FRONT = re.compile(r"\A---\n.*?\n---\n", re.DOTALL)  # what a journal is told of a page
+FRONT = re.compile(r"\A---\n.*?\n---\n", re.DOTALL)  # metadata of a page for a journal
+# A directive of mkdocstrings: a name below app/, and the public name as its heading.
 MEMBER = re.compile(r'^::: app\.([\w.]+)\n +options:\n +heading: "([\w.]+)"$', re.MULTILINE)
+SECTION = re.compile(r"^(\w+)\n-{3,}$", re.MULTILINE)  # of a docstring in NumPy's form
+LISTS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns")  # sections of items with indented texts
 
 
 def write_pages(folder: Path) -> Path:
-    """Write every page as HTML, with its pictures, into a folder; returns the first page."""
+    """Write every page as HTML, with its pictures, into a folder; return the first page."""
     from jinja2 import Environment
 
     source = files(__name__.rpartition(".")[0]).joinpath("page.html").read_text(encoding="utf-8")
@@ -40,14 +42,14 @@ def write_pages(folder: Path) -> Path:
 
 
 def page_text(name: str) -> str:
-    """The Markdown of a page, with what the code says of itself in its place."""
+    """Return the Markdown of a page, with docstrings in place of mkdocstrings' directives."""
     text = (FOLDER / name).read_text(encoding="utf-8")
     text = FRONT.sub("", text)
     return MEMBER.sub(lambda found: _describe(found[1], found[2]), text)
 
 
 def reading_folder(version: str) -> Path:
-    """Where the pages are put for reading: the user's cache, or a new folder for temporary files."""
+    """Return the folder for pages to read: in the user's cache, or a new temporary folder."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     folder = Path(base) / "rodsight" / f"docs-{version}"
     try:
@@ -75,34 +77,50 @@ def _html(text: str) -> str:
 
 
 def anchor(heading: str) -> str:
-    """The name by which a heading is linked to."""
+    """Return the HTML id of a heading."""
     plain = re.sub(r"[`*\[\]]", "", heading).lower()
     return re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", plain)).strip("-")
 
 
-def _describe(place: str, known_as: str) -> str:
-    """What a name of the Python interface says of itself, as Markdown."""
-    module, _, attribute = place.rpartition(".")
-    thing = getattr(import_module(f"{__name__.partition('.')[0]}.{module}"), attribute)
-    parts = [f"## {known_as}", _entry(known_as, thing)]
-    if inspect.isclass(thing):
-        for member, value in vars(thing).items():
+def _describe(path: str, public_name: str) -> str:
+    """Return the docstrings of a public Python name and of its members as Markdown."""
+    module, _, attribute = path.rpartition(".")
+    documented = getattr(import_module(f"{__name__.partition('.')[0]}.{module}"), attribute)
+    parts = [f"## {public_name}", _entry(public_name, documented)]
+    if inspect.isclass(documented):
+        for member, value in vars(documented).items():
             if not member.startswith("_") and (inspect.isfunction(value) or isinstance(value, property)):
                 parts.append(_entry(member, value))
     return "\n\n".join(parts)
 
 
-def _entry(name: str, thing: Any) -> str:
-    shown = "" if isinstance(thing, property) or inspect.isclass(thing) else _signature(thing)
-    text, _, example = (inspect.getdoc(thing) or "").partition("\nExamples:\n")
-    code = f"\n\n```pycon\n{inspect.cleandoc(example)}\n```" if example else ""
-    return f"### `{name}{shown}`\n\n{html.escape(text, quote=False)}{code}"
+def _entry(name: str, documented: Any) -> str:
+    shown = "" if isinstance(documented, property) or inspect.isclass(documented) else _signature(documented)
+    return f"### `{name}{shown}`\n\n{_docstring_markdown(inspect.getdoc(documented) or '')}"
 
 
-def _signature(thing: Any) -> str:
-    """Names and defaults of the arguments; their types are in the text."""
-    signature = inspect.signature(thing)
+def _docstring_markdown(docstring: str) -> str:
+    """Return a docstring in NumPy's form as Markdown."""
+    summary, *parts = SECTION.split(docstring)
+    shown = [html.escape(summary.strip(), quote=False)]
+    for title, body in zip(parts[::2], parts[1::2], strict=True):
+        if title == "Examples":
+            shown.append(f"```pycon\n{inspect.cleandoc(body)}\n```")
+        else:
+            text = html.escape(body.strip("\n"), quote=False)
+            shown.append(f"**{title}**\n\n{_list_markdown(text) if title in LISTS else text}")
+    return "\n\n".join(shown)
+
+
+def _list_markdown(body: str) -> str:
+    """Return the items of a docstring's section as a Markdown list."""
+    return re.sub(r"^(\S.*)$", r"- `\1`:", body, flags=re.MULTILINE)
+
+
+def _signature(documented: Any) -> str:
+    """Return the names and defaults of the arguments; the docstring has their types."""
+    signature = inspect.signature(documented)
     kept = [each.replace(annotation=inspect.Parameter.empty) for each in signature.parameters.values()]
-    told = str(signature.replace(parameters=kept, return_annotation=inspect.Signature.empty))
-    told = re.sub(r"<function (\w+) at \w+>", r"\1", told)  # of a default
-    return told.replace("(self, ", "(").replace("(self)", "()")
+    shown = str(signature.replace(parameters=kept, return_annotation=inspect.Signature.empty))
+    shown = re.sub(r"<function (\w+) at \w+>", r"\1", shown)  # of a default
+    return shown.replace("(self, ", "(").replace("(self)", "()")

@@ -1,4 +1,4 @@
-"""app/docs/troubleshooting.md: every message with what to do about it; `python -m rodsight.manual.troubleshooting`."""
+"""The page app/docs/troubleshooting.md: every message with its cure; `python -m rodsight.manual.troubleshooting`."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 from .contents import FOLDER
 from .messages import Message, find_messages
 
 PAGE = FOLDER / "troubleshooting.md"
-FIRST = Path(__file__).parent / "troubleshooting_first.md"  # what people ask most, written by hand
+QUESTIONS = Path(__file__).parent / "troubleshooting_first.md"  # frequent questions, written by hand
 FIRST_LINE = "<!-- Generated: run `python -m rodsight.manual.troubleshooting` to write it anew. -->"
 CURES = Path(__file__).parent / "cures.toml"
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """What messages are about, and what cures them."""
+    """A group of messages by their source files, and their cures."""
 
     title: str
     files: tuple[str, ...]
     cures: tuple[tuple[str, str], ...]  # pattern, cure
 
     def cure(self, message: Message) -> str | None:
-        """What to do about a message; None: nothing is known."""
+        """Return the cure of a message, None where no pattern matches."""
         return next((cure for pattern, cure in self.cures if re.search(pattern, message.text)), None)
 
 
 @cache
 def topics() -> tuple[Topic, ...]:
-    """The topics in their order."""
-    told = tomllib.loads(CURES.read_text(encoding="utf-8"))["topic"]
-    return tuple(Topic(each["title"], tuple(each["files"]), tuple((p, c) for p, c in each["cures"])) for each in told)
+    """Return the topics in the order of the page."""
+    tables = tomllib.loads(CURES.read_text(encoding="utf-8"))["topic"]
+    return tuple(Topic(each["title"], tuple(each["files"]), tuple((p, c) for p, c in each["cures"])) for each in tables)
 
 
 def topic_of(message: Message) -> Topic | None:
-    """The topic of a message."""
+    """Return the topic of a message."""
     return next((each for each in topics() if message.source.startswith(each.files)), None)
 
 
 def troubleshooting_page() -> str:
-    """The whole page, Markdown."""
-    parts = [FIRST_LINE, FIRST.read_text(encoding="utf-8").strip()]
+    """Return the page as Markdown."""
+    parts = [FIRST_LINE, QUESTIONS.read_text(encoding="utf-8").strip()]
     messages = find_messages()
     for topic in topics():
         own = [each for each in messages if topic_of(each) is topic]
@@ -56,7 +56,7 @@ def troubleshooting_page() -> str:
 
 
 def _table(topic: Topic, messages: Sequence[Message]) -> str:
-    """Messages with the same cure in one row."""
+    """Return a Markdown table with one row per cure."""
     by_cure: dict[str, list[str]] = {}
     for message in messages:
         by_cure.setdefault(topic.cure(message) or "", []).append(message.text)

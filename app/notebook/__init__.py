@@ -1,1 +1,1 @@
-"""What Python gets: runs as tables. The promised face, `import rodsight`, hands these names on; nothing imports it."""
+"""The Python interface: runs as tables. `import rodsight` exports these names."""

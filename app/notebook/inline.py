@@ -1,4 +1,4 @@
-"""Where Python runs: in a notebook a recording is shown below the cell, elsewhere in the viewer."""
+"""Display of a recording: below the cell in a notebook, otherwise in the viewer."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 HEIGHT = 720  # [px] of a recording below a cell
-GREATEST = 200_000_000  # [bytes] of a recording, all parts: browsers refuse pages of more than some 500 MB
-# The viewer's script takes its own address for a part of one, and a page within a cell has none.
+MAX_SIZE = 200_000_000  # [bytes] of a recording, all parts: browsers refuse pages of more than some 500 MB
+# The viewer's script derives addresses from its own, which a page within a cell does not have.
 NO_ADDRESS = ("document.currentScript !== null", "false")
 
 
@@ -20,16 +20,20 @@ def in_notebook() -> bool:
 
 
 def show_recording(recording: Path) -> Any:
-    """Show a recording: what a notebook displays below the cell; elsewhere None, and the viewer opens.
+    """Show a recording.
 
-    Where neither is possible, the sentence that says how to look at it. Viewer and recording, all of its parts, become
-    part of the notebook: no server is asked, and other pages may not frame those that Rodsight serves.
+    The viewer and all parts of the recording become part of the notebook, without a server.
+
+    Returns
+    -------
+    IPython.display.HTML or str or None
+        HTML in a notebook; otherwise None after opening the viewer, or a sentence on how to view the recording.
     """
     from ..recording.parts import parts_of
 
     parts = parts_of(recording)
     size = sum(part.stat().st_size for part in parts)
-    if in_notebook() and size > GREATEST:
+    if in_notebook() and size > MAX_SIZE:
         return (
             f"This recording is {size / 1e6:.0f} MB, too large for a notebook: `rodsight view {recording.parent}` "
             f"opens it, `rodsight share {recording.parent} --frames 0:100 --html` makes a page of some photographs."
@@ -42,6 +46,7 @@ def show_recording(recording: Path) -> Any:
         page = single_page([recording], title=recording.parent.name).replace(*NO_ADDRESS)
         style = f"width: 100%; height: {HEIGHT}px; border: 0"
         return HTML(f'<iframe srcdoc="{html.escape(page, quote=True)}" style="{style}"></iframe>')
-    from ..recording.viewing.viewer import ViewerKind, open_viewer
+    from ..recording.viewing.open_viewer import open_viewer
+    from ..recording.viewing.viewer import ViewerKind
 
     return open_viewer(recording, ViewerKind.NATIVE, *parts[1:])

@@ -1,9 +1,10 @@
-"""A run as a notebook sees it: tables of contacts, grains, frames and walls, with their units."""
+"""Runs in Python: tables of contacts, grains, frames and walls with their units."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -13,48 +14,58 @@ import pandas as pd
 
 from .. import pipeline
 from ..exchange.tidy_tables import TableName, make_table
+from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import load_experiment
-from ..progress import Progress, silent
+from ..process.frame_range import ALL_FRAMES, FrameRange
+from ..process.progress import Progress
 from ..results.hdf5.store import load_results
 from ..results.results import Results
 from ..results.summary import summarize
-from ..run_folder import RECORDING, RESULTS, owned
+from ..run_folder import RECORDING, RESULTS, hold_run
 from ..run_folder import Run as RunFolder
 from ..run_truth import load_truth, truth_of
 from .inline import show_recording
-from .settings import as_texts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from ..figures.page import Width
+from .setting_strings import as_strings
+from .shown_progress import shown_progress
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
+
+    from ..figures.figure_style import Width
+    from ..inference.inputs import Inputs
 
 
 class Run:
-    """What a run found out. Made by `rodsight.run`, `rodsight.open` and `rodsight.solve`.
+    """Results of a run. Made by `rodsight.run`, `rodsight.open` and `rodsight.solve`.
 
-    Tables are pandas.DataFrames in SI units, named in `.attrs["units"]`; what is not known is NaN. Nothing is read
-    before it is asked for.
+    Tables are pandas.DataFrames in SI units, named in `.attrs["units"]`; unknown values are NaN. Files are read on
+    first access.
 
-    Examples:
-        >>> import rodsight
-        >>> run = rodsight.open("runs/shear")
-        >>> contacts = run.contacts(frame=3)
-        >>> bearing = contacts[contacts["fn"] > contacts["fn"].mean()]  # the strong network
-        >>> contacts.attrs["units"]["fn"]
-        'N'
+    Examples
+    --------
+    >>> import rodsight
+    >>> run = rodsight.open("runs/shear")
+    >>> contacts = run.contacts(frame=3)
+    >>> bearing = contacts[contacts["fn"] > contacts["fn"].mean()]  # the strong network
+    >>> contacts.attrs["units"]["fn"]
+    'N'
     """
 
-    def __init__(self, results: Results | Path) -> None:
-        """results: in memory, or the file that holds them, which is read when it is first needed."""
-        self._source = results
+    def __init__(self, results: Results | Path, inputs: Inputs | None = None) -> None:
+        """Make a run from results in memory with their inputs, or from their file, which is read on first access."""
+        self._source, self.inputs = results, inputs
+
+    @classmethod
+    def in_memory(cls, results: Results, name: str, configuration: str, inputs: Inputs) -> Run:
+        """Make a run of a sequence that was just solved, with all of its frames in memory."""
+        frames, statistics = list(results.frames), list(results.statistics)
+        named = replace(results, name=name, configuration=configuration, frames=frames, statistics=statistics)
+        return cls(named, inputs)
 
     @cached_property
     def results(self) -> Results:
-        """Everything, as arrays."""
+        """All results as arrays."""
         return self._source if isinstance(self._source, Results) else load_results(self._source)
 
     @property
@@ -64,124 +75,194 @@ class Run:
 
     @property
     def file(self) -> Path | None:
-        """Where results.h5 lies; None for a run that was never on disk."""
+        """Path of results.h5; None for a run in memory."""
         return None if isinstance(self._source, Results) else self._source
 
     def contacts(self, frame: int | None = None) -> pd.DataFrame:
-        """Contacts of one frame, or of all: bodies, point [m], normal, gap [m], forces and their errors [N], state.
+        """Return contacts: bodies, point [m], normal, gap [m], forces with standard deviations [N], state.
 
-        i is a grain's id; j is a grain's id or a wall's name, as text. f_n > 0 is compression; forces are those that i
-        exerts on j: f_n along the normal (nx, ny) from i to j, f_t along that normal turned by +90°. Raises IndexError
-        for a frame that is not there.
+        i and j are ids of grains; at a wall j is −1 and `wall` is its name, which is empty between grains. f_n > 0 is
+        compression. Forces are those that i exerts on j: f_n along the normal (nx, ny) from i to j, f_t along that
+        normal rotated by +90°.
 
-        Examples:
-            >>> run = rodsight.open("runs/shear")
-            >>> list(run.contacts(frame=3).columns[:9])
-            ['frame', 'time', 'i', 'j', 'with_wall', 'x', 'y', 'nx', 'ny']
-            >>> walls = run.contacts(frame=3).query("with_wall")
-            >>> sorted(set(walls["j"]))
-            ['bottom', 'left', 'right', 'top']
+        Parameters
+        ----------
+        frame : int, optional
+            Default: all frames.
+
+        Raises
+        ------
+        IndexError
+            If there is no such frame.
+
+        Examples
+        --------
+        >>> run = rodsight.open("runs/shear")
+        >>> list(run.contacts(frame=3).columns[:9])
+        ['frame', 'time', 'i', 'j', 'wall', 'x', 'y', 'nx', 'ny']
+        >>> sorted(set(run.contacts(frame=3).query("wall != ''")["wall"]))
+        ['bottom', 'left', 'right', 'top']
+        >>> grains = run.grains().rename(columns={"id": "j"})
+        >>> pairs = run.contacts().query("j >= 0").merge(grains, on=["frame", "j"], suffixes=("", "_j"))
+        >>> bool(pairs["radius"].gt(0).all())
+        True
         """
         return self._table("contacts", frame)
 
     def grains(self, frame: int | None = None) -> pd.DataFrame:
-        """Grains in one frame, or in all: id, radius [m], pose [m, rad] and how well it is known.
+        """Return grains of one frame or all: pose, stress, coordination number, motion since the frame before, D²min.
 
-        Examples:
-            >>> grains = rodsight.open("runs/shear").grains(frame=3)
-            >>> grains.attrs["units"]["theta"]
-            'rad'
-            >>> bool(grains["radius"].gt(0).all())
-            True
+        Parameters
+        ----------
+        frame : int, optional
+            Default: all frames.
+
+        Notes
+        -----
+        - `stress_xx` … `stress_yy` [Pa], compression positive: σ = Σ f ⊗ R n / V over its own volume V = π R² L,
+          f and n the forces and normals of its contacts (J. Weber 1966, A. E. H. Love 1927). The mean weighted with V,
+          times the solid fraction, is the stress of the packing. `pressure` is half its trace.
+        - `coordination_number`: Σ P(bears force) over its contacts, those with walls included.
+        - `displacement_x`, `displacement_y` [m], `rotation` [rad]: since the frame before; `theta` [rad] since frame 0.
+        - `strain_xx`, `strain_xy`, `strain_yy`: ½ ln(F Fᵀ) of the deformation gradient F that fits the motion of its
+          neighbours best, since the frame before; extension positive. Neighbours are grains whose surfaces are less
+          than one mean diameter apart.
+        - `D2min` [m²]: (1/m) Σ |d′ − F d|² over its m neighbours, d and d′ their distances before and after
+          (M. L. Falk & J. S. Langer, Phys. Rev. E 57, 7192, 1998, there without 1/m).
+
+        Raises
+        ------
+        IndexError
+            If there is no such frame.
+
+        Examples
+        --------
+        >>> grains = rodsight.open("runs/shear").grains(frame=3)
+        >>> grains.attrs["units"]["theta"]
+        'rad'
+        >>> rattlers = grains[grains["coordination_number"] < 2]
+        >>> plastic = grains.nlargest(5, "D2min")
+        >>> grains.attrs["units"]["stress_xy"], grains.attrs["units"]["D2min"]
+        ('Pa', 'm2')
         """
         return self._table("grains", frame)
 
     def frames(self) -> pd.DataFrame:
-        """One row a frame: status, trust, residuals and the statistics of the packing.
+        """Return one row per frame: status, trust, residuals and statistics of the packing.
 
-        Examples:
-            >>> frames = rodsight.open("runs/shear").frames()
-            >>> believed = frames[frames["status"].isin(["settled", "settling"]) & (frames["trust"] > 0.8)]
-            >>> frames["status"].iloc[0]
-            'reset'
+        Examples
+        --------
+        >>> frames = rodsight.open("runs/shear").frames()
+        >>> trusted = frames[frames["status"].isin(["settled", "settling"]) & (frames["trust"] > 0.8)]
+        >>> frames["status"].iloc[0]
+        'reset'
         """
         return self._table("frames", None)
 
     def walls(self, frame: int | None = None) -> pd.DataFrame:
-        """Walls in one frame, or in all: ends [m], pressure [Pa], and the forces [N] on them, inferred and recorded.
+        """Return walls of one frame or all: ends [m], pressure [Pa], inferred and recorded forces [N].
 
-        Examples:
-            >>> walls = rodsight.open("runs/shear").walls(frame=0).set_index("wall")
-            >>> float(walls.loc["top", "pressure"])
-            50000.0
+        Examples
+        --------
+        >>> walls = rodsight.open("runs/shear").walls(frame=0).set_index("wall")
+        >>> float(walls.loc["top", "pressure"])
+        50000.0
         """
         return self._table("walls", frame)
 
     def summary(self) -> dict[str, Any]:
-        """The facts that a person reads at the end of `rodsight run`, as plain values.
+        """Return the summary of `rodsight run` as plain values.
 
-        Examples:
-            >>> rodsight.open("runs/shear").summary()["resets"]
-            [0]
+        Examples
+        --------
+        >>> rodsight.open("runs/shear").summary()["resets"]
+        [0]
         """
         return summarize(self.results, None, {})
 
     def dataset(self) -> xarray.DataTree:
-        """Everything, as an xarray.DataTree: named dimensions, labels, units; paths as in results.h5.
+        """Return all results as an xarray.DataTree with dimensions, labels and units; paths as in results.h5.
 
-        `xarray.open_datatree("runs/shear/results.h5")` opens the file itself to the same. Contacts of all frames lie
-        end to end; `frame_of_contact` says whose they are.
+        `xarray.open_datatree("runs/shear/results.h5")` gives the same. Contacts of all frames are concatenated;
+        `frame_of_contact` is their frame.
 
-        Examples:
-            >>> tree = rodsight.open("runs/shear").dataset()
-            >>> tree["tracks/position"].dims
-            ('frame', 'grain', 'xy')
-            >>> tree["statistics/wall_force"].sel(wall="top", xy="y").attrs["units"]
-            'N'
-            >>> mean = tree["forces"].to_dataset()["fn"].groupby("frame_of_contact").mean()
-            >>> mean.sizes == {"frame_of_contact": 5}
-            True
+        Examples
+        --------
+        >>> tree = rodsight.open("runs/shear").dataset()
+        >>> tree["tracks/position"].dims
+        ('frame', 'grain', 'xy')
+        >>> tree["statistics/wall_force"].sel(wall="top", xy="y").attrs["units"]
+        'N'
+        >>> mean = tree["forces"].to_dataset()["fn"].groupby("frame_of_contact").mean()
+        >>> mean.sizes == {"frame_of_contact": 5}
+        True
         """
         from ..exchange.labelled_dataset import make_dataset
 
         return make_dataset(self.results)
 
     def graph(self, frame: int) -> Any:
-        """Contacts of a frame as a networkx.Graph: nodes are ids of grains and names of walls, edges carry forces [N].
+        """Return the contacts of a frame as a networkx.Graph: nodes are grains and walls, edges have forces [N].
 
-        Needs networkx (`pip install 'rodsight[graph]'`), and says so. Raises IndexError for a frame that is not there.
+        Raises
+        ------
+        IndexError
+            If there is no such frame.
+        InputError
+            If networkx is not installed (`pip install 'rodsight[graph]'`).
 
-        Examples:
-            >>> graph = rodsight.open("runs/shear").graph(frame=3)
-            >>> graph.nodes["top"]["kind"]
-            'wall'
-            >>> graph.graph["units"]["fn"]
-            'N'
+        Examples
+        --------
+        >>> graph = rodsight.open("runs/shear").graph(frame=3)
+        >>> graph.nodes["top"]["kind"]
+        'wall'
+        >>> graph.graph["units"]["fn"]
+        'N'
         """
         from ..exchange.contact_graph import make_graph
 
-        return make_graph(self.results, self._checked(frame))
+        return make_graph(self.results, self.checked_frame(frame))
 
     def view(self) -> Any:
-        """Open the recording: below the cell of a notebook, else in the viewer.
+        """Show the recording: below the cell of a notebook, otherwise in the viewer.
 
-        Returns what a notebook displays, None where a window was opened, or the sentence that says how to look at it.
-        Raises FileNotFoundError for a run that has no recording, such as one of `rodsight.solve`.
+        Returns
+        -------
+        IPython.display.HTML or str or None
+            HTML in a notebook; otherwise None after opening the viewer, or a sentence on how to view the recording.
+
+        Raises
+        ------
+        FileNotFoundError
+            If the run has no recording, such as one of `rodsight.solve`.
         """
         file = None if self.file is None else self.file.with_name(RECORDING)
         if file is None or not file.is_file():
-            raise FileNotFoundError("there is no recording of this run: rodsight.run and `rodsight record` make one")
+            raise FileNotFoundError("there is no recording of this run: rodsight.run and `rodsight record` write one")
         return show_recording(file)
 
     def figure(self, name: str = "forces", frame: int | None = None, *, width: Width = "single") -> Figure:
-        """A figure for a paper, to be saved with `.savefig("x.pdf")`: light, at column width, with units.
+        """Draw a figure for a paper, to be saved with `.savefig("x.pdf")`.
 
-        name: forces (the network), density (P(f)), rose, stress, time, or truth (inferred over true forces, where the
-        experiment names a truth); frame: default the last settled one; width: single (85 mm) or double (175 mm).
-        Raises ValueError for a figure that is not known or has no data, IndexError for a frame that is not there.
+        Parameters
+        ----------
+        name : {'forces', 'density', 'rose', 'stress', 'time', 'truth'}
+            Force network, P(f), rose of contact directions, stress, curves over time, or inferred over true forces.
+        frame : int, optional
+            Default: the last settled frame.
+        width : {'single', 'double'}
+            85 or 175 mm.
 
-        Examples:
-            >>> rodsight.open("runs/shear").figure("forces", frame=3).savefig("forces.pdf")
+        Raises
+        ------
+        ValueError
+            If the figure is unknown or has no data.
+        IndexError
+            If there is no such frame.
+
+        Examples
+        --------
+        >>> rodsight.open("runs/shear").figure("forces", frame=3).savefig("forces.pdf")
         """
         from ..figures.gallery import draw_figure
 
@@ -192,7 +273,15 @@ class Run:
         tracks = self.results.tracks
         return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames>"
 
-    def _checked(self, frame: int) -> int:
+    def checked_frame(self, frame: int) -> int:
+        """Return the frame. Raises IndexError if there is no such frame.
+
+        Examples
+        --------
+        >>> rodsight.open("runs/shear").checked_frame(7)
+        Traceback (most recent call last):
+        IndexError: there is no frame 7: frames go from 0 to 4
+        """
         count = self.results.tracks.frame_count
         if not 0 <= frame < count:
             raise IndexError(f"there is no frame {frame}: frames go from 0 to {count - 1}")
@@ -200,20 +289,20 @@ class Run:
 
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
-        """Those that were asked for."""
+        """Tables made so far."""
         return {}
 
     def _table(self, name: TableName, frame: int | None) -> pd.DataFrame:
         if name not in self._tables:
-            made = make_table(self.results, name)
-            self._tables[name] = made.to_pandas()
+            stored = make_table(self.results, name)
+            self._tables[name] = stored.to_pandas()
             self._tables[name].attrs["units"] = {
-                each.name: each.metadata[b"unit"].decode() for each in made.schema if b"unit" in (each.metadata or {})
+                each.name: each.metadata[b"unit"].decode() for each in stored.schema if b"unit" in (each.metadata or {})
             }
         table = self._tables[name]
         if frame is None:
             return table.copy()
-        return table.loc[table["frame"] == self._checked(frame), :].reset_index(drop=True)
+        return table.loc[table["frame"] == self.checked_frame(frame), :].reset_index(drop=True)
 
 
 def run(
@@ -221,42 +310,74 @@ def run(
     *,
     out: str | PathLike[str] | None = None,
     settings: Mapping[str, object] | None = None,
-    frames: tuple[int, int | None] = (0, None),
-    progress: Progress = silent,
+    frames: tuple[int, int | None] | tuple[int, int | None, int] = ALL_FRAMES,
+    progress: Progress | None = None,
 ) -> Run:
-    """Photographs or tracks to forces and a recording: what `rodsight run` does, with its defaults.
+    """Compute forces and a recording from photographs or tracks, as `rodsight run` with its defaults.
 
-    experiment: its folder or its experiment.toml; out: folder of the results, default runs/NAME; settings: by the
-    keys of experiment.toml, {"solver.kappa": 0.1}, laid over it; frames: first, and end or None. What is there already
-    is not done again.
-    Raises InputError for bad input, RunError where another process works in the folder or nothing can be solved.
+    Existing results of the same input are reused.
 
-    Examples:
-        >>> run = rodsight.run("my_test", out="runs/shear", settings={"solver.sweeps": 50})
-        >>> run.name
-        'my_test'
+    Parameters
+    ----------
+    experiment : path
+        Folder of the experiment, or its experiment.toml.
+    out : path, optional
+        Folder of the results; default runs/NAME.
+    settings : mapping, optional
+        Values by the keys of experiment.toml, which they override: {"solver.kappa": 0.1}.
+    frames : tuple
+        First frame, end or None, and perhaps a step: (0, None, 4) for every fourth photograph.
+    progress : callable, optional
+        Called with stage, done and total; default: a line in notebooks.
+
+    Raises
+    ------
+    InputError
+        If the input is invalid.
+    RunError
+        If another process works in the folder, or no frame can be solved.
+
+    Examples
+    --------
+    >>> run = rodsight.run("my_test", out="runs/shear", settings={"solver.sweeps": 50})
+    >>> run.name
+    'my_test'
     """
     began = time.perf_counter()
-    loaded = load_experiment(Path(experiment), as_texts(settings or {}))
+    loaded = load_experiment(Path(experiment), as_strings(settings or {}))
+    refuse_unused_keys(loaded.config, loaded.file)
     folder = Path(out) if out is not None else Path("runs") / loaded.name
-    at = RunFolder(loaded, folder, frames, progress)
-    with owned(at):
-        results = pipeline.solve(at)
-        truth = load_truth(at, results)
-        pipeline.record(at, results, truth)
-        pipeline.conclude(at, results, truth, began)
-    return Run(at.file(RESULTS))
+    folder_of_run = RunFolder(
+        loaded, folder, FrameRange(frames[0], frames[1], *frames[2:]), progress or shown_progress()
+    )
+    with hold_run(folder_of_run):
+        results = pipeline.solve(folder_of_run)
+        truth = load_truth(folder_of_run, results)
+        pipeline.record(folder_of_run, results, truth)
+        pipeline.conclude(folder_of_run, results, truth, began)
+    return Run(folder_of_run.file(RESULTS))
 
 
 def open_run(path: str | PathLike[str]) -> Run:
-    """Open the results of a run: its folder, or results.h5 itself, of any version. Raises FileNotFoundError.
+    """Open the results of a run of any version.
 
-    Examples:
-        >>> rodsight.open("runs/shear")
-        <rodsight.Run 'my_test': 40 grains, 5 frames>
-        >>> rodsight.open("runs/nothing")
-        Traceback (most recent call last):
-        FileNotFoundError: runs/nothing: there are no results
+    Parameters
+    ----------
+    path : path
+        Folder of the run, or results.h5.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there are no results.
+
+    Examples
+    --------
+    >>> rodsight.open("runs/shear")
+    <rodsight.Run 'my_test': 40 grains, 5 frames>
+    >>> rodsight.open("runs/nothing")
+    Traceback (most recent call last):
+    FileNotFoundError: runs/nothing: there are no results
     """
     file = Path(path) / RESULTS if Path(path).is_dir() else Path(path)
     if not file.is_file():

@@ -1,4 +1,4 @@
-"""Arrays or data frames in, a run out, nothing on disk: for tracks that any other code made."""
+"""Solution of tracks in memory, given as arrays or data frames, without files."""
 
 from __future__ import annotations
 
@@ -10,10 +10,6 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from solver.bodies.cell import unwrap
-from solver.bodies.wall_shapes import STRAIGHT
-
-from ..errors import InputError, UndeterminedError
 from ..experiment.boundary import boundary_of, check_cell, find_boundary
 from ..experiment.config.experiment_file import as_toml, load_sections
 from ..experiment.config.input_sections import OUTER
@@ -21,25 +17,29 @@ from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import (
     CELL_COLUMNS,
     GRAIN_COLUMNS,
-    PLACE_COLUMNS,
     POSE_COLUMNS,
+    POSITION_COLUMNS,
     TIME_COLUMNS,
     arrange_cell,
     arrange_tracks,
 )
 from ..experiment.reading.tables import Table
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
-from ..inference.inference import Inputs, correct_sequence, solve_all
-from ..inference.settings import material_of, settings_of
-from ..progress import Progress, silent
-from ..results.results import Results
+from ..inference.infer_sequence import InferenceObserver, infer_sequence
+from ..inference.inference_settings import material_of, settings_of
+from ..inference.inputs import Inputs
+from ..process.errors import InputError, UndeterminedError
+from ..process.progress import Progress
+from ..solver.bodies.cell import unwrap
+from ..solver.bodies.wall_shapes import STRAIGHT
 from ..tracks import Tracks, WallTracks
 from .run import Run
-from .settings import as_texts
+from .setting_strings import as_strings
+from .shown_progress import shown_progress
 
 Columns = pd.DataFrame | Mapping[str, Any]  # of equal length, by name
-UNKNOWN = "theta"  # a column that may hold nothing
-WHOLE = ("frame", "id")  # columns of whole numbers, which data frames like to make floats of
+OPTIONAL = "theta"  # column whose values may be NaN
+WHOLE = ("frame", "id")  # columns of whole numbers, which data frames may store as floats
 
 
 def solve(
@@ -53,59 +53,75 @@ def solve(
     pressure: Mapping[str, float] | None = None,
     precision: float = 1e-5,
     settings: Mapping[str, object] | None = None,
-    progress: Progress = silent,
+    progress: Progress | None = None,
 ) -> Run:
-    """Contact forces from tracks that are in memory.
+    """Infer contact forces from tracks in memory.
 
-    tracks: columns frame, id, x, y [m], theta [rad], radius [m] and time [s], y up, angles counter-clockwise, theta
-    absent or NaN where nobody measured it; a grain that has no row in a frame is lost there; without times frames are
-    a second apart, which matters to forces only where inertia does. walls: columns frame, wall, x1, y1, x2, y2 [m],
-    the packing to the left of 1 → 2. arcs: columns frame, wall, x, y, radius [m], side (in, out) and perhaps theta
-    [rad] of circular walls. load: columns frame, wall, force [N] of walls whose load was measured. boundary: what
-    bounds the packing where it is no wall: ids of grains that move as they were seen, "outer" for the outermost, or
-    the columns frame, ax, ay, bx, by [m] of a periodic cell, instead of walls. material: keys of the experiment file's
-    section (density, length, friction, …), with its defaults. pressure [Pa]: by wall, of those that are pressed; the
-    others move as they were measured. precision [m]: standard deviation of a position. settings: by the keys of
-    experiment.toml, {"solver.kappa": 0.1}; the defaults are those of `rodsight run`.
-    Raises InputError naming column, row and value.
+    Parameters
+    ----------
+    tracks : data frame or mapping of columns
+        Columns frame, id, x, y [m], theta [rad], radius [m] and time [s]; y up, angles counter-clockwise; theta absent
+        or NaN where it is unknown. A grain without a row in a frame is lost there. Without times frames are one second
+        apart, which matters only where inertia does.
+    walls : data frame or mapping of columns, optional
+        Columns frame, wall, x1, y1, x2, y2 [m]; the packing is to the left of 1 → 2.
+    material : mapping, optional
+        Keys of the section [material] of experiment.toml (density, length, friction, …), with its defaults.
+    arcs : data frame or mapping of columns, optional
+        Circular walls: columns frame, wall, x, y, radius [m], side (in, out) and optionally theta [rad].
+    load : data frame or mapping of columns, optional
+        Measured loads: columns frame, wall, force [N].
+    boundary : data frame, mapping of columns, sequence of int or 'outer', optional
+        Boundary without walls: ids of grains with imposed measured motion, 'outer' for the outermost ones, or the
+        columns frame, ax, ay, bx, by [m] of a periodic cell.
+    pressure : mapping of str to float, optional
+        Pressure by wall [Pa]; the other walls move as measured.
+    precision : float
+        Standard deviation of a position [m].
+    settings : mapping, optional
+        Keys of experiment.toml with values, as {"solver.kappa": 0.1}; the defaults are those of `rodsight run`.
+    progress : callable, optional
+        Called with stage, done and total; default: a line in notebooks.
 
-    Examples:
-        >>> import pandas as pd
-        >>> tracks = pd.read_csv("my_test/tracks.csv").merge(pd.read_csv("my_test/grains.csv"), on="id")
-        >>> walls = pd.read_csv("my_test/walls.csv")
-        >>> run = rodsight.solve(tracks, walls, {"friction": 0.25}, pressure={"top": 50e3})
-        >>> len(run.frames()) == tracks["frame"].nunique()
-        True
-        >>> rodsight.solve(tracks.drop(columns="radius"), walls)
-        Traceback (most recent call last):
-        rodsight.errors.InputError: tracks: column radius: there is no such column
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        Names column, row and value.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> tracks = pd.read_csv("my_test/tracks.csv").merge(pd.read_csv("my_test/grains.csv"), on="id")
+    >>> walls = pd.read_csv("my_test/walls.csv")
+    >>> run = rodsight.solve(tracks, walls, {"friction": 0.25}, pressure={"top": 50e3})
+    >>> len(run.frames()) == tracks["frame"].nunique()
+    True
+    >>> rodsight.solve(tracks.drop(columns="radius"), walls)
+    Traceback (most recent call last):
+    rodsight.process.errors.InputError: tracks: column radius: there is no such column
     """
-    texts = as_texts({f"material.{key}": value for key, value in (material or {}).items()} | dict(settings or {}))
+    texts = as_strings({f"material.{key}": value for key, value in (material or {}).items()} | dict(settings or {}))
     sections = load_sections(texts)
     refuse_unused_keys(sections, "settings")
-    followed = _arrange_tracks(pd.DataFrame(tracks), precision)
-    bounded = _arrange_walls(walls, arcs, load, followed.frame_count, pressure or {})
-    followed, bounded = _bound(followed, bounded, boundary)
+    tracked = _arrange_tracks(pd.DataFrame(tracks), precision)
+    wall_tracks = _arrange_walls(walls, arcs, load, tracked.frame_count, pressure or {})
+    tracked, wall_tracks = _add_boundary(tracked, wall_tracks, boundary)
+    inputs = Inputs(tracked, wall_tracks, material_of(sections), settings_of(sections))
     try:
-        sequence = correct_sequence(Inputs(followed, bounded, material_of(sections), settings_of(sections)))
+        results = infer_sequence(inputs, InferenceObserver(progress or shown_progress()))
     except UndeterminedError as error:
         raise InputError("settings", f"key {error.key}", str(error)) from None
-    solved = solve_all(sequence, lambda done: progress("solving", done, followed.frame_count))
-    frames, packing = [each.forces for each in solved], sequence.packing
-    unsolved = Results(
-        "solved", sequence.tracks, sequence.walls, packing.grains, packing.material.friction, (), (),
-        as_toml(sections), calibration=sequence.calibration, radius_tuning=sequence.tuning,
-        boundary=sequence.boundary,
-    )  # fmt: skip
-    frames, check = sequence.check_friction(frames)
-    statistics = [sequence.restate(each.statistics, frame, check) for each, frame in zip(solved, frames, strict=True)]
-    return Run(replace(unsolved, frames=frames, statistics=statistics, friction_check=check))
+    return Run.in_memory(results, "solved", as_toml(sections), inputs)
 
 
 def _arrange_tracks(tracks: pd.DataFrame, precision: float) -> Tracks:
     if not (np.isfinite(precision) and precision > 0):
         raise InputError("precision", repr(precision), "is not a positive number of metres")
-    poses = _table("tracks", tracks, POSE_COLUMNS if "theta" in tracks else PLACE_COLUMNS)
+    poses = _table("tracks", tracks, POSE_COLUMNS if "theta" in tracks else POSITION_COLUMNS)
     if "radius" not in tracks:
         raise InputError("tracks", "column radius", "there is no such column")
     _check_constant(tracks, "id", "radius")
@@ -121,13 +137,13 @@ def _arrange_tracks(tracks: pd.DataFrame, precision: float) -> Tracks:
     )
 
 
-def _bound(
+def _add_boundary(
     tracks: Tracks, walls: WallTracks, boundary: Columns | Sequence[int] | Literal["outer"] | None
 ) -> tuple[Tracks, WallTracks]:
-    """Tracks and walls with what else bounds the packing."""
+    """Add a boundary other than walls to tracks and walls."""
     if boundary is None:
         if walls.count == 0:
-            raise InputError("walls", "", "are missing, and there is no boundary: nothing holds the packing")
+            raise InputError("walls", "", "are missing, and no boundary is given: give one of them")
         return tracks, walls
     if isinstance(boundary, str):
         if boundary != OUTER:
@@ -135,7 +151,7 @@ def _bound(
         return replace(tracks, boundary=find_boundary("boundary", tracks, walls)), walls
     if isinstance(boundary, pd.DataFrame | Mapping):
         if walls.count:
-            raise InputError("boundary", "", "a periodic cell stands instead of walls: give one of them")
+            raise InputError("boundary", "", "a periodic cell replaces the walls: give one of them")
         table = _table("boundary", pd.DataFrame(boundary), CELL_COLUMNS)
         walls = replace(walls, cell=arrange_cell(table, tracks.frame_count))
         check_cell("boundary", tracks, walls)
@@ -157,10 +173,10 @@ def _arrange_walls(
         names, endpoints = arrange_walls(_table("walls", pd.DataFrame(walls), WALL_COLUMNS), frame_count)
     side = None
     if arcs is not None:
-        told = pd.DataFrame(arcs)
-        columns = (*ARC_COLUMNS, "theta") if "theta" in told else ARC_COLUMNS
-        circles, ends, its_side = arrange_arcs(_table("arcs", told, columns), frame_count, others=names)
-        side = np.concatenate([np.full(len(names), STRAIGHT, np.int8), its_side])
+        table = pd.DataFrame(arcs)
+        columns = (*ARC_COLUMNS, "theta") if "theta" in table else ARC_COLUMNS
+        circles, ends, arc_side = arrange_arcs(_table("arcs", table, columns), frame_count, others=names)
+        side = np.concatenate([np.full(len(names), STRAIGHT, np.int8), arc_side])
         names, endpoints = names + circles, np.concatenate([endpoints, ends], axis=1)
     for name, value in pressure.items():
         if name not in names:
@@ -170,13 +186,12 @@ def _arrange_walls(
     pressed = np.array([pressure.get(name, np.nan) for name in names], np.float64)
     measured = None
     if load is not None:
-        table = _table("load", pd.DataFrame(load), LOAD_COLUMNS)
-        measured = arrange_loads(table, names, frame_count, pressed)
+        measured = arrange_loads(_table("load", pd.DataFrame(load), LOAD_COLUMNS), names, frame_count, pressed)
     return WallTracks(names, endpoints, pressed, side=side, load=measured)
 
 
 def _check_constant(frame: pd.DataFrame, by: str, column: str) -> None:
-    """One value of a column for each of another; the complaint names the first that has two."""
+    """Raise InputError unless each value of `by` has a single value of `column`."""
     counts = frame.groupby(by)[column].nunique(dropna=False)
     changing = counts.index[np.asarray(counts) > 1]
     if len(changing):
@@ -184,7 +199,7 @@ def _check_constant(frame: pd.DataFrame, by: str, column: str) -> None:
 
 
 def _table(name: str, frame: pd.DataFrame, columns: Sequence[str]) -> Table:
-    """Columns as a table that was read, so that the same checks say what is wrong with them."""
+    """Convert columns to a table as read from a file, for the same checks and messages."""
     for column in columns:
         if column not in frame:
             raise InputError(name, f"column {column}", f"there is no such column among {', '.join(map(str, frame))}")
@@ -197,4 +212,4 @@ def _texts(column: str, values: Iterable[Any]) -> list[str]:
     array = np.asarray(values)
     if column in WHOLE and array.dtype.kind == "f" and np.all(array == np.floor(array)):
         array = array.astype(np.int64)
-    return ["" if column == UNKNOWN and each != each else str(each) for each in array.tolist()]  # NaN: not told
+    return ["" if column == OPTIONAL and each != each else str(each) for each in array.tolist()]  # NaN: unknown

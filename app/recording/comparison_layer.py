@@ -1,7 +1,8 @@
-"""Writes two force fields side by side: both networks, their difference, and how they differ from frame to frame.
+"""Writes two force fields side by side: both networks, their difference, and curves of their agreement.
 
-Entities stand under /compare; the timeline is `frame`. Widths and colours of both networks mean the same forces. In
-the difference a line is as wide as the forces differ, warm where the first field has more and cool where the second.
+The entities are below /compare; the timeline is `frame`. Widths and colours of both networks have the same scale. In
+the difference the width of a line is the difference of the forces; it is warm where the first field is greater and cool
+where the second is.
 """
 
 from __future__ import annotations
@@ -14,28 +15,27 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts, measure_pairs
-from solver.contacts.pairs import align
-
 from ..experiment.units import Scale
 from ..results.comparison import Comparison, FieldFrame
+from ..solver.bodies.grains import Array
+from ..solver.contacts.contacts import Contacts, measure_pairs
+from ..solver.contacts.pairs import align
 from .files.writing import writing
 from .look import entities
 from .look.axes import Axes, round_step
 from .look.canvas import Canvas
-from .look.clock import Clock, strain_ways
+from .look.clock import Clock, accumulated_strains
 from .look.colours import DIFFERENCE_RAMP, INK, OPEN, SERIES, packed, packed_one
 from .look.force_style import ForceRange, ForceStyle
+from .look.printable_text import printable
 from .look.scene import Scene, tracks_in_cell
-from .look.texts import printable
-from .look.values import known, log_scalar
+from .look.values import log_scalar, nullable
 from .packing_layers.forces.network import body_values
 from .packing_layers.grains_and_walls import log_grains_and_walls
 from .packing_layers.legends import PIECES, log_force_legend, log_ramp_legend
 from .tabs.views import curve_view, drawn_view, packing_view
 
-APPLICATION_ID = "rodsight-compare"  # its own, so that a user's layout of runs is not used for comparisons
+APPLICATION_ID = "rodsight-compare"  # a separate one, so that the viewer does not apply a layout of runs to comparisons
 FIRST, SECOND = "/compare/first", "/compare/second"
 DIFFERENCE = "/compare/difference"
 DIFFERENCE_LEGEND, DIFFERENCE_TICKS = "/legend/difference", "/legend/difference/ticks"
@@ -45,13 +45,13 @@ R_FN, R_FT, ERROR, SUM_RATIO = (f"/compare/{name}" for name in ("r_fn", "r_ft", 
 ANGLES = tuple(f"/compare/{which}/{name}" for which in ("first", "second") for name in ("friction_angle", "wall_ratio"))
 SUMMARY = "/compare/summary"
 
-DIFFERENCE_SHARE = 0.4  # of the drawn range of forces: the difference that is drawn widest and brightest
+DIFFERENCE_FRACTION = 0.4  # of the drawn range of forces: the difference drawn widest and brightest
 
 _RAMP = packed(DIFFERENCE_RAMP)
 
 
 def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale | None = None) -> int:
-    """Write a comparison as a recording; returns its size [bytes]."""
+    """Write a comparison as a recording and return its size [bytes]."""
     path, base = Path(path), comparison.base
     tracks = tracks_in_cell(base.tracks, base.walls)
     canvas = Canvas.around(tracks, scale)
@@ -67,9 +67,9 @@ def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale 
             stream.set_log_time_enabled(False)
             stream.send_recording_name(printable(scene.name))
             axes = _log_styles(stream, scene, comparison)
-            ways = strain_ways([forces.strain for forces in base.frames])
-            for frame, way in enumerate(ways):
-                clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), way)
+            strains = accumulated_strains([forces.strain for forces in base.frames])
+            for frame, strain in enumerate(strains):
+                clock = Clock(stream, frame, frame, frame, float(base.tracks.time[frame]), strain)
                 _log_frame(clock, scene, comparison, axes)
             stream.reset_time()
             text = rr.TextDocument(printable(describe(comparison)), media_type=rr.MediaType.MARKDOWN)
@@ -81,7 +81,7 @@ def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale 
 
 
 def describe(comparison: Comparison) -> str:
-    """What the comparison found, as Markdown."""
+    """Return the results of a comparison as Markdown."""
     first, second = comparison.first.name, comparison.second.name
     rows = [
         f"| {k} | {a.r_fn:.3f} | {a.r_ft:.3f} | {a.relative_l2:.3f} | {a.scale:.3f} "
@@ -97,15 +97,15 @@ def describe(comparison: Comparison) -> str:
     return "\n".join(
         [
             f"# {first} against {second}", "",
-            f"Over all contacts that either has; absent counts as 0. Relative L2 and the ratio of the sums of f_n are "
-            f"relative to {second}. Angles in degrees: φ of the stress, and the wall ratio atan(T/N).", "",
+            "Over the contacts of either field; an absent contact counts as 0. Relative L2 and the ratio of the sums "
+            f"of f_n are relative to {second}. Angles in degrees: φ of the stress, and the wall ratio atan(T/N).", "",
             *[f"- {note}" for note in comparison.notes], "", head, "|" + "---|" * 9, *rows,
         ]
     )  # fmt: skip
 
 
 def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blueprint:
-    """Networks and difference above, scatter and curves below; a second tab with the table."""
+    """Make the blueprint: networks and difference above, scatter plot and curves below; a second tab with the table."""
     packing = [entities.WALLS, f"{entities.GRAINS}/**"]
     legend = f"{entities.FORCE_LEGEND}/**"
     first, second = printable(comparison.first.name), printable(comparison.second.name)
@@ -135,14 +135,14 @@ def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blu
 
 
 def difference_colours(difference: Array, top: float) -> NDArray[np.uint32]:
-    """Colours of first − second (c,) [N], from −top to top."""
+    """Return colours of first − second (c,) [N], from −top to top."""
     level = np.round((np.clip(np.nan_to_num(difference) / top, -1.0, 1.0) + 1.0) * 0.5 * (len(_RAMP) - 1))
     return np.where(difference == 0.0, packed_one(OPEN), _RAMP[level.astype(np.int64)]).astype(np.uint32)
 
 
 def _difference_style(scene: Scene) -> ForceStyle:
     style = scene.style
-    reach = ForceRange(DIFFERENCE_SHARE * style.range.mean, DIFFERENCE_SHARE * style.range.top)
+    reach = ForceRange(DIFFERENCE_FRACTION * style.range.mean, DIFFERENCE_FRACTION * style.range.top)
     return ForceStyle(reach, style.grain_radius, style.quantum)
 
 
@@ -155,10 +155,10 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
     first, second = printable(comparison.first.name), printable(comparison.second.name)
     log_force_legend(stream, scene)
     top = scene.style.range.top
-    share, most = np.linspace(-1.0, 1.0, PIECES), _difference_style(scene).range.top
+    fraction, limit = np.linspace(-1.0, 1.0, PIECES), _difference_style(scene).range.top
     log_ramp_legend(
-        stream, scene.canvas, DIFFERENCE_LEGEND, DIFFERENCE_TICKS, difference_colours(share * most, most),
-        [(0.0, f"{second} more: {most:.3g} N"), (0.5, "equal"), (1.0, f"{first} more: {most:.3g} N")],
+        stream, scene.canvas, DIFFERENCE_LEGEND, DIFFERENCE_TICKS, difference_colours(fraction * limit, limit),
+        [(0.0, f"{second} more: {limit:.3g} N"), (0.5, "equal"), (1.0, f"{first} more: {limit:.3g} N")],
     )  # fmt: skip
     names = (f"φ {first}", f"wall ratio {first}", f"φ {second}", f"wall ratio {second}")
     curves = [
@@ -220,7 +220,7 @@ def _log_network(clock: Clock, scene: Scene, path: str, field: FieldFrame) -> No
             scene.branches(clock.frame, contacts), radii=scene.style.radii(fn), colors=scene.style.colours(fn),
             draw_order=20.0,
         ),
-        rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
+        rr.AnyValues(**body_values(scene, contacts), fn=nullable(fn), ft=nullable(ft)),
     )  # fmt: skip
 
 
@@ -236,14 +236,14 @@ def _log_difference(clock: Clock, scene: Scene, key: NDArray[np.int64], fn: Arra
             colors=difference_colours(difference, style.range.top), draw_order=20.0,
         ),
         rr.AnyValues(
-            **body_values(scene, contacts), fn_first=known(fn[0]), fn_second=known(fn[1]), ft_first=known(ft[0]),
-            ft_second=known(ft[1]),
+            **body_values(scene, contacts), fn_first=nullable(fn[0]), fn_second=nullable(fn[1]),
+            ft_first=nullable(ft[0]), ft_second=nullable(ft[1]),
         ),
     )  # fmt: skip
 
 
 def _on_union(a: FieldFrame, b: FieldFrame, name: str) -> tuple[NDArray[np.int64], Array]:
-    """Keys of the contacts of either field (u,), and both forces on them (2, u) [N], 0 where one has no contact."""
+    """Return keys (u,) of the contacts of either field, and both forces on them (2, u) [N], 0 without contact."""
     key, *both = align(a.contacts.key, np.nan_to_num(getattr(a, name)), b.contacts.key, np.nan_to_num(getattr(b, name)))
     return key, np.stack(both)
 

@@ -1,6 +1,6 @@
-"""A long recording is several files: each opens alone, together they are one.
+"""The parts of a long recording: several files, each of which opens alone and all together as one recording.
 
-Parts carry the recording's identity, which is how viewers know that they belong together.
+All parts carry the identity of the recording, by which viewers recognise them as one.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rerun.chunk import Chunk
 
-MARK = "-part-"
+PART_MARK = "-part-"
 
 
 def part_of(recording: Path, number: int) -> Path:
-    """The file of part 1, 2, …; the first has the recording's own name."""
-    return recording if number == 1 else recording.with_name(f"{recording.stem}{MARK}{number}{recording.suffix}")
+    """Return the file of part 1, 2, …; the first has the name of the recording."""
+    return recording if number == 1 else recording.with_name(f"{recording.stem}{PART_MARK}{number}{recording.suffix}")
 
 
 def is_later_part(file: Path) -> bool:
-    """Whether a file is called as the second part of a recording or a later one."""
-    stem, mark, number = file.stem.rpartition(MARK)
+    """Return whether a file is named as the second or a later part of a recording."""
+    stem, mark, number = file.stem.rpartition(PART_MARK)
     return bool(stem and mark) and number.isdecimal()
 
 
 def parts_of(recording: Path) -> list[Path]:
-    """The files of a recording, the first of which is given, in order; left-overs of another one are none of it."""
+    """Return the files of a recording in order, from its first file; parts of another recording are left out."""
     found, number = [recording], 2
     while (file := part_of(recording, number)).is_file():
         found.append(file)
@@ -38,15 +38,15 @@ def parts_of(recording: Path) -> list[Path]:
     return [recording, *(file for file in found[1:] if _identity(file) == name)]
 
 
-def forget_parts(recording: Path, first: int) -> None:
-    """Remove the parts from number `first` on."""
+def remove_parts(recording: Path, first: int) -> None:
+    """Delete the parts from number `first` on."""
     while (file := part_of(recording, first)).is_file():
         file.unlink()
         first += 1
 
 
-def chunks_of(recording: Path, *, timeline: str | None = None, content: str | None = None) -> Iterator[Chunk]:
-    """What is in a recording, all of its parts; timeline, content: only what is on it, of this entity."""
+def read_chunks(recording: Path, *, timeline: str | None = None, content: str | None = None) -> Iterator[Chunk]:
+    """Yield the chunks of all parts of a recording, where given only those on a timeline or of an entity."""
     from rerun.chunk import RrdReader
 
     for file in parts_of(recording):

@@ -1,1 +1,1 @@
-"""What a run found out: in memory, in results.h5, against truth, in a summary. Stands on experiment."""
+"""The results of a run: in memory, in results.h5, compared with the truth, in a summary. Depends on experiment."""

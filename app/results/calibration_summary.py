@@ -1,4 +1,4 @@
-"""What self-calibration found, in numbers for summary.json."""
+"""The results of the self-calibration as numbers for summary.json."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.calibration.calibrate import Calibration
+from ..solver.bodies.grains import Array
+from ..solver.calibration.calibrate import Calibration
 
 
 def calibration_facts(found: Calibration, walls: tuple[str, ...]) -> dict[str, Any]:
-    """Corrections with their standard deviations, and how far touching surfaces were apart before and after [m, rad].
+    """Return the corrections with their standard deviations, and the rms gap of touching surfaces before and after.
 
-    Standard deviations of centres and radii are rms over grains, of a component and of a radius.
+    Lengths are in m, angles in rad. Corrections and standard deviations of centres and radii are rms over grains, of a
+    component and of a radius.
     """
     return {
         "applied": found.applied,

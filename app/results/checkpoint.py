@@ -1,8 +1,8 @@
 """Finished frames of an unfinished run, one file each, so that an interruption costs one frame at most.
 
-A file is written beside its final name and then renamed: it is there whole or not at all. The folder carries the
-fingerprint of what the frames were computed from; another fingerprint finds it empty. Every file begins with a checksum
-of itself, its number and that fingerprint: one that is damaged, or of another run, is not there, nor is any after it.
+A file is written under a temporary name and then renamed, so that it is complete. The folder holds the fingerprint of
+the input and settings of its frames; it is emptied for another fingerprint. Every file begins with a checksum of its
+content, its number and the fingerprint: a damaged file, or one of another run, ends the sequence of finished frames.
 """
 
 from __future__ import annotations
@@ -20,27 +20,39 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ..atomic import write_atomically
-from ..errors import RunError
-from .hdf5.lazy import Lazily, Remembered
+from ..process.atomic import write_atomically
+from ..process.errors import RunError
+from .hdf5.lazy_sequences import CachedSequence, LazySequence
 from .packed_arrays import pack, unpack
 
 T = TypeVar("T")
 CHECKSUM = 32  # bytes at the beginning of a file
-FORMAT = "packed arrays"  # part of the checksum: what an earlier version left in another form is not there
-ROOM = 1 << 26  # [bytes] for frames that were read last: friction, doubts and two passes of storing ask for each again
+FORMAT = "packed arrays"  # part of the checksum: files of an earlier version in another format are ignored
+CACHE_SIZE = 1 << 26  # [bytes] of recent frames: friction, penalties and two passes of storing read each again
 
 
 class Checkpoint:
-    """Frames of one stage of one run."""
+    """The finished frames of one stage of one run."""
 
     def __init__(
-        self, folder: Path, fingerprint: str, notes: list[str] | None = None, *, looks_on: bool = False
+        self, folder: Path, fingerprint: str, notes: list[str] | None = None, *, read_only: bool = False
     ) -> None:
-        """notes: where a sentence goes about what is damaged; looks_on: another process fills it, none is changed."""
+        """Open a folder of frames.
+
+        Parameters
+        ----------
+        folder
+            Folder of the files.
+        fingerprint
+            Hash of the input and settings of the frames; frames of another fingerprint are removed.
+        notes
+            List that receives a sentence about each damaged frame.
+        read_only
+            Change nothing, because another process writes the frames.
+        """
         self.folder, self._fingerprint = folder, fingerprint
         self._notes = notes if notes is not None else []
-        if looks_on:
+        if read_only:
             return
         mark = folder / "fingerprint"
         if folder.exists() and (not mark.exists() or mark.read_bytes() != fingerprint.encode()):
@@ -50,55 +62,58 @@ class Checkpoint:
             write_atomically(mark, fingerprint.encode())
 
     def finished(self, seen: int = 0) -> int:
-        """How many frames from the first on are there, whole; seen: so many are known to be."""
+        """Return the number of complete frames from the first on; seen: number already known to be complete."""
         count = seen
         while self._file(count).exists():
             if self._content(count) is None:
-                self._notes.append(f"Frame {count} of the unfinished {self.folder.name} is damaged: it is done again.")
+                self._notes.append(
+                    f"Frame {count} of the unfinished {self.folder.name} is damaged: it is computed again."
+                )
                 break
             count += 1
         return count
 
     def save(self, frame: int, *values: Any) -> None:
-        """Keep dataclasses of arrays and numbers."""
+        """Store dataclasses of arrays and numbers as one frame."""
         content = pack({f"{k}.{name}": array for k, value in enumerate(values) for name, array in flatten(value)})
         write_atomically(self._file(frame), self._checksum(frame, content) + content)
 
     def load(self, frame: int, *kinds: type) -> list[Any]:
+        """Return the dataclasses of a frame. Raises RunError where the frame is damaged."""
         content = self._content(frame)
         if content is None:
-            raise RunError(f"{self._file(frame)}: was damaged meanwhile; the same command does it again")
+            raise RunError(f"{self._file(frame)}: was damaged during the run; run the same command again")
         arrays = unpack(content)
         return [restore(kind, arrays, f"{k}.") for k, kind in enumerate(kinds)]
 
     def has(self, frame: int) -> bool:
-        """Whether something was kept of a frame."""
+        """Whether a frame is stored."""
         return self._file(frame).exists()
 
     def find(self, frame: int, kind: type[T]) -> T | None:
-        """What was kept of one frame; None where nothing is, or nothing whole."""
+        """Return the first dataclass of a frame; None where the frame is missing or damaged."""
         content = self._content(frame) if self.has(frame) else None
         return None if content is None else restore(kind, unpack(content), "0.")
 
-    def lazily(self, count: int, *kinds: type) -> tuple[Lazily[Any], ...]:
-        """The first frames, read whenever they are asked for: a sequence for each kind."""
-        loaded = Remembered(count, lambda frame: self.load(frame, *kinds), _bytes_of, ROOM)
-        return tuple(Lazily(count, lambda frame, at=at: loaded[frame][at]) for at in range(len(kinds)))
+    def lazy_sequences(self, count: int, *kinds: type) -> tuple[LazySequence[Any], ...]:
+        """Return the first `count` frames as one sequence per kind, read on access."""
+        loaded = CachedSequence(count, lambda frame: self.load(frame, *kinds), _bytes_of, CACHE_SIZE)
+        return tuple(LazySequence(count, lambda frame, at=at: loaded[frame][at]) for at in range(len(kinds)))
 
     def drop(self, first: int) -> None:
         """Remove the frames from this one on."""
-        for piece in sorted(self.folder.glob("*.piece"), reverse=True):  # the last first: what is left has no hole
+        for piece in sorted(self.folder.glob("*.piece"), reverse=True):  # last first: an interruption leaves no gap
             if int(piece.stem) >= first:
                 piece.unlink()
 
     def clear(self) -> None:
-        """Remove the frames, and the folder above once no stage is left in it."""
+        """Remove the frames, and the parent folder if no stage is left in it."""
         shutil.rmtree(self.folder, ignore_errors=True)
         with suppress(OSError):
             self.folder.parent.rmdir()
 
     def _content(self, frame: int) -> bytes | None:
-        """What was kept of a frame; None if that is not what is there."""
+        """Return the content of a frame; None if its checksum is wrong."""
         whole = self._file(frame).read_bytes()
         content = whole[CHECKSUM:]
         return content if whole[:CHECKSUM] == self._checksum(frame, content) else None
@@ -113,7 +128,7 @@ class Checkpoint:
 
 
 def flatten(value: Any, prefix: str = "") -> list[tuple[str, np.ndarray]]:
-    """Name every array of a dataclass, nested ones as outer.inner."""
+    """Return every array of a dataclass with its name, nested ones as outer.inner."""
     result = []
     for each in fields(value):
         part = getattr(value, each.name)
@@ -129,7 +144,7 @@ def _bytes_of(values: list[Any]) -> int:
 
 
 def restore(kind: type[T], named: Mapping[str, Any], prefix: str) -> T:
-    """Make the dataclass again from what `flatten` named; what has no name gets its default, or None."""
+    """Return the dataclass of the arrays that `flatten` named; missing fields get their default or None."""
     hints = _hints(kind)
     values: dict[str, Any] = {}
     for each in fields(kind):  # type: ignore[arg-type]
@@ -154,7 +169,7 @@ def _typed(hint: Any, value: Any) -> Any:
         return value
     value = np.asarray(value)[()]
     if hint is int and value != value:
-        return float("nan")  # a number that was not stored
+        return float("nan")  # the number was not stored
     return hint(value)
 
 

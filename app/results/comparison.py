@@ -1,4 +1,4 @@
-"""Two force fields on one packing: of two runs, or of a run and its truth, contact by contact."""
+"""Compare two force fields on one packing contact by contact: of two runs, or of a run and its truth."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.bodies.grains import Array
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, measure_contacts
-from solver.contacts.pairs import make_keys
-from solver.statistics.agreement import Agreement, compare_forces
-from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, sums_on_walls, wall_ratio_angle
-
+from ..solver.bodies.grains import Array
+from ..solver.bodies.walls import Walls
+from ..solver.contacts.contacts import Contacts, measure_contacts
+from ..solver.contacts.pairs import make_keys
+from ..solver.statistics.agreement import Agreement, compare_forces
+from ..solver.statistics.stress import friction_angle, love_weber_stress, packing_area, sums_on_walls, wall_ratio_angle
 from .results import Results, TruthContacts
 
-CLOSE = 0.5  # of a radius: two grains nearer than this are the same one
+CLOSE = 0.5  # radii: two grains nearer than this are the same one
 
 
 class DifferentPackingError(ValueError):
-    """The two runs are not of the same packing; the message says why."""
+    """The two runs are not of the same packing."""
 
 
 @dataclass(frozen=True, slots=True)
 class FieldFrame:
-    """One frame's forces, on the rows of the run that is compared."""
+    """The forces of one frame, on the rows of the compared run."""
 
     contacts: Contacts
     fn: Array  # (c,) [N]
@@ -37,20 +36,22 @@ class FieldFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class ComparedField:
+    """A force field with its name and frames."""
+
     name: str
     frames: Sequence[FieldFrame]
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Both fields on the bodies and frames that they share."""
+    """Both fields on their common bodies and frames."""
 
     base: Results  # the first run, its common frames alone
-    first: Field
-    second: Field  # the reference: errors are relative to it
-    agreement: Sequence[Agreement]  # of every frame
-    notes: tuple[str, ...]  # what could not be compared
+    first: ComparedField
+    second: ComparedField  # the reference: errors are relative to it
+    agreement: Sequence[Agreement]  # per frame
+    notes: tuple[str, ...]  # sentences about parts that could not be compared
 
 
 def compare_runs(
@@ -58,9 +59,22 @@ def compare_runs(
 ) -> Comparison:
     """Compare two runs of one packing.
 
-    names: of the runs; starts: number of the first frame of each in its experiment, so that runs over different
-    frames are compared where they overlap. Grains are matched by their ids, or, where ids mean different grains, by
-    their place; walls by their names. Raises DifferentPackingError where too little agrees.
+    Grains are matched by their ids, or by their positions where ids denote different grains; walls by their names.
+
+    Parameters
+    ----------
+    a, b
+        The runs; b is the reference.
+    names
+        Names of the runs.
+    starts
+        Number of the first frame of each run in its experiment: runs over different frames are compared where they
+        overlap.
+
+    Raises
+    ------
+    DifferentPackingError
+        The runs have no common frame, or too few grains are at the same positions.
     """
     offset = starts[1] - starts[0]
     first, stop = max(offset, 0), min(a.tracks.frame_count, b.tracks.frame_count + offset)
@@ -82,22 +96,22 @@ def compare_runs(
         notes.append(f"Only {stop - first} frames are in both runs.")
     if dropped:
         notes.append(f"{dropped} contacts of {names[1]} are of bodies that {names[0]} does not have: left out.")
-    return _compared(base, Field(names[1], frames), names[0], notes)
+    return _compared(base, ComparedField(names[1], frames), names[0], notes)
 
 
 def compare_with_truth(results: Results, truth: TruthContacts, *, name: str) -> Comparison:
-    """Compare a run with its truth, the reference."""
+    """Compare a run with its truth as the reference."""
     bounds = np.searchsorted(truth.frame, np.arange(len(results.frames) + 1))
     frames = []
     for k in range(len(results.frames)):
         rows = slice(bounds[k], bounds[k + 1])
         field, _ = _frame_on(results, k, truth.i[rows], truth.j[rows], truth.fn[rows], truth.ft[rows])
         frames.append(_with_angles(results, k, field))
-    return _compared(results, Field("truth", frames), name, [])
+    return _compared(results, ComparedField("truth", frames), name, [])
 
 
-def _compared(base: Results, second: Field, name: str, notes: list[str]) -> Comparison:
-    first = Field(
+def _compared(base: Results, second: ComparedField, name: str, notes: list[str]) -> Comparison:
+    first = ComparedField(
         name,
         [
             FieldFrame(f.contacts, f.fn, f.ft, s.friction_angle, s.wall_ratio_angle)
@@ -126,7 +140,7 @@ def _frames_of(results: Results, first: int, stop: int) -> Results:
 
 
 def _match_grains(a: Results, b: Results, frame_a: int, frame_b: int) -> tuple[NDArray[np.int64], str]:
-    """Row in a of every grain of b (n_b,), −1 where there is none; and a sentence where ids did not serve."""
+    """Return the row in a of every grain of b (n_b,), −1 for none, and a sentence where ids could not be used."""
     place_a, place_b = a.tracks.position[frame_a], b.tracks.position[frame_b]
     order: NDArray[np.int64] = np.argsort(a.tracks.id)
     at: NDArray[np.int64] = np.minimum(np.searchsorted(a.tracks.id[order], b.tracks.id), len(order) - 1)
@@ -142,15 +156,15 @@ def _match_grains(a: Results, b: Results, frame_a: int, frame_b: int) -> tuple[N
     close = distance < CLOSE * b.tracks.radius[present_b]
     if close.mean() < 0.5:
         raise DifferentPackingError(
-            f"only {close.sum()} of {len(present_b)} grains are at the same place in both: not the same packing"
+            f"only {close.sum()} of {len(present_b)} grains are at the same position in both: not the same packing"
         )
     rows = np.full(len(b.tracks.id), -1, np.int64)
     rows[present_b[close]] = present_a[nearest[close]]
-    return rows, f"Ids mean different grains in the two runs: {close.sum()} grains were matched by their place."
+    return rows, f"Ids denote different grains in the two runs: {close.sum()} grains were matched by their positions."
 
 
 def _match_walls(a: Results, b: Results) -> NDArray[np.int64]:
-    """Body in a of every wall of b (w_b,), −1 where there is none of its name."""
+    """Return the body in a of every wall of b (w_b,), −1 where no wall has its name."""
     body = {name: a.grains.count + row for row, name in enumerate(a.walls.name)}
     return np.array([body.get(name, -1) for name in b.walls.name], np.int64)
 
@@ -158,7 +172,7 @@ def _match_walls(a: Results, b: Results) -> NDArray[np.int64]:
 def _frame_on(
     base: Results, frame: int, i: NDArray[np.integer], j: NDArray[np.integer], fn: Array, ft: Array
 ) -> tuple[FieldFrame, int]:
-    """Forces on bodies of the base (−1: not there) as a frame; and how many of them had to be left out."""
+    """Return forces on bodies of the base (−1: missing) as a frame, and the number of forces left out."""
     known = (i >= 0) & (j >= 0)
     low, high = np.minimum(i, j)[known], np.maximum(i, j)[known]
     order = np.argsort(make_keys(low, high, base.grains.count + base.walls.count), kind="stable")
@@ -180,7 +194,7 @@ def _with_angles(base: Results, frame: int, field: FieldFrame) -> FieldFrame:
 
 
 def _walls_at(base: Results, frame: int) -> Walls:
-    """The walls of a frame at rest, plates with a load of one: which are loaded is all that matters."""
+    """Return the walls of a frame at rest, plates with a load of one: only the fact of a load is used."""
     walls = base.walls
     cell = None if walls.cell is None else walls.cell[frame]
     return Walls.at_rest(walls.endpoints[frame], np.where(walls.loaded, 1.0, np.nan), walls.side, cell)

@@ -1,7 +1,7 @@
-"""manifest.json of a run's folder: what each stored piece was made from, and the checksum that it must have.
+"""manifest.json of a run's folder: the provenance and the checksum of each stored file.
 
-A piece that is not listed, was made from something else or has another checksum is not there. The manifest stays in
-the folder and is not shared, so that it may say where the experiment lies.
+A file that is not listed, has another provenance or another checksum is ignored. The manifest stays in the folder and
+is not shared, so that it may hold the path of the experiment.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 
 MANIFEST = "manifest.json"
-NAMES = "surrogateescape"  # a name of a file may be no text in any language; it is kept byte for byte
+NAMES = "surrogateescape"  # error handler: names of files that are not valid UTF-8 are kept byte for byte
 
 
 class Manifest:
-    """What is written of one folder; read anew for every question, so that it is never older than the folder."""
+    """The manifest of one folder, read again for every call, so that it is never older than the folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -27,30 +27,34 @@ class Manifest:
     def file(self) -> Path:
         return self.folder / MANIFEST
 
-    def tell(self, facts: dict[str, Any]) -> None:
-        """Lay facts over those that are there: the experiment, its inputs, settings and verdicts."""
+    def store(self, facts: dict[str, Any]) -> None:
+        """Add or replace facts: the experiment, its inputs, settings and verdicts."""
         self._write({**self._read(), **facts})
 
     def fact(self, name: str) -> Any:
-        """One of the facts, None if it is not told."""
+        """Return one of the facts, None if it is not stored."""
         return self._read().get(name)
 
-    def add(self, name: str, fingerprint: str) -> None:
-        """List a piece as it is now; fingerprint: of what it was made from."""
-        pieces = self._pieces() | {name: {"made_from": fingerprint, "sha256": _digest(self.folder / name)}}
-        self.tell({"pieces": pieces})
+    def add(self, name: str, fingerprint: str, program: dict[str, Any] | None = None) -> None:
+        """List a file as it is now; fingerprint: hash of its provenance; program: what made it."""
+        entry = {"made_from": fingerprint, "sha256": _digest(self.folder / name), **(program or {})}
+        self.store({"pieces": self._pieces() | {name: entry}})
+
+    def piece(self, name: str) -> dict[str, Any]:
+        """Return the entry of a file; empty where it is not listed."""
+        return self._pieces().get(name, {})
 
     def lists(self, name: str, fingerprint: str) -> bool:
-        """Whether a piece was made from this."""
+        """Whether a file is listed with this fingerprint."""
         return self._pieces().get(name, {}).get("made_from") == fingerprint
 
     def is_whole(self, name: str) -> bool:
-        """Whether a piece is what it was when it was listed; one that is not listed is taken as it is."""
+        """Whether a file is unchanged since it was listed; true for a file that is not listed."""
         expected = self._pieces().get(name, {}).get("sha256")
         file = self.folder / name
         return expected is None or (file.is_file() and _digest(file) == expected)
 
-    def _pieces(self) -> dict[str, dict[str, str]]:
+    def _pieces(self) -> dict[str, dict[str, Any]]:
         pieces = self._read().get("pieces")
         listed = pieces.items() if isinstance(pieces, dict) else ()
         return {name: each for name, each in listed if isinstance(each, dict)}
@@ -58,7 +62,7 @@ class Manifest:
     def _read(self) -> dict[str, Any]:
         try:
             found = json.loads(self.file.read_bytes().decode("utf-8", NAMES))
-        except (FileNotFoundError, ValueError, RecursionError):  # a damaged manifest vouches for nothing
+        except (FileNotFoundError, ValueError, RecursionError):  # a damaged manifest lists no file
             return {}
         return found if isinstance(found, dict) else {}
 

@@ -1,6 +1,6 @@
-"""Arrays by name as bytes, and back: a list of what there is, then the numbers one after the other.
+"""Named arrays as bytes: a header with names, types and shapes, then the values one after the other.
 
-A frame has more than a hundred small arrays; numpy's own files take longer for the name of each than for its numbers.
+A frame has more than a hundred small arrays; numpy's own file format takes longer for each name than for the values.
 """
 
 from __future__ import annotations
@@ -10,33 +10,33 @@ from collections.abc import Mapping
 
 import numpy as np
 
-LENGTH = 8  # bytes that tell the length of the list
-ALIGNED = 64  # bytes that every array begins at a multiple of
+LENGTH = 8  # bytes of the header's length
+ALIGNMENT = 64  # bytes: every array begins at a multiple of it
 
 
 def pack(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """All arrays with type, shape and order in memory. Raises ValueError for arrays of objects."""
+    """Return arrays as bytes, with their types, shapes and memory order. Raises ValueError for arrays of objects."""
     parts: list[bytes] = []
-    told = []
+    header = []
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise ValueError(f"{name} is an array of objects, which have no bytes")
         by_column = array.flags.f_contiguous and not array.flags.c_contiguous
         content = array.tobytes("F" if by_column else "C")
-        told.append((name, array.dtype.str, array.shape, by_column))
-        parts += content, bytes(-len(content) % ALIGNED)
-    listed = json.dumps(told).encode()
-    listed += b" " * (-(LENGTH + len(listed)) % ALIGNED)
-    return b"".join([len(listed).to_bytes(LENGTH, "little"), listed, *parts])
+        header.append((name, array.dtype.str, array.shape, by_column))
+        parts += content, bytes(-len(content) % ALIGNMENT)
+    text = json.dumps(header).encode()
+    text += b" " * (-(LENGTH + len(text)) % ALIGNMENT)
+    return b"".join([len(text).to_bytes(LENGTH, "little"), text, *parts])
 
 
 def unpack(content: bytes) -> dict[str, np.ndarray]:
-    """The arrays again, each for itself: they may be written to."""
+    """Return the arrays of packed bytes as writable copies."""
     start = LENGTH + int.from_bytes(content[:LENGTH], "little")
     arrays = {}
     for name, kind, shape, by_column in json.loads(content[LENGTH:start]):
         order = "F" if by_column else "C"
         array = np.ndarray(tuple(shape), np.dtype(kind), content, start, order=order).copy(order)
         arrays[name] = array
-        start += array.nbytes + -array.nbytes % ALIGNED
+        start += array.nbytes + -array.nbytes % ALIGNMENT
     return arrays

@@ -1,4 +1,4 @@
-"""One run's results in memory, as the store keeps them and as recording, scoring and export read them."""
+"""The results of one run in memory, for storing, recording, scoring and export."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.boundary.boundary import Boundary
-from solver.calibration.calibrate import Calibration
-from solver.contacts.pairs import Keys, make_keys
-from solver.contacts.radius_tuning import RadiusTuning
-from solver.convex.friction_check import FrictionCheck
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
-
+from ..solver.bodies.grains import Array, Grains
+from ..solver.boundary.boundary_correction import Boundary
+from ..solver.calibration.calibrate import Calibration
+from ..solver.contacts.pairs import Keys, make_keys
+from ..solver.contacts.radius_tuning import RadiusTuning
+from ..solver.convex.friction_check import FrictionCheck
+from ..solver.frame_forces import FrameForces
+from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import Tracks, WallTracks
 
 
@@ -32,16 +31,16 @@ class TruthContacts:
     ft: Array  # (t,) [N]
 
     def outside(self, boundary: NDArray[np.bool_] | None) -> TruthContacts:
-        """The same without contacts between two grains of the boundary (n,); None: there is none."""
+        """Return the contacts without those between two boundary grains (mask (n,), None: no such grains)."""
         if boundary is None:
             return self
-        of_boundary = np.append(boundary, False)  # whatever is no grain
+        of_boundary = np.append(boundary, False)  # the last row stands for all walls
         n = len(boundary)
         keep = ~(of_boundary[np.minimum(self.i, n)] & of_boundary[np.minimum(self.j, n)])
         return TruthContacts(self.frame[keep], self.i[keep], self.j[keep], self.fn[keep], self.ft[keep])
 
     def by_frame(self, bodies: int, frame_count: int) -> tuple[tuple[Keys, Array], ...]:
-        """Keys (c,) of the pairs and forces (c, 2) [N] of every frame; bodies: grains and walls together."""
+        """Return the pairs' keys (c,) and forces (c, 2) [N] of every frame; bodies: number of grains and walls."""
         key, force = make_keys(self.i, self.j, bodies), np.column_stack([self.fn, self.ft])
         bounds = np.searchsorted(self.frame, np.arange(frame_count + 1))
         return tuple((key[a:b], force[a:b]) for a, b in pairwise(bounds))
@@ -49,7 +48,7 @@ class TruthContacts:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Everything one run found out."""
+    """All results of one run."""
 
     name: str
     tracks: Tracks
@@ -59,8 +58,14 @@ class Results:
     frames: Sequence[FrameForces]  # one per frame
     statistics: Sequence[FrameStatistics]  # one per frame
     configuration: str  # the resolved configuration, TOML
-    calibration: Calibration | None = None  # None: not tried
+    calibration: Calibration | None = None  # None: not attempted
     friction_check: FrictionCheck | None = None
-    radius_tuning: RadiusTuning | None = None  # None: not asked for
-    boundary: Boundary | None = None  # None: taken as it was told
-    ensemble_size: int = 0  # sequences solved again for the standard deviations of the forces; 0: free formula
+    radius_tuning: RadiusTuning | None = None  # None: not requested
+    boundary: Boundary | None = None  # None: used as given
+    ensemble_size: int = 0  # resampled sequences behind the standard deviations of the forces; 0: free formula
+
+    def contact_friction(self, frame: int) -> Array:
+        """Coefficient of friction used at every contact of a frame (c,); files of earlier versions hold one for all."""
+        forces = self.frames[frame]
+        given = np.full(forces.contacts.count, np.nan) if forces.friction is None else forces.friction
+        return np.where(np.isfinite(given), given, self.friction)

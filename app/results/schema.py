@@ -1,7 +1,7 @@
-"""Every dataset of results.h5: path, dimensions, type, unit and meaning, gathered from the fields that hold it.
+"""Every dataset of results.h5: path, dimensions, type, unit and meaning, generated from the fields of the results.
 
-A field with a `Quantity` becomes a dataset; nothing else lists it. What has no field is declared here: where the rows
-of a frame begin and end, the names of dimensions, the attributes of the file.
+A field with a `Quantity` becomes a dataset. This module declares only what has no field: the first and last rows of a
+frame, the names of dimensions, the attributes of the file.
 """
 
 from __future__ import annotations
@@ -13,25 +13,28 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.quantity import Declared, Quantity, quantities
-from solver.boundary.boundary import Boundary
-from solver.calibration.calibrate import Calibration
-from solver.contacts.radius_tuning import RadiusTuning
-from solver.convex.friction_check import FrictionCheck
-from solver.nlgs.starts import COLD_SWEEPS
-from solver.sequence.ensemble import MEMBERS
-from solver.sequence.frame_forces import ERROR_PARTS, FrameForces
-from solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
-from solver.statistics.frame_statistics import FrameStatistics
-
+from ..solver.bodies.grains import Array, Grains
+from ..solver.boundary.boundary_correction import Boundary
+from ..solver.calibration.calibrate import Calibration
+from ..solver.contacts.radius_tuning import RadiusTuning
+from ..solver.convex.friction_check import FrictionCheck
+from ..solver.frame_forces import ERROR_PARTS, FrameForces
+from ..solver.nlgs.start_residuals import COLD_SWEEPS
+from ..solver.quantity import DeclaredField, Quantity, quantities
+from ..solver.sequence.ensemble import MEMBERS
+from ..solver.statistics.force_statistics import FORCE_EDGES, MOBILISATION_EDGES
+from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import Tracks, WallTracks
 
 SCHEMA_VERSION = 2
 SCHEMA = "schema_version"
-RAGGED = ("contact", "sweep", "kept_sweep")  # as many rows as a frame happens to have: laid end to end over frames
+RAGGED = (
+    "contact",
+    "sweep",
+    "kept_sweep",
+)  # dimensions whose length differs between frames: their rows are concatenated over frames
 
-# The class whose fields each part of a file holds, and whether there is one of it per frame.
+# The class behind each part of a file.
 PARTS: dict[str, type] = {
     "tracks": Tracks,
     "walls": WallTracks,
@@ -43,8 +46,8 @@ PARTS: dict[str, type] = {
     "friction_check": FrictionCheck,
     "radius_tuning": RadiusTuning,
 }
-PER_FRAME = ("frames", "statistics")
-GROUP_OF_PART = {"contacts": "contacts", "history": "sweeps"}  # of parts of a frame: attribute and group
+PER_FRAME = ("frames", "statistics")  # parts with one object per frame
+GROUP_OF_PART = {"contacts": "contacts", "history": "sweeps"}  # nested parts of a frame: attribute and group
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +58,8 @@ class Entry:
     dims: tuple[str, ...]
     dtype: np.dtype  # object: text
     quantity: Quantity
-    absent: Any  # where a file has none: a value for all, or None
-    part: str  # of PARTS; empty: says where rows are
+    absent: Any  # value where a file has no such dataset, or None
+    part: str  # of PARTS; empty: offsets of rows
     attribute: str  # of the part's class, dotted where it is nested
 
     @property
@@ -66,7 +69,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """What the rows of a dimension are, and their labels: fixed, those of a dataset, or none."""
+    """The meaning of a dimension's rows, and their labels: fixed, those of a dataset, or none."""
 
     meaning: str
     labels: tuple[str, ...] | Array | None = None
@@ -79,25 +82,27 @@ def _middles(edges: Array) -> Array:
 
 DIMENSIONS = {
     "frame": Dimension("frames of the run, from 0"),
-    "frame_edge": Dimension("where frames begin and end: the rows of frame k are offset[k] : offset[k + 1]"),
+    "frame_edge": Dimension("limits of frames: the rows of frame k are offset[k] : offset[k + 1]"),
     "grain": Dimension("grains, labelled by their names", labelled_by="grains/id"),
     "wall": Dimension("walls, labelled by their names", labelled_by="walls/name"),
-    "contact": Dimension("contacts, frame after frame; contacts/offset says whose"),
-    "sweep": Dimension("sweeps that were measured, frame after frame; sweeps/offset says whose"),
-    "kept_sweep": Dimension("sweeps whose forces are kept, frame after frame; sweeps/recorded_offset says whose"),
-    "kept_force": Dimension("contacts of each kept sweep, sweep after sweep, frame after frame"),
+    "contact": Dimension("contacts, frame after frame; contacts/offset has the rows of each frame"),
+    "sweep": Dimension("measured sweeps, frame after frame; sweeps/offset has the rows of each frame"),
+    "kept_sweep": Dimension(
+        "sweeps with stored forces, frame after frame; sweeps/recorded_offset has the rows of each frame"
+    ),
+    "kept_force": Dimension("contacts of each stored sweep, sweep after sweep, frame after frame"),
     "xy": Dimension("components of a vector", ("x", "y")),
     "axis": Dimension("second components of a tensor", ("x", "y")),
     "end": Dimension("ends of a wall"),
     "lattice": Dimension("vectors of the periodic cell", ("a", "b")),
-    "member": Dimension("members of the ensemble", MEMBERS),
+    "member": Dimension("ensemble members: chains and convex programs", MEMBERS),
     "component": Dimension("components of a contact's force", ("fn", "ft")),
     "anisotropy": Dimension("kinds of anisotropy", ("contact", "branch", "normal", "tangential")),
-    "error_part": Dimension("causes of the forces' error", ERROR_PARTS),
+    "error_part": Dimension("sources of the error of the forces", ERROR_PARTS),
     "force_bin": Dimension("bins of f / ⟨f⟩, labelled by their middles", _middles(FORCE_EDGES)),
     "mobilisation_bin": Dimension("bins of |f_t| / (μ f_n), labelled by their middles", _middles(MOBILISATION_EDGES)),
-    "radius_change": Dimension("changes of radius that were tried"),
-    "friction_trial": Dimension("frictions that were tried"),
+    "radius_change": Dimension("tested changes of radius"),
+    "friction_trial": Dimension("tested coefficients of friction"),
     "cold_sweep": Dimension("sweeps from zero forces", COLD_SWEEPS.astype(np.float64)),
 }
 
@@ -108,15 +113,15 @@ def _rows(path: str, dims: str, meaning: str) -> Entry:
 
 
 CONTACT_OFFSET = _rows("contacts/offset", "frame_edge", "rows of contacts")
-SWEEP_COUNT = _rows("sweeps/count", "frame", "sweeps done")
-SWEEP_OFFSET = _rows("sweeps/offset", "frame_edge", "rows of sweeps that were measured")
-SWEEP_NUMBER = _rows("sweeps/number", "sweep", "which sweep of its frame, from 0")
-KEPT_OFFSET = _rows("sweeps/recorded_offset", "frame_edge", "rows of sweeps whose forces are kept")
+SWEEP_COUNT = _rows("sweeps/count", "frame", "number of sweeps")
+SWEEP_OFFSET = _rows("sweeps/offset", "frame_edge", "rows of measured sweeps")
+SWEEP_NUMBER = _rows("sweeps/number", "sweep", "index of the sweep in its frame, from 0")
+KEPT_OFFSET = _rows("sweeps/recorded_offset", "frame_edge", "rows of sweeps with stored forces")
 ROWS = (CONTACT_OFFSET, SWEEP_COUNT, SWEEP_OFFSET, SWEEP_NUMBER, KEPT_OFFSET)
 
 
 def entries(*parts: str) -> tuple[Entry, ...]:
-    """The datasets of these parts, of all without any; of a path that two parts hold, that of the later one."""
+    """Return the datasets of parts (default: all); where two parts have the same path, that of the later part."""
     found: dict[str, Entry] = {} if parts else {each.path: each for each in ROWS}
     for part in parts or PARTS:
         for each in _gather(part, PARTS[part], part, ""):
@@ -144,15 +149,15 @@ def _nested(kind: type) -> tuple[tuple[str, type], ...]:
     return tuple((name, hint) for name, hint in get_type_hints(kind).items() if is_dataclass(hint))  # type: ignore[misc]
 
 
-def _group(declared: Declared, group: str) -> str:
-    """Columns of contacts are with the contacts, those in newtons with the forces."""
+def _group(declared: DeclaredField, group: str) -> str:
+    """Return the group of a field: columns of contacts go to `contacts`, those in newtons to `forces`."""
     if group != "frames" or declared.quantity.dims.split()[:1] != ["contact"]:
         return group
     return "forces" if declared.quantity.unit == "N" else "contacts"
 
 
 def _dims_over_frames(dims: tuple[str, ...]) -> tuple[str, ...]:
-    """Dimensions of what all frames have together."""
+    """Return the dimensions of a field over all frames."""
     if dims == ("kept_sweep", "contact"):
         return ("kept_force",)
     return dims if dims[:1] and dims[0] in RAGGED else ("frame", *dims)
@@ -165,7 +170,7 @@ class Attribute:
     name: str
     kind: str
     meaning: str
-    of: tuple[str, ...] = ()  # paths of datasets; none: of the file
+    of: tuple[str, ...] = ()  # paths of datasets; empty: the file
     since: int = 1
 
 
@@ -173,21 +178,28 @@ DEVIATIONS = ("forces/fn_sd", "forces/ft_sd")
 ATTRIBUTES = (
     Attribute(SCHEMA, "integer", "version of this table"),
     Attribute("rodsight_version", "text", "version of Rodsight that wrote the file"),
-    Attribute("created", "text", "when, ISO 8601, UTC"),
+    Attribute("created", "text", "time of writing, ISO 8601, UTC"),
     Attribute("name", "text", "name of the experiment"),
-    Attribute("fingerprint", "text", "SHA-256 of the input and of the settings that matter"),
+    Attribute(
+        "fingerprint",
+        "text",
+        "SHA-256 of the input, of the settings that affect the results, of the code and of the libraries",
+    ),
+    Attribute("inputs", "text", "SHA-256 of the input and the settings alone, whatever the code"),
+    Attribute("code", "text", "SHA-256 of all sources of the program that the results depend on"),
+    Attribute("libraries", "text", "versions of numpy, numba, scipy, OpenCV and h5py by name, JSON"),
     Attribute("experiment", "text", "name of the experiment file"),
-    Attribute("frames", "two integers", "frames of the experiment that are in the file: first, and end or −1"),
+    Attribute("frames", "two integers", "frames of the experiment in the file: first, and end or −1"),
     Attribute("configuration", "text", "the resolved configuration, TOML"),
-    Attribute("friction", "number", "friction that was used"),
-    Attribute("source", "text", "where the standard deviation comes from", DEVIATIONS),
-    Attribute("ensemble_size", "integer", "sequences solved again for it, 0: none", DEVIATIONS),
-    Attribute("member", "texts", "names of the members", ("members/force",)),
+    Attribute("friction", "number", "coefficient of friction used"),
+    Attribute("source", "text", "method of the standard deviation", DEVIATIONS),
+    Attribute("ensemble_size", "integer", "number of resampled sequences behind it, 0: none", DEVIATIONS),
+    Attribute("member", "texts", "names of the ensemble members", ("members/force",)),
 )
 
 
 def unit_of(path: str) -> str:
-    """The unit of a dataset; empty: none."""
+    """Return the unit of a dataset; empty: none."""
     return _BY_PATH[path].quantity.unit
 
 

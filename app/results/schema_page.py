@@ -1,4 +1,4 @@
-"""app/docs/schema.md: the table of results.h5 for people, written by `python -m rodsight.results.schema_page`."""
+"""The page app/docs/schema.md with the datasets of results.h5; `python -m rodsight.results.schema_page` writes it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
 from .schema import ATTRIBUTES, DIMENSIONS, SCHEMA_VERSION, Dimension, Entry, entries
 
 PAGE = Path(__file__).parent.parent / "docs" / "schema.md"
@@ -14,18 +14,18 @@ FIRST_LINE = "<!-- Generated: run `python -m rodsight.results.schema_page` to wr
 
 
 def schema_page() -> str:
-    """The whole page, Markdown."""
+    """Return the page as Markdown."""
     groups = groupby(sorted(entries(), key=_group), key=_group)
     parts = [
         FIRST_LINE,
         f"# results.h5, schema {SCHEMA_VERSION}",
-        "SI units throughout; y points up. Files of earlier schemas open as well: what they lack is absent. A file is\n"
-        "not read without the datasets in bold. `tracks.h5` holds `tracks/`, `walls/`, `grains/id`, `grains/radius`\n"
-        "and `frames/time` alone.",
+        "SI units throughout; y points up. Files of earlier schemas open as well: missing datasets are absent. A file\n"
+        "needs the datasets in bold. `tracks.h5` holds `tracks/`, `walls/`, `grains/id`, `grains/radius` and\n"
+        "`frames/time` only.",
         "## Dimensions",
-        "Each is an HDF5 dimension scale at the root of the file: `xarray.open_datatree(file)` knows names and labels.",
-        _table(("dimension", "labels", "rows"), ((f"`{name}`", _labels(name, told), told.meaning)
-                                                 for name, told in DIMENSIONS.items())),
+        "Each is an HDF5 dimension scale at the root of the file: `xarray.open_datatree(file)` reads names and labels.",
+        _table(("dimension", "labels", "rows"), ((f"`{name}`", _labels(name, each), each.meaning)
+                                                 for name, each in DIMENSIONS.items())),
         *(part for group, members in groups for part in (f"## {group}/", _datasets(members))),
         "## Attributes",
         _table(
@@ -44,14 +44,14 @@ def _group(entry: Entry) -> str:
     return entry.path.split("/")[0]
 
 
-def _labels(name: str, told: Dimension) -> str:
+def _labels(name: str, dimension: Dimension) -> str:
     if name == "frame":
         return "0, 1, …"
-    if told.labels is None:
-        return f"`{told.labelled_by}`" if told.labelled_by else ""
-    if isinstance(told.labels, tuple):
-        return ", ".join(told.labels)
-    return f"{told.labels[0]:g}, {told.labels[1]:g}, … {told.labels[-1]:g}"
+    if dimension.labels is None:
+        return f"`{dimension.labelled_by}`" if dimension.labelled_by else ""
+    if isinstance(dimension.labels, tuple):
+        return ", ".join(dimension.labels)
+    return f"{dimension.labels[0]:g}, {dimension.labels[1]:g}, … {dimension.labels[-1]:g}"
 
 
 def _datasets(members: Iterable[Entry]) -> str:

@@ -1,4 +1,4 @@
-"""What a run comes to: the facts that a person reads at its end, as plain values and as JSON."""
+"""The summary of a run, as plain values and as JSON."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
-from solver.sequence.judging.statistic_intervals import DEVIATION
-from solver.statistics.agreement import Agreement
-from solver.statistics.frame_statistics import FrameStatistics
-
-from ..atomic import write_atomically
+from ..process.atomic import write_atomically
+from ..solver.assessment.statistic_intervals import CONSTANT
+from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
+from ..solver.statistics.agreement import Agreement
+from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import TrackStatus
 from .calibration_summary import calibration_facts
 from .results import Results
@@ -24,7 +23,7 @@ from .truth import accuracy
 
 
 class _Frame(NamedTuple):
-    """What is told of a frame: frames are read one after the other, and only once."""
+    """Values of a frame for the summary: frames are read one after the other, and only once."""
 
     frame: int
     status: FrameStatus
@@ -32,7 +31,7 @@ class _Frame(NamedTuple):
     failed_reason: str
     contact_count: int
     trust: float
-    doubt: str
+    trust_penalties: str
     unbalance: float
     natural_map: float
     correction: float
@@ -44,13 +43,13 @@ class _Frame(NamedTuple):
     def of(cls, forces: FrameForces) -> _Frame:
         return cls(
             forces.frame, forces.status, forces.reason, forces.failed_reason, forces.contacts.count, forces.trust,
-            forces.doubt, forces.unbalance, forces.natural_map, forces.correction, _median_deviation(forces),
+            forces.trust_penalties, forces.unbalance, forces.natural_map, forces.correction, _median_deviation(forces),
             forces.relative_error, None if forces.error_budget is None else forces.error_budget.tolist(),
         )  # fmt: skip
 
 
 class _Statistics(NamedTuple):
-    """What is told of a frame's statistics."""
+    """Values of a frame's statistics for the summary."""
 
     friction_angle: float
     coordination_number: float
@@ -58,13 +57,23 @@ class _Statistics(NamedTuple):
     deviations: Float[np.ndarray, " d"]  # of DEVIATION
 
     @classmethod
-    def of(cls, told: FrameStatistics) -> _Statistics:
-        deviations = np.array([getattr(told, f"{name}_sd") for name in DEVIATION])
-        return cls(told.friction_angle, told.coordination_number, told.mean_fn, deviations)
+    def of(cls, statistics: FrameStatistics) -> _Statistics:
+        deviations = np.array([getattr(statistics, f"{name}_sd") for name in CONSTANT])
+        return cls(statistics.friction_angle, statistics.coordination_number, statistics.mean_fn, deviations)
 
 
 def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: dict[str, float]) -> dict[str, Any]:
-    """Gather the summary; JSON values only."""
+    """Return the summary of a run as JSON values.
+
+    Parameters
+    ----------
+    results
+        The results of the run.
+    agreement
+        Agreement with the truth per frame; None without a truth.
+    seconds
+        Duration of each stage [s].
+    """
     frames, tracks = [_Frame.of(each) for each in results.frames], results.tracks
     statistics = [_Statistics.of(each) for each in results.statistics]
     status = Counter(frame.status.name.lower() for frame in frames)
@@ -101,12 +110,12 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "natural_map": _plain([frame.natural_map for frame in frames]),
         "correction": _plain([frame.correction for frame in frames]),
         "trust": _plain(trust.tolist()),
-        "doubts": [frame.doubt for frame in frames],
+        "trust_penalties": [frame.trust_penalties for frame in frames],
         "friction_angle_degrees": _plain([float(np.rad2deg(each.friction_angle)) for each in statistics]),
         "coordination_number": _plain([each.coordination_number for each in statistics]),
         "mean_fn": _plain([each.mean_fn for each in statistics]),
         "deviations": {
-            name: _plain([float(each.deviations[n]) for each in statistics]) for n, name in enumerate(DEVIATION)
+            name: _plain([float(each.deviations[n]) for each in statistics]) for n, name in enumerate(CONSTANT)
         },
         "error_budget": _error_budget(frames),
         "fn_deviation": _plain([frame.fn_deviation for frame in frames]),
@@ -124,12 +133,12 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
 
 
 def _error_budget(frames: Sequence[_Frame]) -> dict[str, Any] | None:
-    """Shares of the causes by frame, and the relative errors that they divide; None where nobody asked for them."""
-    shares = [frame.error_budget for frame in frames]
-    if not any(shares):
+    """Return the error fraction of each source and the relative error by frame; None where not computed."""
+    fractions = [frame.error_budget for frame in frames]
+    if not any(fractions):
         return None
-    nothing = [float("nan")] * len(ERROR_PARTS)
-    columns = zip(*(each or nothing for each in shares), strict=True)
+    unknown = [float("nan")] * len(ERROR_PARTS)
+    columns = zip(*(each or unknown for each in fractions), strict=True)
     return {
         "share": {name: _plain(list(column)) for name, column in zip(ERROR_PARTS, columns, strict=True)},
         "relative_error": _plain([frame.relative_error for frame in frames]),
@@ -137,18 +146,19 @@ def _error_budget(frames: Sequence[_Frame]) -> dict[str, Any] | None:
 
 
 def _median_deviation(frame: FrameForces) -> float:
-    """The median standard deviation of f_n over the mean f_n, of contacts that bear force; NaN without any."""
+    """Return the median standard deviation of f_n over the mean f_n of bearing contacts; NaN without any."""
     bearing = frame.fn > 0
     return float(np.median(frame.fn_sd[bearing]) / frame.fn[bearing].mean()) if bearing.any() else float("nan")
 
 
 def save_summary(file: Path, summary: dict[str, Any]) -> None:
+    """Write the summary as JSON."""
     text = json.dumps(_finite(summary), indent=1, ensure_ascii=False, allow_nan=False)
     write_atomically(file, (text + "\n").encode())
 
 
 def _radius_curve(results: Results) -> dict[str, list[float]] | None:
-    """The curve z(δR) that a wanted coordination number was looked up on; δR in metres."""
+    """Return the curve z(δR) on which the requested coordination number was found; δR in metres."""
     tuning = results.radius_tuning
     if tuning is None:
         return None
@@ -156,7 +166,7 @@ def _radius_curve(results: Results) -> dict[str, list[float]] | None:
 
 
 def _wall_force_error(results: Results, settled: list[int]) -> dict[str, float]:
-    """rms |F inferred − F recorded| / rms |F recorded| of every wall with a sensor, over settled frames."""
+    """Return rms |F inferred − F recorded| / rms |F recorded| of every wall with a sensor, over settled frames."""
     recorded = results.walls.force
     if recorded is None or not settled:
         return {}
@@ -183,12 +193,12 @@ def _friction(results: Results) -> dict[str, Any] | None:
         "frames": [check.first, check.last],
         "enclosed": check.enclosed,
         "walls": _plain([check.wall_measured, check.wall_low, check.wall_high]),
-        "agrees": check.agrees if check.enclosed else None,  # None: nothing can be said
+        "agrees": check.agrees if check.enclosed else None,  # None: undetermined
     }
 
 
 def _finite(value: Any) -> Any:
-    """The same with None for numbers that are not known: JSON has no NaN."""
+    """Replace unknown numbers by None, because JSON has no NaN."""
     if isinstance(value, dict):
         return {key: _finite(part) for key, part in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""True contact forces on the rows of a run's results, and how well the run agrees with them."""
+"""True contact forces on the rows of a run's results, and the agreement of the run with them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import ContactSource
-from solver.statistics.agreement import Agreement, compare_forces
-
-from ..errors import InputError
 from ..experiment.reading.input_files import InputFiles
 from ..experiment.reading.tables import check_frames, check_unique, read_table
+from ..process.errors import InputError
+from ..process.frame_range import ALL_FRAMES, FrameRange
+from ..solver.bodies.grains import Array
+from ..solver.contacts.contacts import ContactSource
+from ..solver.statistics.agreement import Agreement, compare_forces
 from ..tracks import Tracks
 from .results import Results, TruthContacts
 
 TRUTH_COLUMNS = ("frame", "i", "j", "fn", "ft")
-CLOSE = 0.5  # of a radius: a grain whose true place is nearer than this is that grain
+CLOSE = 0.5  # radii: largest distance between a grain and its true position
 
 
 def read_truth(
@@ -29,20 +29,40 @@ def read_truth(
     ids: NDArray[np.int64],
     walls: tuple[str, ...],
     *,
-    first_frame: int,
     frame_count: int,
+    frames: FrameRange = ALL_FRAMES,
     unseen: NDArray[np.int64] | None = None,
     inputs: InputFiles | None = None,
 ) -> TruthContacts:
     """Read a table of true contact forces.
 
-    ids (n,): the truth's name of every grain, negative for grains that it does not know. Frames count from
-    first_frame; others, and contacts of grains that have no row, are passed over. unseen: names of grains that have
-    none, of `true_ids`. inputs: what the file is read by. Raises InputError for a grain or wall that is not known at
-    all.
+    Other frames, and contacts of grains without a row in the results, are ignored.
+
+    Parameters
+    ----------
+    file
+        Table frame,i,j,fn,ft.
+    ids
+        Id of every grain in the truth (n,), negative for grains that the truth does not have.
+    walls
+        Names of the walls.
+    frame_count
+        Number of frames to read.
+    frames
+        Photographs of the results; the returned frames are rows of the results.
+    unseen
+        Ids of `true_ids`, which the table may contain although no grain of the results has them.
+    inputs
+        Reads the file and refuses it if it has changed since it was first read.
+
+    Raises
+    ------
+    InputError
+        A grain or wall is unknown.
     """
     table = read_table(file, TRUTH_COLUMNS, inputs)
-    frame, i = table.integers("frame") - first_frame, table.integers("i")
+    number, i = table.integers("frame") - frames.start, table.integers("i")
+    frame = np.where(number % frames.step == 0, number // frames.step, -1)
     body = {int(each): row for row, each in enumerate(ids) if each >= 0}
     wall = {name: len(ids) + row for row, name in enumerate(walls)}
     pair = np.empty((len(table), 2), np.int64)
@@ -55,7 +75,7 @@ def read_truth(
                 pair[row, 1] = body.get(int(text), -1)
             except ValueError:
                 raise table.error(row, "j", "is neither a grain's id nor the name of a wall") from None
-    if not np.any(ids < 0):  # every grain has a name, so that an unknown one is a mistake
+    if not np.any(ids < 0):  # every grain has an id in the truth, so that an unknown id is a mistake
         for column, values in (("i", pair[:, 0]), ("j", pair[:, 1])):
             unknown = np.flatnonzero(values < 0)
             if unseen is not None:
@@ -63,10 +83,10 @@ def read_truth(
                 unknown = unknown[[int(table.text(column)[row]) not in known_unseen for row in unknown]]
             if len(unknown):
                 raise table.error(int(unknown[0]), column, "is not the id of a grain")
-    # A pair may be listed from either side: f_n and f_t are the same seen from both.
+    # A pair may be listed in either order: f_n and f_t are the same in both.
     low, high = pair.min(axis=1), pair.max(axis=1)
     known = low >= 0
-    check_unique(table, "j", frame, np.where(known, low, i), np.where(known, high, -1 - np.arange(len(table))))
+    check_unique(table, "j", number, np.where(known, low, i), np.where(known, high, -1 - np.arange(len(table))))
     fn, ft = table.numbers("fn"), table.numbers("ft")
     keep = np.flatnonzero(known & (frame >= 0) & (frame < frame_count))
     keep = keep[np.argsort(frame[keep], kind="stable")]
@@ -74,28 +94,28 @@ def read_truth(
 
 
 def true_ids(file: Path) -> NDArray[np.int64]:
-    """The ids of all true grains, those that no photograph showed included; file: table frame,id,x,y,theta."""
+    """Return the ids of all true grains, including those that no photograph shows; file: table frame,id,x,y,theta."""
     return np.unique(read_table(file, ("id",)).integers("id"))
 
 
-def names_of_told(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64]:
-    """The truth's ids of grains (n,) that were told by their own ids: those of inferred rods are found by their place.
+def names_of_given(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64]:
+    """Return the true ids of grains given with ids (n,); inferred rods get the id at their position, −1 for none.
 
-    Told positions may have been corrected by more than a radius, as where a scale is wrong, and are not asked.
-    An inferred rod that lies where a told one should has no name, nor has the second of two at one place.
+    The positions of given grains are not used, because a correction of the scale may have moved them by more than a
+    radius. An inferred rod at the position of a given one gets no id, nor does the second of two at one position.
     file: table frame,id,x,y,theta of true poses [m, rad].
     """
     names = tracks.id.copy()
     inferred = np.zeros(tracks.grain_count, np.bool_) if tracks.inferred is None else tracks.inferred
     if not inferred.any():
         return names
-    frame, ids, place = _read_poses(file)
+    frame, ids, point = _read_poses(file)
     here = frame == first_frame
     unseen = here & ~np.isin(ids, tracks.id[~inferred])
     names[inferred] = -1
     rows = np.flatnonzero(inferred & tracks.present[0])
     if unseen.any() and len(rows):
-        nearest = _nearest(place[unseen], tracks, rows)
+        nearest = _nearest(point[unseen], tracks, rows)
         named = np.where(nearest >= 0, ids[unseen][nearest], -1)
         _, first = np.unique(named, return_index=True)
         names[rows[first]] = named[first]
@@ -103,17 +123,17 @@ def names_of_told(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.in
 
 
 def true_names(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64]:
-    """The truth's ids of detected grains (n,), found by their place on the run's first frame; −1 for none.
+    """Return the true ids of detected grains (n,), found by their positions on the run's first frame; −1 for none.
 
     file: table frame,id,x,y,theta of true poses [m, rad].
     """
-    frame, ids, place = _read_poses(file)
+    frame, ids, point = _read_poses(file)
     here = frame == first_frame
     if not here.any():
-        raise InputError(file, f"frame {first_frame}", "is not there")
+        raise InputError(file, f"frame {first_frame}", "is missing")
     names = np.full(tracks.grain_count, -1, np.int64)
     present = np.flatnonzero(tracks.present[0])
-    nearest = _nearest(place[here], tracks, present)
+    nearest = _nearest(point[here], tracks, present)
     names[present] = np.where(nearest >= 0, ids[here][nearest], -1)
     taken = np.sort(names[names >= 0])
     twice = np.flatnonzero(np.diff(taken) == 0)
@@ -123,7 +143,7 @@ def true_names(file: Path, tracks: Tracks, first_frame: int) -> NDArray[np.int64
 
 
 def _read_poses(file: Path) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Frame (m,), id (m,) and place (m, 2) [m] of true poses."""
+    """Return the frame (m,), id (m,) and position (m, 2) [m] of true poses."""
     table = read_table(file, ("frame", "id", "x", "y", "theta"))
     frame, ids = table.integers("frame"), table.integers("id")
     check_frames(table, frame)
@@ -133,15 +153,15 @@ def _read_poses(file: Path) -> tuple[NDArray[np.int64], NDArray[np.int64], Array
     return frame, ids, np.column_stack([table.numbers("x"), table.numbers("y")])
 
 
-def _nearest(place: Array, tracks: Tracks, rows: NDArray[np.intp]) -> NDArray[np.int64]:
-    """Which of some places (m, 2) [m] these rows of grains (r,) have on the first frame; −1: none is near enough."""
-    found = KDTree(place).query(tracks.position[0, rows])
+def _nearest(point: Array, tracks: Tracks, rows: NDArray[np.intp]) -> NDArray[np.int64]:
+    """Return the index of the point (m, 2) [m] nearest to each grain row (r,) on the first frame; −1: none is close."""
+    found = KDTree(point).query(tracks.position[0, rows])
     distance, nearest = np.asarray(found[0]), np.asarray(found[1])
     return np.where(distance < CLOSE * tracks.radius[rows], nearest, -1)
 
 
 def score(results: Results, truth: TruthContacts) -> list[Agreement]:
-    """Agreement with the truth in every frame."""
+    """Return the agreement with the truth in every frame."""
     true = truth.by_frame(results.grains.count + results.walls.count, len(results.frames))
     return [
         compare_forces(
@@ -154,14 +174,14 @@ def score(results: Results, truth: TruthContacts) -> list[Agreement]:
 
 
 def accuracy(agreement: Sequence[Agreement]) -> dict[str, list[float | None]]:
-    """Lists per frame, None where a quantity does not exist: the public `accuracy` object."""
+    """Return the public `accuracy` object: lists per frame, with None where a quantity does not exist."""
     rows = [asdict(each) for each in agreement]
     keys = ("r_fn", "r_ft", "relative_l2", "scale", "contact_precision", "contact_recall")
     return {key: [_or_none(row[key]) for row in rows] for key in keys}
 
 
 def correlations(agreement: Sequence[Agreement]) -> Array:
-    """r(f_n) of every frame (f,)."""
+    """Return r(f_n) of every frame (f,)."""
     return np.array([each.r_fn for each in agreement])
 
 

@@ -1,4 +1,4 @@
-"""How well inferred forces agree with the truth: several packings, loading and unloading, several noises."""
+"""Agreement of inferred forces with the truth over packings, loading directions and noise levels."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from solver.dem.simulation import DemTruth
-
-from ..inference.inference import infer_frames
-from ..progress import Progress, silent
-from .truths import agreement_of, observe, simulate, starts_of
+from ..inference.infer_sequence import infer_sequence
+from ..process.progress import Progress, no_progress
+from ..solver.dem.dem_truth import DemTruth
+from .truths import agreement_of, observe, simulate, window_starts
 
 WINDOW = 12  # photographs of one sequence
 SHOWN = (1, 3, 5, 10)  # frames of the table
@@ -24,7 +23,7 @@ NOISES = (0.0, 1e-5, 2e-5, 4e-5)  # [m]
 
 @dataclass(frozen=True, slots=True)
 class AccuracyRow:
-    """One noise: means over packings and windows, except the least."""
+    """One noise level: means over packings and windows, except `least`."""
 
     noise: float  # [m]
     r_fn: tuple[float, ...]  # at the frames SHOWN
@@ -32,23 +31,23 @@ class AccuracyRow:
     relative_l2: tuple[float, ...]
     late: float  # mean r(f_n) from frame 5 on
     least: float  # least r(f_n) of a frame from 5 on
-    last: float  # mean r(f_n) of the last frame, which has no successor to look at
+    last: float  # mean r(f_n) of the last frame, which has no successor
     scale: float  # mean from frame 5 on
     cpu: float  # [s] per frame
 
 
 def measure_accuracy(
-    truths: Sequence[DemTruth], noise: float, estimator: str, *, window: int = WINDOW, progress: Progress = silent
+    truths: Sequence[DemTruth], noise: float, estimator: str, *, window: int = WINDOW, progress: Progress = no_progress
 ) -> AccuracyRow:
     """Solve windows of all truths at one noise [m]."""
     runs, began, done = [], time.process_time(), 0
     for number, truth in enumerate(truths):
-        for start in starts_of(truth, window):
+        for start in window_starts(truth, window):
             rng = np.random.default_rng([number, start, round(noise * 1e9)])
             inputs = observe(truth, range(start, start + window), noise, rng, estimator=estimator)
             rows = []
-            for solved in infer_frames(inputs):
-                found = agreement_of(solved.forces, truth, start + solved.forces.frame)
+            for frame in infer_sequence(inputs).frames:
+                found = agreement_of(frame, truth, start + frame.frame)
                 rows.append((found.r_fn, found.r_ft, found.relative_l2, found.scale))
                 done += 1
                 progress(f"{noise * 1e6:.0f} µm", done, 2 * window * len(truths))
@@ -68,9 +67,15 @@ def measure_accuracy(
 
 
 def study_accuracy(
-    seeds: Sequence[int], *, grains: int, folder: Path, estimator: str, console: Console, progress: Progress = silent
+    seeds: Sequence[int],
+    *,
+    grains: int,
+    folder: Path,
+    estimator: str,
+    console: Console,
+    progress: Progress = no_progress,
 ) -> list[AccuracyRow]:
-    """Print the table of accuracy against noise."""
+    """Measure the accuracy at several noise levels and print the table."""
     truths = [simulate(seed, grains=grains, folder=folder, progress=progress) for seed in seeds]
     rows = [measure_accuracy(truths, noise, estimator, progress=progress) for noise in NOISES]
     title = f"{estimator}: {len(truths)} packings of {grains} rods, loading and unloading, 0.25° per photograph"

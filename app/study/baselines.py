@@ -1,4 +1,4 @@
-"""How far forces that need no motion agree with the truth, beside the run's own, on the same pairs."""
+"""Agreement of motion-free baselines with the truth, beside that of the run's forces, on the same pairs."""
 
 from __future__ import annotations
 
@@ -8,33 +8,32 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from solver.baselines.still_forces import StillForces, estimate_still
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Packing
-from solver.bodies.rods import RodMaterial
-from solver.contacts.contacts import ContactSource
-from solver.contacts.pairs import Keys, join_keys, recall
-from solver.detection.precision import measure_precision
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.agreement import pearson
-
 from ..inference.snapshots import make_snapshots
 from ..results.results import Results, TruthContacts
+from ..solver.baselines.motion_free import MotionFreeForces, estimate_motion_free
+from ..solver.bodies.grains import Array
+from ..solver.bodies.motion import Snapshot
+from ..solver.bodies.packing import Packing
+from ..solver.bodies.rods import RodMaterial
+from ..solver.contacts.contacts import ContactSource
+from ..solver.contacts.pairs import Keys, join_keys, match_values
+from ..solver.detection.precision import measure_precision
+from ..solver.frame_forces import FrameForces
+from ..solver.statistics.agreement import pearson
 
 
 @dataclass(frozen=True, slots=True)
 class BaselineAgreement:
-    """Correlations of f_n with the truth in one frame, on all near pairs and all that either side names."""
+    """Correlations of f_n with the truth in one frame, on all candidate pairs and all contacts of either side."""
 
     r_ours: float
-    r_static: float  # in balance, near the same force on every contact
-    r_overlap: float  # in balance, near forces in proportion to the overlaps
+    r_static: float  # in equilibrium, nearest to the same force on every contact
+    r_overlap: float  # in equilibrium, nearest to forces proportional to the overlaps
     r_uniform: float  # the same force on every contact
 
 
 def score_baselines(results: Results, truth: TruthContacts) -> list[BaselineAgreement]:
-    """Compare every frame; the baselines see what the run's own forces were made from, as it was corrected."""
+    """Compare every frame; the baselines use the corrected data from which the run's forces were computed."""
     true = truth.by_frame(results.grains.count + results.walls.count, len(results.frames))
     return compare_baselines(
         packing_of(results), make_snapshots(results.tracks, results.walls), results.frames, true
@@ -49,27 +48,27 @@ def compare_baselines(
     found = []
     for k, frame in enumerate(frames):
         listed = frame.source != ContactSource.FORBIDDEN_BY_REVIEWER
-        # What is told of the noise leaves errors out that stay the same; what is measured, errors of another kind.
+        # The stated noise omits constant errors, the measured noise omits others: the larger is used.
         noise = max(snapshots[k].sigma, measured.sigma if measured is not None else 0.0)
-        still = estimate_still(packing, snapshots, k, noise)
-        found.append(_compare(still, frame.contacts.key[listed], frame.fn[listed], *true[k]))
+        baseline = estimate_motion_free(packing, snapshots, k, noise)
+        found.append(_compare(baseline, frame.contacts.key[listed], frame.fn[listed], *true[k]))
     return found
 
 
 def baseline_lists(agreement: Sequence[BaselineAgreement]) -> dict[str, list[float | None]]:
-    """Lists per frame, None where a correlation does not exist: the public `baselines` object."""
+    """Return lists per frame, None where a correlation does not exist: the public `baselines` object."""
     return {
         each.name: [round(r, 6) if np.isfinite(r := getattr(row, each.name)) else None for row in agreement]
         for each in fields(BaselineAgreement)
     }
 
 
-def tell_baselines(agreement: Sequence[BaselineAgreement]) -> str:
-    """One line: the mean correlations over all frames."""
+def describe_baselines(agreement: Sequence[BaselineAgreement]) -> str:
+    """Return one line with the mean correlations over all frames."""
     mean = {name: _mean([r for r in values if r is not None]) for name, values in baseline_lists(agreement).items()}
     return (
-        f"On all near pairs, mean r(f_n) of these forces {mean['r_ours']}; of forces that need no motion: in balance "
-        f"{mean['r_static']}, pulled towards the overlaps {mean['r_overlap']}, the same everywhere {mean['r_uniform']}."
+        f"On all candidate pairs, mean r(f_n) of these forces {mean['r_ours']}; of motion-free baselines: in "
+        f"equilibrium {mean['r_static']}, nearest to the overlaps {mean['r_overlap']}, uniform {mean['r_uniform']}."
     )
 
 
@@ -77,24 +76,24 @@ def _mean(values: Sequence[float]) -> str:
     return f"{np.mean(values):.3f}" if values else "–"
 
 
-def _compare(still: StillForces, key: Keys, fn: Array, true_key: Keys, true_force: Array) -> BaselineAgreement:
-    pairs = join_keys(still.near, key, true_key)
-    true = recall(pairs, true_key, true_force[:, 0])
-    fields_of = (
+def _compare(baseline: MotionFreeForces, key: Keys, fn: Array, true_key: Keys, true_force: Array) -> BaselineAgreement:
+    pairs = join_keys(baseline.candidates, key, true_key)
+    true = match_values(pairs, true_key, true_force[:, 0])
+    forces = (
         (key, fn),
-        *((still.contacts.key, f[:, 0]) for f in (still.balanced, still.overlapping, still.uniform)),
+        *((baseline.contacts.key, f[:, 0]) for f in (baseline.balanced, baseline.overlapping, baseline.uniform)),
     )
-    return BaselineAgreement(*(pearson(recall(pairs, *each), true) for each in fields_of))
+    return BaselineAgreement(*(pearson(match_values(pairs, *each), true) for each in forces))
 
 
 def packing_of(results: Results) -> Packing:
-    """The packing as it was solved: its material is in the configuration, its friction as it was used."""
+    """Return the packing that was solved: material from the stored configuration, friction as used."""
     section = tomllib.loads(results.configuration).get("material", {})
-    told = {each.name: section[each.name] for each in fields(RodMaterial) if each.name in section}
-    told["friction"] = results.friction
-    if not isinstance(told.get("wall_friction"), int | float):
-        told["wall_friction"] = None
-    told["gravity"] = tuple(told.get("gravity", (0.0, 0.0)))
-    material = RodMaterial(**told)
+    given = {each.name: section[each.name] for each in fields(RodMaterial) if each.name in section}
+    given["friction"] = results.friction
+    if not isinstance(given.get("wall_friction"), int | float):
+        given["wall_friction"] = None
+    given["gravity"] = tuple(given.get("gravity", (0.0, 0.0)))
+    material = RodMaterial(**given)
     pressure = results.walls.usual_pressure(material.length)
     return material.pack(results.tracks.radius, pressure, boundary=results.tracks.boundary)

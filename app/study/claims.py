@@ -1,4 +1,4 @@
-"""The paper's claims, measured on simulated truth: claim, what was found, verdict."""
+"""The paper's claims, tested on simulated truth: claim, measurement, verdict."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import measure_pairs
-from solver.contacts.pairs import align
-from solver.dem.simulation import DemTruth
-from solver.nlgs.chain import ChainSettings
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.settings import SequenceSettings
-from solver.statistics.agreement import pearson
-from solver.statistics.force_statistics import plateau_ratio, tail_exponent
-from solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
-
-from ..inference.inference import Inputs, infer_frames
-from ..progress import Progress, silent
-from .truths import agreement_of, observe, packing_of, simulate, starts_of, true_forces, with_imposed_walls
+from ..inference.infer_sequence import infer_sequence
+from ..inference.inputs import Inputs
+from ..process.progress import Progress, no_progress
+from ..solver.bodies.grains import Array
+from ..solver.contacts.contacts import measure_pairs
+from ..solver.contacts.pairs import align
+from ..solver.dem.dem_truth import DemTruth
+from ..solver.frame_forces import FrameForces
+from ..solver.nlgs.chain import ChainSettings
+from ..solver.sequence.settings import SequenceSettings
+from ..solver.statistics.agreement import pearson
+from ..solver.statistics.force_statistics import plateau_ratio, tail_exponent
+from ..solver.statistics.stress import friction_angle, love_weber_stress, packing_area, principal_stresses
+from .truths import agreement_of, observe, packing_of, simulate, true_forces, window_starts, with_imposed_walls
 
 WINDOW = 14  # photographs of one sequence
-SETTLED_WITHIN = 0.01  # of the level of the last frames
+SETTLED_WITHIN = 0.01  # below the mean r of the last four frames
 NOISE = 1e-5  # [m], the precision the paper states
 
 
@@ -50,10 +50,10 @@ def study_claims(
     grains: int,
     folder: Path,
     console: Console,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
     window: int = WINDOW,
 ) -> list[ClaimVerdict]:
-    """Print the table of the paper's claims."""
+    """Test the paper's claims on packings of these seeds and print the verdicts."""
     truths = [simulate(seed, grains=grains, folder=folder, progress=progress) for seed in seeds]
     ours = _solve_all(truths, window, progress, "ensemble")
     paper = _solve_all(truths, window, progress, "paper", _as_the_paper)
@@ -77,7 +77,7 @@ def study_claims(
 
 
 def _as_the_paper(inputs: Inputs) -> Inputs:
-    """The paper's recipe to the letter: inertia alone, one step per interval, ε_f, reset to zero."""
+    """Replace the settings by the paper's: inertia only, one step per interval, stop at ε_f, reset to zero."""
     chain = ChainSettings(kappa=None, substeps=1, spin_up=1, sweeps=5000, force_change=1e-2, keep="none")
     sequence = SequenceSettings(estimator="nlgs", chain=chain, reset_to_zero=True)
     return replace(inputs, settings=replace(inputs.settings, sequence=sequence))
@@ -90,14 +90,14 @@ def _solve_all(
     label: str,
     changed: Callable[[Inputs], Inputs] = lambda inputs: inputs,
 ) -> list[_Sequence]:
-    """Solve a window up and a window down of every truth, the inputs changed."""
+    """Solve a loading and an unloading window of every truth, with changed inputs."""
     found, done = [], 0
     for number, truth in enumerate(truths):
-        for start in starts_of(truth, window):
+        for start in window_starts(truth, window):
             rng = np.random.default_rng([number, start])
             frames = []
-            for solved in infer_frames(changed(observe(truth, range(start, start + window), NOISE, rng))):
-                frames.append(solved.forces)
+            for frame in infer_sequence(changed(observe(truth, range(start, start + window), NOISE, rng))).frames:
+                frames.append(frame)
                 done += 1
                 progress(label, done, 2 * window * len(truths))
             found.append(_Sequence(truth, start, frames))
@@ -109,20 +109,20 @@ def _r(sequences: list[_Sequence]) -> Array:
 
 
 def _settled_at(r: Array) -> int:
-    """First frame from which on the mean over sequences stays near the level of its last four."""
+    """Return the first frame from which the mean over sequences stays near the mean of its last four frames."""
     mean = r.mean(axis=0)
     off = np.flatnonzero(mean < mean[-4:].mean() - SETTLED_WITHIN)
     return int(off[-1]) + 1 if len(off) else 0
 
 
 def _settling(paper: list[_Sequence], ours: list[_Sequence]) -> ClaimVerdict:
-    theirs, here = _r(paper), _r(ours)
+    r_paper, r_ours = _r(paper), _r(ours)
     return ClaimVerdict(
         "settles in about five photographs",
-        f"paper's recipe: r {theirs[:, 1].mean():.2f} at the first pair, level {theirs[:, -4:].mean():.2f}, reached at "
-        f"frame {_settled_at(theirs)}; default: {here[:, 1].mean():.3f}, level {here[:, -4:].mean():.3f}, "
-        f"frame {_settled_at(here)}",
-        "about right for its recipe" if 3 <= _settled_at(theirs) <= 8 else "not seen",
+        f"paper's method: r {r_paper[:, 1].mean():.2f} at the first pair, level {r_paper[:, -4:].mean():.2f}, reached "
+        f"at frame {_settled_at(r_paper)}; default: {r_ours[:, 1].mean():.3f}, level {r_ours[:, -4:].mean():.3f}, "
+        f"frame {_settled_at(r_ours)}",
+        "about right for its method" if 3 <= _settled_at(r_paper) <= 8 else "not confirmed",
     )
 
 
@@ -199,5 +199,5 @@ def _distribution(sequences: list[_Sequence]) -> ClaimVerdict:
         f"greatest {a[-1]:.1f} means (99.9 %: {np.quantile(a, 0.999):.1f}); tail exponent {tail.value:.2f} "
         f"(true {tail_exponent(b).value:.2f}); plateau {plateau.value:.2f} (true {plateau_ratio(b).value:.2f}); "
         f"distance to the true distribution {distance:.3f}",
-        "yes, but it proves little: wrong forces have it too",
+        "yes, but wrong forces have the same distribution",
     )

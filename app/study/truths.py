@@ -1,4 +1,4 @@
-"""Simulated truths for studies: simulated once, kept in a folder, observed with noise."""
+"""Simulated truths for studies: simulated once, cached in a folder, observed with noise."""
 
 from __future__ import annotations
 
@@ -8,37 +8,50 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.packing import Packing
-from solver.bodies.rods import RodMaterial
-from solver.contacts.contacts import Contacts
-from solver.contacts.pairs import Keys, make_keys
-from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
-from solver.nlgs.chain import ChainSettings
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.settings import SequenceSettings
-from solver.statistics.agreement import Agreement, compare_forces
-
-from ..inference.inference import Inputs
-from ..inference.settings import InferenceSettings
-from ..progress import Progress, silent
+from ..inference.inference_settings import InferenceSettings
+from ..inference.inputs import Inputs
+from ..process.progress import Progress, no_progress
+from ..solver.bodies.grains import Array
+from ..solver.bodies.packing import Packing
+from ..solver.bodies.rods import RodMaterial
+from ..solver.contacts.contacts import Contacts
+from ..solver.contacts.pairs import Keys, make_keys
+from ..solver.dem.dem_truth import DemSettings, DemTruth
+from ..solver.dem.shear_cell import shear_photographs
+from ..solver.frame_forces import FrameForces
+from ..solver.nlgs.chain import ChainSettings
+from ..solver.sequence.settings import SequenceSettings
+from ..solver.statistics.agreement import Agreement, compare_forces
 from ..synthetic.dense_packing import prepare_packing
-from ..synthetic.worlds.making import load_truth, save_truth
+from ..synthetic.scenarios.scenario_folder import load_truth, save_truth
 from ..tracks import Tracks, TrackStatus, WallTracks
 
 STEP = 0.25  # [°] of shear between photographs
-TURN = 15.0  # [°] at which the shear turns back
+REVERSAL_ANGLE = 15.0  # [°] of shear at which the direction is reversed
 INTERVAL = 52.0  # [s] between photographs at the real test's rate
-FINEST = 1e-6  # [m] precision claimed of exact positions
+FINEST_PRECISION = 1e-6  # [m] stated for exact positions
+NEGLIGIBLE = 1e-3  # over the mean f_n: contacts whose inferred and true forces are below it are left out of errors
 
 
-def simulate(seed: int, *, grains: int, folder: Path, turn: float = TURN, progress: Progress = silent) -> DemTruth:
-    """One loading cycle of a packing, a photograph every 0.25° (f = 2 turn / 0.25 + 1); from the folder if there."""
-    file = folder / f"truth_{grains}_{turn:g}_{seed}.npz"
+def simulate(
+    seed: int, *, grains: int, folder: Path, reversal_angle: float = REVERSAL_ANGLE, progress: Progress = no_progress
+) -> DemTruth:
+    """Load or simulate one loading cycle of a packing, a photograph every 0.25°.
+
+    Parameters
+    ----------
+    seed, grains : int
+    folder : Path
+        Cache of simulated truths.
+    reversal_angle : float
+        Shear at which the direction is reversed [°]; the truth has 2 reversal_angle / 0.25 + 1 frames.
+    progress : Progress
+    """
+    file = folder / f"truth_{grains}_{reversal_angle:g}_{seed}.npz"
     settings = DemSettings()
     if file.exists():
         return load_truth(file, settings)
-    up = np.arange(round(turn / STEP) + 1)
+    up = np.arange(round(reversal_angle / STEP) + 1)
     angles = np.deg2rad(STEP) * np.concatenate([up, up[-2::-1]])
     cell = prepare_packing(grains, np.random.default_rng(seed), settings)
     frames = []
@@ -51,16 +64,27 @@ def simulate(seed: int, *, grains: int, folder: Path, turn: float = TURN, progre
 
 
 def packing_of(truth: DemTruth) -> Packing:
-    """The mechanics of a truth, the top a plate under pressure."""
+    """Return the packing of a truth, with the top wall a plate under pressure."""
     return _material_of(truth).pack(truth.radius, _pressure_of(truth))
 
 
 def observe(
     truth: DemTruth, photographs: range, noise: float, rng: np.random.Generator, *, estimator: str = "ensemble"
 ) -> Inputs:
-    """Photographs of a truth, tracked with Gaussian noise [m] on positions and noise / R [rad] on rotations.
+    """Return the inputs of a run: tracks of a truth with Gaussian noise.
 
-    Solved as `rodsight run` would, but for the estimator, and without calibration: nothing constant is wrong.
+    The settings are those of `rodsight run` except the estimator, without calibration, since there are no constant
+    errors.
+
+    Parameters
+    ----------
+    truth : DemTruth
+    photographs : range
+        Frames of the truth.
+    noise : float
+        Standard deviation of a position component [m]; that of a rotation is noise / R [rad].
+    rng : numpy.random.Generator
+    estimator : {'ensemble', 'nlgs'}
     """
     n, shape = len(truth.radius), (len(photographs), len(truth.radius))
     position, rotation = np.empty((*shape, 2)), np.empty(shape)
@@ -69,7 +93,8 @@ def observe(
         rotation[row] = truth.rotation[k] + noise / truth.radius * rng.standard_normal(n)
     tracks = Tracks(
         np.arange(n), truth.radius, INTERVAL * np.array(photographs), position, rotation,
-        np.full(shape, max(noise, FINEST)), np.full(shape, np.nan), np.full(shape, TrackStatus.GIVEN, np.uint8),
+        np.full(shape, max(noise, FINEST_PRECISION)), np.full(shape, np.nan),
+        np.full(shape, TrackStatus.GIVEN, np.uint8),
     )  # fmt: skip
     walls = WallTracks(truth.wall_names, truth.endpoints[photographs], _pressure_of(truth))
     sequence = SequenceSettings(estimator=estimator, chain=ChainSettings(keep="none"))  # type: ignore[arg-type]
@@ -77,7 +102,7 @@ def observe(
 
 
 def with_imposed_walls(inputs: Inputs) -> Inputs:
-    """The same photographs with the measured motion of all walls imposed: no plate carries a pressure."""
+    """Replace all pressures by imposed measured motion of the walls."""
     pressure = np.full_like(inputs.walls.pressure, np.nan)
     return replace(inputs, walls=replace(inputs.walls, pressure=pressure))
 
@@ -93,22 +118,22 @@ def _pressure_of(truth: DemTruth) -> Array:
 
 
 def true_forces(truth: DemTruth, frame: int) -> tuple[NDArray[np.int64], Array]:
-    """Keys (t,) and forces (t, 2) [N] of one frame's true contacts."""
+    """Return keys (t,) and forces (t, 2) [N] of the true contacts of one frame."""
     rows = slice(truth.offset[frame], truth.offset[frame + 1])
     bodies = len(truth.radius) + len(truth.wall_names)
     return make_keys(truth.i[rows], truth.j[rows], bodies), np.column_stack([truth.fn[rows], truth.ft[rows]])
 
 
 def agreement_of(forces: FrameForces, truth: DemTruth, frame: int) -> Agreement:
-    """Agreement of inferred forces with the truth's photograph `frame`; those of inferred rods are left out."""
+    """Compare inferred forces with frame `frame` of the truth, leaving out contacts of inferred rods."""
     key, seen = truth_keys(forces.contacts, truth)
     return compare_forces(key, np.column_stack([forces.fn, forces.ft])[seen], *true_forces(truth, frame))
 
 
 def truth_keys(contacts: Contacts, truth: DemTruth) -> tuple[Keys, NDArray[np.bool_]]:
-    """Keys of the contacts as the truth counts bodies, and which contacts (c,) have one.
+    """Return the keys of contacts in the numbering of the truth, and a mask (c,) of the contacts that have one.
 
-    Rods that were inferred come after all others, before the walls; which of the truth's they are is not asked.
+    Inferred rods are numbered after all others, before the walls; they have no counterpart in the truth.
     """
     rods = len(truth.radius)
     wall = contacts.with_wall
@@ -117,10 +142,10 @@ def truth_keys(contacts: Contacts, truth: DemTruth) -> tuple[Keys, NDArray[np.bo
     return make_keys(contacts.i[seen], j[seen], rods + len(truth.wall_names)), seen
 
 
-def starts_of(truth: DemTruth, length: int) -> tuple[int, ...]:
-    """First photographs of two windows of `length`: one on the way up, one on the way back."""
-    turn = truth.position.shape[0] // 2
-    up = max(1, turn // 4)
-    if up + length > turn or turn + up + length > len(truth.position):
+def window_starts(truth: DemTruth, length: int) -> tuple[int, ...]:
+    """Return the first photographs of two windows of `length` frames: loading and unloading."""
+    reversal = truth.position.shape[0] // 2
+    up = max(1, reversal // 4)
+    if up + length > reversal or reversal + up + length > len(truth.position):
         raise ValueError(f"windows of {length} photographs do not fit into {len(truth.position)}")
-    return up, turn + up
+    return up, reversal + up

@@ -1,4 +1,4 @@
-"""Dense packings of rods in a rectangular frame: the start of a synthetic experiment."""
+"""Dense packings of rods in a rectangular frame: the initial state of a synthetic experiment."""
 
 from __future__ import annotations
 
@@ -7,38 +7,42 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.dem.simulation import DemSettings, ShearCell, UnbalancedError
+from ..solver.bodies.grains import Array
+from ..solver.dem.dem_truth import DemSettings, UnbalancedError
+from ..solver.dem.shear_cell import ShearCell
 
 RADIUS_CLASSES = (0.007, 0.008, 0.011)  # [m], rods of 14, 16 and 22 mm
-CLASS_SHARES = (0.40, 0.41, 0.19)  # by number: 1172 rods then fill 0.5 × 0.6 m
+CLASS_FRACTIONS = (0.40, 0.41, 0.19)  # by number: 1172 rods then fill 0.5 × 0.6 m
 WIDE_RADII = (0.004, 0.020)  # [m], least and greatest
-TWO_RADII = (0.007, 0.0098)  # [m], 1 : 1.4, which keeps discs from forming crystals
+TWO_RADII = (0.007, 0.0098)  # [m], 1 : 1.4, which prevents crystals
 SOLID_FRACTION = 0.845  # of a dense frictionless packing in two dimensions
-LOOSENESS = 1.1  # first height over the dense one
+LOOSENESS = 1.1  # initial height over the dense one
 JITTER = 0.3  # of a lattice cell, either way
-SOFTENING = 1e-3  # the springs' share of their stiffness while overlaps are pushed apart
+SOFTENING = 1e-3  # factor of the springs' stiffness while overlaps are removed
 SOFT_STEPS, SOFT_DRAG = 4000, 50.0  # –, [1/s]
-LOADING_STEPS, LOADING_DRAG = 5000, 20.0  # between two looks at the balance, [1/s]
-LOADING_ROUNDS, ROUNDS_OF = 40, 2000  # at most, of so many rods; of more as many more as their rows: sound has to pass
-PREPARED = 1e-3  # unbalance, of grains and plate, at which a packing counts as at rest
+LOADING_STEPS, LOADING_DRAG = 5000, 20.0  # between two checks of the balance, [1/s]
+LOADING_ROUNDS, ROUNDS_OF = (
+    40,
+    2000,
+)  # at most, for this many rods; beyond, proportional to the rows of rods
+PREPARED = 1e-3  # force residual of grains and plate at which a packing is at rest
 
 
 def choose_radii(count: int, rng: np.random.Generator) -> Array:
-    """Draw count radii (n,) [m] in the fixed shares, in random order."""
-    shares = np.cumsum(CLASS_SHARES)
-    classes = np.searchsorted(shares, (np.arange(count) + 0.5) / count)
+    """Draw count radii (n,) [m] in the fixed fractions, in random order."""
+    fractions = np.cumsum(CLASS_FRACTIONS)
+    classes = np.searchsorted(fractions, (np.arange(count) + 0.5) / count)
     return rng.permutation(np.array(RADIUS_CLASSES)[np.minimum(classes, len(RADIUS_CLASSES) - 1)])
 
 
 def choose_wide_radii(count: int, rng: np.random.Generator) -> Array:
-    """Draw count radii (n,) [m] between WIDE_RADII, every size covering the same area."""
+    """Draw count radii (n,) [m] between WIDE_RADII, with equal area per size."""
     small, large = WIDE_RADII
     return 1.0 / rng.uniform(1.0 / large, 1.0 / small, count)
 
 
 def choose_two_radii(count: int, rng: np.random.Generator) -> Array:
-    """Draw count radii (n,) [m], as many of one of TWO_RADII as of the other, in random order."""
+    """Draw count radii (n,) [m], half of them of each of TWO_RADII, in random order."""
     return rng.permutation(np.array(TWO_RADII)[np.arange(count) % 2])
 
 
@@ -51,12 +55,32 @@ def prepare_packing(
     sizes: Callable[[int, np.random.Generator], Array] = choose_radii,
     loose: bool = False,
 ) -> ShearCell:
-    """Compress rods without friction under the settings' pressure; return the cell at rest, friction switched on.
+    """Compress rods under the settings' pressure.
 
-    aspect: height over width. loose: compressed with friction, so that few contacts bear.
-    The rods start on a jittered lattice, overlaps are pushed apart with
-    soft springs, then the plate is loaded; a drag that only this preparation knows takes the energy out.
-    Raise UnbalancedError if the packing does not come to rest.
+    The rods start on a jittered lattice, soft springs remove the overlaps, then the plate is loaded; a drag force, used
+    in the preparation only, dissipates the energy.
+
+    Parameters
+    ----------
+    count : int
+    rng : numpy.random.Generator
+    settings : DemSettings
+    aspect : float
+        Height over width.
+    sizes : callable
+        Draws the radii (n,) [m].
+    loose : bool
+        Compress with friction, so that fewer contacts bear; default: without.
+
+    Returns
+    -------
+    ShearCell
+        The cell at rest, with friction.
+
+    Raises
+    ------
+    UnbalancedError
+        If the packing does not come to rest.
     """
     radius = sizes(count, rng)
     width = float(np.sqrt(np.pi * np.sum(radius**2) / SOLID_FRACTION / aspect))

@@ -1,4 +1,4 @@
-"""The files of a synthetic experiment besides its photographs: tables and experiment.toml."""
+"""Writers of a synthetic experiment's tables and experiment.toml."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import IN, circle_of, reach_of_wall
-from solver.dem.simulation import DemSettings, DemTruth
+from ..solver.bodies.grains import Array
+from ..solver.bodies.wall_shapes import IN, circle_parameters, wall_distance
+from ..solver.dem.dem_truth import DemSettings, DemTruth
 
 Ids = NDArray[np.integer]
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """What an experiment file says of the material and the loads."""
+class StatedInputs:
+    """The material and the loads that an experiment file states."""
 
-    pressure: dict[str, float]  # [Pa] on plates by their walls' names; where there is one, walls have sensors, too
+    pressure: dict[str, float]  # [Pa] on plates by the names of their walls; with a plate, all walls have sensors
     density: float  # [kg/m³]
     length: float  # [m]
     friction: float
@@ -30,8 +30,8 @@ class Known:
     gravity: tuple[float, float]  # [m/s²]
 
     @classmethod
-    def of(cls, settings: DemSettings, *, plates: tuple[str, ...]) -> Known:
-        """What is true of a simulation in which these walls are plates under its pressure."""
+    def of(cls, settings: DemSettings, *, plates: tuple[str, ...]) -> StatedInputs:
+        """Return the true values of a simulation in which these walls are plates under its pressure."""
         return cls(
             dict.fromkeys(plates, settings.pressure), settings.density, settings.length, settings.friction,
             settings.wall_friction, settings.gravity,
@@ -55,12 +55,12 @@ def write_cell(path: Path, vectors: Array) -> None:
 
 
 def write_arcs(path: Path, names: Sequence[str], endpoints: Array, side: NDArray[np.int8]) -> None:
-    """Write circles by their diameters (f, w, 2, 2) [m] as arcs.csv, with their turns."""
-    centre, radius, turn = circle_of(endpoints)
+    """Write circles by their diameters (f, w, 2, 2) [m] as arcs.csv, with their rotations."""
+    centre, radius, angle = circle_parameters(endpoints)
     rows = (
-        (frame, name, _metres(x), _metres(y), _metres(radius[frame, w]), told, _metres(turn[frame, w]))
+        (frame, name, _metres(x), _metres(y), _metres(radius[frame, w]), side_name, _metres(angle[frame, w]))
         for frame in range(len(endpoints))
-        for w, (name, told) in enumerate(zip(names, ("in" if s == IN else "out" for s in side), strict=True))
+        for w, (name, side_name) in enumerate(zip(names, ("in" if s == IN else "out" for s in side), strict=True))
         for x, y in (centre[frame, w],)
     )
     _write(path, ("frame", "wall", "x", "y", "radius", "side", "theta"), rows)
@@ -74,12 +74,15 @@ def write_loads(path: Path, names: Sequence[str], load: Array) -> None:
     _write(path, ("frame", "wall", "force"), rows)
 
 
-def write_tracks(path: Path, ids: Ids, position: Array, rotation: Array | None) -> None:
-    """Write position (f, n, 2) [m] and rotation (f, n) [rad], None: unknown, of grains by id (n,)."""
+def write_tracks(
+    path: Path, ids: Ids, position: Array, rotation: Array | None, lost: NDArray[np.bool_] | None = None
+) -> None:
+    """Write position (f, n, 2) [m] and rotation (f, n) [rad], None: unknown, of grains by id (n,); not of lost ones."""
     rows = (
         (frame, grain, _metres(x), _metres(y), *(() if rotation is None else (f"{rotation[frame, row]:.9f}",)))
         for frame in range(len(position))
         for row, (grain, (x, y)) in enumerate(zip(ids, position[frame], strict=True))
+        if lost is None or not lost[frame, row]
     )
     _write(path, ("frame", "id", "x", "y", *(() if rotation is None else ("theta",))), rows)
 
@@ -96,14 +99,14 @@ def write_truth_contacts(path: Path, truth: DemTruth) -> None:
 
 
 def write_wall_forces(path: Path, truth: DemTruth) -> None:
-    """Write the packing's force on every wall [N], as sensors would record it."""
+    """Write the packing's force on every wall [N], as sensors record it."""
     n, w = len(truth.radius), len(truth.wall_names)
     frame = np.repeat(np.arange(truth.frame_count), np.diff(truth.offset))
     on_wall = truth.j >= n
     k, wall = frame[on_wall], truth.j[on_wall] - n
     force = np.zeros((truth.frame_count, w, 2))
     side = None if truth.side is None else truth.side[wall]
-    _, normal = reach_of_wall(truth.endpoints[k, wall], side, truth.position[k, truth.i[on_wall]])
+    _, normal = wall_distance(truth.endpoints[k, wall], side, truth.position[k, truth.i[on_wall]])
     tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
     each = truth.fn[on_wall, None] * normal + truth.ft[on_wall, None] * tangent
     np.add.at(force, (k, wall), each)
@@ -116,7 +119,7 @@ def write_wall_forces(path: Path, truth: DemTruth) -> None:
 
 
 def write_grains(path: Path, ids: Ids, radius: Array) -> None:
-    """Write radius (n,) [m] of grains by id (n,), as tracks need it."""
+    """Write radius (n,) [m] of grains by id (n,), in the form for tracks."""
     _write(path, ("id", "radius"), ((grain, _metres(value)) for grain, value in zip(ids, radius, strict=True)))
 
 
@@ -140,13 +143,23 @@ def write_experiment(
     name: str,
     remark: str,
     source: str,
-    known: Known,
+    known: StatedInputs,
     boundary: str = "",
     walls: str = 'file = "walls.csv"\n',
 ) -> None:
-    """Write experiment.toml; source is its [photographs] or [tracks] table.
+    """Write experiment.toml.
 
-    boundary: a table in place of [walls]; walls: what [walls] says of tables.
+    Parameters
+    ----------
+    path : Path
+    name, remark : str
+    source : str
+        The [photographs] or [tracks] table.
+    known : StatedInputs
+    boundary : str
+        A table in place of [walls].
+    walls : str
+        The keys of [walls] that name tables.
     """
     name = re.sub(r"[^\w .+-]", "-", name)
     name = name if re.match(r"\w", name) else f"synthetic {name}"

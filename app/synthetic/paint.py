@@ -1,7 +1,7 @@
-"""What is painted on rods and bars: dots at random, of mixed sizes, drawn once per seed.
+"""Paint of rods and bars: random dots of several sizes, drawn once per seed.
 
-A body's dots depend on the seed, its row and its size alone, never on where it is or on the other bodies. Dots fall
-independently of one another (a Boolean model), so n dots of area a per area A leave the share exp(−n a/A) unpainted.
+A body's dots depend on the seed, its row and its size alone, not on its position or on other bodies. Dots fall
+independently of one another (a Boolean model), so n dots of area a per area A leave the fraction exp(−n a/A) unpainted.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from ..solver.bodies.grains import Array
 
 STRENGTH = (0.85, 1.0)  # weakest and strongest dot, of full black
-RIM_SCATTER = (0.5, 1.5)  # darkness of a rod's rim against the mean
-MARK_ENLARGEMENT = 1.6  # a bar's marks against a rod's dots
-STRIP = 256.0  # [px], a bar is painted strip by strip, so that a longer bar keeps the marks it had
+RIM_DARKNESS = (0.5, 1.5)  # of a rod's rim over the mean: least and greatest
+MARK_ENLARGEMENT = 1.6  # size of a bar's marks over that of a rod's dots
+STRIP = 256.0  # [px], a bar is painted strip by strip, so that a longer bar keeps its marks
 BACKING_PITCH = 6  # [px], grain of the backing's texture
 
 _BACKING, _ROD, _BAR = 0, 1, 2  # second word of a seed: independent streams for each kind of body
@@ -42,15 +42,15 @@ class RodPaint:
 
 
 def paint_rods(
-    radius: Array, *, seed: int, coverage: float, dot_radius: tuple[float, float], brightness_scatter: float
+    radius: Array, *, seed: int, coverage: float, dot_radius: tuple[float, float], brightness_range: float
 ) -> RodPaint:
     """Paint n rods of the given radii (n,) [px] with dots of radii between the two given [px]."""
     n = len(radius)
     dots, brightness, rim, tilt = [], np.empty(n), np.empty(n), np.empty((n, 2))
     for k, size in enumerate(radius):
         generator = np.random.default_rng([seed, _ROD, k])
-        brightness[k] = 1.0 + brightness_scatter * generator.uniform(-1.0, 1.0)
-        rim[k] = generator.uniform(*RIM_SCATTER)
+        brightness[k] = 1.0 + brightness_range * generator.uniform(-1.0, 1.0)
+        rim[k] = generator.uniform(*RIM_DARKNESS)
         direction, length = generator.uniform(0.0, 2 * math.pi), math.sqrt(generator.uniform())
         tilt[k] = length * math.cos(direction), length * math.sin(direction)
         reach = size + dot_radius[1]  # a dot whose centre is off the face may still touch it

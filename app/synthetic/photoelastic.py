@@ -1,9 +1,9 @@
-"""A synthetic photoelastic test: discs and the forces that their fringes would tell, with the faults of real ones.
+"""A synthetic photoelastic test: discs with forces as read from fringes, with the errors of real readings.
 
-Soft discs of two sizes, nearly jammed on a base that rubs, sheared purely. What is written is what PeGS leaves of each
-photograph: centres in pixels, y down, with noise and with errors that stay; radii in whole pixels, all too small; no
-rotations; on every contact two forces, one as either disc's fringes were read, which differ; weak contacts missing,
-some read from one side only; nothing of walls.
+Soft discs of two sizes, nearly jammed on a base with friction, in pure shear. The files are those of PeGS for each
+photograph: centres in pixels, y down, with noise and with constant errors; radii in whole pixels, all too small; no
+rotations; two forces per contact, one read from each disc's fringes, which differ; weak contacts missing, some read
+from one side only; no walls.
 """
 
 from __future__ import annotations
@@ -13,30 +13,29 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.dem.simulation import DemTruth
-
-from ..errors import InputError
-from ..progress import Progress, silent
-from .worlds.making import GRAINS, LEAST_GRAINS, simulate_kept
-from .worlds.table import WORLDS
+from ..process.errors import InputError
+from ..process.progress import Progress, no_progress
+from ..solver.bodies.grains import Array
+from ..solver.dem.dem_truth import DemTruth
+from .scenarios.scenario_folder import GRAINS, LEAST_GRAINS, load_or_simulate
+from .scenarios.scenario_table import SCENARIOS
 
 DIAMETER = 50.0  # px, mean
 NOISE = 0.3  # px of a centre's coordinate, from photograph to photograph
-CENTRE_ERROR = 0.25  # px of a centre's coordinate, the same in all of them
-TOO_SMALL = 0.8  # px, by which every radius is read
-RADIUS_NOISE = 0.2  # px, before it is rounded
-READING = 0.35  # of a force: standard deviation of its reading
-BASE_READING = 0.1  # of the mean force: likewise, whatever the force
-WEAK, MISSED = 0.3, 0.6  # of the mean force; share of contacts below it that no fringe shows
-ONE_SIDED = 0.04  # of the contacts
-SHEAR_READING = 0.05  # tangential reading over the normal one: it tells nothing
+CENTRE_ERROR = 0.25  # px of a centre's coordinate, the same in all photographs
+RADIUS_DEFICIT = 0.8  # px, by which every radius is read too small
+RADIUS_NOISE = 0.2  # px, before rounding
+READING_SD = 0.35  # standard deviation of a reading, over the force
+BASE_READING_SD = 0.1  # standard deviation of every reading, over the mean force
+WEAK, MISSED = 0.3, 0.6  # over the mean force; fraction of the contacts below it that no fringe shows
+ONE_SIDED = 0.04  # fraction of the contacts
+SHEAR_READING = 0.05  # tangential reading over the normal one: pure noise
 FIRST = 5000  # number of the first photograph
 
 
 @dataclass(frozen=True, slots=True)
 class MadePhotoelastic:
-    """What was written, and what is known about it."""
+    """A folder that was written, its truth and its scale."""
 
     folder: Path
     truth: DemTruth
@@ -44,19 +43,33 @@ class MadePhotoelastic:
 
 
 def make_photoelastic(
-    out: Path, seed: int = 0, *, grains: int | None = None, kept: Path | None = None, progress: Progress = silent
+    out: Path, seed: int = 0, *, grains: int | None = None, cache: Path | None = None, progress: Progress = no_progress
 ) -> MadePhotoelastic:
-    """Write a folder of NAME_ParticleData.dlm with its matrices of forces; the same arguments give the same bytes.
+    """Write a folder of NAME_ParticleData.dlm with matrices of forces; the same arguments give the same bytes.
 
-    kept: folder of truths that were simulated before. Raises InputError for a folder that is there and not empty,
-    UnbalancedError when the simulation does not come to rest.
+    Parameters
+    ----------
+    out : Path
+        Folder to write; must be absent or empty.
+    seed : int
+    grains : int, optional
+    cache : Path, optional
+        Folder of simulated truths, read and added to.
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty or there are too few grains.
+    UnbalancedError
+        If the simulation does not come to rest.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(out, "", "exists already and is not an empty folder")
     grains = GRAINS if grains is None else grains
     if grains < LEAST_GRAINS:
         raise InputError("synth", f"grains = {grains}", f"expected at least {LEAST_GRAINS}")
-    truth = simulate_kept(WORLDS["nearly_jammed"].course, grains, seed, kept, progress)
+    truth = load_or_simulate(SCENARIOS["nearly_jammed"].loading, grains, seed, cache, progress)
     rng = np.random.default_rng([seed, 3])
     pixel = 2.0 * float(truth.radius.mean()) / DIAMETER
     floor = float(truth.position[..., 1].max()) / pixel + DIAMETER
@@ -66,7 +79,7 @@ def make_photoelastic(
         place = truth.position[frame] / pixel
         place = np.column_stack([place[:, 0], floor - place[:, 1]]) + centre_error
         place += NOISE * rng.standard_normal(place.shape)
-        radius = np.rint(truth.radius / pixel - TOO_SMALL + RADIUS_NOISE * rng.standard_normal(grains))
+        radius = np.rint(truth.radius / pixel - RADIUS_DEFICIT + RADIUS_NOISE * rng.standard_normal(grains))
         normal, tangential = _read_forces(truth, frame, rng)
         stem = out / f"DSC{FIRST + 2 * frame:05d}_solved_Tracke"
         discs = np.column_stack([np.arange(1, grains + 1), place, radius, normal.sum(axis=1)])
@@ -77,7 +90,7 @@ def make_photoelastic(
 
 
 def _read_forces(truth: DemTruth, frame: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Normal and tangential force on every contact as the disc of its row tells it (n, n) [N]."""
+    """Return the normal and tangential forces (n, n) [N] as read from the disc of each row."""
     n = len(truth.radius)
     rows = slice(int(truth.offset[frame]), int(truth.offset[frame + 1]))
     i, j, fn = truth.i[rows], truth.j[rows], truth.fn[rows]
@@ -86,7 +99,7 @@ def _read_forces(truth: DemTruth, frame: int, rng: np.random.Generator) -> tuple
     mean = float(fn.mean()) if len(fn) else 0.0
     seen = (fn > WEAK * mean) | (rng.random(len(fn)) > MISSED)
     i, j, fn = i[seen], j[seen], fn[seen]
-    deviation = np.hypot(READING * fn, BASE_READING * mean)
+    deviation = np.hypot(READING_SD * fn, BASE_READING_SD * mean)
     reading = np.maximum(fn + deviation * rng.standard_normal((2, len(fn))), 0.0)
     alone = rng.random(len(fn)) < ONE_SIDED
     reading[rng.integers(0, 2, len(fn))[alone], np.flatnonzero(alone)] = 0.0

@@ -1,4 +1,4 @@
-"""Where a simulated packing lies in the world of its experiment."""
+"""Placement of a simulated packing in the world coordinates of its experiment."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.bodies.wall_shapes import STRAIGHT, circle_of
-from solver.dem.simulation import DemTruth
+from ..solver.bodies.wall_shapes import STRAIGHT, circle_parameters
+from ..solver.dem.dem_truth import DemTruth
 
-SIDE_SURPLUS = 0.004  # [m], that the sides stand out above the plate at its highest
+SIDE_SURPLUS = 0.004  # [m], of the sides above the plate at its highest
 
 
 def cut_sides(truth: DemTruth) -> DemTruth:
@@ -25,13 +25,13 @@ def cut_sides(truth: DemTruth) -> DemTruth:
 
 
 def place_in_picture(truth: DemTruth, margin: float) -> DemTruth:
-    """Shift the world until everything is right of and above the picture's corner by `margin` [m].
+    """Shift everything until it lies right of and above the picture's corner by `margin` [m].
 
-    Rotations count from the first photograph.
+    Rotations are measured from the first photograph.
     """
     lowest = truth.endpoints.min(axis=(0, 1, 2))
     if truth.side is not None and truth.side.any():
-        centre, radius, _ = circle_of(truth.endpoints[:, truth.side != STRAIGHT])
+        centre, radius, _ = circle_parameters(truth.endpoints[:, truth.side != STRAIGHT])
         lowest = np.minimum(lowest, (centre - radius[..., None]).min(axis=(0, 1)))
     shift = margin - lowest
     return replace(

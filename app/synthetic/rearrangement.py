@@ -1,21 +1,25 @@
-"""Where a simulated packing rearranges: how badly the former forces fit the network that follows."""
+"""Rearrangements of a simulated packing: the residual of the previous forces on the following contact network."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import measure_contacts
-from solver.contacts.pairs import are_among, make_keys
-from solver.dem.simulation import DemTruth
-from solver.statistics.balance import unbalances
+from ..solver.bodies.grains import Array, Grains
+from ..solver.bodies.walls import Walls
+from ..solver.contacts.contacts import measure_contacts
+from ..solver.contacts.pairs import are_among, make_keys
+from ..solver.dem.dem_truth import DemTruth
+from ..solver.statistics.balance import resultant_norms
 
 
 def measure_old_unbalance(truth: DemTruth) -> Array:
-    """Mean |ΣF| of the true forces of frame k−1 on those of its contacts that frame k still has, over mean f_n.
+    """Compute the residual ū of the previous true forces on the lasting contacts of each frame.
 
-    Returns (f,), NaN at frame 0. Small while contacts last and turn slowly, large where strong contacts open.
+    Returns
+    -------
+    ndarray
+        (f,) mean |ΣF| of the forces of frame k−1 over their mean f_n, NaN at frame 0: small while contacts last and
+        rotate slowly, large where strong contacts open.
     """
     settings = truth.settings
     grains = Grains.of_rods(truth.radius, density=settings.density, length=settings.length)
@@ -28,16 +32,21 @@ def measure_old_unbalance(truth: DemTruth) -> Array:
         i, j = truth.i[old][lasting], truth.j[old][lasting]
         contacts = measure_contacts(grains, truth.position[k], Walls.at_rest(truth.endpoints[k]), i, j)
         fn, ft = truth.fn[old][lasting], truth.ft[old][lasting]
-        result[k] = unbalances(contacts, fn, ft, weight).mean() / truth.fn[old].mean()
+        result[k] = resultant_norms(contacts, fn, ft, weight).mean() / truth.fn[old].mean()
     return result
 
 
 def choose_window(old_unbalance: Array, frames: int) -> tuple[int, int]:
-    """Choose `frames` consecutive photographs with the greatest rearrangement: (first photograph, event's).
+    """Choose `frames` consecutive photographs around the greatest rearrangement.
 
-    The event is the photograph of greatest ū (f,) among those with half a window before them and a
-    quarter, itself counted, behind: forces found from the photographs have settled when it comes and
-    may settle again after it. It stands in the middle of the window, or later where the photographs end.
+    The event is the photograph of greatest ū (f,) among those with half a window before them and a quarter of a window
+    from them on, so that inferred forces settle before it and again after it. It is in the middle of the window, or
+    later where the photographs end.
+
+    Returns
+    -------
+    tuple of int
+        First photograph of the window, and photograph of the event.
     """
     before, behind = frames // 2, -(-frames // 4)
     last = len(old_unbalance) - behind

@@ -1,4 +1,4 @@
-"""Dense packings of rods between two circles: the start of a synthetic experiment in a drum."""
+"""Dense packings of rods between two circles: the initial state of a synthetic experiment in a drum."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.dem.ring import RingCell
-from solver.dem.simulation import DemSettings, UnbalancedError
-
+from ..solver.bodies.grains import Array
+from ..solver.dem.dem_truth import DemSettings, UnbalancedError
+from ..solver.dem.ring_cell import RingCell
 from .dense_packing import (
     JITTER,
     LOADING_DRAG,
@@ -24,8 +23,8 @@ from .dense_packing import (
     choose_radii,
 )
 
-CORE_SHARE = 0.22  # radius of the core over the ring's
-LOOSENESS = 1.06  # first radius of the ring over the dense one
+CORE_RATIO = 0.22  # radius of the core over the ring's
+LOOSENESS = 1.06  # initial radius of the ring over the dense one
 
 
 def prepare_ring(
@@ -35,14 +34,22 @@ def prepare_ring(
     *,
     sizes: Callable[[int, np.random.Generator], Array] = choose_radii,
 ) -> RingCell:
-    """Compress rods without friction between ring and core; return the cell at rest, friction switched on.
+    """Compress rods without friction between ring and core, as `prepare_packing` does in a box.
 
-    As `prepare_packing` does it in a box. Raise UnbalancedError if the packing does not come to rest.
+    Returns
+    -------
+    RingCell
+        The cell at rest, with friction.
+
+    Raises
+    ------
+    UnbalancedError
+        If the packing does not come to rest.
     """
     radius = sizes(count, rng)
     area = np.pi * float(np.sum(radius**2)) / SOLID_FRACTION
-    ring = float(np.sqrt(area / (np.pi * (1.0 - CORE_SHARE**2))))
-    core, wide = CORE_SHARE * ring, LOOSENESS * ring
+    ring = float(np.sqrt(area / (np.pi * (1.0 - CORE_RATIO**2))))
+    core, wide = CORE_RATIO * ring, LOOSENESS * ring
     position = _scatter(count, rng, core, wide)
     frictionless = replace(settings, friction=0.0, wall_friction=0.0)
     soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
@@ -57,10 +64,10 @@ def prepare_ring(
 
 
 def _scatter(count: int, rng: np.random.Generator, core: float, ring: float) -> Array:
-    """Places (n, 2) [m] spread evenly between two circles: in turns about the golden angle, jittered."""
-    share = (np.arange(count) + 0.5) / count
-    away = np.sqrt(core**2 + share * (ring**2 - core**2))
+    """Return positions (n, 2) [m], uniform between two circles: a jittered golden-angle spiral."""
+    fraction = (np.arange(count) + 0.5) / count
+    distance = np.sqrt(core**2 + fraction * (ring**2 - core**2))
     angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
     cell = np.sqrt(np.pi * (ring**2 - core**2) / count)
-    place = away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return place + 0.3 * JITTER * cell * rng.uniform(-1.0, 1.0, (count, 2))
+    position = distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return position + 0.3 * JITTER * cell * rng.uniform(-1.0, 1.0, (count, 2))

@@ -1,11 +1,11 @@
-"""Photographs of rods with speckled end faces, whose motion is exactly known.
+"""Synthetic photographs of rods with speckled end faces and exactly known motion.
 
-Everything painted is an analytic function in its body's own frame, the union of soft-edged dots, and is evaluated anew
-for every pose: nothing is interpolated, so a motion by any part of a pixel, or a turn by any angle, is as exact as the
-camera that sees it (`synthetic.camera`).
+The paint is an analytic function in each body's frame, the union of soft-edged dots, and is evaluated for every pose:
+nothing is interpolated, so a motion by a fraction of a pixel and a rotation by any angle are as exact as the camera
+model (`synthetic.camera`).
 
-Three things stay where they are while the bodies move, as in a laboratory: the light's unevenness, the side on which a
-tilted rod's rim darkens, and the backing behind the gaps.
+Three properties are fixed in the picture while the bodies move, as in a laboratory: the unevenness of the light, the
+side on which a tilted rod's rim darkens, and the backing behind the gaps.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
 from ..experiment.units import Scale
+from ..solver.bodies.grains import Array
 from .camera import Camera
 from .paint import Paint, paint_backing, paint_bars, paint_rods
 from .speckle_kernels import FINE, add_backing, draw_bar, draw_rod
@@ -37,10 +36,10 @@ class SpeckleSettings:
 
     dot_diameter: tuple[float, float] = (0.8e-3, 1.5e-3)  # [m], smallest and largest paint dot
     dot_pixels: float = 3.0  # [px], no dot is smaller: all are enlarged until the smallest is this
-    coverage: float = 0.5  # share of an end face under dots
+    coverage: float = 0.5  # fraction of an end face under dots
     white: float = 185.0  # [grey], the end face
     black: float = 60.0  # [grey], a dot of full strength
-    brightness_scatter: float = 0.05  # ±, of one rod's end face against another's
+    brightness_range: float = 0.05  # ±, of the end faces of different rods
 
     light: float = 0.15  # ±, unevenness of the light over the picture, fixed in the picture
     rim_shading: float = 0.6  # darkening towards the rims, mean over rods and directions; 0 = none
@@ -51,7 +50,7 @@ class SpeckleSettings:
 
     bar_thickness: float = 0.012  # [m]
     bar_metal: float = 160.0  # [grey]
-    bar_coverage: float = 0.3  # share of a bar under marks
+    bar_coverage: float = 0.3  # fraction of a bar under marks
 
     def __post_init__(self) -> None:
         if self.depth not in (8, 16):
@@ -62,7 +61,7 @@ class SpeckleSettings:
         for name in ("noise", "blur", "black", "gap", "gap_texture", "bar_metal"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
-        for name in ("coverage", "bar_coverage", "light", "rim_shading", "brightness_scatter"):
+        for name in ("coverage", "bar_coverage", "light", "rim_shading", "brightness_range"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must be in [0, 1), not {getattr(self, name)}")
         if not 0 < self.dot_diameter[0] <= self.dot_diameter[1] < math.inf:
@@ -76,53 +75,50 @@ class SpeckleSettings:
         return smallest * enlargement, largest * enlargement
 
 
-def render_photograph(
-    settings: SpeckleSettings,
-    *,
-    width: int,
-    height: int,
-    radius: Array,
-    position: Array,
-    rotation: Array,
-    bars: Array,
-    pattern_seed: int,
-    noise_seed: int,
-) -> Photograph:
-    """Photograph n rods and w bars: (height, width), uint8 or uint16 as the depth asks.
+@dataclass(frozen=True, slots=True)
+class RodScene:
+    """The bodies in front of the camera, in the world coordinates of `experiment.units`.
 
-    radius (n,) [m]; position (n, 2) [m] and rotation (n,) [rad], counter-clockwise, in the world of
-    `experiment.units`; bars (w, 2, 2) [m], segments whose body lies on the right of endpoint 0 → 1 and the packing on
-    the left. `pattern_seed` fixes the paint of every row over all photographs: a row must mean the same rod, of the
-    same radius, in each.
-    `noise_seed` fixes this photograph's noise. Bodies may leave the picture. Raises ValueError for wrong shapes,
-    values that are not finite and radii that are not positive.
+    `pattern_seed` fixes the paint of every row: a row must be the same rod, of the same radius, in all photographs.
+    Bodies may extend beyond the picture.
     """
-    scene = render_scene(
-        settings,
-        width=width,
-        height=height,
-        radius=radius,
-        position=position,
-        rotation=rotation,
-        bars=bars,
-        pattern_seed=pattern_seed,
-    )
-    return expose(settings, scene, noise_seed=noise_seed)
+
+    width: int  # [px] of the photograph
+    height: int  # [px]
+    radius: Array  # (n,) [m]
+    position: Array  # (n, 2) [m]
+    rotation: Array  # (n,) [rad], counter-clockwise
+    bars: Array  # (w, 2, 2) [m], segments; the packing lies to the left of endpoint 0 → 1, the bar to the right
+    pattern_seed: int
 
 
-def render_scene(
-    settings: SpeckleSettings,
-    *,
-    width: int,
-    height: int,
-    radius: Array,
-    position: Array,
-    rotation: Array,
-    bars: Array,
-    pattern_seed: int,
-) -> NDArray[np.float32]:
-    """The light that reaches the sensor, before noise and rounding: (height, width) [grey]. Arguments as above."""
-    radius, position, rotation, bars = _checked(radius, position, rotation, bars)
+def render_photograph(settings: SpeckleSettings, scene: RodScene, *, noise_seed: int) -> Photograph:
+    """Photograph n rods and w bars.
+
+    Parameters
+    ----------
+    settings : SpeckleSettings
+    scene : RodScene
+    noise_seed : int
+        Seed of this photograph's noise.
+
+    Returns
+    -------
+    ndarray
+        (height, width), uint8 or uint16 according to the depth.
+
+    Raises
+    ------
+    ValueError
+        If shapes are wrong, values are not finite or radii are not positive.
+    """
+    return expose(settings, render_scene(settings, scene), noise_seed=noise_seed)
+
+
+def render_scene(settings: SpeckleSettings, scene: RodScene) -> NDArray[np.float32]:
+    """Render the light at the sensor before noise and rounding: (height, width) [grey]. Raises ValueError."""
+    width, height, pattern_seed = scene.width, scene.height, scene.pattern_seed
+    radius, position, rotation, bars = _checked(scene.radius, scene.position, scene.rotation, scene.bars)
     if width < 1 or height < 1:
         raise ValueError(f"a photograph has at least one pixel, not {width} × {height}")
     scale = Scale(settings.pixel_size, height)
@@ -133,13 +129,14 @@ def render_scene(
         seed=pattern_seed,
         coverage=settings.coverage,
         dot_radius=settings.dot_radius,
-        brightness_scatter=settings.brightness_scatter,
+        brightness_range=settings.brightness_range,
     )
     for k, (x, y) in enumerate(scale.to_pixels(position)):
         for tile in camera.tiles((x - size[k], y - size[k]), (x + size[k], y + size[k])):
             draw_rod(
-                tile.glow, tile.share, *tile.within(x, y), FINE * size[k], math.cos(rotation[k]), math.sin(rotation[k]),
-                _dots(rods.paint, k), settings.white * rods.brightness[k], settings.black,
+                tile.glow, tile.fraction, *tile.within(x, y), FINE * size[k],
+                math.cos(rotation[k]), math.sin(rotation[k]), _dots(rods.paint, k),
+                settings.white * rods.brightness[k], settings.black,
                 settings.rim_shading * rods.rim[k], rods.tilt[k], FINE * settings.rim_width,
             )  # fmt: skip
 
@@ -156,7 +153,7 @@ def render_scene(
         corners = np.concatenate([ends[k], ends[k] + inward])
         for tile in camera.tiles(tuple(corners.min(axis=0)), tuple(corners.max(axis=0))):
             draw_bar(
-                tile.glow, tile.share, *tile.within(*ends[k, 0]), along, FINE * length[k], FINE * thickness,
+                tile.glow, tile.fraction, *tile.within(*ends[k, 0]), along, FINE * length[k], FINE * thickness,
                 _dots(marks, k), settings.bar_metal, settings.black,
             )  # fmt: skip
 
@@ -166,7 +163,7 @@ def render_scene(
 
 
 def expose(settings: SpeckleSettings, scene: NDArray[np.float32], *, noise_seed: int) -> Photograph:
-    """Add the sensor's noise to a scene (height, width) [grey] and round it to the depth's whole numbers."""
+    """Add the sensor's noise to a scene (height, width) [grey] and round it to the integers of the depth."""
     noise = np.random.default_rng(noise_seed).standard_normal(scene.shape, dtype=np.float32)
     noise *= np.float32(settings.noise)
     noise += scene

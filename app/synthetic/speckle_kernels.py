@@ -1,7 +1,7 @@
-"""Loops over sub-pixels that draw rods and bars, and over pixels that collect them and add the backing.
+"""Kernels that draw rods and bars on sub-pixels, sum them over pixels and add the backing.
 
-Each body adds its covered share of a pixel times its grey level, which is exactly what blur makes of bodies that touch
-but do not overlap. Rows and columns count sub-pixels of a tile while drawing, x to the right and y down.
+Each body adds its covered fraction of a pixel times its grey level, which is exact for blurred bodies that touch but do
+not overlap. Rows and columns count sub-pixels of a tile while drawing, x to the right and y down.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ EDGE = 3.0 * SMOOTHING  # [sub-pixel], half the support of (1 − t²)³ is thre
 
 @njit(cache=True)
 def blurred_step(t):
-    """The integral of the kernel (1 − t²)³, from 0 at t ≤ −1 to 1 at t ≥ 1: needs no library, ends where it ends."""
+    """Integrate the kernel (1 − t²)³, normalised to 0 at t ≤ −1 and 1 at t ≥ 1."""
     if t <= -1.0:
         return 0.0
     if t >= 1.0:
@@ -29,11 +29,11 @@ def blurred_step(t):
 
 
 @njit(cache=True)
-def draw_rod(glow, share, x, y, radius, cosine, sine, dots, white, black, rim_shading, tilt, rim_width):
+def draw_rod(glow, fraction, x, y, radius, cosine, sine, dots, white, black, rim_shading, tilt, rim_width):
     """Draw a rod on a tile: its dots first, then face, rim and edge. Lengths in sub-pixels, dots in pixels."""
     glow[:] = 1.0
     for k in range(dots.shape[0]):
-        # counter-clockwise with y up is this turn with y down
+        # the rotation is counter-clockwise with y up; here y is down
         dot_x = x + FINE * (cosine * dots[k, 0] - sine * dots[k, 1])
         dot_y = y - FINE * (sine * dots[k, 0] + cosine * dots[k, 1])
         _multiply_dot(glow, dot_x, dot_y, FINE * dots[k, 2], dots[k, 3])
@@ -44,7 +44,7 @@ def draw_rod(glow, share, x, y, radius, cosine, sine, dots, white, black, rim_sh
             dx, dy = column - x, row - y
             square = dx * dx + dy * dy
             part = blurred_step((radius * radius - square) / (2.0 * radius * EDGE))
-            share[row, column] = part
+            fraction[row, column] = part
             if part > 0.0:
                 grey = black + (white - black) * glow[row, column]
                 if square > shade_from:
@@ -57,8 +57,8 @@ def draw_rod(glow, share, x, y, radius, cosine, sine, dots, white, black, rim_sh
 
 
 @njit(cache=True)
-def draw_bar(glow, share, x, y, along, length, thickness, dots, metal, black):
-    """Draw a bar on a tile: `along` is its unit vector from endpoint 0 at (x, y); its body lies on the right of it."""
+def draw_bar(glow, fraction, x, y, along, length, thickness, dots, metal, black):
+    """Draw a bar on a tile: `along` is its unit vector from endpoint 0 at (x, y); its body lies to the right."""
     inward_x, inward_y = -along[1], along[0]  # the right hand side, with y down
     glow[:] = 1.0
     for k in range(dots.shape[0]):
@@ -73,12 +73,12 @@ def draw_bar(glow, share, x, y, along, length, thickness, dots, metal, black):
             q = dx * inward_x + dy * inward_y
             part = blurred_step(q / EDGE) * blurred_step((thickness - q) / EDGE)
             part *= blurred_step(s / EDGE) * blurred_step((length - s) / EDGE)
-            share[row, column] = part
+            fraction[row, column] = part
             glow[row, column] = part * (black + (metal - black) * glow[row, column])
 
 
 @njit(cache=True)
-def collect_light(light, covered, glow, share, taps, top, left, columns):
+def collect_light(light, covered, glow, fraction, taps, top, left, columns):
     """Add a tile's sub-pixels, weighted by `taps` about each pixel's centre, to its pixels from (top, left) on."""
     fine_rows, fine_columns = glow.shape
     count = taps.shape[0]
@@ -88,7 +88,7 @@ def collect_light(light, covered, glow, share, taps, top, left, columns):
             weight = taps[k]
             for column in range(fine_columns):
                 columns[0, column] += weight * glow[FINE * row + k, column]
-                columns[1, column] += weight * share[FINE * row + k, column]
+                columns[1, column] += weight * fraction[FINE * row + k, column]
         for column in range((fine_columns - count) // FINE + 1):
             grey, part = 0.0, 0.0
             for k in range(count):
@@ -100,7 +100,7 @@ def collect_light(light, covered, glow, share, taps, top, left, columns):
 
 @njit(cache=True)
 def add_backing(scene, covered, backing, gap, gap_texture, light):
-    """Fill what no body covers with the backing, and light everything unevenly."""
+    """Fill the uncovered pixels with the backing, and apply the uneven light."""
     height, width = scene.shape
     half = 0.5 * max(height, width)
     for row in range(height):
@@ -109,15 +109,15 @@ def add_backing(scene, covered, backing, gap, gap_texture, light):
         y = (row - 0.5 * height) / half
         for column in range(width):
             grey = scene[row, column]
-            share = covered[row, column]
-            if share > 1.0:
-                grey /= share
-            elif share < 1.0:
+            fraction = covered[row, column]
+            if fraction > 1.0:
+                grey /= fraction
+            elif fraction < 1.0:
                 j = column // BACKING_PITCH
                 u = _ease((column - j * BACKING_PITCH) / BACKING_PITCH)
                 above = backing[i, j] + u * (backing[i, j + 1] - backing[i, j])
                 below = backing[i + 1, j] + u * (backing[i + 1, j + 1] - backing[i + 1, j])
-                grey += (1.0 - share) * max(0.0, gap + gap_texture * (above + v * (below - above)))
+                grey += (1.0 - fraction) * max(0.0, gap + gap_texture * (above + v * (below - above)))
             x = (column - 0.5 * width) / half
             scene[row, column] = grey * (1.0 + light * (0.6 * x - 0.3 * y + 0.1 * (1.0 - x * x - y * y)))
 
@@ -129,10 +129,10 @@ def _ease(t):
 
 @njit(cache=True)
 def _multiply_dot(unpainted, x, y, radius, strength):
-    """Multiply what is unpainted by what this dot leaves.
+    """Multiply the unpainted fraction by the fraction that this dot leaves unpainted.
 
-    The distance to the dot's edge is (r² − d²)/2r: the same at the edge as r − d, but smooth at the dot's centre, and
-    it keeps the dot's area.
+    The distance to the dot's edge is approximated by (r² − d²)/2r: it equals r − d to first order at the edge, is
+    smooth at the dot's centre and preserves the dot's area.
     """
     square_reach = radius * radius + 2.0 * radius * EDGE
     reach = math.sqrt(square_reach)

@@ -1,40 +1,38 @@
-"""A synthetic experiment: a simulated shear test, written as the folder a real one would give, with its truth."""
+"""A synthetic experiment: a simulated shear test, written as an experiment folder with its truth."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
-
-from ..errors import InputError
 from ..experiment.units import Scale
+from ..process.errors import InputError
+from ..process.progress import Progress, no_progress
+from ..solver.bodies.grains import Array
+from ..solver.dem.dem_truth import DemSettings, DemTruth
+from ..solver.dem.shear_cell import shear_photographs
 from . import experiment_files
 from .dense_packing import prepare_packing
 from .placement import cut_sides, place_in_picture
 from .rearrangement import choose_window, measure_old_unbalance
-from .speckle import SpeckleSettings, render_photograph
+from .speckle import RodScene, SpeckleSettings, render_photograph
 
-Progress = Callable[[str, int, int], None]
-
-SHEAR_RATE = 4.8e-3  # [°/s], of the real test: it dates the photographs
+SHEAR_RATE = 4.8e-3  # [°/s], of the real test; gives the times of the photographs
 STEEPEST = 30.0  # [°]
 LEAST_GRAINS = 12
-MARGIN = 0.006  # [m], of backing seen around the frame
+MARGIN = 0.006  # [m], of visible backing around the frame
 FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
-# Speckle and noise offer no repeats to find: Huffman coding alone packs them best and fastest (measured).
+# Speckle and noise have no repeats: Huffman coding alone compresses them best and fastest (measured).
 PNG_OPTIONS = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
 
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """Size and course of an experiment."""
+    """Size and loading of an experiment."""
 
     grains: int
     frames: int  # photographs written
@@ -52,7 +50,7 @@ PRESETS = {
 
 @dataclass(frozen=True, slots=True)
 class Synthesis:
-    """What was written, and what is known about it."""
+    """An experiment folder that was written, and its truth."""
 
     folder: Path
     truth: DemTruth  # in the experiment's world coordinates
@@ -81,14 +79,41 @@ def synthesize(
 ) -> Synthesis:
     """Simulate a simple shear test and write it as an experiment folder; the same arguments give the same bytes.
 
-    With photographs, the grains are left to be detected. Photographs are JPEG where the preset or jpeg_quality
-    (1 … 100) says so, PNG with `png` and at 16 bits.
-    Without, tracks are written, with Gaussian noise of standard deviation `noise` [m] on positions and
-    noise / radius [rad] on rotations. grains, frames, step_degrees and pixel_size [m] replace the
-    preset's. reversal: the shear turns back half way. speckle: how rods are painted and photographed,
-    its pixel size and depth replaced. progress is told (stage, done, total).
-    Raises InputError for a folder that exists and is not empty and for arguments out of range, and
-    solver.dem.UnbalancedError when the simulation does not come to rest: nothing is written then.
+    Parameters
+    ----------
+    out : Path
+        Folder to write; must be absent or empty.
+    preset : {'small', 'paper'}
+    seed : int
+    photographs : bool
+        Write photographs, whose grains are to be detected; otherwise tracks.
+    noise : float
+        Standard deviation [m] of tracked positions; that of rotations is noise / radius [rad].
+    depth : {8, 16}
+        Bits of a photograph; 16 bits are always PNG.
+    jpeg_quality : int, optional
+        Of 8-bit photographs, 1 … 100; default: the preset's.
+    png : bool
+        Write PNG at 8 bits.
+    grains, frames : int, optional
+        Default: the preset's.
+    step_degrees : float, optional
+        Shear between photographs [°]; default: the preset's.
+    pixel_size : float, optional
+        Side of a pixel [m]; default: the preset's.
+    reversal : bool
+        Reverse the shear half way.
+    speckle : SpeckleSettings, optional
+        Paint and camera; its pixel size and depth are replaced.
+    progress : callable, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty or an argument is out of range.
+    UnbalancedError
+        If the simulation does not come to rest; nothing is written then.
     """
     out = Path(out)
     _check_choices(preset, seed, photographs, noise, depth, jpeg_quality)
@@ -101,7 +126,7 @@ def synthesize(
         jpeg_quality = plan.jpeg_quality
     jpeg_quality = None if png else jpeg_quality
 
-    truth = _simulate(plan, seed, reversal, progress or _silent)
+    truth = _simulate(plan, seed, reversal, progress or no_progress)
     truth = place_in_picture(cut_sides(truth), MARGIN + speckle.bar_thickness)
     old_unbalance = measure_old_unbalance(truth)
     event = int(np.nanargmax(old_unbalance)) if truth.frame_count > 1 else 0
@@ -114,34 +139,34 @@ def synthesize(
     experiment_files.write_tracks(out / "truth_tracks.csv", ids, truth.position, truth.rotation)
     if photographs:
         source, shape = _write_photographs(
-            out, truth, speckle, seed, plan.step_degrees, jpeg_quality, progress or _silent
+            out, truth, speckle, seed, plan.step_degrees, jpeg_quality, progress or no_progress
         )
     else:
         source, shape = _write_tracks(out, truth, noise, seed, plan.step_degrees), None
-    # Last, so that a folder that was left unfinished is not an experiment.
+    # Written last, so that an unfinished folder is not an experiment.
     experiment_files.write_experiment(
         out / "experiment.toml",
         name=out.resolve().name,
         remark=_remark(preset, seed, truth, old_unbalance, event),
         source=source,
-        known=experiment_files.Known.of(truth.settings, plates=("top",)),
+        known=experiment_files.StatedInputs.of(truth.settings, plates=("top",)),
     )
     return Synthesis(out, truth, old_unbalance, event, shape)
 
 
-def plan_course(plan: Preset, reversal: bool) -> Array:
-    """Shear angles (f,) [rad] of the photographs to simulate."""
+def shear_angles(plan: Preset, reversal: bool) -> Array:
+    """Return the shear angles (f,) [rad] of the photographs to simulate."""
     count = max(plan.frames, round(plan.search_degrees / plan.step_degrees) + 1)
     step = np.arange(count)
     if reversal:
-        turn = (count - 1) // 2
-        step = turn - abs(step - turn)
+        peak = (count - 1) // 2
+        step = peak - abs(step - peak)
     return np.deg2rad(plan.step_degrees) * step
 
 
 def _simulate(plan: Preset, seed: int, reversal: bool, progress: Progress) -> DemTruth:
     settings = DemSettings()
-    angles = plan_course(plan, reversal)
+    angles = shear_angles(plan, reversal)
     progress("simulate", 0, len(angles))
     cell = prepare_packing(plan.grains, np.random.default_rng(seed), settings)
     frames = []
@@ -176,13 +201,7 @@ def _write_photographs(
     for k in range(truth.frame_count):
         image = render_photograph(
             speckle,
-            width=width,
-            height=height,
-            radius=truth.radius,
-            position=truth.position[k],
-            rotation=truth.rotation[k],
-            bars=truth.endpoints[k],
-            pattern_seed=seed,
+            RodScene(width, height, truth.radius, truth.position[k], truth.rotation[k], truth.endpoints[k], seed),
             noise_seed=int(np.random.SeedSequence([seed, k]).generate_state(1)[0]),
         )
         name = out / "photos" / f"{k:04d}.{suffix}"
@@ -228,7 +247,7 @@ def _remark(preset: str, seed: int, truth: DemTruth, old_unbalance: Array, event
     text = (
         f"Synthetic: explicit discrete-element simulation of simple shear, preset {preset}, seed {seed},\n"
         f"{len(truth.radius)} rods, {truth.frame_count} photographs, shear {first:.2f}° to {last:.2f}°.\n"
-        f"Worst mean unbalance of a grain in the truth: {truth.unbalance.max():.1e} of the mean force."
+        f"Greatest mean force residual of a grain in the truth: {truth.unbalance.max():.1e} of the mean force."
     )
     if event > 0:
         text += (
@@ -249,7 +268,7 @@ def _check_choices(
     if not (math.isfinite(noise) and noise >= 0.0):
         raise InputError("synth", f"noise = {noise}", "expected metres, 0 or more")
     if photographs and noise > 0.0:
-        raise InputError("synth", f"noise = {noise}", "noise of positions is for tracks: photographs bring their own")
+        raise InputError("synth", f"noise = {noise}", "applies to tracks only: photographs have noise of their own")
     if jpeg_quality is not None and not (1 <= jpeg_quality <= 100 and depth == 8):
         raise InputError("synth", f"jpeg_quality = {jpeg_quality}", "expected 1 … 100, and a depth of 8 bits")
 
@@ -261,12 +280,8 @@ def _plan(preset: Preset, given: dict[str, float], reversal: bool) -> Preset:
     plan = replace(preset, **given)
     if plan.grains < LEAST_GRAINS:
         raise InputError("synth", f"grains = {plan.grains}", f"expected at least {LEAST_GRAINS}")
-    steepest = float(np.rad2deg(plan_course(plan, reversal).max()))
+    steepest = float(np.rad2deg(shear_angles(plan, reversal).max()))
     if steepest > STEEPEST + 1e-9:
-        given_course = f"frames = {plan.frames}, step_degrees = {plan.step_degrees}"
-        raise InputError("synth", given_course, f"shears to {steepest:g}°, expected at most {STEEPEST:g}°")
+        loading = f"frames = {plan.frames}, step_degrees = {plan.step_degrees}"
+        raise InputError("synth", loading, f"shears to {steepest:g}°, expected at most {STEEPEST:g}°")
     return plan
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    pass

@@ -1,4 +1,4 @@
-"""From photographs to tracks. Stands on experiment and results; knows no forces."""
+"""From photographs to tracks: detection, correlation and tracking of grains and walls."""
 
-DETECTIONS = "detections.csv"  # in a run's folder: the rods of the first photograph as they were found
-PICTURES = "pictures"  # stage that keeps photographs as recordings show them
+DETECTIONS = "detections.csv"  # in a run's folder: the detected rods of the first photograph
+PICTURES = "pictures"  # stage that stores the JPEG copies of photographs

@@ -1,4 +1,4 @@
-"""What tracking keeps of an earlier one when somebody tells other poses: the frames before the first of them."""
+"""Removal of stored frames that depend on pose corrections that have changed since."""
 
 from __future__ import annotations
 
@@ -6,29 +6,29 @@ import json
 
 import numpy as np
 
-from ..atomic import write_atomically
 from ..experiment.corrections import PoseCorrections
+from ..process.atomic import write_atomically
 from ..results.checkpoint import Checkpoint
 
-OBEYED = "obeyed.json"  # beside a checkpoint's frames: what they obey, by frame
+APPLIED = "obeyed.json"  # beside a checkpoint's frames: the corrections applied in them, by frame
 
 
-def keep_frames_before(checkpoint: Checkpoint, told: PoseCorrections | None) -> None:
-    """Have in the checkpoint no frame that obeys, or follows from, other poses than those that are told now."""
-    file, now = checkpoint.folder / OBEYED, _by_frame(told)
-    former = json.loads(file.read_bytes()) if file.exists() else {}
-    if now == former:
+def drop_outdated_frames(checkpoint: Checkpoint, corrections: PoseCorrections | None) -> None:
+    """Drop the frames of a checkpoint from the first one whose corrections have changed."""
+    file, current = checkpoint.folder / APPLIED, _lines_by_frame(corrections)
+    applied = json.loads(file.read_bytes()) if file.exists() else {}
+    if current == applied:
         return
-    other = [int(frame) for frame in {*now, *former} if now.get(frame) != former.get(frame)]
-    checkpoint.drop(min(other))  # first: what is told may only stand beside frames that obey it
-    write_atomically(file, json.dumps(now).encode())
+    changed = [int(frame) for frame in {*current, *applied} if current.get(frame) != applied.get(frame)]
+    checkpoint.drop(min(changed))  # first: corrections may only be stored beside frames that contain them
+    write_atomically(file, json.dumps(current).encode())
 
 
-def _by_frame(told: PoseCorrections | None) -> dict[str, list[str]]:
-    """What is told of each frame, in an order of its own."""
+def _lines_by_frame(corrections: PoseCorrections | None) -> dict[str, list[str]]:
+    """The corrections of each frame, one sorted line each."""
     found: dict[str, list[str]] = {}
-    if told is not None:
-        rows = zip(told.frame.tolist(), told.id.tolist(), np.stack([told.x, told.y, told.theta], axis=1), strict=True)
-        for frame, name, pose in rows:
+    if corrections is not None:
+        poses = np.stack([corrections.x, corrections.y, corrections.theta], axis=1)
+        for frame, name, pose in zip(corrections.frame.tolist(), corrections.id.tolist(), poses, strict=True):
             found.setdefault(str(frame), []).append(f"{name} {pose.tolist()}")
     return {frame: sorted(lines) for frame, lines in found.items()}

@@ -1,7 +1,8 @@
-"""From photographs to tracks in the world: one photograph after the other, grains and walls.
+"""Tracking of grains and walls through a series of photographs, with results in world coordinates.
 
-A photograph that shows nothing of the packing, or that a tracker cannot get through, fails alone: nothing is tracked in
-it, why is kept with the tracks, and the next one is compared with the last that showed something.
+A photograph that shows nothing of the packing fails alone: it has no poses, the reason is stored with the tracks, and
+the next photograph is compared with the last one that has poses. A grain whose fit has no support is lost alone. An
+error of the program is no failure of a photograph: it is raised.
 """
 
 from __future__ import annotations
@@ -13,19 +14,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.sequence.failure import describe_error
-
-from ..errors import InputError
-from ..experiment.photographs import Image, Photographs, ReadAhead
+from ..experiment.photographs import Image, Photographs, PrefetchedPhotographs
 from ..experiment.units import Scale
-from ..progress import Observer, Progress, silent, unheard
+from ..process.errors import InputError
+from ..process.progress import Progress, no_progress
 from ..results.checkpoint import Checkpoint
+from ..solver.bodies.grains import Array
 from ..tracks import Tracks, WallTracks
 from .correlation.correlator import Rows
 from .detection.detect import Detection
-from .kept_pictures import KeepingPictures
 from .outline.outline_tracker import OutlineTracker
+from .photograph_cache import CachingPhotographs
 from .registration.manual_poses import ManualPoses
 from .registration.poses import FramePoses, no_poses
 from .settings import TrackingSettings
@@ -34,16 +33,16 @@ from .walls.wall_tracker import WallPoses, WallTracker
 
 AnyTracker = Tracker | OutlineTracker
 
-HISTORY = 8  # frames that the tracker looks back upon
+HISTORY = 8  # earlier frames that are handed to the tracker
 
-# Share of the grains of the first photograph: one that shows fewer shows none, and those by accident.
-FEWEST_FOUND = 0.1
+# Fraction of the first photograph's grains below which a photograph fails: the few that are found are accidental.
+MIN_FOUND_FRACTION = 0.1
 
-# The least that a centre by its rim is off for good [px]: rims are not lit alike all around.
-RIM_ERROR = 0.02
+# Least constant error of a centre measured by its rim [px]: rims are not lit evenly.
+RIM_SIGMA_MIN = 0.02
 
-# What is assumed of the centre of a grain whose outline could not be seen [px].
-UNSEEN_SIGMA = 1.0
+# Standard deviation that is assumed for the centre of a grain whose outline was not detected [px].
+UNMEASURED_SIGMA = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +50,7 @@ class Series:
     """The photographs of one test."""
 
     photographs: Photographs
-    time: Array  # (f,) [s] of those that are followed, the first ones
+    time: Array  # (f,) [s] of those that are tracked, the first ones
     scale: Scale
 
 
@@ -66,23 +65,22 @@ class ReferenceGrains:
 
 @dataclass(frozen=True, slots=True)
 class Execution:
-    """How the work is done: by how many threads, where finished frames are kept, who hears of it."""
+    """Threads, checkpoints and progress of the work."""
 
     workers: int
     checkpoint: Checkpoint
-    progress: Progress = silent
-    observer: Observer = unheard  # hears what failed a photograph
-    pictures: Checkpoint | None = None  # where photographs are kept as recordings show them
+    progress: Progress = no_progress
+    pictures: Checkpoint | None = None  # for the JPEG copies of photographs
 
 
 @dataclass(frozen=True, slots=True)
 class FollowedWalls:
-    """The walls of f frames and how well they are known."""
+    """The walls of f frames and the accuracy of their positions."""
 
     walls: WallTracks
-    sigma: Array  # (f, w, 2) [m] of each endpoint along the normal, against frame 0; NaN where it was measured
-    zncc: Array  # (f, w) NaN where it was measured
-    patches: NDArray[np.int64]  # (f, w) how many agree
+    sigma: Array  # (f, w, 2) [m] of each endpoint along the normal, against frame 0; NaN where the table gives it
+    zncc: Array  # (f, w) NaN where the table gives the wall
+    patches: NDArray[np.int64]  # (f, w) number of patches that agree
 
 
 def follow_photographs(
@@ -90,13 +88,23 @@ def follow_photographs(
     grains: ReferenceGrains,
     execution: Execution,
     settings: TrackingSettings | None = None,
-    told: Mapping[int, ManualPoses] | None = None,
+    given: Mapping[int, ManualPoses] | None = None,
 ) -> Tracks:
-    """Follow the detected grains through all photographs; finished ones are taken from the checkpoint.
+    """Track the detected grains through all photographs; finished frames are read from the checkpoint.
 
-    told: poses given by hand, by frame.
+    Parameters
+    ----------
+    series : Series
+        The photographs.
+    grains : ReferenceGrains
+        The grains of the first one.
+    execution : Execution
+        Threads, checkpoints and progress.
+    settings : TrackingSettings, optional
+    given : mapping, optional
+        Poses given by hand, by frame.
     """
-    told = told if told is not None else {}
+    given = given if given is not None else {}
     photographs, scale, detection = series.photographs, series.scale, grains.detection
     checkpoint, progress = execution.checkpoint, execution.progress
     kind = OutlineTracker if settings is not None and settings.follow == "outline" else Tracker
@@ -107,21 +115,21 @@ def follow_photographs(
     ]
     for k in range(1, len(poses)):
         _renew(tracker, photographs, poses[:k], np.flatnonzero(poses[k].reference != poses[k - 1].reference))
-    seen = photographs if execution.pictures is None else KeepingPictures(photographs, execution.pictures)
-    with ReadAhead(seen, frame_count) as coming:
+    source = photographs if execution.pictures is None else CachingPhotographs(photographs, execution.pictures)
+    with PrefetchedPhotographs(source, frame_count) as coming:
         for k in range(len(poses), frame_count):
             progress("tracking", k, frame_count)
             image = coming[k]
-            pose = tracker.first() if k == 0 else _follow(tracker, photographs, image, poses, told.get(k), execution)
+            pose = tracker.first() if k == 0 else _follow(tracker, photographs, image, poses, given.get(k))
             checkpoint.save(k, pose)
             poses.append(pose)
     progress("tracking", frame_count, frame_count)
     pixels = np.stack([np.stack([p.x, p.y], axis=1) for p in poses])
     centre = np.stack([detection.x, detection.y], axis=1)
-    constant = np.where(np.isfinite(detection.sigma), detection.sigma, UNSEEN_SIGMA)
-    if isinstance(tracker, OutlineTracker):  # every photograph is measured by itself: noise does not last
+    constant = np.where(np.isfinite(detection.sigma), detection.sigma, UNMEASURED_SIGMA)
+    if isinstance(tracker, OutlineTracker):  # every photograph is measured by itself: its noise is no constant error
         noise = np.nan_to_num(poses[0].sigma)
-        constant = np.sqrt(np.maximum(constant**2 - noise**2, RIM_ERROR**2))
+        constant = np.sqrt(np.maximum(constant**2 - noise**2, RIM_SIGMA_MIN**2))
     return Tracks(
         id=grains.id,
         radius=grains.radius,
@@ -139,47 +147,60 @@ def follow_photographs(
 
 
 def _follow(
-    tracker: AnyTracker, photographs: Photographs, image: Image, poses: list[FramePoses], told: ManualPoses | None,
-    execution: Execution,
-) -> FramePoses:  # fmt: skip
-    """The poses in the photograph after those that are given; what it cannot be followed for fails it alone."""
+    tracker: AnyTracker, photographs: Photographs, image: Image, poses: list[FramePoses], given: ManualPoses | None
+) -> FramePoses:
+    """The poses in the next photograph; it fails, alone, if it shows too few grains."""
     k = len(poses)
     recent = poses[-HISTORY:]
-    # Whether a reference is damaged is judged on photographs in a row.
-    row = next((at for at in range(len(recent), 0, -1) if recent[at - 1].failed_reason), 0)
-    try:
-        if recent[row:]:
-            damaged = tracker.find_damaged(recent[row:], k - len(recent[row:]), photographs.__getitem__)
-            _renew(tracker, photographs, poses, damaged)
-        pose = tracker.follow(image, recent, told)
-    except (MemoryError, InputError, OSError):  # not the picture's fault
-        raise
-    except Exception as error:
-        execution.observer("tracking", k, error)
-        return no_poses(tracker.reference, f"{photographs.files[k].name} cannot be followed: {describe_error(error)}")
+    # Damage of a reference is judged on consecutive photographs: those since the last failed one.
+    since = next((at for at in range(len(recent), 0, -1) if recent[at - 1].failed_reason), 0)
+    if recent[since:]:
+        damaged = tracker.find_damaged(recent[since:], k - len(recent[since:]), photographs.__getitem__)
+        _renew(tracker, photographs, poses, damaged)
+    pose = tracker.follow(image, recent, given)
     found, expected = int(pose.has_pose.sum()), int(poses[0].has_pose.sum())
-    if found < FEWEST_FOUND * expected:
+    if found < MIN_FOUND_FRACTION * expected:
         return no_poses(tracker.reference, f"{found} of {expected} grains are found in {photographs.files[k].name}")
     return pose
 
 
 def _renew(tracker: AnyTracker, photographs: Photographs, poses: list[FramePoses], rows: Rows) -> None:
-    """Take the references of `rows` (m,) anew from the last frame of poses."""
+    """Renew the references of `rows` (m,) from the last frame of poses."""
     if len(rows):
         tracker.renew(rows, len(poses) - 1, photographs[len(poses) - 1], poses[-1])
 
 
 def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Execution, source: Path) -> FollowedWalls:
-    """Follow the walls where their endpoints are NaN; depth (w,) [m]: how much of each bar is seen.
+    """Track the walls where their endpoints are NaN.
 
-    source: the walls' table. A wall that is not found in a photograph has no ends there. Raises InputError for a wall
-    without texture.
+    Parameters
+    ----------
+    series : Series
+        The photographs.
+    walls : WallTracks
+        The walls of f frames, complete in frame 0.
+    depth : (w,) array
+        Visible depth of each bar [m].
+    execution : Execution
+        Threads, checkpoints and progress.
+    source : Path
+        The walls' table, for messages.
+
+    Returns
+    -------
+    FollowedWalls
+        Endpoints are NaN where a wall is not found.
+
+    Raises
+    ------
+    InputError
+        If a wall has no texture.
     """
     photographs, checkpoint, progress = series.photographs, execution.checkpoint, execution.progress
     frame_count = len(walls.endpoints)
     tracker = WallTracker(photographs[0], walls.endpoints[0], series.scale, depth, workers=execution.workers)
-    asked = np.asarray(np.isnan(walls.endpoints).any(axis=(2, 3)), dtype=np.bool_)
-    for w in np.flatnonzero(asked.any(axis=0) & (tracker.patch_count < tracker.settings.least_patches)):
+    followed = np.asarray(np.isnan(walls.endpoints).any(axis=(2, 3)), dtype=np.bool_)
+    for w in np.flatnonzero(followed.any(axis=0) & (tracker.patch_count < tracker.settings.min_patches)):
         raise InputError(
             source,
             f"frame 0, wall {walls.name[w]!r}",
@@ -187,12 +208,12 @@ def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Exe
             "too few to be followed; give its position in every frame",
         )
     poses: list[WallPoses] = [checkpoint.load(k, WallPoses)[0] for k in range(min(checkpoint.finished(), frame_count))]
-    with ReadAhead(photographs, frame_count) as coming:
+    with PrefetchedPhotographs(photographs, frame_count) as coming:
         for k in range(len(poses), frame_count):
             progress("walls", k, frame_count)
             image = coming[k]
-            pose = tracker.first() if k == 0 else _follow_bars(tracker, image, poses, execution)
-            pose = _measured_where_told(pose, walls.endpoints[k], ~asked[k])
+            pose = tracker.first() if k == 0 else tracker.follow(image, poses[-HISTORY:])
+            pose = _replace_given(pose, walls.endpoints[k], ~followed[k])
             checkpoint.save(k, pose)
             poses.append(pose)
     progress("walls", frame_count, frame_count)
@@ -204,22 +225,10 @@ def follow_walls(series: Series, walls: WallTracks, depth: Array, execution: Exe
     )
 
 
-def _follow_bars(tracker: WallTracker, image: Image, poses: list[WallPoses], execution: Execution) -> WallPoses:
-    """The walls in the photograph after those that are given; NaN where they are not found in it."""
-    try:
-        return tracker.follow(image, poses[-HISTORY:])
-    except (MemoryError, InputError, OSError):  # not the picture's fault
-        raise
-    except Exception as error:
-        execution.observer("walls", len(poses), error)
-        w = tracker.wall_count
-        return WallPoses(np.full((w, 2, 2), np.nan), np.full((w, 2), np.nan), np.full(w, np.nan), np.zeros(w, np.int64))
-
-
-def _measured_where_told(pose: WallPoses, endpoints: Array, told: NDArray[np.bool_]) -> WallPoses:
+def _replace_given(pose: WallPoses, endpoints: Array, given: NDArray[np.bool_]) -> WallPoses:
     return WallPoses(
-        np.where(told[:, None, None], endpoints, pose.endpoints),
-        np.where(told[:, None], np.nan, pose.sigma),
-        np.where(told, np.nan, pose.zncc),
-        np.where(told, 0, pose.patches),
+        np.where(given[:, None, None], endpoints, pose.endpoints),
+        np.where(given[:, None], np.nan, pose.sigma),
+        np.where(given, np.nan, pose.zncc),
+        np.where(given, 0, pose.patches),
     )

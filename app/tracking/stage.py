@@ -1,4 +1,4 @@
-"""The tracking stage: an experiment's photographs in, tracks of its grains and walls out."""
+"""The tracking stage: from an experiment's photographs to tracks of its grains and walls."""
 
 from __future__ import annotations
 
@@ -12,12 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT, reach_of_wall
-
-from ..atomic import replacing
-from ..errors import InputError
-from ..experiment.boundary import bound_tracks
+from ..experiment.boundary import apply_boundary
 from ..experiment.corrections import read_corrections
 from ..experiment.experiment import Experiment, read_grain_guess, read_times
 from ..experiment.photographs import FULL_SCALE, Image, Photographs
@@ -25,29 +20,34 @@ from ..experiment.reading.tables import read_table, write_table
 from ..experiment.scaling import make_scale
 from ..experiment.units import Scale
 from ..experiment.walls import read_walls
-from ..progress import Observer, Progress, silent, unheard
+from ..process.atomic import replacing
+from ..process.errors import InputError
+from ..process.frame_range import FrameRange
+from ..process.progress import Progress, no_progress
 from ..results.checkpoint import Checkpoint
+from ..solver.bodies.grains import Array
+from ..solver.bodies.wall_shapes import STRAIGHT, wall_distance
 from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
 from .detection.channels import count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
-from .detection.strangers import describe_channels, describe_strangers
+from .detection.false_detections import describe_channels, describe_false_detections
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
 from .registration.manual_poses import ManualPoses
-from .report.page import Tracked
+from .report.page import TrackingReportData
 from .settings import TrackingSettings
 from .walls.bar_depth import visible_depth
 
-# A bar's body beside its face is looked at over no more than this many mean radii of the grains.
-BAR_DEPTH = 3.0
+# Greatest depth of a bar's body that is used, in mean radii of the grains.
+MAX_BAR_DEPTH = 3.0
 
 Columns = dict[str, NDArray[Any]]
 
 WALLS = "tracked_walls.csv"
 
 
-def untold(sentence: str) -> None:
-    """Keep a sentence for the user to oneself."""
+def discard_message(message: str) -> None:
+    """Discard a message for the user."""
 
 
 def track_photographs(
@@ -55,16 +55,38 @@ def track_photographs(
     stop: int,
     keep: Callable[[str], Checkpoint],
     progress: Progress,
-    observer: Observer,
     *,
     grains: ReferenceGrains | None = None,
-    tell: Callable[[str], None] = untold,
+    notify: Callable[[str], None] = discard_message,
 ) -> tuple[Tracks, WallTracks | None, dict[str, Columns]]:
-    """Tracks of the grains and walls of the frames 0 … stop − 1, and tables by file name, for the user to edit.
+    """Track the grains and walls of the frames 0 … stop − 1.
 
-    grains: of the first photograph, where they are found already. keep: gives the checkpoint of a stage by its name;
-    observer: hears what a photograph could not be followed for; tell: gets sentences for the user.
-    Raises InputError where nothing is found.
+    Parameters
+    ----------
+    experiment : Experiment
+        The experiment with photographs.
+    stop : int
+        Number of frames.
+    keep : callable
+        Returns the checkpoint of a stage, by its name.
+    progress : callable
+        Called with the progress.
+    grains : ReferenceGrains, optional
+        The grains of the first photograph, where they are known already.
+    notify : callable
+        Called with messages for the user.
+
+    Returns
+    -------
+    tracks : Tracks
+    walls : WallTracks or None
+    tables : dict
+        Tables of the detected grains and tracked walls by file name, for the user to edit.
+
+    Raises
+    ------
+    InputError
+        If no grains are found.
     """
     section, tuning = experiment.config.photographs, experiment.config.tracking
     assert section is not None
@@ -76,12 +98,12 @@ def track_photographs(
     walls = read_walls(experiment, count)
     if grains is None:
         progress("detection", 0, 1)
-        grains = _detect(experiment, first, scale, walls, tell)
+        grains = _detect(experiment, first, scale, walls, notify)
         progress("detection", 1, 1)
     if grains.detection.count == 0:
         raise InputError(photographs.files[0], "", "no grains were found; give them with photographs.grains")
     tables = {DETECTIONS: _detections_table(grains)}
-    unfound: dict[int, str] = {}
+    missing_walls: dict[int, str] = {}
     series = Series(photographs, read_times(experiment, count)[:stop], scale)
     if walls is not None:
         walls = walls.frames(0, stop)
@@ -90,55 +112,63 @@ def track_photographs(
             bars = walls.select(straight)
             followed = follow_walls(
                 series, bars, _bar_depth(experiment, first, bars, scale, float(grains.radius.mean())),
-                Execution(workers, keep("walls"), progress, observer),
+                Execution(workers, keep("walls"), progress),
                 source=experiment.folder / ((experiment.config.walls and experiment.config.walls.file) or ""),
             )  # fmt: skip
             endpoints, sigma = walls.endpoints.copy(), np.full(walls.endpoints.shape[:2], np.nan)
             endpoints[:, straight] = followed.walls.endpoints
             sigma[:, straight] = np.sqrt((followed.sigma**2).mean(axis=2))
             walls = replace(walls, endpoints=endpoints, sigma=sigma)
-            unfound = _name_unfound(walls, photographs)
+            missing_walls = _missing_walls_by_frame(walls, photographs)
             tables[WALLS] = _walls_table(followed)
     tracks = follow_photographs(
-        series, grains, Execution(workers, keep("tracking"), progress, observer, keep(PICTURES)),
+        series, grains, Execution(workers, keep("tracking"), progress, keep(PICTURES)),
         TrackingSettings(section.follow, search_window=tuning.search_window),
         _manual_poses(experiment, grains.id, scale, count),
     )  # fmt: skip
-    reasons = ("; ".join(filter(None, (said, unfound.get(k)))) for k, said in enumerate(tracks.failed_reason or ()))
-    return replace(tracks, failed_reason=tuple(reasons)), walls, tables
+    failed = enumerate(tracks.failed_reason or ())
+    reasons = tuple("; ".join(filter(None, (reason, missing_walls.get(k)))) for k, reason in failed)
+    return replace(tracks, failed_reason=reasons), walls, tables
 
 
 def track_first(
-    experiment: Experiment, count: int, progress: Progress = silent, tell: Callable[[str], None] = untold
+    experiment: Experiment,
+    count: int,
+    progress: Progress = no_progress,
+    notify: Callable[[str], None] = discard_message,
 ) -> tuple[Tracks, WallTracks | None]:
-    """Tracks of the first photographs, at most `count`, of which nothing is kept. Raises InputError."""
+    """Track the first photographs, at most `count`, without storing anything; raises InputError."""
     stop = min(count, len(experiment.photographs()))
     with TemporaryDirectory() as folder:
         tracks, walls, _ = track_photographs(
-            experiment, stop, lambda stage: Checkpoint(Path(folder) / stage, ""), progress, unheard, tell=tell
+            experiment,
+            stop,
+            lambda stage: Checkpoint(Path(folder) / stage, ""),
+            progress,
+            notify=notify,
         )
-    return bound_tracks(experiment, tracks, walls), walls
+    return apply_boundary(experiment, tracks, walls), walls
 
 
 def find_reference(experiment: Experiment) -> ReferenceGrains:
-    """The grains of the first photograph, as `track_photographs` finds them."""
+    """Return the grains of the first photograph, as `track_photographs` finds them."""
     section, photographs = experiment.config.photographs, experiment.photographs()
     assert section is not None
     scale = make_scale(section, photographs.shape[0])
-    return _detect(experiment, photographs[0], scale, read_walls(experiment, len(photographs)), untold)
+    return _detect(experiment, photographs[0], scale, read_walls(experiment, len(photographs)), discard_message)
 
 
 def write_found_tables(folder: Path, tables: dict[str, Columns]) -> None:
-    """Write what the stage found beside the results."""
+    """Write the tables of the stage beside the results."""
     for name, columns in tables.items():
         with replacing(folder / name) as part:
             write_table(part, {key: values.tolist() for key, values in columns.items()})
 
 
 def gather_report(
-    experiment: Experiment, folder: Path, tracks: Tracks, walls: WallTracks | None, first_frame: int
-) -> Tracked:
-    """What a report needs of finished tracks; folder: where `write_found_tables` left the grains of photograph 0."""
+    experiment: Experiment, folder: Path, tracks: Tracks, walls: WallTracks | None, frames: FrameRange
+) -> TrackingReportData:
+    """Collect the data of a tracking report; folder: where `write_found_tables` wrote the grains of photograph 0."""
     assert experiment.config.photographs is not None
     photographs = experiment.photographs()
     table = read_table(folder / DETECTIONS, ("id", "x", "y", "radius", "quality"))
@@ -148,23 +178,23 @@ def gather_report(
             raise InputError(table.file, f"id = {name}", "is missing: the table was edited; track again without it")
     order = [row[int(name)] for name in tracks.id]
     centre = np.stack([table.numbers("x"), table.numbers("y")], axis=1)[order]
-    return Tracked(
-        experiment.name, tracks, walls, first_frame, make_scale(experiment.config.photographs, photographs.shape[0]),
+    return TrackingReportData(
+        experiment.name, tracks, walls, frames, make_scale(experiment.config.photographs, photographs.shape[0]),
         centre, table.numbers("radius")[order], table.numbers("quality")[order], photographs.__getitem__,
     )  # fmt: skip
 
 
 def _detect(
-    experiment: Experiment, first: Image, scale: Scale, walls: WallTracks | None, tell: Callable[[str], None]
+    experiment: Experiment, first: Image, scale: Scale, walls: WallTracks | None, notify: Callable[[str], None]
 ) -> ReferenceGrains:
-    """The grains that are told, else those that are found."""
+    """The given grains, else the detected ones."""
     section, tuning = experiment.config.photographs, experiment.config.tracking
     assert section is not None
     guess = read_grain_guess(experiment)
     if guess is not None:
         detection = refine_grains(first, guess.x, guess.y, guess.radius)
         centres = np.stack([detection.x, detection.y], axis=1)
-        # Its own radius is what the user measured on this photograph, so the lens bent it too.
+        # The user measured the radius on this photograph, so it contains the lens distortion.
         return ReferenceGrains(guess.id, detection, detection.radius * scale.size_at(centres))
     classes = np.array(section.radii)
     try:
@@ -173,15 +203,16 @@ def _detect(
         raise InputError(experiment.file, f"key photographs.radii = {list(section.radii)}", str(error)) from None
     detection = detect_grains(first, settings)
     if section.follow == "outline":
-        # Dark discs on a light ground are as good.
+        # Dark discs on a light background are detected as well.
         dark = detect_grains(np.float32(FULL_SCALE) - first, settings)
         detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
     centres = np.stack([detection.x, detection.y], axis=1)
-    within = _inside(scale.to_world(centres), walls) if walls is not None else None
-    for sentence in [*_about_channels(experiment, settings), *describe_strangers(detection, within, first.shape)]:
-        tell(sentence)
+    within = _inside_walls(scale.to_world(centres), walls) if walls is not None else None
+    messages = [*_channel_messages(experiment, settings), *describe_false_detections(detection, within, first.shape)]
+    for message in messages:
+        notify(message)
     if within is not None:
-        detection = _some(detection, within)
+        detection = _select(detection, within)
         centres = centres[within]
     if len(classes):
         radius = detection.radius * scale.mean_size
@@ -195,8 +226,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _about_channels(experiment: Experiment, settings: DetectionSettings) -> list[str]:
-    """Whether discs of a colour photograph stand out better in another channel."""
+def _channel_messages(experiment: Experiment, settings: DetectionSettings) -> list[str]:
+    """Message if more discs of a colour photograph are detected in another channel."""
     section = experiment.config.photographs
     assert section is not None
     channels = experiment.photographs().in_channels(0)
@@ -205,17 +236,17 @@ def _about_channels(experiment: Experiment, settings: DetectionSettings) -> list
     return describe_channels(count_discs(channels, settings), section.channel)
 
 
-def _inside(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
-    """Which circles (n,) lie between the walls of frame 0: screws and wheels of the apparatus are round, too.
+def _inside_walls(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
+    """Which circles (n,) lie between the walls of frame 0: screws and wheels of the apparatus are round as well.
 
-    Walls that would leave next to nothing are told the wrong way round; that is said later, with all grains there.
+    Walls that would exclude nearly all grains have the wrong direction; a later check reports that, with all grains.
     """
-    depth, _ = reach_of_wall(walls.endpoints[0], walls.sides, position[:, None])
+    depth, _ = wall_distance(walls.endpoints[0], walls.sides, position[:, None])
     within = np.asarray((depth > 0.0).all(axis=1))
     return within if within.mean() > 0.2 else np.ones_like(within)
 
 
-def _some(detection: Detection, rows: NDArray[np.bool_]) -> Detection:
+def _select(detection: Detection, rows: NDArray[np.bool_]) -> Detection:
     return Detection(
         detection.x[rows], detection.y[rows], detection.radius[rows], detection.sigma[rows], detection.quality[rows]
     )
@@ -225,20 +256,19 @@ def _bar_depth(experiment: Experiment, first: Image, walls: WallTracks, scale: S
     given = experiment.config.walls.thickness if experiment.config.walls is not None else None
     if given is not None:
         return np.full(walls.count, given)
-    return visible_depth(first, walls.endpoints[0], scale, BAR_DEPTH * radius)
+    return visible_depth(first, walls.endpoints[0], scale, MAX_BAR_DEPTH * radius)
 
 
 def _manual_poses(experiment: Experiment, ids: NDArray[np.int64], scale: Scale, count: int) -> dict[int, ManualPoses]:
-    """Poses told by hand, by frame, as the tracker takes them."""
-    told = read_corrections(experiment, ids, count)
-    if told is None:
+    """Poses given by hand, by frame, in the tracker's units."""
+    corrections = read_corrections(experiment, ids, count)
+    if corrections is None:
         return {}
-    pose = np.stack([told.x, told.y, scale.angle_to_world(told.theta)], axis=1)
-    at = {int(name): k for k, name in enumerate(ids)}
-    row = np.array([at[int(name)] for name in told.id], dtype=np.intp)
-    return {
-        int(frame): ManualPoses(row[told.frame == frame], pose[told.frame == frame]) for frame in np.unique(told.frame)
-    }
+    pose = np.stack([corrections.x, corrections.y, scale.angle_to_world(corrections.theta)], axis=1)
+    row_of = {int(name): k for k, name in enumerate(ids)}
+    row = np.array([row_of[int(name)] for name in corrections.id], dtype=np.intp)
+    frame = corrections.frame
+    return {int(k): ManualPoses(row[frame == k], pose[frame == k]) for k in np.unique(frame)}
 
 
 def _detections_table(grains: ReferenceGrains) -> Columns:
@@ -253,14 +283,14 @@ def _detections_table(grains: ReferenceGrains) -> Columns:
     }
 
 
-def _name_unfound(walls: WallTracks, photographs: Photographs) -> dict[int, str]:
-    """The frames in which walls were not found, and what to do about it."""
-    unfound: dict[int, list[str]] = {}
+def _missing_walls_by_frame(walls: WallTracks, photographs: Photographs) -> dict[int, str]:
+    """Messages for the frames in which walls were not found."""
+    missing_walls: dict[int, list[str]] = {}
     for k, w in np.argwhere(np.isnan(walls.endpoints).any(axis=(2, 3))).tolist():
-        unfound.setdefault(k, []).append(repr(walls.name[w]))
+        missing_walls.setdefault(k, []).append(repr(walls.name[w]))
     return {
         k: f"wall {', '.join(names)} is not found in {photographs.files[k].name}: give its position in that frame"
-        for k, names in unfound.items()
+        for k, names in missing_walls.items()
     }
 
 

@@ -1,10 +1,9 @@
-"""Follow every grain of the first photograph through the later ones.
+"""Tracking of every grain of the first photograph through the later ones.
 
-Every photograph is compared with the same reference, the first one, so errors do not add up; only a grain that is
-damaged for good is compared with a later one from then on, and that is recorded. A grain is fitted from where its own
-motion leads, else from where its neighbours' leads, else it is searched for. What still fits worse than the noise
-explains is refitted robustly, and what remains doubtful is compared with its neighbours. A pose that cannot be vouched
-for is never handed out as a good one.
+Every photograph is compared with the same reference, the first one, so errors do not accumulate. Only a grain that is
+damaged permanently is compared with a later photograph from then on, which is recorded. A grain is fitted from its own
+extrapolated motion, else from its neighbours' motion, else it is searched for. Fits whose residual exceeds what noise
+explains are repeated robustly. Poses that stay poor, are ambiguous or contradict their neighbours are suspect.
 """
 
 from __future__ import annotations
@@ -13,18 +12,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from solver.bodies.grains import Array
-
 from ..experiment.photographs import Image
+from ..solver.bodies.grains import Array
 from .correlation.correlator import Correlator, Rows
 from .correlation.noise import image_noise
 from .correlation.patches import Patches
 from .correlation.splines import Pyramid
 from .detection.detect import Detection
-from .registration.consistency import doubt_inconsistent, refit_poor
-from .registration.manual_poses import ManualPoses, settle_manual_poses
+from .registration.consistency import flag_inconsistent, refit_poor
+from .registration.manual_poses import ManualPoses, apply_manual_poses
 from .registration.poses import FramePoses, found_poses, reference_poses
-from .registration.prediction import follow_own_motion, last_known
+from .registration.prediction import fit_from_own_motion, last_known
 from .registration.registration import Registration
 from .registration.renewal import find_damaged
 from .registration.rescue import rescue
@@ -34,9 +32,18 @@ from .settings import TrackingSettings
 class Tracker:
     """Poses of the grains of one reference photograph in other photographs.
 
-    grains: a Detection, or x, y, radius (n,) [px]. The tracker holds no state of the sequence but the references
-    that were renewed: `follow` reads the rest from the history it is given, and `renew` repeats a renewal from stored
-    poses, so that a run can be resumed.
+    The tracker's only state of the sequence are the renewed references: `follow` takes the rest from the history it is
+    given, and `renew` repeats a renewal from stored poses, so that a run can be resumed.
+
+    Parameters
+    ----------
+    reference_image : (H, W) array
+        The reference photograph [grey].
+    grains : Detection or tuple of (n,) arrays
+        The grains, or their x, y, radius [px].
+    settings : TrackingSettings, optional
+    workers : int
+        Number of threads; results do not depend on it.
     """
 
     def __init__(
@@ -51,7 +58,7 @@ class Tracker:
         self.radius = np.ascontiguousarray(radius, dtype=np.float64)  # (n,) [px]
         centre = np.stack([np.asarray(x, np.float64), np.asarray(y, np.float64)], axis=1)
         reference = Pyramid(np.ascontiguousarray(reference_image, dtype=np.float32))
-        self.patches = Patches.cut(reference, centre, self.settings.patch_share * self.radius)
+        self.patches = Patches.cut(reference, centre, self.settings.patch_fraction * self.radius)
         self.noise = image_noise(reference.image)  # [grey]
         self._correlator = Correlator(
             self.patches, workers=workers, tolerance=self.settings.tolerance, limit=self.settings.step_limit
@@ -64,40 +71,51 @@ class Tracker:
         return len(self.radius)
 
     def first(self) -> FramePoses:
-        """The poses in the reference itself."""
+        """Return the poses in the reference itself."""
         return self._first
 
-    def follow(self, image: Image, history: Sequence[FramePoses], told: ManualPoses | None = None) -> FramePoses:
-        """Find the grains in the next photograph. history: earlier frames, most recent last, at least one.
+    def follow(self, image: Image, history: Sequence[FramePoses], given: ManualPoses | None = None) -> FramePoses:
+        """Find the grains in the next photograph.
 
-        told: what a user tells of some of them in this photograph.
+        Parameters
+        ----------
+        image : (H, W) array
+            The photograph [grey].
+        history : sequence of FramePoses
+            Earlier frames, most recent last, at least one. The last two predict the motion. Earlier ones are needed
+            only for grains that were lost: without them such a grain's rotation counts from the first photograph, in
+            (−π, π].
+        given : ManualPoses, optional
+            Poses of some grains in this photograph, given by hand.
 
-        The last two frames predict the motion. Frames further back are read only for grains that were lost
-        meanwhile: without them such a grain's rotation counts from the first photograph, in (−π, π].
+        Raises
+        ------
+        ValueError
+            If the history is empty or the photograph has another size than the reference.
         """
         registration = self.begin(image, history)
-        if told is not None:
-            settle_manual_poses(registration, told)
-        follow_own_motion(registration, history)
-        registration.judge_residuals()
+        if given is not None:
+            apply_manual_poses(registration, given)
+        fit_from_own_motion(registration, history)
+        registration.flag_poor()
         rescue(registration)
         refit_poor(registration)
-        doubt_inconsistent(registration, self.radius)
+        flag_inconsistent(registration, self.radius)
         return found_poses(registration, self._first, self.reference)
 
     def find_damaged(self, history: Sequence[FramePoses], first_frame: int, photograph: Callable[[int], Image]) -> Rows:
-        """The grains whose reference is damaged for good by the last frame of the history, see `renewal`."""
+        """Find the grains whose reference is permanently damaged at the end of the history, see `renewal`."""
         return find_damaged(self._correlator, history, first_frame, photograph)
 
     def renew(self, rows: Rows, frame: int, photograph: Image, poses: FramePoses) -> None:
-        """Compare `rows` (m,) from now on with a later photograph, in which they have the poses found in it."""
+        """Replace the references of `rows` (m,) by those in a later photograph, at the poses found in it."""
         self.patches = self.patches.renew(photograph, rows, poses.pose[rows], poses.sigma[rows])
         self._correlator = self._correlator.with_patches(self.patches)
         self.reference = self.reference.copy()
         self.reference[rows] = frame
 
     def begin(self, image: Image, history: Sequence[FramePoses]) -> Registration:
-        """Make a photograph ready to be registered; nothing is looked for yet. history: as of `follow`."""
+        """Prepare the registration of a photograph, without any fit; parameters and errors as of `follow`."""
         if not history:
             raise ValueError("the history must hold at least one frame, the tracker's own first()")
         if image.shape != self.patches.reference.image.shape:

@@ -1,1 +1,1 @@
-"""What people said of contacts and frames, and how it reaches the solver. Stands on experiment."""
+"""Reviewers' verdicts on contacts and frames, and their conversion for the solver. Depends on experiment."""

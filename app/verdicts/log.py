@@ -1,12 +1,12 @@
-"""The log of what people said: one JSON object per line, appended and never rewritten.
+"""The log of reviewers' verdicts: one JSON object per line, appended and never rewritten.
 
 Three kinds of line. A verdict has `frame`, `a`, `b` (a grain's id each, or a wall's name for `b`) and `verdict`. A
 flag has `frame`, `flag` and `on`. An undo has `undo`, the `line` it takes back. All have `reviewer`, `time` (ISO 8601,
-UTC), `seconds` spent, the program's `version` and a random name `line`; a verdict also tells `origin` (how the pair
-came up) and `blind`. A reviewer's last word on a pair counts.
+UTC), `seconds` spent, the program's `version` and a random name `line`; a verdict also has `origin` (why the pair
+was judged) and `blind`. A reviewer's latest verdict on a pair counts.
 
 A line is written by one call under a lock and flushed to the disk, so that two tabs, or two programs, cannot mix
-their lines. A line torn by a crash is passed over and counted; the next line begins on a line of its own.
+their lines. A line cut by a crash is ignored and counted; the next entry begins on a new line.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import os
 import secrets
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..errors import InputError
+from ..process.errors import InputError
 
 try:
     import fcntl
@@ -48,7 +48,7 @@ class Flag(StrEnum):
 
 
 class Origin(StrEnum):
-    """How a pair came before the reviewer. Only a pair that the queue chose says something about its like."""
+    """Why a reviewer judged a pair. Only pairs chosen by the queue are a random sample of similar pairs."""
 
     QUEUE = "queue"
     CLICK = "click"
@@ -79,70 +79,89 @@ class Entry:
 
     @property
     def subject(self) -> tuple[object, ...]:
-        """What the line is about: a later line of the same reviewer on it replaces an earlier one."""
+        """The pair or flag of the line: a later line of the same reviewer on it replaces an earlier one."""
         return (self.frame, self.flag) if self.pair is None else canonical(self.pair)
 
 
 @dataclass(slots=True)
-class _Words:
+class _Lines:
     """All lines of one file so far."""
 
     entries: dict[str, Entry] = field(default_factory=dict)  # by line, in the order of the file
     undone: set[str] = field(default_factory=set)
-    torn: int = 0
+    damaged: int = 0
 
 
 class VerdictLog:
-    """The log of one experiment's results. Lines that others append are seen at the next reading."""
+    """The log of one experiment's results. Lines appended by other programs appear at the next access."""
 
     def __init__(self, file: Path) -> None:
         self.file = file
-        self._words = _Words()
+        self._lines = _Lines()
         self._read_to = 0
         self._line_number = 0
         self._lock = threading.RLock()
-        self._closed = False  # to lines that are not read yet
+        self._closed = False  # to later lines
 
     def append(self, entry: Entry) -> Entry:
-        """Write one verdict or flag; returns it with its time and name."""
+        """Append one verdict or flag; return it with its time and name."""
         return self.append_all([entry])[0]
 
     def append_all(self, entries: list[Entry]) -> list[Entry]:
-        """Write several lines at once; returns them with their times and names."""
+        """Append several lines at once; return them with their times and names."""
         stamped = [_stamped(entry) for entry in entries]
         self._write([_as_json(entry) for entry in stamped])
         return stamped
 
-    def as_of_now(self) -> VerdictLog:
-        """The same without what will be said from now on."""
+    def snapshot(self) -> VerdictLog:
+        """Return the log without lines that are appended later."""
         with self._lock:
             self._read()
-            words = self._words
-            now = VerdictLog(self.file)
-            now._words = _Words(dict(words.entries), set(words.undone), words.torn)
-            now._closed = True
-            return now
+            lines = self._lines
+            copy = VerdictLog(self.file)
+            copy._lines = _Lines(dict(lines.entries), set(lines.undone), lines.damaged)
+            copy._closed = True
+            return copy
 
     def undo(self, reviewer: str) -> Entry | None:
-        """Take back the reviewer's last line that still counts; None where there is none."""
+        """Undo the reviewer's last line that counts; None where there is none."""
         with self._lock:
             self._read()
-            last = next(
-                (e for e in reversed(self._words.entries.values()) if e.reviewer == reviewer and self._counts(e)), None
-            )
-            if last is None:
+            last = self.last_line(reviewer)
+            return None if last is None else self.undo_line(last.line)
+
+    def undo_line(self, line: str) -> Entry | None:
+        """Undo one line, by its name; None where there is none that counts."""
+        with self._lock:
+            self._read()
+            entry = self._lines.entries.get(line)
+            if entry is None or not self._counts(entry):
                 return None
-            self._write([{"undo": last.line, **_signature(_stamped(Entry(last.frame, reviewer)))}])
-            return last
+            self._write([{"undo": line, **_signature(_stamped(Entry(entry.frame, entry.reviewer)))}])
+            return entry
+
+    def repeat(self, line: str) -> Entry | None:
+        """Append a line again, by its name; None where there is none."""
+        with self._lock:
+            self._read()
+            entry = self._lines.entries.get(line)
+            return None if entry is None else self.append(replace(entry, time=""))
+
+    def last_line(self, reviewer: str) -> Entry | None:
+        """Return the reviewer's last line that counts; None where there is none."""
+        with self._lock:
+            self._read()
+            counting = (e for e in reversed(self._lines.entries.values()) if e.reviewer == reviewer and self._counts(e))
+            return next(counting, None)
 
     def entries(self) -> list[Entry]:
-        """Every line that was not taken back, in the order of the file."""
+        """Return all lines that were not undone, in the order of the file."""
         with self._lock:
             self._read()
-            return [e for e in self._words.entries.values() if self._counts(e)]
+            return [e for e in self._lines.entries.values() if self._counts(e)]
 
-    def last_words(self, reviewer: str | None = None) -> list[Entry]:
-        """Every reviewer's last line on every pair and flag; of one reviewer alone where named."""
+    def latest_entries(self, reviewer: str | None = None) -> list[Entry]:
+        """Return the latest line of every reviewer, or of the given one, on every pair and flag."""
         last: dict[tuple[object, ...], Entry] = {}
         for entry in self.entries():
             if reviewer is None or entry.reviewer == reviewer:
@@ -150,45 +169,46 @@ class VerdictLog:
         return list(last.values())
 
     def verdicts(self, reviewer: str | None = None) -> Iterator[tuple[Pair, Entry]]:
-        """The last words that are verdicts, with their pair."""
-        for entry in self.last_words(reviewer):
+        """Yield the latest verdicts with their pairs."""
+        for entry in self.latest_entries(reviewer):
             if entry.pair is not None and entry.verdict is not None:
                 yield entry.pair, entry
 
     @property
-    def torn(self) -> int:
-        """Lines that were cut by a crash and are passed over."""
+    def damaged_lines(self) -> int:
+        """Number of lines that were cut by a crash and are ignored."""
         with self._lock:
             self._read()
-            return self._words.torn
+            return self._lines.damaged
 
     @property
     def size(self) -> int:
-        """Bytes of the file: another number where anything was said since."""
+        """Size of the file [bytes], which changes with every new line."""
         return self.file.stat().st_size if self.file.exists() else 0
 
     def _counts(self, entry: Entry) -> bool:
-        return entry.line not in self._words.undone
+        return entry.line not in self._lines.undone
 
     def _write(self, lines: list[dict[str, Any]]) -> None:
         content = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines).encode()
         with self._lock:
             self.file.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(self.file, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+            handle = os.open(self.file, os.O_RDWR | os.O_APPEND | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o644)
             try:
                 if fcntl is not None:
                     fcntl.flock(handle, fcntl.LOCK_EX)
                 end = os.lseek(handle, 0, os.SEEK_END)
-                if end and os.pread(handle, 1, end - 1) != b"\n":
-                    content = b"\n" + content
+                if end:
+                    os.lseek(handle, end - 1, os.SEEK_SET)  # pread is missing on Windows
+                    content = content if os.read(handle, 1) == b"\n" else b"\n" + content
                 while content:
                     content = content[os.write(handle, content) :]
                 os.fsync(handle)
             finally:
-                os.close(handle)  # which also unlocks
+                os.close(handle)  # releases the lock
 
     def _read(self) -> None:
-        """Read on from where the last reading ended, whole lines only."""
+        """Read the complete lines after those that were read before."""
         if self._closed:
             return
         try:
@@ -211,20 +231,20 @@ class VerdictLog:
         try:
             values = json.loads(line)
         except (ValueError, RecursionError):
-            self._words.torn += 1
+            self._lines.damaged += 1
             return
         where = f"line {self._line_number}"
         if not isinstance(values, dict):
             raise InputError(self.file, where, "is not a JSON object")
         if "undo" in values:
-            self._words.undone.add(str(values["undo"]))
+            self._lines.undone.add(str(values["undo"]))
             return
         entry = _entry(self.file, where, values)
-        self._words.entries[entry.line] = entry
+        self._lines.entries[entry.line] = entry
 
 
 def canonical(pair: Pair) -> Pair:
-    """The same name for a pair from either side: the lower id first, a wall last."""
+    """Return a pair in canonical order: the lower id first, a wall last."""
     frame, a, b = pair
     return (frame, b, a) if isinstance(b, int) and b < a else pair
 

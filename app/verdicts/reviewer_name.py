@@ -1,16 +1,18 @@
-"""Who judges, where nobody has said it."""
+"""The default name of a reviewer."""
 
 from __future__ import annotations
 
 import getpass
 
-NOBODY = frozenset(("root", "admin", "administrator", "user", "nobody", "runner"))  # accounts of machines
+SHARED_ACCOUNTS = frozenset(
+    ("root", "admin", "administrator", "user", "nobody", "runner")
+)  # accounts that are no person's
 
 
 def account_name() -> str:
-    """The name of the account in which somebody sits; empty where it is nobody's own, so that a page asks."""
+    """Return the name of the user's account; empty for a shared account, so that the page requests a name."""
     try:
         name = getpass.getuser()
     except (OSError, KeyError):  # a machine without user names
         return ""
-    return "" if name.lower() in NOBODY else name
+    return "" if name.lower() in SHARED_ACCOUNTS else name

@@ -1,4 +1,4 @@
-"""Agreement between people, and between people and the detector: Cohen's κ."""
+"""Agreement between reviewers, and between reviewers and the detector: Cohen's κ."""
 
 from __future__ import annotations
 
@@ -21,15 +21,19 @@ class Kappa:
     first: str
     second: str
     count: int  # pairs judged by both, "unsure" left out
-    observed: float  # share on which they agree
-    kappa: float  # (observed − by chance) / (1 − by chance); NaN where chance alone explains all
+    observed: float  # fraction on which they agree
+    kappa: float  # (observed − chance) / (1 − chance); NaN where the agreement by chance is complete
     standard_error: float  # large-sample, Cohen (1960) eq. 9
 
 
 def cohen_kappa(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """Measure the agreement of two judges on the same pairs (m,): observed share, κ and its standard error.
+    """Return the agreement of two judges on the same pairs (m,): observed fraction, κ and its standard error.
 
-    J. Cohen, "A coefficient of agreement for nominal scales", Educ. Psychol. Meas. 20 (1960), eqs. 1 and 9.
+    Notes
+    -----
+    κ = (p_o − p_c) / (1 − p_c), SE = √(p_o (1 − p_o) / m) / (1 − p_c), with the observed fraction p_o and the fraction
+    by chance p_c = p q + (1 − p)(1 − q). J. Cohen, "A coefficient of agreement for nominal scales", Educ. Psychol.
+    Meas. 20 (1960), eqs. 1 and 9.
     """
     if first.shape != second.shape or first.ndim != 1:
         raise ValueError("both judges must have judged the same pairs")
@@ -48,16 +52,16 @@ def cohen_kappa(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> tuple[fl
 def reviewer_kappas(log: VerdictLog, detected: Mapping[Pair, bool]) -> list[Kappa]:
     """Compare all reviewers with each other and with the detector.
 
-    detected: what the detector said of pairs, named as `canonical` does; of a pair that is not there it saw no contact.
+    detected: whether the detector found a contact, by pairs in canonical order; a missing pair is no contact.
     """
-    said: dict[str, dict[Pair, bool]] = {}
+    verdicts: dict[str, dict[Pair, bool]] = {}
     for pair, entry in log.verdicts():
         if entry.verdict is not Verdict.UNSURE:
-            said.setdefault(entry.reviewer, {})[canonical(pair)] = entry.verdict is Verdict.CONTACT
-    found = [_compare(a, said[a], b, said[b]) for a, b in combinations(sorted(said), 2)]
-    for name in sorted(said):
-        judged = {pair: bool(detected.get(pair, False)) for pair in said[name]}
-        found.append(_compare(name, said[name], DETECTOR, judged))
+            verdicts.setdefault(entry.reviewer, {})[canonical(pair)] = entry.verdict is Verdict.CONTACT
+    found = [_compare(a, verdicts[a], b, verdicts[b]) for a, b in combinations(sorted(verdicts), 2)]
+    for name in sorted(verdicts):
+        judged = {pair: bool(detected.get(pair, False)) for pair in verdicts[name]}
+        found.append(_compare(name, verdicts[name], DETECTOR, judged))
     return found
 
 

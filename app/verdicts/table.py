@@ -1,4 +1,4 @@
-"""Verdicts as a table frame,i,j,verdict,reviewer,time,seconds: contacts judged elsewhere come in, ours go out."""
+"""Import and export verdicts as a table frame,i,j,verdict,reviewer,time,seconds."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import csv
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from ..experiment.reading.input_files import ordinary
+from ..experiment.reading.input_files import regular
 from ..experiment.reading.tables import Table, read_table, write_table
-from .decisions import Bodies
+from .decisions import BodyNames
 from .log import Entry, Origin, Pair, Verdict, VerdictLog, canonical
 
 _OPTIONAL = ("verdict", "reviewer", "time", "seconds")
 
 
 def export_verdicts(log: VerdictLog, file: Path) -> int:
-    """Write every reviewer's last word on every pair; returns how many."""
+    """Write the latest verdict of every reviewer on every pair; return their number."""
     entries = sorted((e for _, e in log.verdicts()), key=lambda e: (e.frame, e.a, str(e.b), e.reviewer))
     write_table(
         file,
@@ -31,19 +31,36 @@ def export_verdicts(log: VerdictLog, file: Path) -> int:
 def import_verdicts(
     log: VerdictLog,
     file: Path,
-    bodies: Bodies,
+    bodies: BodyNames,
     reviewer: str,
     *,
     first_frame: int,
     frame_count: int,
     candidates: Mapping[int, Collection[tuple[int, int]]] | None = None,
-) -> int:
-    """Append the verdicts of a table to the log; returns how many.
+) -> list[Entry]:
+    """Append the verdicts of a table to the log; return the written entries.
 
-    The table has the columns frame, i, j, and may have verdict (absent: every row is a contact), reviewer, time
-    and seconds. Frames are those of the experiment. candidates: pairs of rows by frame of the run; where given, the
-    table lists all contacts of the frames it names, so that every candidate it leaves out is no contact.
-    Raises InputError naming the row for an unknown frame, grain, wall or verdict, and writes nothing then.
+    Parameters
+    ----------
+    log
+        The log.
+    file
+        Table with the columns frame, i, j, and perhaps verdict (absent: every row is a contact), reviewer, time and
+        seconds. Its frames are those of the experiment.
+    bodies
+        Names and rows of the run's bodies.
+    reviewer
+        Name of the reviewer for rows without one.
+    first_frame, frame_count
+        First frame of the run in the experiment, and number of its frames.
+    candidates
+        Pairs of rows by frame of the run. If given, the table lists all contacts of its frames, so that every candidate
+        without a row is no contact.
+
+    Raises
+    ------
+    InputError
+        A frame, grain, wall or verdict is unknown; nothing is written.
     """
     present = [name for name in _OPTIONAL if name in _header(file)]
     table = read_table(file, ("frame", "i", "j", *present))
@@ -63,8 +80,8 @@ def import_verdicts(
         if not first_frame <= number < first_frame + frame_count:
             last = first_frame + frame_count - 1
             raise table.error(row, "frame", f"is not a frame of the results ({first_frame} to {last})")
-        told = table.text("verdict")[row] if "verdict" in present else Verdict.CONTACT.value
-        verdict = told.strip().lower().replace("_", " ")
+        given = table.text("verdict")[row] if "verdict" in present else Verdict.CONTACT.value
+        verdict = given.strip().lower().replace("_", " ")
         if verdict not in {each.value for each in Verdict}:
             raise table.error(row, "verdict", "is none of contact, no contact, unsure")
         pair = canonical((number, a, b))
@@ -84,16 +101,15 @@ def import_verdicts(
             assert isinstance(a, int)
             if canonical((number, a, bodies.name(high))) not in listed:
                 entries.append(Entry(number, reviewer, a, bodies.name(high), Verdict.NO_CONTACT, origin=Origin.IMPORT))
-    log.append_all(entries)
-    return len(entries)
+    return log.append_all(entries)
 
 
 def _header(file: Path) -> list[str]:
     try:
-        with ordinary(file).open(newline="", encoding="utf-8-sig") as stream:
+        with regular(file).open(newline="", encoding="utf-8-sig") as stream:
             return [name.strip() for name in next(csv.reader(stream), [])]
     except (OSError, UnicodeDecodeError, csv.Error):
-        return []  # read_table says what is wrong
+        return []  # read_table reports the error
 
 
 def _grain(table: Table, row: int, text: str) -> int:

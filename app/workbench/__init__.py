@@ -1,2 +1,3 @@
-"""The workbench: one local page on which an experiment is set up, mended, run, inspected and reviewed.
-Whatever is done on it is an ordinary file of the experiment's folder; it computes nothing that a command would not."""
+"""The workbench: one local page to set up an experiment, run, inspect, review and correct it.
+
+Every action of the page writes ordinary files of the experiment's folder, and the commands compute the same."""

@@ -1,1 +1,1 @@
-"""Forces that need no motion: what every estimator has to beat. Touches contacts and the convex program."""
+"""Motion-free force estimates, the baselines for every estimator that uses the motion."""

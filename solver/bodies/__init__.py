@@ -1,1 +1,1 @@
-"""What is there and how it moved: grains, walls, packing, motion, holes. Touches nothing but arrays."""
+"""Grains, walls, packing and their motion between photographs; depends on no other folder of the solver."""

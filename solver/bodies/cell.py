@@ -1,7 +1,7 @@
-"""A periodic cell: the packing goes on beyond its edges as it is inside, in place of walls.
+"""A periodic cell in place of walls, and the minimum-image convention.
 
-Centres may lie anywhere; what counts is where the images of a pair come nearest to each other. A cell that is higher
-than two of the largest diameters, across either of its vectors, has one such image for a pair that touches.
+Centres may lie outside the cell: a pair touches through its nearest images. A pair that touches has one nearest image
+if both heights of the cell exceed two of the largest diameters.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from .grains import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The cell at one instant, and how it deforms."""
+    """The vectors of the cell at one instant, and their rates."""
 
     vectors: Float[Array, "2 2"]  # [m], a and b by rows
-    velocity: Float[Array, "2 2"]  # [m/s] of their ends, the origin at rest
+    velocity: Float[Array, "2 2"]  # [m/s] rates of both vectors
 
     @classmethod
     def at_rest(cls, vectors: Array) -> Cell:
@@ -34,49 +34,77 @@ class Cell:
 
     @property
     def heights(self) -> Array:
-        """Distance between opposite sides (2,) [m], across a and across b, of the cell as upright as it can be."""
+        """Distances (2,) [m] between opposite sides, across a and across b, of the reduced cell."""
         a, b = np.linalg.norm(reduce_vectors(self.vectors)[1], axis=1)
         return self.area / np.array([b, a])
 
     def shift(self, separation: Array) -> Array:
-        """What to add to x_j (c, 2) [m] for the image of j that is nearest to i; separation: x_j − x_i (c, 2) [m].
+        """Return the lattice vectors that lead from j to its image nearest to i.
 
-        Whole numbers of the cell's vectors; zero where the separation is NaN.
+        Parameters
+        ----------
+        separation : (c, 2)
+            x_j − x_i [m].
+
+        Returns
+        -------
+        (c, 2)
+            The shift to add to x_j [m], an integer combination of the cell's vectors; zero where the separation is NaN.
         """
-        _, upright = reduce_vectors(self.vectors)
+        _, reduced = reduce_vectors(self.vectors)
         known = np.isfinite(separation).all(axis=1, keepdims=True)
-        share = np.where(known, separation, 0.0) @ np.linalg.inv(upright)
-        return -np.rint(share) @ upright
+        fraction = np.where(known, separation, 0.0) @ np.linalg.inv(reduced)
+        return -np.rint(fraction) @ reduced
 
     def drift(self, shift: Array) -> Array:
-        """What a shift by whole vectors (c, 2) [m] adds to a velocity (c, 2) [m/s]."""
+        """Return the velocity (c, 2) [m/s] of images relative to their originals; shift: lattice vectors (c, 2) [m]."""
         return np.rint(shift @ np.linalg.inv(self.vectors)) @ self.velocity
 
     def wrapped(self, position: Array) -> Array:
-        """The places (n, 2) [m] as they lie in the cell whose corner is the origin."""
-        share = position @ np.linalg.inv(self.vectors)
-        return (share - np.floor(share)) @ self.vectors
+        """Return positions (n, 2) [m] wrapped into the cell whose corner is the origin."""
+        fraction = position @ np.linalg.inv(self.vectors)
+        return (fraction - np.floor(fraction)) @ self.vectors
 
-    def with_surroundings(self, position: Array, reach: float) -> tuple[Array, NDArray[np.intp]]:
-        """Places (m, 2) [m] in an upright cell and of their images within `reach` [m] of it, and whose they are (m,).
+    def with_images(self, position: Array, reach: float) -> tuple[Array, NDArray[np.intp]]:
+        """Wrap points into the reduced cell and add their images around it.
 
-        The first of them are those of position (n, 2) [m], in order.
+        Parameters
+        ----------
+        position : (n, 2)
+            Points [m].
+        reach
+            Greatest distance of an image from the cell [m].
+
+        Returns
+        -------
+        points : (m, 2)
+            The wrapped points [m] in their order, then their images.
+        owners : (m,)
+            Row of the original of each point.
         """
-        _, upright = reduce_vectors(self.vectors)
-        share = position @ np.linalg.inv(upright)
-        share -= np.floor(share)
-        margin = reach * np.linalg.norm(upright, axis=1)[::-1] / self.area
-        places, owners = [share @ upright], [np.arange(len(position))]
+        _, reduced = reduce_vectors(self.vectors)
+        fraction = position @ np.linalg.inv(reduced)
+        fraction -= np.floor(fraction)
+        margin = reach * np.linalg.norm(reduced, axis=1)[::-1] / self.area
+        points, owners = [fraction @ reduced], [np.arange(len(position))]
         for step in product((-1, 0, 1), repeat=2):
-            moved = share + step
+            moved = fraction + step
             near = np.all((moved > -margin) & (moved < 1.0 + margin), axis=1) & any(step)
-            places.append(moved[near] @ upright)
+            points.append(moved[near] @ reduced)
             owners.append(np.flatnonzero(near))
-        return np.concatenate(places), np.concatenate(owners)
+        return np.concatenate(points), np.concatenate(owners)
 
 
 def reduce_vectors(vectors: Array) -> tuple[NDArray[np.int64], Array]:
-    """The same lattice by its shortest vectors: whole numbers (2, 2) to multiply (2, 2) [m] by, and the product."""
+    """Reduce a lattice basis to its shortest vectors (Lagrange–Gauss).
+
+    Returns
+    -------
+    transform : (2, 2) int
+        Integer matrix T.
+    reduced : (2, 2)
+        T @ vectors [m].
+    """
     steps, short = np.eye(2, dtype=np.int64), vectors.copy()
     while True:
         if short[1] @ short[1] < short[0] @ short[0]:
@@ -88,8 +116,11 @@ def reduce_vectors(vectors: Array) -> tuple[NDArray[np.int64], Array]:
         short = np.stack([short[0], short[1] - times * short[0]])
 
 
-def follow_cell(vectors: Array) -> Array:
-    """The vectors (f, 2, 2) [m] without jumps by whole vectors, as codes make them that keep a sheared cell upright."""
+def unwrap_cell(vectors: Array) -> Array:
+    """Remove the jumps by lattice vectors from cell vectors (f, 2, 2) [m].
+
+    Simulation codes make such jumps where they keep a sheared cell upright.
+    """
     followed = vectors.copy()
     for k in range(1, len(vectors)):
         for one, other in ((1, 0), (0, 1)):
@@ -100,16 +131,26 @@ def follow_cell(vectors: Array) -> Array:
 
 
 def unwrap(position: Array, vectors: Array) -> Array:
-    """Places (f, n, 2) [m] without jumps by whole vectors (f, 2, 2) [m] of the cell, wrapped or not as they were told.
+    """Remove the jumps by lattice vectors from positions, whether they were wrapped or not.
 
-    Each grain begins inside the cell where it is first seen. NaN stays NaN, and what lies between is passed over.
+    Parameters
+    ----------
+    position : (f, n, 2)
+        Positions [m]; NaN stays NaN.
+    vectors : (f, 2, 2)
+        Vectors of the cell [m].
+
+    Returns
+    -------
+    (f, n, 2)
+        Continuous positions [m]. Each grain starts inside the cell in the first frame that shows it.
     """
     inverse = np.linalg.inv(vectors)
-    share = np.einsum("fnk,fkl->fnl", position, inverse)
+    fraction = np.einsum("fnk,fkl->fnl", position, inverse)
     last = np.full(position.shape[1:], 0.5)
-    for each in share:
+    for each in fraction:
         known = np.isfinite(each).all(axis=1)
         jump = np.rint(each[known] - last[known])
         each[known] -= jump
         last[known] = each[known]
-    return np.einsum("fnk,fkl->fnl", share, vectors)
+    return np.einsum("fnk,fkl->fnl", fraction, vectors)

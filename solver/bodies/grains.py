@@ -1,4 +1,4 @@
-"""Grains and their motion: what is known of the bodies before any force is."""
+"""Grains and their motion at one instant."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import NDArray
 
-from solver.bodies.quantity import Quantity
+from ..quantity import Quantity
 
 # Spelt out: since numpy 2.5 NDArray is an alias, in which jaxtyping sees no array.
 Array = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]
@@ -24,11 +24,11 @@ class Grains:
     boundary: Annotated[
         Bool[np.ndarray, " n"] | None,
         Quantity("whether the grain is the packing's boundary: its motion is imposed", dims="grain", since=2),
-    ] = None  # none is
+    ] = None  # None: no grain
 
     def __post_init__(self) -> None:
         if self.boundary is not None and self.boundary.shape != self.radius.shape:
-            raise ValueError("boundary must tell of every grain")
+            raise ValueError(f"boundary must have shape {self.radius.shape}, not {self.boundary.shape}")
         if self.radius.shape != self.mass.shape or self.radius.ndim != 1:
             raise ValueError("radius and mass must be one-dimensional and of equal length")
         if not (np.all(self.radius > 0) and np.all(self.mass > 0)):
@@ -38,7 +38,19 @@ class Grains:
     def of_rods(
         cls, radius: Array, *, density: float, length: float, boundary: NDArray[np.bool_] | None = None
     ) -> Grains:
-        """Make rods of one material: radius (n,) [m], density [kg/m³], length [m]; boundary (n,)."""
+        """Make solid rods of one material, of mass m = ρ L π R².
+
+        Parameters
+        ----------
+        radius : (n,)
+            Radii [m].
+        density
+            ρ [kg/m³].
+        length
+            Length L of the rods [m].
+        boundary : (n,) bool, optional
+            Grains whose motion is imposed.
+        """
         radius = np.ascontiguousarray(radius, dtype=np.float64)
         return cls(radius, density * length * np.pi * radius**2, boundary)
 
@@ -48,7 +60,7 @@ class Grains:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which grains are in balance (n,): all that are no boundary."""
+        """Grains in equilibrium (n,): all but the boundary grains."""
         return np.ones(self.count, np.bool_) if self.boundary is None else ~self.boundary
 
     @property
@@ -63,15 +75,15 @@ class Grains:
 
 @dataclass(frozen=True, slots=True)
 class GrainMotion:
-    """Where the grains are at one instant and how they have moved to get there.
+    """Positions of the grains at one instant and their mean velocities over the interval before it.
 
-    Rows of grains that are not present may hold any number: nobody reads them.
+    Rows of absent grains are never read and may hold any number.
     """
 
     position: Float[Array, "n 2"]  # [m]
     velocity: Float[Array, "n 2"]  # [m/s], the mean over the interval that ends here
     spin: Float[Array, " n"]  # [rad/s], counter-clockwise
-    present: Bool[np.ndarray, " n"]  # False: lost or never seen; takes no part
+    present: Bool[np.ndarray, " n"]  # False: lost or never seen
 
     def __post_init__(self) -> None:
         n = len(self.present)

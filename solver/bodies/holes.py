@@ -1,4 +1,4 @@
-"""Holes in a packing that a rod would fit into: grains that no photograph shows leave them behind."""
+"""Holes in a packing that a rod would fit into, as a grain that no photograph shows leaves them."""
 
 from __future__ import annotations
 
@@ -6,69 +6,83 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.wall_shapes import reach_of_wall
-from solver.bodies.walls import Walls
+from .grains import Array, Grains
+from .wall_shapes import wall_distance
+from .walls import Walls
 
-FITTING = 0.97  # of the smallest radius: the three grains around a hole give way a little
-NATURAL = 0.6  # of the greatest radius: gaps between great grains are that wide without anything missing
-NEIGHBOURS = 12  # nearest centres among which the nearest surface is sought
-FEWEST = 4  # grains that a triangulation needs
-STEPS = 8  # of the walk from a triangle's middle to the middle of its hole
+SMALLEST_FRACTION = 0.97  # of the smallest radius: least size of a hole, as its neighbours move in a little
+LARGEST_FRACTION = 0.6  # of the largest radius: pores between large grains have this radius without a missing grain
+NEIGHBOURS = 12  # nearest centres among which the nearest surface is searched
+MIN_GRAINS = 4  # that a Delaunay triangulation needs
+NEWTON_STEPS = 8  # from the centroid of a triangle to the centre of its hole
 
 
 def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], walls: Walls) -> Array:
-    """Centres (h, 2) [m] of circles of the smallest rod's size, or nearly, that touch neither grains nor walls.
+    """Find empty circles of about the smallest rod's size.
 
-    position (n, 2) [m]; present (n,): the others leave holes. No circle lies over the centre of another.
+    Parameters
+    ----------
+    grains
+        The grains of the packing.
+    position : (n, 2)
+        Centres of the grains [m].
+    present : (n,) bool
+        Grains seen; absent ones leave holes.
+    walls
+        Walls of the frame.
+
+    Returns
+    -------
+    (h, 2)
+        Centres [m] of circles that overlap neither grains nor walls; none covers the centre of another.
     """
     seen = np.flatnonzero(present)
-    if len(seen) < FEWEST or walls.count == 0:
+    if len(seen) < MIN_GRAINS or walls.count == 0:
         return np.empty((0, 2))
-    centre, radius, least = position[seen], grains.radius[seen], _least_room(grains.radius)
+    centre, radius, least_radius = position[seen], grains.radius[seen], _least_radius(grains.radius)
     corner = Delaunay(centre).simplices
-    place = _equally_far(centre[corner], radius[corner])
+    point = _equidistant_points(centre[corner], radius[corner])
     with np.errstate(invalid="ignore"):
         inside = np.all(
-            reach_of_wall(walls.endpoints[None], None if walls.side is None else walls.side[None], place[:, None])[0]
-            >= least,
+            wall_distance(walls.endpoints[None], None if walls.side is None else walls.side[None], point[:, None])[0]
+            >= least_radius,
             1,
         )
-    place = place[inside & np.isfinite(place).all(axis=1)]
+    point = point[inside & np.isfinite(point).all(axis=1)]
     tree = KDTree(centre)
-    # Nearly all places are ruled out by the nearest centre, whose search is quick.
-    place = place[np.asarray(tree.query(place)[0]) - radius.min() >= least]
-    if not len(place):
+    # The nearest centre, quick to find, excludes nearly all points.
+    point = point[np.asarray(tree.query(point)[0]) - radius.min() >= least_radius]
+    if not len(point):
         return np.empty((0, 2))
-    distance, near = tree.query(place, k=min(NEIGHBOURS, len(seen)))
-    room = (np.asarray(distance) - radius[np.asarray(near)]).min(axis=1)
+    distance, near = tree.query(point, k=min(NEIGHBOURS, len(seen)))
+    clearance = (np.asarray(distance) - radius[np.asarray(near)]).min(axis=1)
     found: list[Array] = []
-    for k in np.argsort(-room, kind="stable"):
-        if room[k] < least:
+    for k in np.argsort(-clearance, kind="stable"):
+        if clearance[k] < least_radius:
             break
-        if all(np.hypot(*(place[k] - each)) >= least for each in found):
-            found.append(place[k])
+        if all(np.hypot(*(point[k] - each)) >= least_radius for each in found):
+            found.append(point[k])
     return np.array(found).reshape(-1, 2)
 
 
-def _least_room(radius: Array) -> float:
-    return max(FITTING * float(radius.min()), NATURAL * float(radius.max()))
+def _least_radius(radius: Array) -> float:
+    return max(SMALLEST_FRACTION * float(radius.min()), LARGEST_FRACTION * float(radius.max()))
 
 
-def _equally_far(centre: Array, radius: Array) -> Array:
-    """Points (h, 2) equally far from three rims, of centre (h, 3, 2) and radius (h, 3), by Newton's method."""
+def _equidistant_points(centre: Array, radius: Array) -> Array:
+    """Return points (h, 2) equidistant from three circles of centre (h, 3, 2) and radius (h, 3) (Newton's method)."""
     point = centre.mean(axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        for _ in range(STEPS):
+        for _ in range(NEWTON_STEPS):
             apart = point[:, None] - centre
             distance = np.linalg.norm(apart, axis=2)
-            room = distance - radius
-            toward = apart / distance[:, :, None]
-            matrix = toward[:, 1:] - toward[:, :1]
-            wrong = room[:, 1:] - room[:, :1]
+            clearance = distance - radius
+            unit = apart / distance[:, :, None]
+            matrix = unit[:, 1:] - unit[:, :1]
+            residual = clearance[:, 1:] - clearance[:, :1]
             pivot = matrix[:, 0, 0] * matrix[:, 1, 1] - matrix[:, 0, 1] * matrix[:, 1, 0]
             point = point - np.stack([
-                (matrix[:, 1, 1] * wrong[:, 0] - matrix[:, 0, 1] * wrong[:, 1]) / pivot,
-                (matrix[:, 0, 0] * wrong[:, 1] - matrix[:, 1, 0] * wrong[:, 0]) / pivot,
+                (matrix[:, 1, 1] * residual[:, 0] - matrix[:, 0, 1] * residual[:, 1]) / pivot,
+                (matrix[:, 0, 0] * residual[:, 1] - matrix[:, 1, 0] * residual[:, 0]) / pivot,
             ], axis=1)  # fmt: skip
     return point

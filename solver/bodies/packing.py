@@ -1,4 +1,4 @@
-"""What does not change from frame to frame: the grains, their material, their length, the loads on the walls."""
+"""The packing: grains, material, rod length and wall pressures, constant over a sequence."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.motion import Snapshot
-from solver.bodies.wall_shapes import Sides
-from solver.bodies.walls import Walls
+from .grains import Array, Grains
+from .motion import Snapshot
+from .wall_shapes import Sides
+from .walls import Walls
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
+    """Friction, restitution weight and gravity, as the contact laws need them."""
+
     friction: float
     wall_friction: float
     formal_weight: float = 0.0  # η in [0, ½]
@@ -25,23 +27,23 @@ class Material:
         if self.friction < 0 or self.wall_friction < 0:
             raise ValueError("a coefficient of friction cannot be negative")
         if not 0.0 <= self.formal_weight <= 0.5:
-            raise ValueError(f"the formal weight lies in [0, 0.5], not at {self.formal_weight}")
+            raise ValueError(f"the formal weight must be in [0, 0.5], not {self.formal_weight}")
 
     def friction_at(self, with_wall: NDArray[np.bool_]) -> Array:
-        """Coefficient of friction of contacts with a wall or between grains (c,)."""
+        """Return the coefficient of friction of contacts (c,), with a wall or between grains."""
         return np.where(with_wall, self.wall_friction, self.friction)
 
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """What does not change from frame to frame."""
+    """Quantities that are constant over a sequence."""
 
     grains: Grains
     length: float  # [m] of the rods
     material: Material
-    # [Pa] on plates, NaN where the motion is imposed; of a load that was measured, what it makes on average
+    # [Pa] on plates, NaN where the motion is imposed; of a measured load its mean over the frames
     pressure: Float[Array, " w"]
-    inferred: int = 0  # grains that no photograph shows
+    inferred: int = 0  # number of grains that no photograph shows
 
     @property
     def weight(self) -> Array:
@@ -50,11 +52,11 @@ class Packing:
 
     @property
     def scale_is_known(self) -> bool:
-        """Whether loads or weight fix the scale of the forces; else they are known up to a factor."""
+        """Whether loads or weight fix the scale of the forces; otherwise they are known up to a factor."""
         return bool(np.isfinite(self.pressure).any() or any(self.material.gravity))
 
     def mean_pressure(self, snapshot: Snapshot) -> float:
-        """Mean pressure of the plates as they are loaded at a snapshot [Pa]; 0 without one."""
+        """Return the mean pressure of the plates at a snapshot [Pa]; 0 without a plate."""
         plates = np.isfinite(self.pressure)
         if snapshot.load is None or not plates.any():
             return float(self.pressure[plates].mean()) if plates.any() else 0.0
@@ -62,18 +64,25 @@ class Packing:
         return float((walls.load[plates] / (walls.face[plates] * self.length)).mean())
 
     def load(self, endpoints: Array, side: Sides = None, measured: Array | None = None) -> Array:
-        """Load on every wall (w,) [N] of given endpoints (w, 2, 2) [m].
+        """Return the load on every wall (w,) [N], NaN where the motion is imposed.
 
-        measured (w,) [N]: loads that were measured, which count instead of a pressure; NaN: none.
+        Parameters
+        ----------
+        endpoints : (w, 2, 2)
+            Walls [m].
+        side : (w,), optional
+            Shapes of the walls.
+        measured : (w,), optional
+            Measured loads [N], used instead of the pressure; NaN: not measured.
         """
         pressed = self.pressure * Walls.at_rest(endpoints, side=side).face * self.length
         return pressed if measured is None else np.where(np.isfinite(measured), measured, pressed)
 
     def walls(self, endpoints: Array, side: Sides = None, measured: Array | None = None) -> Walls:
-        """The walls at rest at these endpoints (w, 2, 2) [m], under their loads."""
+        """Return the walls of endpoints (w, 2, 2) [m] at rest under their loads; arguments as of `load`."""
         return Walls.at_rest(endpoints, self.load(endpoints, side, measured), side)
 
     def walls_of(self, snapshot: Snapshot) -> Walls:
-        """The walls of a snapshot at rest, under the loads that they carry there."""
+        """Return the walls of a snapshot at rest under their loads."""
         load = self.load(snapshot.endpoints, snapshot.side, snapshot.load)
-        return Walls.at_rest(snapshot.endpoints, load, snapshot.side, snapshot.cell)
+        return Walls.at_rest(snapshot.endpoints, load, snapshot.side, snapshot.cell, snapshot.plate)

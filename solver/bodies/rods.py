@@ -1,4 +1,4 @@
-"""What all rods of a packing have in common, and the packing that rods of given radii make."""
+"""Material and length of the rods, and the packing of rods of given radii."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.packing import Material, Packing
+from .grains import Array, Grains
+from .packing import Material, Packing
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,23 +22,34 @@ class RodMaterial:
     wall_friction: float | None = None  # None: as friction
     formal_weight: float = 0.0  # η in [0, ½]
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
-    friction_measured: bool = False  # friction is a first guess: it is found from the motion
-    stiffness: float | Literal["rigid", "estimate"] | None = None  # [Pa] of a contact, per length; None: as gaps show
+    friction_measured: bool = False  # True: `friction` is an initial guess, estimated from the motion
+    stiffness: float | Literal["rigid", "estimate"] | None = (
+        None  # [Pa] contact stiffness per length; None: estimated from the gaps where they show it
+    )
 
     def at_walls(self) -> float:
-        """The coefficient of friction at walls."""
+        """Return the coefficient of friction at walls."""
         return self.friction if self.wall_friction is None else self.wall_friction
 
     def friction_law(self) -> Material:
-        """What of it the contacts need."""
+        """Return friction, formal weight and gravity as `Material`."""
         return Material(self.friction, self.at_walls(), self.formal_weight, self.gravity)
 
     def pack(
         self, radius: Array, pressure: Array, inferred: int = 0, boundary: NDArray[np.bool_] | None = None
     ) -> Packing:
-        """Make a packing of rods of radius (n,) [m]; pressure (w,) [Pa] on walls, NaN where motion is imposed.
+        """Make a packing of rods.
 
-        inferred: rods that no photograph shows; boundary (n,): rods whose motion is imposed.
+        Parameters
+        ----------
+        radius : (n,)
+            Radii [m].
+        pressure : (w,)
+            Pressure on walls [Pa], NaN where the motion is imposed.
+        inferred
+            Number of rods that no photograph shows.
+        boundary : (n,) bool, optional
+            Rods whose motion is imposed.
         """
         return Packing(
             Grains.of_rods(radius, density=self.density, length=self.length, boundary=boundary),

@@ -1,4 +1,4 @@
-"""How a packing as a whole deforms: the homogeneous motion that fits those of its grains best."""
+"""Strain of a packing: the homogeneous motion that fits the motion of its grains best."""
 
 from __future__ import annotations
 
@@ -6,29 +6,48 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from .grains import Array
 
-FEWEST = 4  # grains below which nothing is said
+MIN_GRAINS = 4  # fewer give no gradient
 
 
 def displacement_gradient(
-    position: Float[Array, "n 2"], displacement: Float[Array, "n 2"], here: NDArray[np.bool_]
+    position: Float[Array, "n 2"], displacement: Float[Array, "n 2"], present: NDArray[np.bool_]
 ) -> Float[Array, "2 2"]:
-    """Give ∂u_a/∂x_b of the grains (n,) that are here, by least squares; NaN where they are too few.
+    """Fit the displacement gradient ∂u_a/∂x_b by least squares.
 
-    position: before the displacement [m], or after it, which the gradient then refers to.
+    Parameters
+    ----------
+    position : (n, 2)
+        Positions [m] before or after the displacement; the gradient refers to these.
+    displacement : (n, 2)
+        Displacements [m].
+    present : (n,) bool
+        Grains that are used.
+
+    Returns
+    -------
+    (2, 2)
+        The gradient; NaN for fewer than MIN_GRAINS grains.
     """
-    if here.sum() < FEWEST:
+    if present.sum() < MIN_GRAINS:
         return np.full((2, 2), np.nan)
-    x = position[here]
+    x = position[present]
     design = np.column_stack([x - x.mean(axis=0), np.ones(len(x))])
-    return np.asarray(np.linalg.lstsq(design, displacement[here], rcond=None)[0][:2].T, dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(design, displacement[present], rcond=None)[0][:2].T, dtype=np.float64)
 
 
 def logarithmic_strain(gradient: Float[Array, "2 2"]) -> Float[Array, "2 2"]:
-    """Strain ½ ln(F Fᵀ) of a displacement gradient before the motion, F = 1 + gradient; extension is positive.
+    """Return the logarithmic (Hencky) strain of a displacement gradient; extension is positive.
 
-    It is that of the whole way, however far: rotations leave it as it is. NaN where the gradient is none.
+    Returns
+    -------
+    (2, 2)
+        The strain; NaN where the gradient is not finite or det F ≤ 0.
+
+    Notes
+    -----
+    ε = ½ ln(F Fᵀ) with F = 1 + ∂u/∂X, the gradient by positions before the motion. Rotations do not change it.
     """
     deformation = np.eye(2) + gradient
     if not np.isfinite(deformation).all() or not np.linalg.det(deformation) > 0.0:
@@ -37,13 +56,13 @@ def logarithmic_strain(gradient: Float[Array, "2 2"]) -> Float[Array, "2 2"]:
     return np.asarray((axes * (0.5 * np.log(stretch))) @ axes.T, dtype=np.float64)
 
 
-def shear_of(strain: Float[Array, "2 2"]) -> float:
-    """Difference of the principal strains [rad], the amount of shear where it is small; NaN of NaN."""
+def shear_strain(strain: Float[Array, "2 2"]) -> float:
+    """Return the difference of the principal strains, the shear angle [rad] where it is small; NaN for NaN."""
     return float(np.hypot(strain[0, 0] - strain[1, 1], strain[0, 1] + strain[1, 0]))
 
 
-def way_of(step: Float[Array, "2 2"]) -> float:
-    """How far a strain goes: its shear, or its greatest principal strain where that is greater; NaN of NaN."""
+def strain_magnitude(step: Float[Array, "2 2"]) -> float:
+    """Return the shear strain or the greatest absolute principal strain, whichever is greater; NaN for NaN."""
     if not np.isfinite(step).all():
         return float("nan")
-    return max(shear_of(step), float(np.abs(np.linalg.eigvalsh(0.5 * (step + step.T))).max()))
+    return max(shear_strain(step), float(np.abs(np.linalg.eigvalsh(0.5 * (step + step.T))).max()))

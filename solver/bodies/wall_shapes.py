@@ -1,8 +1,8 @@
-"""The shapes of walls: how far a place is from one, and how one moves between two photographs.
+"""Shapes of walls: distance of a point from a wall, and displacement of a wall between two photographs.
 
-Every wall is two points. Those of a straight wall are its ends, the packing to the left of 0 → 1. Those of a circle are
-the ends of a diameter, which turns with it; the packing is inside it or outside. Arrays of walls may have any leading
-axes (…); `side` None says that all are straight.
+Every wall is given by two points. Those of a straight wall are its ends, with the packing to the left of 0 → 1. Those
+of a circle are the ends of a diameter that rotates with it, with the packing inside or outside. Arrays of walls may
+have any leading axes (…); side = None: all walls are straight.
 """
 
 from __future__ import annotations
@@ -10,63 +10,76 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from .grains import Array
 
-STRAIGHT, IN, OUT = 0, 1, -1  # what a wall is: straight, or a circle with the packing inside or outside
-CORNERS = 72  # of a circle as it is drawn
+STRAIGHT, IN, OUT = 0, 1, -1  # shape of a wall: straight, or a circle with the packing inside or outside
+CORNERS = 72  # of the polygon that draws a circle
 Sides = NDArray[np.int8] | None
 
 
 def all_sides(side: Sides, count: int) -> NDArray[np.int8]:
-    """What each of so many walls is (w,)."""
+    """Return the shape of every wall (w,), STRAIGHT where `side` is None."""
     return np.full(count, STRAIGHT, np.int8) if side is None else side
 
 
-def circle_ends(centre: Array, radius: Array, turn: Array) -> Array:
-    """Ends (…, 2, 2) [m] of the diameters of circles: centre (…, 2) [m], radius (…) [m], turn (…) [rad]."""
-    arm = radius[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+def circle_ends(centre: Array, radius: Array, angle: Array) -> Array:
+    """Return the ends (…, 2, 2) [m] of diameters; centre (…, 2) [m], radius (…) [m], angle (…) [rad]."""
+    arm = radius[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return np.stack([centre - arm, centre + arm], axis=-2)
 
 
-def circle_of(endpoints: Array) -> tuple[Array, Array, Array]:
-    """Centre (…, 2) [m], radius (…) [m] and turn (…) [rad], wrapped, of circles with these diameters (…, 2, 2)."""
+def circle_parameters(endpoints: Array) -> tuple[Array, Array, Array]:
+    """Return centre (…, 2) [m], radius (…) [m] and angle (…) [rad] in (−π, π] of circles of diameters (…, 2, 2)."""
     along = endpoints[..., 1, :] - endpoints[..., 0, :]
     radius = 0.5 * np.linalg.norm(along, axis=-1)
     return endpoints.mean(axis=-2), radius, np.arctan2(along[..., 1], along[..., 0])
 
 
 def outlines(endpoints: Array, side: Sides) -> list[Array]:
-    """Lines that draw walls (w, 2, 2): a straight one's ends (2, 2), points round a circle (CORNERS + 1, 2) [m]."""
+    """Return a line for every wall (w, 2, 2): the ends (2, 2) [m], or points along a circle (CORNERS + 1, 2) [m]."""
     shape = all_sides(side, len(endpoints))
-    centre, radius, turn = circle_of(endpoints)
-    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    centre, radius, angle = circle_parameters(endpoints)
+    corner = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
     lines = []
     for w, ends in enumerate(endpoints):
-        around = turn[w] + angle
+        around = angle[w] + corner
         circle = centre[w] + radius[w] * np.stack([np.cos(around), np.sin(around)], axis=1)
         lines.append(ends if shape[w] == STRAIGHT else circle)
     return lines
 
 
 def outward_normals(endpoints: Array) -> Array:
-    """Unit normals (…, 2) that point out of the packing, of straight walls with endpoints (…, 2, 2) [m]."""
+    """Return the unit normals (…, 2) out of the packing, of straight walls with endpoints (…, 2, 2) [m]."""
     along = endpoints[..., 1, :] - endpoints[..., 0, :]
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     return np.stack([along[..., 1], -along[..., 0]], axis=-1)
 
 
-def reach_of_wall(endpoints: Array, side: Sides, place: Array) -> tuple[Array, Array]:
-    """Distance (…) [m] of places (…, 2) from walls (…, 2, 2), negative beyond them, and outward normals (…, 2).
+def wall_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Array, Array]:
+    """Return the distance of points from walls and the outward normals there.
 
-    side (…), broadcast as the walls are. A straight wall counts as an endless line. A place in a circle's centre has
-    no normal: it is NaN.
+    Parameters
+    ----------
+    endpoints : (…, 2, 2)
+        Walls [m]; a straight wall counts as an infinite line.
+    side : (…)
+        Shapes of the walls, broadcast as the walls.
+    point : (…, 2)
+        Points [m].
+
+    Returns
+    -------
+    distance : (…)
+        Distance [m], negative beyond the wall.
+    normal : (…, 2)
+        Outward unit normals; NaN at the centre of a circle.
     """
     outward = outward_normals(endpoints)
-    distance = np.einsum("...k,...k->...", endpoints[..., 0, :] - place, outward)
+    distance = np.einsum("...k,...k->...", endpoints[..., 0, :] - point, outward)
     if side is None or not np.any(side):
-        return distance, np.broadcast_to(outward, np.broadcast_shapes(outward.shape, place.shape))
-    centre, radius, _ = circle_of(endpoints)
-    from_centre = place - centre
+        return distance, np.broadcast_to(outward, np.broadcast_shapes(outward.shape, point.shape))
+    centre, radius, _ = circle_parameters(endpoints)
+    from_centre = point - centre
     apart = np.linalg.norm(from_centre, axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         radial = np.where(apart > 0.0, side, np.nan)[..., None] * from_centre / apart[..., None]
@@ -74,54 +87,66 @@ def reach_of_wall(endpoints: Array, side: Sides, place: Array) -> tuple[Array, A
     return np.where(curved, side * (radius - apart), distance), np.where(curved[..., None], radial, outward)
 
 
-def beside_wall(endpoints: Array, side: Sides, place: Array, margin: Array) -> NDArray[np.bool_]:
-    """Whether places (…, 2) project onto walls (…, 2, 2), give or take a margin (…) [m]; a circle is beside all."""
+def beside_wall(endpoints: Array, side: Sides, point: Array, margin: Array) -> NDArray[np.bool_]:
+    """Return whether points (…, 2) project onto walls (…, 2, 2), within a margin (…) [m]; True for circles."""
     along = endpoints[..., 1, :] - endpoints[..., 0, :]
     length = np.linalg.norm(along, axis=-1)
-    s = np.einsum("...k,...k->...", place - endpoints[..., 0, :], along / length[..., None])
+    s = np.einsum("...k,...k->...", point - endpoints[..., 0, :], along / length[..., None])
     beside = (s > -margin) & (s < length + margin)
     return beside if side is None else beside | (side != STRAIGHT)
 
 
-def walls_moved(former: Array, later: Array, side: Sides, at: Array | None = None) -> Array:
-    """Displacement (…, 2, 2) [m] of the endpoints that leads to walls `later` (…, 2, 2) from `former`.
+def wall_displacement(former: Array, later: Array, side: Sides, at: Array | None = None) -> Array:
+    """Return the displacement of the endpoints from walls `former` to walls `later`.
 
-    A circle's is that of its diameter as it lies in `at` (the later instant unless given): moved, widened and turned,
-    as at a rate, so that a turn does not seem to narrow it.
+    Parameters
+    ----------
+    former, later : (…, 2, 2)
+        Walls at two instants [m].
+    side : (…)
+        Shapes of the walls.
+    at : (…, 2, 2), optional
+        Instant of the diameter to which a circle's displacement refers; the later one by default.
+
+    Returns
+    -------
+    (…, 2, 2)
+        Displacements [m]. Those of a circle are a rate times the interval: translation, widening and rotation of the
+        diameter to first order, so that a finite rotation does not narrow it.
     """
     straight = later - former
     if side is None or not np.any(side):
         return straight
-    centre, radius, turn = circle_of(later)
-    former_centre, former_radius, former_turn = circle_of(former)
-    by = (turn - former_turn + np.pi) % (2.0 * np.pi) - np.pi
-    place, wide = (turn, radius) if at is None else circle_of(at)[2:0:-1]
-    unit = np.stack([np.cos(place), np.sin(place)], axis=-1)
+    centre, radius, angle = circle_parameters(later)
+    former_centre, former_radius, former_angle = circle_parameters(former)
+    rotation = (angle - former_angle + np.pi) % (2.0 * np.pi) - np.pi
+    phase, size = (angle, radius) if at is None else circle_parameters(at)[2:0:-1]
+    unit = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
     across = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
-    arm = (radius - former_radius)[..., None] * unit + (wide * by)[..., None] * across
+    arm = (radius - former_radius)[..., None] * unit + (size * rotation)[..., None] * across
     shift = centre - former_centre
     curved = np.stack([shift - arm, shift + arm], axis=-2)
     return np.where((side != STRAIGHT)[..., None, None], curved, straight)
 
 
-def moved_back(endpoints: Array, moved: Array, side: Sides) -> Array:
-    """Walls (…, 2, 2) [m] as they were before a displacement of `walls_moved`; a circle stays one."""
+def walls_before(endpoints: Array, moved: Array, side: Sides) -> Array:
+    """Return walls (…, 2, 2) [m] before a displacement given by `wall_displacement`; a circle remains a circle."""
     straight = endpoints - moved
     if side is None or not np.any(side):
         return straight
-    centre, radius, turn = circle_of(endpoints)
+    centre, radius, angle = circle_parameters(endpoints)
     arm = 0.5 * (moved[..., 1, :] - moved[..., 0, :])
-    unit = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    unit = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     widened = np.einsum("...k,...k->...", arm, unit)
-    turned = (unit[..., 0] * arm[..., 1] - unit[..., 1] * arm[..., 0]) / radius
-    curved = circle_ends(centre - moved.mean(axis=-2), radius - widened, turn - turned)
+    rotation = (unit[..., 0] * arm[..., 1] - unit[..., 1] * arm[..., 0]) / radius
+    curved = circle_ends(centre - moved.mean(axis=-2), radius - widened, angle - rotation)
     return np.where((side != STRAIGHT)[..., None, None], curved, straight)
 
 
-def walls_between(one: Array, two: Array, share: float, side: Sides) -> Array:
-    """Walls (…, 2, 2) [m] at a share of the way from one state to another."""
-    straight = (1.0 - share) * one + share * two
+def interpolate_walls(one: Array, two: Array, fraction: float, side: Sides) -> Array:
+    """Return walls (…, 2, 2) [m] at a fraction of the displacement from one state to another."""
+    straight = (1.0 - fraction) * one + fraction * two
     if side is None or not np.any(side):
         return straight
-    curved = moved_back(two, (1.0 - share) * walls_moved(one, two, side), side)
+    curved = walls_before(two, (1.0 - fraction) * wall_displacement(one, two, side), side)
     return np.where((side != STRAIGHT)[..., None, None], curved, straight)

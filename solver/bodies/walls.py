@@ -1,7 +1,7 @@
-"""Walls: straight segments or circles whose motion is imposed, or plates that carry a load.
+"""Walls: straight segments or circles whose motion is imposed, or plates under a load.
 
-A straight wall is directed: the packing lies to the LEFT of endpoint 0 → endpoint 1. The endpoints of a circular one
-are the ends of a diameter that turns with it: centre, radius and rotation in the same four numbers.
+A straight wall is directed: the packing lies to the LEFT of endpoint 0 → endpoint 1. The endpoints of a circular wall
+are the ends of a diameter that rotates with it, which give its centre, radius and rotation.
 """
 
 from __future__ import annotations
@@ -9,29 +9,30 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int8
+from jaxtyping import Float, Int8, Int32
 from numpy.typing import NDArray
 
-from solver.bodies.cell import Cell
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, reach_of_wall
+from .cell import Cell
+from .grains import Array
+from .wall_shapes import STRAIGHT, Sides, all_sides, wall_distance
 
 
 @dataclass(frozen=True, slots=True)
 class Walls:
     """The walls at one instant.
 
-    Every wall has its tangential motion imposed. Along its normal either the motion is
-    imposed too (`load` is NaN), or the wall is a rigid plate, free along its normal, that
-    is pressed against the packing by `load`. A circle under load is free to widen: its load is the sum of the normal
-    forces on it.
+    The tangential motion of every wall is imposed. Along its normal either the motion is imposed too (`load` is NaN),
+    or the wall is a rigid plate, free along its normal and pressed against the packing by `load`. A circle under load
+    changes its radius freely; its load is the sum of the normal forces on it. A wall that is fixed to a plate, such as
+    a corner disc, moves with it: free along the plate's normal, it carries part of the plate's load.
     """
 
     endpoints: Float[Array, "w 2 2"]  # [m], wall, end, (x, y)
     velocity: Float[Array, "w 2 2"]  # [m/s], of the endpoints
     load: Float[Array, " w"]  # [N], NaN where the normal motion is imposed
     side: Int8[np.ndarray, " w"] | None = None  # STRAIGHT, or a circle's: IN, OUT; None: all straight
-    cell: Cell | None = None  # the packing goes on beyond its edges; there are no walls then
+    cell: Cell | None = None  # periodic cell in place of walls
+    plate: Int32[np.ndarray, " w"] | None = None  # loaded wall that it is fixed to, −1: none; None: none is fixed
 
     def __post_init__(self) -> None:
         w = len(self.load)
@@ -44,11 +45,16 @@ class Walls:
 
     @classmethod
     def at_rest(
-        cls, endpoints: Array, load: Array | None = None, side: Sides = None, cell: Array | None = None
+        cls,
+        endpoints: Array,
+        load: Array | None = None,
+        side: Sides = None,
+        cell: Array | None = None,
+        plate: NDArray[np.int32] | None = None,
     ) -> Walls:
-        """Walls (w, 2, 2) [m] that do not move, under loads (w,) [N] if there are any; cell: its vectors (2, 2) [m]."""
+        """Make walls (w, 2, 2) [m] at rest, with loads (w,) [N] if given; cell: its vectors (2, 2) [m]."""
         load = np.full(len(endpoints), np.nan) if load is None else load
-        return cls(endpoints, np.zeros_like(endpoints), load, side, None if cell is None else Cell.at_rest(cell))
+        return cls(endpoints, np.zeros_like(endpoints), load, side, None if cell is None else Cell.at_rest(cell), plate)
 
     @property
     def count(self) -> int:
@@ -56,7 +62,7 @@ class Walls:
 
     @property
     def sides(self) -> NDArray[np.int8]:
-        """What each wall is (w,): STRAIGHT, or a circle with the packing IN or OUT of it."""
+        """Shape of every wall (w,): STRAIGHT, or a circle with the packing inside (IN) or outside (OUT)."""
         return all_sides(self.side, self.count)
 
     @property
@@ -71,7 +77,7 @@ class Walls:
 
     @property
     def face(self) -> Array:
-        """Length along which the packing meets every wall: that of a segment, or a circumference (w,) [m]."""
+        """Length of the surface of every wall: of the segment, or the circumference (w,) [m]."""
         return np.where(self.curved, np.pi, 1.0) * self.length
 
     @property
@@ -86,10 +92,7 @@ class Walls:
 
     @property
     def outward(self) -> Array:
-        """Unit normal that points out of the packing (w, 2): the contact normal of a grain on this wall.
-
-        NaN of a circle, where it depends on the place: `reach` gives it.
-        """
+        """Unit normal out of the packing (w, 2), the contact normal of a grain on this wall; NaN of a circle."""
         d = self.direction
         return np.where(self.curved[:, None], np.nan, np.stack([d[:, 1], -d[:, 0]], axis=1))
 
@@ -98,14 +101,50 @@ class Walls:
         """Which walls are plates under load (w,)."""
         return np.isfinite(self.load)
 
-    def reach(self, wall: NDArray[np.integer], place: Array) -> tuple[Array, Array]:
-        """Distance (c,) [m] of places (c, 2) [m] from walls (c,), negative beyond them, and outward normals (c, 2)."""
-        return reach_of_wall(self.endpoints[wall], None if self.side is None else self.side[wall], place)
+    @property
+    def carrier(self) -> NDArray[np.int32]:
+        """Return the plate under load that every wall belongs to (w,), itself or another; −1: its motion is imposed."""
+        own = np.where(self.loaded, np.arange(self.count), -1).astype(np.int32)
+        if self.plate is None:
+            return own
+        other = np.append(own, np.int32(-1))[self.plate]
+        return np.where(self.loaded, own, other).astype(np.int32)
+
+    def plate_components(self, wall: NDArray[np.integer], normal: Array) -> tuple[NDArray[np.int32], Array, Array]:
+        """Return how forces on walls act on the free motion of their plates.
+
+        Parameters
+        ----------
+        wall : (c,)
+            Walls of contacts.
+        normal : (c, 2)
+            Contact normals, out of the packing.
+
+        Returns
+        -------
+        plate : (c,)
+            Carrier of each wall; the wall itself where its motion is imposed.
+        along_normal, along_tangent : (c,)
+            n·p and t·p, with p the outward normal of the plate: 1 and 0 on the plate itself, also on a circle under
+            load.
+        """
+        carrier = self.carrier[wall]
+        fixed = (carrier >= 0) & (carrier != wall)
+        plate = np.where(carrier >= 0, carrier, wall).astype(np.int32)
+        outward = self.outward[plate]
+        along_normal = np.where(fixed, np.einsum("ij,ij->i", normal, outward), 1.0)
+        along_tangent = np.where(fixed, normal[:, 0] * outward[:, 1] - normal[:, 1] * outward[:, 0], 0.0)
+        return plate, along_normal, along_tangent
+
+    def distance(self, wall: NDArray[np.integer], place: Array) -> tuple[Array, Array]:
+        """Return distances (c,) [m] of points (c, 2) [m] from walls (c,), and outward normals; see `wall_distance`."""
+        return wall_distance(self.endpoints[wall], None if self.side is None else self.side[wall], place)
 
     def velocity_at(self, wall: NDArray[np.int32], point: Array) -> Array:
-        """Velocity of wall `wall` (c,) at `point` (c, 2) [m], rigid motion between its endpoints (c, 2) [m/s].
+        """Return the velocity (c, 2) [m/s] of walls (c,) at points (c, 2) [m].
 
-        A circle also widens with its radius: its points move by the similarity that moves the diameter.
+        A segment moves linearly between its endpoints. A circle moves by the similarity transformation of its diameter,
+        widening included.
         """
         start, end = self.endpoints[wall, 0], self.endpoints[wall, 1]
         along = end - start
@@ -114,7 +153,7 @@ class Walls:
         v0, v1 = self.velocity[wall, 0], self.velocity[wall, 1]
         velocity = v0 + s[:, None] * (v1 - v0)
         if self.side is not None:
-            off = (along[:, 0] * (point - start)[:, 1] - along[:, 1] * (point - start)[:, 0]) / square
-            turned = np.stack([-(v1 - v0)[:, 1], (v1 - v0)[:, 0]], axis=1)
-            velocity += np.where(self.curved[wall], off, 0.0)[:, None] * turned
+            offset = (along[:, 0] * (point - start)[:, 1] - along[:, 1] * (point - start)[:, 0]) / square
+            rotated = np.stack([-(v1 - v0)[:, 1], (v1 - v0)[:, 0]], axis=1)
+            velocity += np.where(self.curved[wall], offset, 0.0)[:, None] * rotated
         return velocity

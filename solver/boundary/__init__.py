@@ -1,1 +1,1 @@
-"""What was measured of the boundary, made what it must have been: rigid bars that meet, seen by one camera."""
+"""Corrections of the measured boundary: rigid bars, walls that continue beyond their ends, the camera's motion."""

@@ -1,8 +1,8 @@
-"""Walls are rigid bars: the motion along a bar is that of its own points, not of the corners where bars meet.
+"""Motion of rigid bars whose ends are given as corners, where bars meet, instead of points of the bar.
 
-A person marks where bars meet. As the packing dilates such a corner slides along the bar, so that the distance of the
-two corners changes, which that of two points of a bar cannot. What share of the change belongs to either end is told by
-the grains: one that rolls on the wall without sliding, as part of those that bear do at any time, moves with the bar.
+As the packing dilates, a corner slides along the bar, so that the distance of two corners changes; that of two points
+of a bar cannot. Grains that roll on the wall without sliding move with the bar and determine the fraction of the change
+that happens at each end.
 """
 
 from __future__ import annotations
@@ -13,102 +13,154 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import Quantity
-from solver.bodies.wall_shapes import STRAIGHT, all_sides, outward_normals
-from solver.calibration.gaps import MeasuredSequence
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import STRAIGHT, all_sides, outward_normals
+from ..calibration.gaps import MeasuredSequence
+from ..quantity import Quantity
 
-STRETCH = 4.0  # standard deviations of a length by which the ends of a rigid bar may come apart …
-LEAST_STRETCH = 1e-4  # … and the share of the length
+MAX_STRETCH_SDS = 4.0  # standard deviations of a length: smaller changes are noise …
+MIN_STRETCH = 1e-4  # … and of the length
 TOUCHING = 4.0  # standard deviations of a gap, and …
-MISPLACED = 1e-2  # … mean radii by which its wall and its rim may be told wrong
+WALL_TOLERANCE = 1e-2  # … mean radii: half the width of the gaps of touching grains
+COMMON_ERROR = 5e-2  # mean radii: error of the given wall and of all radii together, at most
+FEWEST_TOUCHING = 10  # poses of touching grains from which the motion of a bar is read
 SLIP_SIGMAS = 2.8  # noise of a grain's surface displacement, of a position: as between grains
-SHARES = np.linspace(-0.5, 1.5, 201)  # of the change of length, that happens at end 0
-NEARLY = 0.97  # of the best agreement: an end that is as good as held by the bar is
+END_FRACTIONS = np.linspace(-0.5, 1.5, 201)  # trial fractions of the change of length at end 0
+HINGE_AGREEMENT = 0.97  # of the best agreement: from here on a fraction of 0 or 1 is preferred
 
 
 @dataclass(frozen=True, slots=True)
 class Bars:
-    """How the told ends of walls move along them."""
+    """Motion of the given ends of walls along the bars."""
 
     slip: Annotated[
         Array,
         Quantity(
-            "sliding of the told ends along the bar since the frame before, mean of both, towards end 1", "m",
+            "sliding of the given ends along the bar since the frame before, mean of both, towards end 1", "m",
             "frame wall", since=2, path="walls/slip",
         ),
     ]  # fmt: skip
     corner: Annotated[
-        NDArray[np.bool_], Quantity("whether the told ends slide along the bar", dims="wall", since=2, absent=False)
+        NDArray[np.bool_], Quantity("whether the given ends slide along the bar", dims="wall", since=2, absent=False)
     ]
-    stretch: Annotated[Array, Quantity("greatest change of the told length, over the length", dims="wall", since=2)]
-    share: Annotated[Array, Quantity("of the change of length that happens at end 0; NaN: none", dims="wall", since=2)]
+    stretch: Annotated[Array, Quantity("greatest change of the given length, over the length", dims="wall", since=2)]
+    end_fraction: Annotated[
+        Array,
+        Quantity(
+            "fraction of the change of length that happens at end 0; NaN: none, or unknown", dims="wall", since=2,
+            path="boundary/bars/share",
+        ),
+    ]  # fmt: skip
 
 
-def find_bars(sequence: MeasuredSequence, noise: float, told: NDArray[np.int8]) -> tuple[Bars, Array]:
-    """Find which ends are corners and how they slide; and points (f, w, 2, 2) [m] of the bars, in place of such ends.
+def find_wall_bars(sequence: MeasuredSequence, noise: float, end_kind: NDArray[np.int8]) -> tuple[Bars, Array]:
+    """Find which ends are corners, how they slide along the bars, and points of the bars.
 
-    noise [m]: standard deviation of an end along the wall; told (w,): 1 corner, 0 bar, −1 not told, which the
-    stretching then judges.
+    Parameters
+    ----------
+    sequence : MeasuredSequence
+    noise : float
+        Standard deviation [m] of an end along the wall.
+    end_kind : int array (w,)
+        1: corners; 0: points of the bar; −1: unspecified, corners if the length changes significantly.
+
+    Returns
+    -------
+    bars : Bars
+        Sliding of the ends.
+    points : array (f, w, 2, 2)
+        Points [m] of the bars in place of corners; other ends as given.
+
+    Notes
+    -----
+    A length changes significantly if max |ℓ − ℓ_0| > max(4 √2 noise, 10⁻⁴ ⟨ℓ⟩).
     """
     ends = sequence.endpoints
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
     stretch = np.abs(length - length[:1]).max(axis=0) / length.mean(axis=0)
-    limit = np.maximum(STRETCH * np.sqrt(2.0) * noise, LEAST_STRETCH * length.mean(axis=0))
+    limit = np.maximum(MAX_STRETCH_SDS * np.sqrt(2.0) * noise, MIN_STRETCH * length.mean(axis=0))
     stretches = stretch * length.mean(axis=0) > limit
-    corner = np.where(told < 0, stretches, told == 1) & (all_sides(sequence.side, sequence.wall_count) == STRAIGHT)
-    points, slip, share = ends.copy(), np.zeros(length.shape), np.full(sequence.wall_count, np.nan)
+    corner = np.where(end_kind < 0, stretches, end_kind == 1) & (
+        all_sides(sequence.side, sequence.wall_count) == STRAIGHT
+    )
+    points, slip, end_fraction = ends.copy(), np.zeros(length.shape), np.full(sequence.wall_count, np.nan)
     for w in np.flatnonzero(corner).tolist():
-        share[w] = _share_of_first_end(sequence, w, length[:, w])
-        points[:, w], slip[:, w] = _points_of_bar(ends[:, w], length[:, w], share[w])
-    return Bars(slip, corner, stretch, share), points
+        end_fraction[w] = _first_end_fraction(sequence, w, length[:, w])
+        points[:, w], slip[:, w] = _points_of_bar(ends[:, w], length[:, w], end_fraction[w])
+    return Bars(slip, corner, stretch, end_fraction), points
 
 
-def _share_of_first_end(sequence: MeasuredSequence, w: int, length: Array) -> float:
-    """The share of the change of length that lets most grains roll on the wall, rather than slide."""
+def _first_end_fraction(sequence: MeasuredSequence, w: int, length: Array) -> float:
+    """Find the fraction of the change of length at end 0 for which most grains roll on the wall.
+
+    Notes
+    -----
+    The fraction a maximises ⟨1/(1 + ((d − a Δℓ)/σ)²)⟩, with d the displacement of a grain's surface along the wall
+    from end 0, Δℓ the change of length meanwhile and σ its noise. 0 or 1 is taken where its mean is at least 0.97 of
+    the maximum. NaN: too few grains touch the wall.
+    """
     moved, stretched, noise = _surface_motion(sequence, w, length)
-    if not len(moved):
-        return 0.0
-    left = moved[:, None] - SHARES * stretched[:, None]
+    if len(moved) < FEWEST_TOUCHING:
+        return np.nan
+    left = moved[:, None] - END_FRACTIONS * stretched[:, None]
     agreement = (1.0 / (1.0 + (left / noise[:, None]) ** 2)).mean(axis=0)
     best = float(agreement.max())
-    for held in (0.0, 1.0):  # a hinge is what apparatuses have
-        if agreement[np.argmin(np.abs(SHARES - held))] >= NEARLY * best:
+    for held in (0.0, 1.0):  # most apparatuses have a hinge at one end
+        if agreement[np.argmin(np.abs(END_FRACTIONS - held))] >= HINGE_AGREEMENT * best:
             return held
-    return float(SHARES[np.argmax(agreement)])
+    return float(END_FRACTIONS[np.argmax(agreement)])
 
 
 def _surface_motion(sequence: MeasuredSequence, w: int, length: Array) -> tuple[Array, Array, Array]:
-    """Surface displacement of touching grains along the wall, from end 0 (m,) [m]; the stretch meanwhile; the noise."""
+    """Compute surface displacements (m,) [m] of touching grains from end 0 of the wall, its stretch, and the noise."""
     ends = sequence.endpoints[:, w]
     normal = outward_normals(ends)
     along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-    turn = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+    angle = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     offset = sequence.position - ends[:, None, 0]
     place = np.einsum("fnk,fk->fn", offset, along)
     gap = -np.einsum("fnk,fk->fn", offset, normal) - sequence.radius
     sigma = np.where(sequence.present, sequence.sigma, 0.0)
-    near = np.abs(gap) < TOUCHING * sigma + MISPLACED * float(sequence.radius.mean())
     beside = (place > 0.0) & (place < length[:, None])
+    width = TOUCHING * sigma + WALL_TOLERANCE * float(sequence.radius.mean())
+    near = np.abs(gap - _touching_gap(gap[beside & sequence.present], sequence.radius, width)) < width
     both = (near & beside & sequence.present)[1:] & (near & sequence.present)[:-1]
-    rolled = sequence.radius * (np.diff(sequence.rotation, axis=0) - np.diff(turn)[:, None])
+    rolled = sequence.radius * (np.diff(sequence.rotation, axis=0) - np.diff(angle)[:, None])
     motion = np.diff(place, axis=0) + rolled
     stretched = np.broadcast_to(np.diff(length)[:, None], motion.shape)
-    noise = SLIP_SIGMAS * np.maximum(sigma[1:], LEAST_STRETCH * float(sequence.radius.mean()))
+    noise = SLIP_SIGMAS * np.maximum(sigma[1:], MIN_STRETCH * float(sequence.radius.mean()))
     known = both & np.isfinite(motion)
     return motion[known], stretched[known], noise[known]
 
 
-def _points_of_bar(ends: Array, length: Array, share: float) -> tuple[Array, Array]:
-    """Points (f, 2, 2) [m] of the bar on the line of its told ends (f, 2, 2), and the slip (f,) [m] of these.
+def _touching_gap(gap: Array, radius: Array, width: Array) -> float:
+    """Find the gap [m] that touching grains seem to have, as radii and walls may share an error.
 
-    The bar begins where its ends are told in the first frame, and is made as long as covers them in all frames.
+    Notes
+    -----
+    Centre of the interval of twice the width that holds the most gaps, among gaps of at most the common error.
     """
-    slid = share * (length - length[0])  # of the bar past end 0, towards end 1
+    half = float(width.max(initial=0.0))
+    gap = np.sort(gap[np.abs(gap) < half + COMMON_ERROR * float(radius.mean())])
+    if not len(gap):
+        return 0.0
+    count = np.searchsorted(gap, gap + 2.0 * half) - np.arange(len(gap))
+    first = int(np.argmax(count))
+    return float(np.median(gap[first : first + count[first]]))
+
+
+def _points_of_bar(ends: Array, length: Array, end_fraction: float) -> tuple[Array, Array]:
+    """Compute points (f, 2, 2) [m] of the bar on the line of its given ends (f, 2, 2), and the slip (f,) [m] of these.
+
+    The bar begins at its given ends of the first frame and is extended to cover those of all frames. Where the fraction
+    is unknown, the middle of the bar stays in the middle of its ends.
+    """
+    end_fraction = 0.5 if np.isnan(end_fraction) else end_fraction
+    slid = end_fraction * (length - length[0])  # motion of the bar past end 0, towards end 1
     direction = (ends[:, 1] - ends[:, 0]) / length[:, None]
     first = min(0.0, float((-slid).min()))
     last = max(float(length[0]), float((length - slid).max()))
     points = ends[:, None, 0] + (slid[:, None] + np.array([first, last]))[:, :, None] * direction[:, None, :]
-    # The bar moves by share of the stretch from end 0, and by share − 1 from end 1.
-    slip = -(share - 0.5) * np.diff(length, prepend=length[0])
+    # The bar moves past end 0 by end_fraction times the stretch, and past end 1 by end_fraction − 1 times the stretch.
+    slip = -(end_fraction - 0.5) * np.diff(length, prepend=length[0])
     return points, slip

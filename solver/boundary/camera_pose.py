@@ -1,8 +1,8 @@
-"""How the camera stood against the walls in each photograph, where the walls were measured otherwise.
+"""Pose of the camera relative to the walls in each photograph, where the walls were measured independently of it.
 
-A camera that moves between two photographs shifts, turns and enlarges all rods alike; walls that a displacement sensor
-told do not follow. Rods that bear on a wall keep their gap to it, whatever their radii are wrong by, so that what all
-gaps to all walls change from one photograph to the next is the camera's.
+A camera that moves between two photographs shifts, rotates and scales all rods alike, but not walls measured by a
+displacement sensor. Rods that bear on a wall keep their gap to it, whatever the errors of their radii, so that common
+changes of all gaps to walls are the camera's.
 """
 
 from __future__ import annotations
@@ -13,52 +13,73 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import Quantity
-from solver.calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
+from ..bodies.grains import Array
+from ..calibration.gaps import GapRows, MeasuredSequence, find_gap_rows, measure_gaps
+from ..quantity import Quantity
 
-REACH = 0.1  # mean radii: pairs whose gaps come nearer in some frame may bear on the wall
-PRIOR = 0.05  # mean radii by which a photograph may move, or its corners turn or stretch
-FINEST = 1e-4  # mean radii: gaps are not known better
+REACH = 0.1  # mean radii: greatest gap of pairs that may bear on the wall
+PRIOR = 0.05  # mean radii: prior standard deviation of a shift, and of a rotation or stretch at the farthest rod
+MIN_NOISE = 1e-4  # mean radii: lower limit of the noise of a gap
 ROUNDS = 12
-LEAST_PAIRS = 8  # wall gaps in a frame below which its pose is not asked for
-DECISIVE = 6.0  # mean square of the poses over their variance; 1 is noise alone
+MIN_PAIRS = 8  # gaps at walls in a frame; with fewer in any frame no pose is estimated
+MIN_EVIDENCE = 6.0  # mean square of the poses over their variance above which they are applied; 1: noise alone
 
 
 @dataclass(frozen=True, slots=True)
 class CameraPose:
-    """Pose of the camera in every frame, against its mean. Applied: positions are moved back."""
+    """Pose of the camera in every frame relative to its mean; if applied, positions were corrected by it."""
 
-    shift: Annotated[Array, Quantity("shift of the picture against the walls", "m", "frame xy", since=2)]
-    turn: Annotated[
-        Array, Quantity("turn of the picture against the walls, counter-clockwise", "rad", "frame", since=2)
+    shift: Annotated[Array, Quantity("shift of the picture relative to the walls", "m", "frame xy", since=2)]
+    rotation: Annotated[
+        Array,
+        Quantity(
+            "rotation of the picture relative to the walls, counter-clockwise",
+            "rad",
+            "frame",
+            since=2,
+            path="boundary/camera/turn",
+        ),
     ]
-    stretch: Annotated[Array, Quantity("relative enlargement of the picture", dims="frame", since=2)]
+    stretch: Annotated[Array, Quantity("relative stretch of the picture", dims="frame", since=2)]
     shift_sd: Annotated[Array, Quantity("standard deviation of the shift", "m", "frame xy", since=2)]
-    centre: Annotated[Array, Quantity("point about which the picture turns and stretches", "m", "xy", since=2)]
+    centre: Annotated[Array, Quantity("point about which the picture rotates and stretches", "m", "xy", since=2)]
     evidence: Annotated[float, Quantity("mean square of all poses over their variance; 1: noise alone", since=2)]
     applied: Annotated[bool, Quantity("whether positions were corrected by it", since=2, absent=False)]
 
     @classmethod
     def unknown(cls, frame_count: int) -> CameraPose:
-        """The pose where nothing tells it."""
+        """Return zero poses of unknown accuracy, which are not applied."""
         zero = np.zeros(frame_count)
         plane = np.zeros((frame_count, 2))
         return cls(plane, zero, zero, np.full_like(plane, np.nan), np.zeros(2), np.nan, applied=False)
 
     def correct(self, position: Array) -> Array:
-        """Centres (f, n, 2) [m] as the walls see them."""
+        """Correct centres (f, n, 2) [m] by the pose.
+
+        Notes
+        -----
+        x ← x − t − φ ẑ × (x − m) − λ (x − m), with t the shift, φ the rotation, λ the stretch, m the centre.
+        """
         place = position - self.centre
-        turned = self.turn[:, None, None] * np.stack([-place[..., 1], place[..., 0]], axis=2)
-        return position - self.shift[:, None] - turned - self.stretch[:, None, None] * place
+        rotated = self.rotation[:, None, None] * np.stack([-place[..., 1], place[..., 0]], axis=2)
+        return position - self.shift[:, None] - rotated - self.stretch[:, None, None] * place
 
 
 def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
-    """Find the pose of every photograph; unknown where too few rods bear on walls to tell."""
+    """Estimate the pose of every photograph; unknown where too few rods bear on walls.
+
+    Notes
+    -----
+    In frame k, the gap of pair p at a wall of outward normal n is g = ḡ_p − n·(t_k + φ_k ẑ × r + λ_k r) + noise, with r
+    the rod's position from the mean of all and ḡ_p the pair's usual gap. Poses minimise Σ W(e/(3 s)) e²/σ² plus their
+    Gaussian priors in twelve rounds, with e the residual, W(u) = (1 + u²)⁻², ḡ_p the median of the pair, and s
+    shrinking from the prior to the noise; their mean over the photographs is zero. They are applied if the mean of
+    pose²/variance exceeds 6.
+    """
     radius = float(sequence.radius.mean())
     rows = _wall_rows(sequence, REACH * radius)
     seen = sequence.present.any(axis=1)
-    if rows.count == 0 or np.bincount(rows.frame, minlength=sequence.frame_count)[seen].min() < LEAST_PAIRS:
+    if rows.count == 0 or np.bincount(rows.frame, minlength=sequence.frame_count)[seen].min() < MIN_PAIRS:
         return CameraPose.unknown(sequence.frame_count)
     geometry = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side)
     at = sequence.position[rows.frame, rows.i]
@@ -66,15 +87,15 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
     place = at - centre
     reach = float(np.linalg.norm(place, axis=1).max())
     normal = geometry.normal
-    # A picture that is shifted by t has every rod further out by n·t, and its gap less by so much.
+    # A shift t of the picture moves every rod outward by n·t, which reduces its gap.
     derivative = -np.column_stack([
         normal, (-normal[:, 0] * place[:, 1] + normal[:, 1] * place[:, 0]) / reach,
         np.einsum("mk,mk->m", normal, place) / reach,
     ])  # fmt: skip
-    noise = np.maximum(sequence.sigma[rows.frame, rows.i], FINEST * radius)
+    noise = np.maximum(sequence.sigma[rows.frame, rows.i], MIN_NOISE * radius)
     pose, variance = _fit(rows, geometry.gap, derivative, noise, PRIOR * radius, sequence.frame_count)
     evidence = float(np.mean((pose**2 / variance)[seen]))
-    applied = evidence > DECISIVE
+    applied = evidence > MIN_EVIDENCE
     shown = pose if applied else np.zeros_like(pose)
     return CameraPose(
         shown[:, :2], shown[:, 2] / reach, shown[:, 3] / reach, np.sqrt(variance[:, :2]), centre, evidence, applied
@@ -82,7 +103,7 @@ def find_camera_pose(sequence: MeasuredSequence) -> CameraPose:
 
 
 def _wall_rows(sequence: MeasuredSequence, reach: float) -> GapRows:
-    """Gaps to walls of pairs that are near in more than half of all frames."""
+    """List the gaps to walls of pairs within reach in more than half of all frames."""
     rows = find_gap_rows(sequence, -np.inf, wall_reach=reach)
     often = (
         np.bincount(rows.pair, minlength=int(rows.pair.max(initial=-1)) + 1) > 0.5 * sequence.present.any(axis=1).sum()
@@ -91,15 +112,15 @@ def _wall_rows(sequence: MeasuredSequence, reach: float) -> GapRows:
 
 
 def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: float, frames: int) -> tuple[Array, Array]:
-    """Poses (f, 4) [m] and their variances, by re-weighted least squares in turn with each pair's own usual gap."""
+    """Fit poses (f, 4) [m] and their variances by re-weighted least squares, in turn with the pairs' median gaps."""
     pose, variance = np.zeros((frames, 4)), np.full((frames, 4), prior**2)
     order = np.argsort(rows.frame, kind="stable")
     ends = np.searchsorted(rows.frame[order], np.arange(frames + 1))
     scale = np.maximum(noise, prior)
     for _ in range(ROUNDS):
         left = gap - np.einsum("mk,mk->m", derivative, pose[rows.frame])
-        left = left - _usual(rows.pair, left)[rows.pair]
-        scale = np.maximum(noise, 0.5 * scale)  # from the poses' own size to the noise
+        left = left - _median_gaps(rows.pair, left)[rows.pair]
+        scale = np.maximum(noise, 0.5 * scale)  # from the prior to the noise
         weight = 1.0 / (1.0 + (left / (3.0 * scale)) ** 2) ** 2 / noise**2
         for k in range(frames):
             at = order[ends[k] : ends[k + 1]]
@@ -109,13 +130,13 @@ def _fit(rows: GapRows, gap: Array, derivative: Array, noise: Array, prior: floa
             step = inverse @ (d.T @ (w * left[at]) - pose[k] / prior**2)
             pose[k] += step
             variance[k] = np.diag(inverse)
-        told = np.diff(ends) > 0
-        pose[told] -= pose[told].mean(axis=0)  # what all photographs share is where the walls are
+        fitted = np.diff(ends) > 0
+        pose[fitted] -= pose[fitted].mean(axis=0)  # a common pose would be an error of the walls
     return pose, variance
 
 
-def _usual(pair: NDArray[np.int32], gap: Array) -> Array:
-    """The gap of every pair while it bears: its median, for those looked at are near in most frames (p,) [m]."""
+def _median_gaps(pair: NDArray[np.int32], gap: Array) -> Array:
+    """Compute the median gap (p,) [m] of every pair: most frames show it bearing."""
     count = int(pair.max()) + 1
     order = np.lexsort((gap, pair))
     start, stop = np.searchsorted(pair[order], [np.arange(count), np.arange(1, count + 1)])

@@ -1,30 +1,30 @@
-"""Walls that were told too short go on: along the rods that lie on their line, to where they meet the next wall."""
+"""Extension of walls that are too short, along the rods on their line, up to the next wall."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT, all_sides, outward_normals
-from solver.calibration.gaps import MeasuredSequence
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import STRAIGHT, all_sides, outward_normals
+from ..calibration.gaps import MeasuredSequence
 
-BEARING = 0.05  # radii off the line: a rod as near as that may bear on the wall
-BEYOND = 0.5  # radii past an end: nearer ones bear on the wall as it was told
-BESIDE = 1.0  # radii off the line: a wall goes on along rods as near as that
+CONTACT_DISTANCE = 0.05  # radii: greatest distance of a rod's surface from the line of a wall that it bears on
+PAST_END = 0.5  # radii: rods nearer to an end bear on the given wall
+NEIGHBOUR_DISTANCE = 1.0  # radii: a wall is extended along rods whose surface is this near to its line
 PARALLEL = 0.1  # sine of the least angle of two walls that meet
 
 
 def continue_walls(sequence: MeasuredSequence) -> Array:
-    """How far each wall goes on beyond its ends (w, 2) [m], zero where it was told long enough.
+    """Compute the extension (w, 2) [m] of each wall beyond its ends, zero where it is long enough.
 
-    It goes on only where a rod lies on its line beyond the end, past the last rod beside it in any frame, and not
-    beyond the line of another wall.
+    A wall is extended only where a rod bears on its line beyond the end: past the last rod beside the line in any
+    frame, but not beyond the line of another wall.
     """
     ends = sequence.endpoints
     normal = outward_normals(ends)
     along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    beyond = np.zeros((sequence.wall_count, 2))
+    extension = np.zeros((sequence.wall_count, 2))
     straight = np.flatnonzero(all_sides(sequence.side, sequence.wall_count) == STRAIGHT)
     for at, w in enumerate(straight.tolist()):
         offset = sequence.position - ends[:, None, w, 0]
@@ -32,25 +32,26 @@ def continue_walls(sequence: MeasuredSequence) -> Array:
         off = np.abs(-np.einsum("fnk,fk->fn", offset, normal[:, w]) - sequence.radius) / sequence.radius
         for end, past in enumerate((-place, place - length[:, None, w])):
             with np.errstate(invalid="ignore"):
-                bears = sequence.present & (off < BEARING) & (past > BEYOND * sequence.radius)
-                rods = sequence.present & (off < BESIDE) & (past > 0.0)
+                bears = sequence.present & (off < CONTACT_DISTANCE) & (past > PAST_END * sequence.radius)
+                rods = sequence.present & (off < NEIGHBOUR_DISTANCE) & (past > 0.0)
             if bears.any():
                 reach = np.where(rods, past + sequence.radius, 0.0).max(axis=1)
-                beyond[w, end] = np.minimum(reach, _way_to_next(ends[:, straight], along[:, straight], at, end)).max()
-    return beyond
+                limit = _distance_to_next_wall(ends[:, straight], along[:, straight], at, end)
+                extension[w, end] = np.minimum(reach, limit).max()
+    return extension
 
 
-def lengthen(endpoints: Array, beyond: Array) -> Array:
-    """Walls (f, w, 2, 2) [m] that go on beyond their ends by `beyond` (w, 2) [m]."""
+def extend_walls(endpoints: Array, extension: Array) -> Array:
+    """Extend walls (f, w, 2, 2) [m] beyond their ends by `extension` (w, 2) [m]."""
     along = endpoints[:, :, 1] - endpoints[:, :, 0]
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    return endpoints + np.stack([-beyond[:, 0, None] * along, beyond[:, 1, None] * along], axis=2)
+    return endpoints + np.stack([-extension[:, 0, None] * along, extension[:, 1, None] * along], axis=2)
 
 
-def _way_to_next(ends: Array, along: Array, w: int, end: int) -> Array:
-    """Distance (f,) [m] from an end of wall w, along the wall, to the nearest line of another; inf: there is none."""
+def _distance_to_next_wall(ends: Array, along: Array, w: int, end: int) -> Array:
+    """Compute the distance (f,) [m] from an end of wall w along it to the nearest line of another; inf: none."""
     start, ahead = ends[:, w, end], (2 * end - 1) * along[:, w]
-    way = np.full(len(ends), np.inf)
+    distance = np.full(len(ends), np.inf)
     for other in range(ends.shape[1]):
         d = along[:, other]
         sine = ahead[:, 0] * d[:, 1] - ahead[:, 1] * d[:, 0]
@@ -58,5 +59,5 @@ def _way_to_next(ends: Array, along: Array, w: int, end: int) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
             there = (to[:, 0] * d[:, 1] - to[:, 1] * d[:, 0]) / sine
         meets = (other != w) & (np.abs(sine) > PARALLEL) & (there > 0.0)
-        way = np.where(meets, np.minimum(way, there), way)
-    return way
+        distance = np.where(meets, np.minimum(distance, there), distance)
+    return distance

@@ -1,11 +1,11 @@
-"""Self-calibration: constant errors of centres, radii, walls and pixel size, found from the gaps of a sequence.
+"""Self-calibration: constant errors of centres, radii, walls and pixel size, estimated from the gaps of a sequence.
 
-Rigid grains neither overlap nor, where they carry force, stand apart. What all grains share is found first: a wrong
-pixel size, a mistaken radius of a whole class. Then what each has for itself. A centre that is wrong by a constant,
-body-fixed amount opens and closes gaps in a way that turns with the grain and changes with its neighbours, so many
-photographs reveal it. The gap equations are solved by robust, one-sided, iteratively re-weighted least squares: a
-positive gap g counts as (1 + (g/s)²)⁻², an overlap in full unless only a wrong track can explain it, and s shrinks
-from the scale of the errors to that of the noise. Gaussian priors hold whatever the sequence does not determine.
+Rigid grains do not overlap, and where they carry force their gap is zero. Errors that all grains share are estimated
+first: the pixel size, the radius of a whole class (`scale`). Then the errors of each grain: a constant, body-fixed
+error of a centre changes the gaps as the grain rotates and its neighbours change, so that many photographs determine
+it. The gap equations (`equations`) are solved by robust, one-sided, iteratively re-weighted least squares with Gaussian
+priors (`fit`, `weights`, `priors`). Corrections are applied only if they make the gaps of touching pairs more
+plausible.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import Quantity
-from solver.calibration.equations import GapEquations, bulge, move_walls, rotate_offsets
-from solver.calibration.fit import ROUNDS, GapFit, fit_gaps
-from solver.calibration.gaps import MeasuredSequence, measure_gaps
-from solver.calibration.priors import FINEST_SURFACE, CalibrationPriors, narrow_priors, prior_vector
-from solver.calibration.scale import ScaleErrors, find_scale
-from solver.calibration.statistics import GapStatistics, gap_statistics, width_gain
+from ..bodies.grains import Array
+from ..quantity import Quantity
+from .equations import GapEquations, move_walls, radial_distortion, rotate_offsets
+from .fit import ROUNDS, GapFit, fit_gaps
+from .gap_statistics import GapStatistics, gap_statistics, width_gain
+from .gaps import MeasuredSequence, measure_gaps
+from .priors import FINEST_SURFACE, CalibrationPriors, narrow_priors, prior_vector
+from .scale import ScaleErrors, find_scale
 
-LEAST_GAIN = 0.1  # corrections that narrow the gaps of touching pairs by less are not worth their own noise
-CERTAIN = 3.0  # standard deviations beyond which a correction is called sure, or larger than its prior allows
-EXCESSIVE_NOISE = 1.3  # true over stated noise: above this the user is told …
-MISJUDGED_NOISE = 2.0  # … and above this everything is judged anew
-TOLERATED_IMPOSSIBLE = 0.02  # share of the overlaps: above this the user is told
-EXCESSIVE_DEMAND = 2.0  # errors that the overlaps suggest, over the prior: above this the user is told
-LENS_FRAMES = 16  # photographs that tell whether the lens matters
-LENS_SAMPLES = 30  # draws behind its standard deviation there
-POSTERIOR_SAMPLES = 100  # draws behind each standard deviation: known to 7 %
-EXPECTED_CENTRE = 1e-2  # widest prior without being told, of the mean diameter; the overlaps then narrow it
-EXPECTED_WALL = 3e-3  # prior of a wall without being told, of the mean diameter
-EXPECTED_TILT = 5e-4  # [rad] prior of a wall's direction without being told
-EXPECTED_LENS = 1e-2  # prior of the displacement by the lens at the farthest corner, of the mean diameter
-RADIUS_SHARE = 0.5  # prior of a radius over that of a centre without being told; the data then reduce either
+MIN_GAIN = 0.1  # relative narrowing of the gaps of touching pairs below which grains are not corrected
+SIGNIFICANT_SDS = 3.0  # standard deviations above which a correction is significant, or exceeds its prior
+EXCESSIVE_NOISE = 1.3  # measured over stated noise above which the verdict contains a warning
+MISJUDGED_NOISE = 2.0  # … above which the calibration is repeated with the measured noise
+TOLERATED_IMPOSSIBLE = 0.02  # fraction of overlaps that are impossible above which the verdict contains a warning
+EXCESSIVE_WIDTH = 2.0  # width of the errors by the overlaps, over the prior, above which the verdict contains a warning
+LENS_FRAMES = 16  # photographs used to decide whether the lens is corrected
+LENS_SAMPLES = 30  # draws for its standard deviation there
+POSTERIOR_SAMPLES = 100  # draws for each standard deviation: accurate to 7 %
+DEFAULT_CENTRE_SD = 1e-2  # of the mean diameter: default upper limit, which the overlaps reduce
+DEFAULT_WALL_SD = 3e-3  # of the mean diameter: default prior of a wall
+DEFAULT_TILT_SD = 5e-4  # [rad] default prior of a wall's direction
+DEFAULT_LENS_SD = 1e-2  # of the mean diameter: default prior of the shift by the lens at the farthest corner
+RADIUS_SD_FRACTION = 0.5  # default prior of a radius over that of a centre; the data reduce both
 
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Constant errors found in a sequence. Add the corrections to what was measured."""
+    """Estimated constant errors of a sequence. Add the corrections to the measured values."""
 
     offset: Annotated[Array, Quantity("from measured to true centre, turning with the grain", "m", "grain xy")]
     radius: Annotated[Array, Quantity("from given to true radius", "m", "grain")]
-    # A dataset must not be called as a dimension is: netCDF would take it for the labels of that.
+    # A dataset must not have the name of a dimension: netCDF would read it as the labels of that dimension.
     wall: Annotated[
         Array,
         Quantity(
@@ -72,24 +72,26 @@ class Calibration:
     pixel_size_sd: Annotated[float, Quantity("standard deviation of pixel_size")]
     radius_offset_sd: Annotated[float, Quantity("standard deviation of radius_offset", "m", since=2)]
     lens_sd: Annotated[float, Quantity("standard deviation of lens", "m")]
-    gap_sd: Annotated[float, Quantity("what the errors left do to a gap, noise apart", "m")]
-    priors: CalibrationPriors  # those used: never wider than given, narrower where the gaps say so
-    noise_factor: Annotated[float, Quantity("noise that the corrected gaps show over that stated")]
+    gap_sd: Annotated[float, Quantity("standard deviation of a gap by the remaining errors, without noise", "m")]
+    priors: CalibrationPriors  # as used: at most those given, smaller where the gaps support less
+    noise_factor: Annotated[float, Quantity("measured noise of the corrected gaps over the stated noise")]
     before: GapStatistics
     after: GapStatistics  # with the corrections, whether they are applied or not
-    rounds: Annotated[int, Quantity("times that contacts were looked for again", absent=0)]
+    rounds: Annotated[int, Quantity("rounds of re-weighted least squares", absent=0)]
     applied: Annotated[bool, Quantity("whether the corrections were applied; if not, all are zero", absent=True)]
     verdict: Annotated[str, Quantity("why it was applied or not, for the user", absent="")]
 
     def position_sd(self, sigma: float) -> float:
-        """Standard deviation [m] of a position for contact detection: stated noise `sigma` [m] and what is left.
+        """Compute the standard deviation [m] of a position for contact detection from the stated noise `sigma` [m].
 
-        The gap of a touching pair has √2 times this standard deviation.
+        Notes
+        -----
+        σ² = (noise_factor · sigma)² + gap_sd²/2: the gap of a touching pair has the standard deviation √2 σ.
         """
         return float(np.hypot(self.noise_factor * sigma, self.gap_sd / np.sqrt(2.0)))
 
     def of_grains(self, count: int) -> Calibration:
-        """The same for `count` grains: those after the ones that were calibrated were not corrected at all."""
+        """Extend to `count` grains; those after the calibrated ones have no correction."""
         more = count - len(self.radius)
         unknown = np.full((more, 2), np.nan)
         return replace(
@@ -101,12 +103,18 @@ class Calibration:
         )
 
     def correct(self, sequence: MeasuredSequence) -> MeasuredSequence:
-        """Apply the corrections: centres, radii and walls of the sequence they were found in."""
+        """Apply the corrections to the sequence that they were estimated from.
+
+        Notes
+        -----
+        x ← (1 + ε) x + d q(x) + Rot(θ) o,  R ← R + δR, with ε the pixel size, d the lens and q by `radial_distortion`;
+        walls by `move_walls`.
+        """
         scale = 1.0 + self.pixel_size
         endpoints = scale * sequence.endpoints if self.walls_follow else sequence.endpoints
         return MeasuredSequence(
             sequence.radius + self.radius,
-            scale * sequence.position + self.lens * bulge(sequence) + rotate_offsets(sequence, self.offset),
+            scale * sequence.position + self.lens * radial_distortion(sequence) + rotate_offsets(sequence, self.offset),
             sequence.rotation,
             sequence.present,
             move_walls(endpoints, self.wall, self.wall_tilt, sequence.side),
@@ -124,24 +132,44 @@ def calibrate(
     typical_overlap: float = 0.0,
     radius_class: NDArray[np.integer] | None = None,
 ) -> Calibration:
-    """Find the constant errors of a sequence and decide whether correcting them makes it more plausible.
+    """Estimate the constant errors of a sequence and decide whether they are corrected.
 
-    priors: standard deviations of the errors; None: centres, radii and walls are taken as uncertain, the
-    pixel size as exact. Widths given for centres and radii are upper limits: what the overlaps of the
-    sequence do not support is not corrected. typical_overlap [m]: mean elastic overlap of a touching pair.
-    radius_class (n,) int: the class 0, 1, … of each grain, for `priors.radius_class`.
+    Parameters
+    ----------
+    sequence : MeasuredSequence
+        Tracked grains and walls.
+    priors : CalibrationPriors, optional
+        Standard deviations of the errors; None: defaults for centres, radii and walls, an exact pixel size. Those of
+        centres and radii are upper limits, which the data reduce.
+    rng : numpy.random.Generator
+        Random numbers of the posterior draws.
+    typical_overlap : float
+        Mean elastic overlap [m] of a touching pair.
+    radius_class : int array (n,), optional
+        Class 0, 1, … of each grain, for `priors.radius_class`.
+
+    Returns
+    -------
+    Calibration
+        Corrections, all zero unless they narrow the gaps of touching grains by 10 %, a correction of walls, lens or
+        classes is significant (3 standard deviations), or the scale is wrong.
+
+    Raises
+    ------
+    ValueError
+        If the overlap is negative, or the classes do not match the grains.
     """
     if not typical_overlap >= 0.0:
         raise ValueError(f"typical_overlap must be zero or positive, not {typical_overlap}")
     if radius_class is not None and radius_class.shape != sequence.radius.shape:
         raise ValueError(f"radius_class must name a class for each of the {sequence.grain_count} grains")
-    limits = expected_priors(sequence) if priors is None else priors
+    limits = default_priors(sequence) if priors is None else priors
     found = _calibrate(sequence, limits, rng, typical_overlap, radius_class, 1.0)
     if found.noise_factor < MISJUDGED_NOISE:
         return found
-    # With noise taken for errors of centres, what looks like a gain is none: judge it by the noise that is there.
-    louder = replace(sequence, sigma=found.noise_factor * sequence.sigma)
-    return _calibrate(louder, limits, rng, typical_overlap, radius_class, found.noise_factor)
+    # Understated noise passes for errors of centres: repeat with the measured noise.
+    noisier = replace(sequence, sigma=found.noise_factor * sequence.sigma)
+    return _calibrate(noisier, limits, rng, typical_overlap, radius_class, found.noise_factor)
 
 
 def _calibrate(
@@ -150,35 +178,35 @@ def _calibrate(
     rng: np.random.Generator,
     typical_overlap: float,
     radius_class: NDArray[np.integer] | None,
-    raised: float,
+    noise_ratio: float,
 ) -> Calibration:
-    """One pass; raised: the noise of `sequence` over that stated."""
+    """Calibrate once; noise_ratio: the noise of `sequence` over that stated."""
     scale = find_scale(sequence, limits, typical_overlap, radius_class)
     equations = GapEquations(scale.correct(sequence, radius_class), radius_class, walls_follow=scale.walls_follow)
-    # A scale that may be right is not touched; one that was wrong is known to its standard deviation now.
+    # A scale that may be right stays; a corrected one has its posterior standard deviation as prior.
     rest = replace(
         limits, pixel_size=scale.pixel_size_sd if scale.found else 0.0, radius_class=0.0,
         radius_offset=0.0,
     )  # fmt: skip
-    start, demand = narrow_priors(equations, rest, typical_overlap)
+    start, width_ratio = narrow_priors(equations, rest, typical_overlap)
     lens_sd = _lens_sd(equations, start, typical_overlap, rng)
     if lens_sd is not None:
         start = replace(start, lens=0.0)
     fit = fit_gaps(equations, start, typical_overlap, POSTERIOR_SAMPLES, rng)
-    if width_gain(fit) < LEAST_GAIN and (scale.found or _certain_parts(equations, fit)):
-        # What is wrong belongs to walls and scale alone: the grains stay where they were measured.
+    if width_gain(fit) < MIN_GAIN and (scale.found or _significant_parts(equations, fit)):
+        # Only walls and scale are wrong: the grains stay where they were measured.
         held = fit_gaps(equations, replace(start, centre=0.0, radius=0.0), typical_overlap, 1, rng)
         fit = replace(held, sd=fit.sd, gap_sd=fit.gap_sd, priors=fit.priors)
-    found = _judge(sequence, scale, equations, limits, demand, fit, raised)
+    found = _assess(sequence, scale, equations, limits, width_ratio, fit, noise_ratio)
     return found if lens_sd is None else replace(found, lens_sd=lens_sd)
 
 
 def _lens_sd(
     equations: GapEquations, priors: CalibrationPriors, overlap: float, rng: np.random.Generator
 ) -> float | None:
-    """How well some of the photographs tell the lens; None where they show that it surely bends the picture.
+    """Compute the standard deviation of the lens from some photographs; None where its distortion is significant.
 
-    It looks much like walls that stand too far out, so that it is left alone unless it is needed.
+    Distortion resembles walls that are too far out, and is corrected only where it is significant.
     """
     if priors.lens == 0.0:
         return 0.0
@@ -187,49 +215,49 @@ def _lens_sd(
     )  # fmt: skip
     fit, lens = fit_gaps(some, priors, overlap, LENS_SAMPLES, rng), some.layout.lens
     value, sd = float(fit.unknowns[lens][0]), float(fit.sd[lens][0])
-    return None if abs(value) > CERTAIN * sd > 0.0 else sd
+    return None if abs(value) > SIGNIFICANT_SDS * sd > 0.0 else sd
 
 
-def expected_priors(
+def default_priors(
     sequence: MeasuredSequence, *, pixel_size: float = 0.0, radius_class: float = 0.0, radius_offset: float = 0.0
 ) -> CalibrationPriors:
-    """What to think of errors nobody was told about; pixel_size, radius_class and radius_offset are relative."""
+    """Build default priors; pixel_size, radius_class and radius_offset are relative."""
     radius = float(sequence.radius.mean())
-    if sequence.cell is not None:  # no camera saw it, and its size is told with the positions
+    if sequence.cell is not None:  # a simulation: no camera, and its size is given with the positions
         pixel_size, lens = 0.0, 0.0
     else:
-        lens = EXPECTED_LENS * 2.0 * radius
-    centre = EXPECTED_CENTRE * 2.0 * radius
+        lens = DEFAULT_LENS_SD * 2.0 * radius
+    centre = DEFAULT_CENTRE_SD * 2.0 * radius
     return CalibrationPriors(
-        centre, RADIUS_SHARE * centre, wall=EXPECTED_WALL * 2.0 * radius, wall_tilt=EXPECTED_TILT,
+        centre, RADIUS_SD_FRACTION * centre, wall=DEFAULT_WALL_SD * 2.0 * radius, wall_tilt=DEFAULT_TILT_SD,
         pixel_size=pixel_size, lens=lens, radius_class=radius_class * radius,
         radius_offset=radius_offset * radius,
     )  # fmt: skip
 
 
-def _judge(
+def _assess(
     sequence: MeasuredSequence,
     scale: ScaleErrors,
     equations: GapEquations,
     limits: CalibrationPriors,
-    demand: float,
+    width_ratio: float,
     fit: GapFit,
-    raised: float,
+    noise_ratio: float,
 ) -> Calibration:
-    layout, noise_factor = equations.layout, raised * fit.candidates.noise_factor
+    layout, noise_factor = equations.layout, noise_ratio * fit.candidates.noise_factor
     given = measure_gaps(
         fit.candidates.rows, sequence.position, sequence.endpoints, sequence.radius, sequence.side, sequence.cell
     ).gap
     before = gap_statistics(given, fit)
     between, after = gap_statistics(fit.gap_before, fit), gap_statistics(fit.gap_after, fit)
-    gain, certain = width_gain(fit), _certain_parts(equations, fit)
-    applied = gain >= LEAST_GAIN or bool(certain) or scale.found
+    gain, significant = width_gain(fit), _significant_parts(equations, fit)
+    applied = gain >= MIN_GAIN or bool(significant) or scale.found
     if not applied:
         after = between
-    verdict = _verdict(applied, gain, list(dict.fromkeys(_scale_parts(scale) + certain)), before, after)
+    verdict = _verdict(applied, gain, list(dict.fromkeys(_scale_parts(scale) + significant)), before, after)
     verdict += _track_warning(noise_factor, after)
     if applied:
-        verdict += _prior_warning(equations, limits, demand, fit)
+        verdict += _prior_warning(equations, limits, width_ratio, fit)
     unknowns = fit.unknowns if applied else np.zeros(layout.count)
     sd = fit.sd
     radius_sd = sd[layout.radius]
@@ -265,12 +293,12 @@ def _judge(
 def _scale_parts(scale: ScaleErrors) -> list[str]:
     parts = [] if abs(scale.pixel_size) <= scale.pixel_size_sd else ["pixel size"]
     parts += [] if abs(scale.radius_offset) <= scale.radius_offset_sd else ["all radii alike"]
-    if len(parts) and not scale.told_apart:
-        parts = ["pixel size or all radii alike, which rods of one size cannot tell"]
+    if len(parts) and not scale.separable:
+        parts = ["pixel size or all radii alike, which rods of one size cannot separate"]
     return parts + (["radius classes"] if np.any(np.abs(scale.radius_class) > scale.radius_class_sd) else [])
 
 
-def _certain_parts(equations: GapEquations, fit: GapFit) -> list[str]:
+def _significant_parts(equations: GapEquations, fit: GapFit) -> list[str]:
     layout = equations.layout
     finest = FINEST_SURFACE * float(equations.sequence.radius.mean())
     parts = {
@@ -282,35 +310,37 @@ def _certain_parts(equations: GapEquations, fit: GapFit) -> list[str]:
     return [
         name
         for name, (part, least) in parts.items()
-        if np.any(np.abs(fit.unknowns[part]) > CERTAIN * np.hypot(fit.sd[part], least))
+        if np.any(np.abs(fit.unknowns[part]) > SIGNIFICANT_SDS * np.hypot(fit.sd[part], least))
     ]
 
 
-def _verdict(applied: bool, gain: float, certain: list[str], before: GapStatistics, after: GapStatistics) -> str:
-    widths = f"the gaps of touching grains go from {before.spread * 1e6:.1f} to {after.spread * 1e6:.1f} µm rms"
+def _verdict(applied: bool, gain: float, significant: list[str], before: GapStatistics, after: GapStatistics) -> str:
+    widths = f"the gaps of touching grains change from {before.spread * 1e6:.1f} to {after.spread * 1e6:.1f} µm rms"
     if not applied:
-        return f"not applied: nothing to gain, {widths} and no wall or scale is surely wrong"
-    reasons = [widths] if gain >= LEAST_GAIN or after.spread < (1.0 - LEAST_GAIN) * before.spread else []
-    reasons += [f"surely wrong before: {', '.join(certain)}"] if certain else []
+        return f"not applied: {widths}, and no error of walls or scale is significant"
+    reasons = [widths] if gain >= MIN_GAIN or after.spread < (1.0 - MIN_GAIN) * before.spread else []
+    reasons += [f"significant errors: {', '.join(significant)}"] if significant else []
     return "applied: " + "; ".join(reasons or [widths])
 
 
 def _track_warning(noise_factor: float, after: GapStatistics) -> str:
-    """Say what the tracks promise and do not keep."""
+    """Describe noise above the stated one and impossible overlaps."""
     text = ""
     if noise_factor > EXCESSIVE_NOISE:
-        text += f"; positions scatter {noise_factor:.1f} times as much as stated"
+        text += f"; the noise of positions is {noise_factor:.1f} times the stated noise"
     if after.impossible > TOLERATED_IMPOSSIBLE:
-        text += f"; {100 * after.impossible:.0f} % of the overlaps stay impossible: some tracks are wrong"
+        text += f"; {100 * after.impossible:.0f} % of the overlaps remain impossible: some tracks are wrong"
     return text
 
 
-def _prior_warning(equations: GapEquations, limits: CalibrationPriors, demand: float, fit: GapFit) -> str:
-    """Say what is larger than the priors allow."""
+def _prior_warning(equations: GapEquations, limits: CalibrationPriors, width_ratio: float, fit: GapFit) -> str:
+    """Describe errors that exceed their priors."""
     text = ""
-    if demand > EXCESSIVE_DEMAND:
-        text += f"; the overlaps suggest errors of grains {demand:.1f} times wider than the prior"
-    large = np.abs(fit.unknowns) > CERTAIN * np.maximum(prior_vector(equations, limits), np.finfo(float).tiny)
+    if width_ratio > EXCESSIVE_WIDTH:
+        text += f"; the overlaps correspond to errors of grains {width_ratio:.1f} times wider than the prior"
+    large = np.abs(fit.unknowns) > SIGNIFICANT_SDS * np.maximum(prior_vector(equations, limits), np.finfo(float).tiny)
     if np.any(large):
-        text += f"; {np.count_nonzero(large)} corrections exceed {CERTAIN:.0f} standard deviations of their prior"
+        text += (
+            f"; {np.count_nonzero(large)} corrections exceed {SIGNIFICANT_SDS:.0f} standard deviations of their prior"
+        )
     return text

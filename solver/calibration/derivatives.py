@@ -1,4 +1,4 @@
-"""Derivatives of gaps by constant errors: of its two grains for themselves, and of few that many gaps share."""
+"""Derivatives of gaps with respect to constant errors: those of its two grains, and a few that many gaps share."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from ..bodies.grains import Array
 
 OF_GRAIN = 3  # unknowns of a grain: x and y of its centre, its radius
 
 
 class Derivatives(NamedTuple):
-    """A (m, u), a row for each gap; unknowns: x and y of every grain's centre, radii, then what gaps share."""
+    """Sparse matrix A (m, u), a row for each gap; unknowns: x and y of every centre, radii, then shared ones."""
 
     first: NDArray[np.int64]  # (m,) a grain
     second: NDArray[np.int64]  # (m,) another, or the same where the gap is to a wall
-    own: Array  # (m, 3) by what is wrong of the first
-    other: Array  # (m, 3) of the second, zero where there is none
-    column: NDArray[np.int64]  # (m, s) which of the shared ones
-    value: Array  # (m, s) by these
+    own: Array  # (m, 3) with respect to the errors of the first
+    other: Array  # (m, 3) of the second, zero at a wall
+    column: NDArray[np.int64]  # (m, s) shared unknowns
+    value: Array  # (m, s) with respect to these
     grain_count: int
     shared_count: int
 
@@ -29,11 +29,11 @@ class Derivatives(NamedTuple):
     def unknown_count(self) -> int:
         return OF_GRAIN * self.grain_count + self.shared_count
 
-    def of_unknowns(self, free: NDArray[np.bool_]) -> Derivatives:
-        """The same with zeros for unknowns (u,) that are not free."""
+    def restrict_to(self, free: NDArray[np.bool_]) -> Derivatives:
+        """Set the columns of unknowns (u,) that are not free to zero."""
         if free.all():
             return self
-        by_grain, shared = by_grains(free.astype(np.float64), self.grain_count)
+        by_grain, shared = split_unknowns(free.astype(np.float64), self.grain_count)
         found = self if shared.all() else self._replace(value=self.value * shared[self.column])
         if by_grain.all():
             return found
@@ -47,27 +47,27 @@ class Derivatives(NamedTuple):
         )  # fmt: skip
 
     def times(self, x: Array) -> Array:
-        """A x (m,)."""
+        """Compute A x (m,)."""
         out = np.empty(len(self.first))
-        _multiply(*self[:6], *by_grains(x, self.grain_count), out)
+        _multiply(*self[:6], *split_unknowns(x, self.grain_count), out)
         return out
 
     def transposed_times(self, v: Array) -> Array:
-        """Aᵀ v (u,)."""
+        """Compute Aᵀ v (u,)."""
         grains, shared = np.zeros((self.grain_count, OF_GRAIN)), np.zeros(self.shared_count)
         _multiply_transposed(*self[:6], v, grains, shared)
-        return in_order(grains, shared)
+        return join_unknowns(grains, shared)
 
 
-def by_grains(x: Array, grain_count: int) -> tuple[Array, Array]:
-    """What is asked of every grain (n, 3), and of what is shared (q,), from the one vector of unknowns (u,)."""
+def split_unknowns(x: Array, grain_count: int) -> tuple[Array, Array]:
+    """Split a vector of unknowns (u,) into those of every grain (n, 3) and shared ones (q,)."""
     n = grain_count
     grains = np.concatenate([x[: 2 * n].reshape(n, 2), x[2 * n : 3 * n, None]], axis=1)
     return np.ascontiguousarray(grains), np.ascontiguousarray(x[OF_GRAIN * n :])
 
 
-def in_order(grains: Array, shared: Array) -> Array:
-    """The one vector (u,) again."""
+def join_unknowns(grains: Array, shared: Array) -> Array:
+    """Join the unknowns of grains and shared ones into one vector (u,)."""
     return np.concatenate([grains[:, :2].ravel(), grains[:, 2], shared])
 
 

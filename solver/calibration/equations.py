@@ -1,13 +1,15 @@
-"""The gap equations of a sequence: how constant errors of grains and walls show in every measured gap.
+"""The gap equations of a sequence: measured gaps as functions of the constant errors of grains and walls.
 
-Let a grain's true centre be (1 + ε) x + Rot(θ) o, its true radius R + δR, a wall lie b further out and be turned by a
-about its middle. The gap of grains i and j is then, to first order,
+Notes
+-----
+Let a grain's true centre be (1 + ε) x + Rot(θ) o, its true radius R + δR, a wall lie b further out and be rotated by a
+about its middle. Where the gap of grains i and j is measured as g, the true gap is, to first order,
 
     g − n·Rot(θ_i) o_i + n·Rot(θ_j) o_j − δR_i − δR_j + ε n·(x_j − x_i),
 
 and of grain i and a wall g − n·Rot(θ_i) o_i − δR_i + b − a s − ε n·x_i, at the distance s from the wall's middle, with
 + ε n·e more where the wall e was measured with the same pixel size. A circular wall that lies b further out has a
-radius that is b greater, or smaller where the packing is outside it; it is not turned. The angle θ counts from the
+radius that is b greater, or smaller where the packing is outside it; it is not rotated. The angle θ counts from the
 first frame in which the grain is seen.
 """
 
@@ -18,17 +20,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, circle_ends, circle_of, outward_normals
-from solver.calibration.derivatives import Derivatives
-from solver.calibration.gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, circle_ends, circle_parameters, outward_normals
+from .derivatives import Derivatives
+from .gaps import GapGeometry, GapRows, MeasuredSequence, measure_gaps
 
-SHARED = 5  # unknowns that a gap shares with others, at most: a wall and its tilt, or classes, scale and lens
+SHARED = 5  # greatest number of shared unknowns of a gap: a wall and its tilt, or classes, scale and lens
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """Where each kind of unknown stands in the one vector that is solved for."""
+class UnknownLayout:
+    """Slices of the vector of unknowns by kind."""
 
     grain_count: int
     wall_count: int
@@ -66,7 +68,7 @@ class Layout:
 
     @property
     def lens(self) -> slice:
-        """Displacement by what is left of the lens's radial distortion, at the corner farthest from the centre [m]."""
+        """Shift by the remaining radial distortion of the lens, at the corner farthest from the centre [m]."""
         return slice(self.scale.stop, self.scale.stop + 1)
 
     @property
@@ -75,20 +77,29 @@ class Layout:
 
 
 def rotate_offsets(sequence: MeasuredSequence, offset: Array) -> Array:
-    """Turn body-fixed offsets (n, 2) [m] with their grains: (f, n, 2) [m], zero where a grain is not present."""
+    """Rotate body-fixed offsets (n, 2) [m] with their grains: (f, n, 2) [m], zero where a grain is not present."""
     angle = _angle_since_first_seen(sequence)
-    return _turn(offset, np.cos(angle), np.sin(angle), sequence.present)
+    return _rotate(offset, np.cos(angle), np.sin(angle), sequence.present)
 
 
-def _turn(offset: Array, c: Array, s: Array, present: NDArray[np.bool_]) -> Array:
-    turned = np.stack([c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0] + c * offset[:, 1]], axis=2)
-    return np.where(present[..., None], turned, 0.0)
+def _rotate(offset: Array, c: Array, s: Array, present: NDArray[np.bool_]) -> Array:
+    rotated = np.stack([c * offset[:, 0] - s * offset[:, 1], s * offset[:, 0] + c * offset[:, 1]], axis=2)
+    return np.where(present[..., None], rotated, 0.0)
 
 
 def move_walls(endpoints: Array, outward: Array, tilt: Array, side: Sides = None) -> Array:
-    """Walls with endpoints (f, w, 2, 2) [m], moved outward (w,) [m] and turned by tilt (w,) [rad], small.
+    """Move walls outward and rotate them.
 
-    side (w,): which are circles; these get wider, or narrower, instead.
+    Parameters
+    ----------
+    endpoints : array (f, w, 2, 2)
+        Ends [m].
+    outward : array (w,)
+        Displacement [m]; a circular wall changes its radius by it instead.
+    tilt : array (w,)
+        Small rotation [rad] about the middle; none for circles.
+    side : array (w,), optional
+        Which walls are circles.
     """
     along = endpoints[..., 1, :] - endpoints[..., 0, :]
     half = 0.5 * np.linalg.norm(along, axis=-1) * tilt  # (f, w) [m] outward at end 0, inward at end 1
@@ -96,14 +107,17 @@ def move_walls(endpoints: Array, outward: Array, tilt: Array, side: Sides = None
     straight = endpoints + moved[..., None] * outward_normals(endpoints)[:, :, None, :]
     if side is None or not np.any(side):
         return straight
-    centre, radius, turn = circle_of(endpoints)
-    return np.where((side != STRAIGHT)[:, None, None], circle_ends(centre, radius + side * outward, turn), straight)
+    centre, radius, angle = circle_parameters(endpoints)
+    return np.where((side != STRAIGHT)[:, None, None], circle_ends(centre, radius + side * outward, angle), straight)
 
 
-def bulge(sequence: MeasuredSequence) -> Array:
-    """Direction and share (f, n, 2) in which radial distortion of third order moves the centres.
+def radial_distortion(sequence: MeasuredSequence) -> Array:
+    """Compute the displacement (f, n, 2) of the centres by radial distortion of unit amplitude.
 
-    It counts from the middle of the walls, in place of the middle of the picture, and is 1 at the farthest corner.
+    Notes
+    -----
+    q(x) = |r|² r with r = (x − m)/a: third order, from the middle m of the walls instead of that of the picture, and of
+    length 1 at the farthest corner, at the distance a.
     """
     if sequence.wall_count == 0:
         return np.zeros_like(sequence.position)
@@ -114,7 +128,7 @@ def bulge(sequence: MeasuredSequence) -> Array:
 
 
 class GapEquations:
-    """Gaps and derivatives of the rows of a sequence, for any value of the unknowns."""
+    """Corrected gaps of a sequence and their derivatives, for any value of the unknowns."""
 
     def __init__(
         self,
@@ -123,45 +137,56 @@ class GapEquations:
         *,
         walls_follow: bool = True,
     ) -> None:
-        """radius_class (n,): class 0, 1, … of each grain; walls_follow: the pixel size scales the walls, too."""
+        """radius_class (n,): class 0, 1, … of each grain; walls_follow: the pixel size also scales the walls."""
         self.sequence = sequence
         self.radius_class = radius_class
         self.walls_follow = walls_follow
         classes = 0 if radius_class is None else int(radius_class.max()) + 1
-        self.layout = Layout(sequence.grain_count, sequence.wall_count, classes)
+        self.layout = UnknownLayout(sequence.grain_count, sequence.wall_count, classes)
         angle = _angle_since_first_seen(sequence)
         self._cosine, self._sine = np.cos(angle), np.sin(angle)
-        self._bulge = bulge(sequence)
+        self._distortion = radial_distortion(sequence)
 
     def radius(self, unknowns: Array) -> Array:
-        """Corrected radii (n,) [m]."""
+        """Compute the corrected radii (n,) [m]."""
         correction = unknowns[self.layout.radius]
         if self.radius_class is not None:
             correction = correction + unknowns[self.layout.radius_class][self.radius_class]
         return self.sequence.radius + correction
 
     def position(self, unknowns: Array) -> Array:
-        """Corrected centres (f, n, 2) [m]."""
+        """Compute the corrected centres (f, n, 2) [m]."""
         offset = unknowns[self.layout.offset].reshape(-1, 2)
         scaled = (1.0 + unknowns[self.layout.scale]) * self.sequence.position
-        turned = _turn(offset, self._cosine, self._sine, self.sequence.present)
-        return scaled + unknowns[self.layout.lens] * self._bulge + turned
+        rotated = _rotate(offset, self._cosine, self._sine, self.sequence.present)
+        return scaled + unknowns[self.layout.lens] * self._distortion + rotated
 
     def endpoints(self, unknowns: Array) -> Array:
-        """Corrected ends of the walls (f, w, 2, 2) [m]."""
+        """Compute the corrected ends of the walls (f, w, 2, 2) [m]."""
         scale = 1.0 + unknowns[self.layout.scale] * self.walls_follow
         out, tilt = unknowns[self.layout.wall], unknowns[self.layout.wall_tilt]
         return move_walls(scale * self.sequence.endpoints, out, tilt, self.sequence.side)
 
     def measure(self, rows: GapRows, unknowns: Array) -> GapGeometry:
-        """Compute the corrected gaps, exactly, not to first order."""
+        """Compute the corrected gaps exactly, not to first order."""
         radius, side, cell = self.radius(unknowns), self.sequence.side, self.sequence.cell
         return measure_gaps(rows, self.position(unknowns), self.endpoints(unknowns), radius, side, cell)
 
     def derive(self, rows: GapRows, geometry: GapGeometry, free: NDArray[np.bool_] | None = None) -> Derivatives:
-        """Derivatives (m, unknowns) of the corrected gaps of `rows`, whose geometry is `geometry`.
+        """Compute the derivatives (m, u) of the corrected gaps of some rows.
 
-        free (u,): unknowns that are asked for; those of others may be zero. None: all.
+        Parameters
+        ----------
+        rows : GapRows
+        geometry : GapGeometry
+            Their corrected gaps and normals.
+        free : bool array (u,), optional
+            Unknowns whose derivatives are needed; others may be zero. None: all.
+
+        Notes
+        -----
+        ∂g/∂o_i = −Rot(θ_i)ᵀ n, ∂g/∂o_j = Rot(θ_j)ᵀ n, ∂g/∂δR = −1 for both radii and their classes, ∂g/∂b = 1,
+        ∂g/∂a = −s at a wall, ∂g/∂ε = n·(x_j − x_i), ∂g/∂d = n·(q(x_j) − q(x_i)) for the lens.
         """
         n, layout, count = self.sequence.grain_count, self.layout, rows.count
         i, grain, wall = rows.i.astype(np.int64), rows.second_grain(n).astype(np.int64), rows.with_wall(n)
@@ -179,15 +204,15 @@ class GapEquations:
         met = rows.j[wall] - n
         column[wall, 1], value[wall, 1] = layout.wall_tilt.start - start + met, -geometry.along[wall]
         column[wall, 2], value[wall, 2] = met, 1.0
-        of_all = (layout.scale.start, self._stretch), (layout.lens.start, self._bend)
+        of_all = (layout.scale.start, self._scale_derivatives), (layout.lens.start, self._lens_derivatives)
         for k, (place, measure) in enumerate(of_all, start=3):
             column[:, k] = place - start
             if free is None or free[place]:
                 value[:, k] = measure(rows, geometry)
         return Derivatives(i, grain, own, other, column, value, n, layout.count - start)
 
-    def _stretch(self, rows: GapRows, geometry: GapGeometry) -> Array:
-        """What the pixel size does to the gaps (m,) [m]."""
+    def _scale_derivatives(self, rows: GapRows, geometry: GapGeometry) -> Array:
+        """Compute the derivatives (m,) [m] with respect to the pixel size."""
         n, k, position = self.sequence.grain_count, rows.frame, self.sequence.position
         wall = rows.with_wall(n)
         end = position[k, rows.second_grain(n)]
@@ -199,12 +224,12 @@ class GapEquations:
             end[curved] = (position[k, rows.i] + depth[:, None] * geometry.normal)[curved]
         return np.einsum("mk,mk->m", geometry.normal, end - position[k, rows.i])
 
-    def _bend(self, rows: GapRows, geometry: GapGeometry) -> Array:
-        """What the lens does to the gaps (m,); the walls are straight and stay where they are."""
+    def _lens_derivatives(self, rows: GapRows, geometry: GapGeometry) -> Array:
+        """Compute the derivatives (m,) with respect to the lens; walls do not move with it."""
         n, k = self.sequence.grain_count, rows.frame
         wall = rows.with_wall(n)
-        end = np.where(wall[:, None], 0.0, self._bulge[k, rows.second_grain(n)])
-        return np.einsum("mk,mk->m", geometry.normal, end - self._bulge[k, rows.i])
+        end = np.where(wall[:, None], 0.0, self._distortion[k, rows.second_grain(n)])
+        return np.einsum("mk,mk->m", geometry.normal, end - self._distortion[k, rows.i])
 
     def _in_body_frame(self, frame: NDArray, grain: NDArray, normal: Array) -> tuple[Array, Array]:
         c, s = self._cosine[frame, grain], self._sine[frame, grain]

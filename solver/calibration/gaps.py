@@ -1,4 +1,4 @@
-"""What is measured of a sequence, and the gaps in it that may be contacts."""
+"""A measured sequence of grains and walls, and its gaps that may be contacts."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.cell import Cell, reduce_vectors
-from solver.bodies.grains import Array
-from solver.bodies.near_discs import find_near_discs
-from solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides, beside_wall, reach_of_wall
+from ..bodies.cell import Cell, reduce_vectors
+from ..bodies.disc_pairs import find_disc_pairs
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import STRAIGHT, Sides, all_sides, beside_wall, wall_distance
 
-TINY = 1e-300  # [m] lest a distance of zero have no direction at all
+TINY = 1e-300  # [m] avoids division by a distance of zero
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredSequence:
-    """What tracking says of n grains and w walls in f frames. Rows that are not present may hold any number."""
+    """Tracked poses of n grains and w walls in f frames. Rows that are not present may hold any number."""
 
     radius: Array  # (n,) [m]
     position: Array  # (f, n, 2) [m]
@@ -43,7 +43,7 @@ class MeasuredSequence:
                 raise ValueError(f"the {name} of a present grain is not finite")
 
     def thinned(self, count: int) -> MeasuredSequence:
-        """At most `count` frames, evenly spread."""
+        """Select at most `count` frames, evenly spaced."""
         f = self.frame_count
         k = np.unique(np.linspace(0, f - 1, min(f, count)).round().astype(np.int64))
         return MeasuredSequence(
@@ -66,7 +66,7 @@ class MeasuredSequence:
 
 @dataclass(frozen=True, slots=True)
 class GapRows:
-    """The pairs that may touch, once for every frame in which both are seen, sorted by pair, then frame."""
+    """Candidate pairs, one row for every frame in which both are present, sorted by pair, then frame."""
 
     frame: NDArray[np.int32]  # (m,)
     i: NDArray[np.int32]  # (m,) a grain
@@ -91,11 +91,11 @@ class GapRows:
 
 @dataclass(frozen=True, slots=True)
 class GapGeometry:
-    """Gaps of some rows and the directions they are measured in."""
+    """Gaps of some rows and their directions."""
 
     gap: Array  # (m,) [m], negative: overlap
     normal: Array  # (m, 2) unit vector from i towards j
-    along: Array  # (m,) [m] from the middle of the wall to where i meets it, in its direction 0 → 1; 0 between grains
+    along: Array  # (m,) [m] s, from the middle of the wall to the contact, in its direction 0 → 1; 0 between grains
 
     def select(self, rows: NDArray) -> GapGeometry:
         return GapGeometry(self.gap[rows], self.normal[rows], self.along[rows])
@@ -126,9 +126,26 @@ def measure_gaps(
     side: Sides = None,
     cell: Array | None = None,
 ) -> GapGeometry:
-    """Gaps of `rows` at position (f, n, 2) [m], endpoints (f, w, 2, 2) [m], radius (n,) [m] and cell (f, 2, 2) [m].
+    """Measure the gaps of some rows.
 
-    side (w,): which walls are circles.
+    Parameters
+    ----------
+    rows : GapRows
+        Pairs and frames (m).
+    position : array (f, n, 2)
+        Centres [m].
+    endpoints : array (f, w, 2, 2)
+        Ends of the walls [m].
+    radius : array (n,)
+        Radii [m].
+    side : array (w,), optional
+        Which walls are circles.
+    cell : array (f, 2, 2), optional
+        Vectors [m] of a periodic cell.
+
+    Notes
+    -----
+    g = |x_j − x_i| − R_i − R_j, with the nearest image in a cell; at a wall g = distance of its face − R_i.
     """
     n = len(radius)
     k, i, wall = rows.frame, rows.i, rows.with_wall(n)
@@ -138,9 +155,9 @@ def measure_gaps(
     kw, w, at = k[wall], rows.j[wall] - n, position[k[wall], i[wall]]
     shape = all_sides(side, endpoints.shape[1])[w]
     curved = shape != STRAIGHT
-    depth, outward = reach_of_wall(endpoints[kw, w], shape, at)
+    depth, outward = wall_distance(endpoints[kw, w], shape, at)
     direction = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
-    # A circle that is turned about its middle stays where it is.
+    # A circle that is rotated about its middle does not change.
     along[wall] = np.where(curved, 0.0, np.einsum("mk,mk->m", at - endpoints[kw, w].mean(axis=1), direction))
     gap[wall], normal[wall] = depth - radius[i[wall]], outward
     return GapGeometry(gap, normal, along)
@@ -173,11 +190,11 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
     if sequence.cell is not None:
         widest = 2.0 * radius[rows].max() + reach
         return _pairs_of_cell(Cell.at_rest(sequence.cell[k]), position[rows], radius[rows], rows, widest, reach)
-    i, j = rows[find_near_discs(position[rows], radius[rows], reach)].T
+    i, j = rows[find_disc_pairs(position[rows], radius[rows], reach)].T
 
     walls, side = sequence.endpoints[k][None], all_sides(sequence.side, sequence.wall_count)[None]
     place, margin = position[rows, None], radius[rows, None]
-    gap = reach_of_wall(walls, side, place)[0] - margin
+    gap = wall_distance(walls, side, place)[0] - margin
     # A grain meets a straight wall only beside it, give or take its radius.
     beside = beside_wall(walls, side, place, margin) & (gap > -margin)
     grain, wall = np.nonzero(beside & (gap < wall_reach))
@@ -187,9 +204,9 @@ def _pairs_of_frame(sequence: MeasuredSequence, k: int, reach: float, wall_reach
 def _pairs_of_cell(
     cell: Cell, position: Array, radius: Array, rows: NDArray, widest: float, reach: float
 ) -> tuple[NDArray, NDArray]:
-    """The same across the edges of a cell, without walls; widest [m]: distance of centres that is looked at."""
-    place, owner = cell.with_surroundings(position, widest)
-    pairs = find_near_discs(place, radius[owner], reach)
+    """List the pairs across the edges of a cell, without walls; widest [m]: greatest distance of centres."""
+    place, owner = cell.with_images(position, widest)
+    pairs = find_disc_pairs(place, radius[owner], reach)
     i, j = owner[pairs[pairs[:, 0] < len(rows)]].T  # of each pair and its images one lies in the cell by its first disc
     once = np.unique(i[i < j] * len(rows) + j[i < j])
     return rows[once // len(rows)], rows[once % len(rows)]

@@ -1,7 +1,7 @@
-"""Normal equations of gaps, factorised: grains among their neighbours as sparse blocks, what all share as a border.
+"""Normal equations of gaps, factorised: sparse blocks for grains, a dense border for shared unknowns.
 
-Pairs of neighbours make an almost planar graph, where a direct factorisation is cheap and exact. What is coupled with
-all grains comes last: its Schur complement is small and full.
+Pairs of neighbours make an almost planar graph, where a direct factorisation is cheap and exact. Unknowns that are
+coupled with all grains come last: their Schur complement is small and dense.
 """
 
 from __future__ import annotations
@@ -12,47 +12,66 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.calibration.derivatives import OF_GRAIN, Derivatives, by_grains, in_order
-from solver.factor.blocks import TRIPLE, area_of, lanes_of
-from solver.factor.cholesky import factorize, solve
-from solver.factor.pattern import Ids, Pattern, find_pattern
+from ..bodies.grains import Array
+from ..factor.blocks import TRIPLE, block_size, padded_rows
+from ..factor.cholesky import factorize, solve
+from ..factor.pattern import Ids, Pattern, find_pattern
+from .derivatives import OF_GRAIN, Derivatives, join_unknowns, split_unknowns
 
-AREA, FILLED = area_of(TRIPLE), lanes_of(TRIPLE)  # numbers of a block, and of a node beside the matrix
+AREA, FILLED = block_size(TRIPLE), padded_rows(TRIPLE)  # stored numbers of a block, and of a node's right side
 
 
 class Couplings(NamedTuple):
-    """Which grains have gaps with each other, whatever rows of them count."""
+    """Sparsity pattern of the normal equations: which grains have gaps with each other in any row."""
 
     pattern: Pattern
-    entry: Ids  # (m,) of the pattern, of every row
+    entry: Ids  # (m,) entry of the pattern for every row
 
     @classmethod
     def of(cls, grain_count: int, first: NDArray[np.integer], second: NDArray[np.integer]) -> Couplings:
-        """first, second (m,): the grains of every row."""
+        """Build the pattern; first, second (m,): the grains of every row."""
         key, row = np.unique(first.astype(np.int64) * grain_count + second, return_inverse=True)
         one, two = key // grain_count, key % grain_count
         pattern = find_pattern(grain_count, one, two)
         return cls(pattern, pattern.locate(one, two)[row])
 
     def select(self, rows: NDArray) -> Couplings:
-        """For some of the rows."""
+        """Select some rows; the pattern stays."""
         return Couplings(self.pattern, self.entry[rows])
 
 
 class NormalEquations:
-    """Aᵀ P A + D, factorised."""
+    """Cholesky factorisation of Aᵀ P A + D.
+
+    Notes
+    -----
+    With G the block of the grains, B that of grains and shared unknowns, C that of shared unknowns, a right side
+    (r, q) has the solution y = S⁻¹ (q − Bᵀ G⁻¹ r), x = G⁻¹ (r − B y), S = C − Bᵀ G⁻¹ B.
+    """
 
     def __init__(self, derivatives: Derivatives, couplings: Couplings, precision: Array, penalty: Array) -> None:
-        """Derivatives A (m, u) and couplings of their rows, precision (m,), penalties (u,).
+        """Assemble and factorise.
 
-        An unknown of infinite penalty is held: it stays zero, as its derivatives must be. Errors: LinAlgError where
-        something is not determined.
+        Parameters
+        ----------
+        derivatives : Derivatives
+            A (m, u).
+        couplings : Couplings
+            Pattern of its rows.
+        precision : array (m,)
+            Diagonal of P.
+        penalty : array (u,)
+            Diagonal of D; an unknown of infinite penalty is held at zero, and its derivatives must be zero.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the errors of a grain are not determined.
         """
         self._free = np.isfinite(penalty)
         d, pattern = derivatives, couplings.pattern
         n, q = d.grain_count, d.shared_count
-        of_grain, of_shared = by_grains(np.where(self._free, penalty, 1.0), n)
+        of_grain, of_shared = split_unknowns(np.where(self._free, penalty, 1.0), n)
         blocks, corner = np.zeros(AREA * pattern.entry_count), np.diag(of_shared)
         border = np.zeros((n, FILLED, q))  # nodes in the order of elimination
         _assemble(
@@ -60,7 +79,7 @@ class NormalEquations:
             precision, of_grain, blocks, border, corner,
         )  # fmt: skip
         if not factorize(pattern, blocks, np.empty(n, np.int64), TRIPLE):
-            raise np.linalg.LinAlgError("what is wrong of some grain is not determined")
+            raise np.linalg.LinAlgError("the errors of a grain are not determined by its gaps and priors")
         solved = np.empty((q, FILLED * n))
         for k in range(q):
             solved[k] = border[:, :, k].ravel()
@@ -70,15 +89,15 @@ class NormalEquations:
         self._corner = np.linalg.inv(corner - solved @ border.reshape(FILLED * n, q))
 
     def solve(self, right: Array) -> Array:
-        """(Aᵀ P A + D)⁻¹ of a right side (u,)."""
-        of_grain, shared = by_grains(np.where(self._free, right, 0.0), self._grains)
+        """Compute (Aᵀ P A + D)⁻¹ of a right side (u,)."""
+        of_grain, shared = split_unknowns(np.where(self._free, right, 0.0), self._grains)
         x = np.zeros((self._grains, FILLED))
         x[self._pattern.place, :OF_GRAIN] = of_grain
         flat = x.ravel()
         rest = self._corner @ (shared - self._solved @ flat)
         solve(self._pattern, self._blocks, flat, TRIPLE)
         flat -= rest @ self._solved
-        return np.where(self._free, in_order(flat.reshape(-1, FILLED)[self._pattern.place, :OF_GRAIN], rest), 0.0)
+        return np.where(self._free, join_unknowns(flat.reshape(-1, FILLED)[self._pattern.place, :OF_GRAIN], rest), 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,4 +1,4 @@
-"""What is thought of the constant errors before and while the gaps are looked at, and which gaps may matter then."""
+"""Priors of the constant errors, their reduction by the data, and the pairs and frames that are fitted."""
 
 from __future__ import annotations
 
@@ -8,21 +8,33 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import Quantity
-from solver.calibration.equations import GapEquations
-from solver.calibration.gaps import GapRows, MeasuredSequence, find_gap_rows
-from solver.calibration.weights import contact_width
+from ..bodies.grains import Array
+from ..quantity import Quantity
+from .equations import GapEquations
+from .gaps import GapRows, MeasuredSequence, find_gap_rows
+from .weights import contact_width
 
-REACH = 4.0  # candidate pairs: gap below this many times the scale of the errors
+REACH = 4.0  # calibration pairs have gaps below this many times the scale of the errors
 REACH_OF_NOISE = 6.0  # … plus this many standard deviations of the noise
-LEAST_EXCESS = 0.1  # of the noise: constant errors below this cannot be told from none
+MIN_EXCESS = 0.1  # of the noise: smaller constant errors cannot be detected
 FINEST_SURFACE = 1e-5  # of the mean radius: below this no real grain is round
 
 
 @dataclass(frozen=True, slots=True)
+class CalibrationSettings:
+    """Which constant errors are estimated, and their prior standard deviations."""
+
+    pixel_size: float = 5e-3  # relative standard deviation of the given scale; 0: it is exact
+    lens: bool = True  # estimate the remaining radial distortion of the lens
+    radius_class: float = 1e-3  # relative error common to the rods of one radius class; 0: none
+    radius_offset: float = 4e-3  # relative error common to all radii; 0: none
+    # Whether radii were measured independently: those from photographs share the scale's error and cannot determine it.
+    radii_are_known: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class CalibrationPriors:
-    """Standard deviations of the constant errors before the gaps are looked at. Zero: known exactly."""
+    """Prior standard deviations of the constant errors. Zero: known exactly."""
 
     centre: Annotated[float, Quantity("prior standard deviation of a component of a centre", "m", absent=0.0)]
     radius: Annotated[float, Quantity("prior standard deviation of a radius, grain by grain", "m", absent=0.0)]
@@ -55,28 +67,34 @@ class CalibrationPriors:
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
-    """Rows whose pair may touch once it is corrected."""
+class CalibrationPairs:
+    """Rows whose pair may touch after the correction."""
 
     rows: GapRows
-    scale: Array  # (m,) [m] what the constant errors may do to the gap: the initial s
-    stated_noise: Array  # (m,) [m] what the stated noise of positions does to the gap
+    scale: Array  # (m,) [m] s_0, standard deviation of the gap by the prior errors
+    stated_noise: Array  # (m,) [m] standard deviation of the gap by the stated noise of positions
     overlap: float  # [m] mean elastic overlap of a touching pair
     between_grains: NDArray[np.bool_]  # (m,)
     noise_factor: float = 1.0  # true over stated noise
 
     @property
     def position_noise(self) -> Array:
-        """Standard deviation of a gap by the noise of positions (m,) [m]."""
+        """Standard deviation (m,) [m] of a gap by the noise of positions."""
         return self.noise_factor * self.stated_noise
 
     @property
     def noise(self) -> Array:
-        """Standard deviation of the gap of a touching pair, by noise and elastic overlap (m,) [m]."""
+        """Standard deviation (m,) [m] of a touching gap by noise and elastic overlap."""
         return np.hypot(self.position_noise, self.overlap)
 
-    def judge_noise(self, gap: Array) -> Candidates:
-        """Raise the noise where gaps (m,) [m] scatter more than stated; few photographs cannot show less."""
+    def update_noise(self, gap: Array) -> CalibrationPairs:
+        """Update the noise from corrected gaps (m,) [m]; it is never below the stated one.
+
+        Notes
+        -----
+        noise_factor² = max(1, (w² − ō²)/⟨σ²⟩), w = `contact_width` of the gaps between grains, ō the overlap, ⟨σ²⟩ the
+        mean square of the stated noise of a gap.
+        """
         if not np.any(self.between_grains):
             return self
         excess = contact_width(gap[self.between_grains], self.overlap) ** 2 - self.overlap**2
@@ -84,8 +102,21 @@ class Candidates:
         return replace(self, noise_factor=float(np.sqrt(max(1.0, excess / stated))))
 
 
-def find_candidates(sequence: MeasuredSequence, priors: CalibrationPriors, overlap: float) -> Candidates:
-    """List the pairs and frames that the fit looks at. overlap [m]: mean elastic overlap of a touching pair."""
+def find_calibration_pairs(sequence: MeasuredSequence, priors: CalibrationPriors, overlap: float) -> CalibrationPairs:
+    """List the pairs and frames that are fitted.
+
+    Parameters
+    ----------
+    sequence : MeasuredSequence
+    priors : CalibrationPriors
+    overlap : float
+        Mean elastic overlap [m] of a touching pair.
+
+    Notes
+    -----
+    With σ_g² = σ_c² + σ_r² + σ_class², s_0² = 2 σ_g² between grains and σ_g² + σ_wall² + (σ_tilt L/2)² + σ_lens² at a
+    wall of the greatest length L. Pairs with gaps below 4 s_0 + 6 (√2 σ_max + ō) are listed.
+    """
     grain = priors.centre**2 + priors.radius**2 + priors.radius_class**2
     half = 0.5 * float(_wall_length(sequence).max(initial=0.0))
     pair = np.sqrt(2.0 * grain)
@@ -99,36 +130,56 @@ def find_candidates(sequence: MeasuredSequence, priors: CalibrationPriors, overl
     first = sequence.sigma[rows.frame, rows.i]
     second = np.where(with_wall, 0.0, sequence.sigma[rows.frame, rows.second_grain(sequence.grain_count)])
     finest = FINEST_SURFACE * float(sequence.radius.mean())
-    return Candidates(rows, start, np.sqrt(first**2 + second**2 + finest**2), overlap, ~with_wall)
+    return CalibrationPairs(rows, start, np.sqrt(first**2 + second**2 + finest**2), overlap, ~with_wall)
 
 
 def narrow_priors(
     equations: GapEquations, limits: CalibrationPriors, overlap: float
 ) -> tuple[CalibrationPriors, float]:
-    """Limit the priors of centres and radii to what the overlaps between grains allow.
+    """Reduce the priors of centres and radii to the width that the overlaps between grains show.
 
-    Returns the priors and the width of the errors that the overlaps suggest over the width that `limits`
-    allow: above 1 the limits are narrower than the data.
+    Returns
+    -------
+    priors : CalibrationPriors
+        `limits`, with those of centres and radii multiplied by min(1, ratio).
+    ratio : float
+        Width of the errors by the overlaps over that of `limits`; above 1 the limits are narrower than the data.
+
+    Notes
+    -----
+    ratio² = max(w² − σ², (0.1 σ)²)/(2 (σ_c² + σ_r²)), w = `contact_width` of the gaps between grains, σ their noise.
     """
     given = np.sqrt(2.0) * np.hypot(limits.centre, limits.radius)
-    candidates = find_candidates(equations.sequence, limits, overlap)
+    candidates = find_calibration_pairs(equations.sequence, limits, overlap)
     between = candidates.between_grains
     if given == 0.0 or not np.any(between):
         return limits, 0.0
     gap = equations.measure(candidates.rows, np.zeros(equations.layout.count)).gap
     noise = float(np.sqrt(np.mean(candidates.noise[between] ** 2)))
     excess = contact_width(gap[between], overlap) ** 2 - noise**2
-    ratio = float(np.sqrt(max(excess, (LEAST_EXCESS * noise) ** 2))) / given
-    share = min(1.0, ratio)
-    return replace(limits, centre=share * limits.centre, radius=share * limits.radius), ratio
+    ratio = float(np.sqrt(max(excess, (MIN_EXCESS * noise) ** 2))) / given
+    fraction = min(1.0, ratio)
+    return replace(limits, centre=fraction * limits.centre, radius=fraction * limits.radius), ratio
 
 
 def reduce_priors(
     limits: CalibrationPriors, equations: GapEquations, unknowns: Array, draws: Array
 ) -> CalibrationPriors:
-    """One step of expectation maximisation: prior variance of centres and radii = mean (estimate² + variance).
+    """Update the prior variances of centres and radii by one step of expectation maximisation.
 
-    unknowns (u,) is the estimate, draws (d, u) are samples of its error; the result never exceeds `limits`.
+    Parameters
+    ----------
+    limits : CalibrationPriors
+        Upper limits.
+    equations : GapEquations
+    unknowns : array (u,)
+        The estimate.
+    draws : array (d, u)
+        Draws of its error.
+
+    Notes
+    -----
+    σ² = ⟨û²⟩ + ⟨draw²⟩, means over all grains (and components, and draws).
     """
 
     def reduce(part: slice, limit: float) -> float:
@@ -145,7 +196,7 @@ def _wall_length(sequence: MeasuredSequence) -> Array:
 
 
 def prior_vector(equations: GapEquations, priors: CalibrationPriors) -> Array:
-    """Prior standard deviation of every unknown (u,)."""
+    """Return the prior standard deviation (u,) of every unknown."""
     layout = equations.layout
     sd = np.zeros(layout.count)
     sd[layout.offset] = priors.centre

@@ -1,15 +1,19 @@
-"""The scale of a sequence: a wrong pixel size and wrong radii of whole classes, found before anything finer.
+"""The scale of a sequence: errors of the pixel size and of whole radius classes, estimated before any finer errors.
 
-Touching grains of two classes have one gap: measured with the true scale and radii, zero less the elastic overlap.
-So the gaps of each pair of classes pile up at one value, on a tail of pairs that do not touch, and where they pile up
-tells an error that all of these pairs share,
+With the true scale and radii, touching grains of two classes have a gap of minus the elastic overlap. The distribution
+of the gaps of each pair of classes therefore has a peak, beside a tail of open pairs, and the peak's position shows the
+errors that all of these pairs share.
+
+Notes
+-----
+The peak of classes a and b is at
 
     gap = −overlap − ε (R_a + R_b) + 2 ω + δR_a + δR_b,
 
-with ε the relative error of the pixel size, ω one that all radii share, as where a rim is seen too far in, and δR those
-of the classes. A pixel size is easily wrong by half a per cent, rims are seen true or well inside, and machined rods
-are true to a thousandth unless a class was mistaken altogether: ε has a Gaussian prior, ω and every δR an exponential
-one on both sides, so that the fewest causes that explain all gaps are found. Rods of one size cannot tell ε from ω.
+with ε the relative error of the pixel size, ω the error that all radii share, for instance of a rim measured too far
+inside, and δR those of the classes. Typical errors are half a per cent for pixel sizes, zero or large for rims, and a
+thousandth for machined rods unless a class was mistaken: ε has a Gaussian prior, ω and every δR a Laplace prior, which
+selects the fewest causes that explain all gaps. Rods of one size cannot separate ε from ω.
 """
 
 from __future__ import annotations
@@ -19,42 +23,42 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import all_sides, reach_of_wall
-from solver.calibration.gaps import MeasuredSequence, find_gap_rows, measure_gaps
-from solver.calibration.priors import CalibrationPriors
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import all_sides, wall_distance
+from .gaps import MeasuredSequence, find_gap_rows, measure_gaps
+from .priors import CalibrationPriors
 
-REACH = 0.06  # of a mean diameter: gaps beyond are not looked at
-COARSE = 1.5e-3  # of a mean diameter: width of the kernel that finds the pile, then reduced to the pile's own
-FINEST = 2e-4  # of a mean diameter: no narrower kernel
+REACH = 0.06  # of a mean diameter: greatest gap that is used
+COARSE = 1.5e-3  # of a mean diameter: initial kernel width, then reduced to the width of the peak
+FINEST = 2e-4  # of a mean diameter: smallest kernel width
 KERNEL_STEPS = 30  # mean-shift steps
-LEAST_PAIRS = 6  # distinct pairs in a pile: fewer tell nothing of their classes
-FRAMES = 20  # photographs that are looked at, evenly spread
-OVERLAP_DOUBT = 0.5  # the typical overlap is known to this share …
-TAIL_DOUBT = 0.1  # … and the tail of open gaps may draw the pile aside by this share of its width
+MIN_PAIRS = 6  # distinct pairs in a peak; classes with fewer are not used
+FRAMES = 20  # photographs used, evenly spaced
+OVERLAP_SD = 0.5  # relative standard deviation of the typical overlap
+TAIL_SD = 0.1  # standard deviation of the peak's shift by the tail of open gaps, over the peak's width
 NORMAL_MEDIAN = 0.6745  # median of |N(0, 1)|
-TOLD = 3.0  # standard deviations beyond which an error is surely there
-DECISIVE = 20.0  # gain in twice the log likelihood, priors included, from which on the given scale is given up
-REWEIGHTINGS = 60  # of the exponential priors
-NEGLIGIBLE = 1e-3  # of a prior: an error of a class below this is none
+SIGNIFICANT_SDS = 3.0  # standard deviations above which an error is significant
+MIN_LIKELIHOOD_GAIN = 20.0  # gain in twice the log posterior above which the given scale is corrected
+REWEIGHTINGS = 60  # rounds for the Laplace priors
+NEGLIGIBLE = 1e-3  # of a prior: smaller errors of a class count as zero
 
 
 @dataclass(frozen=True, slots=True)
 class ScaleErrors:
-    """Errors that whole classes of lengths share. Add them to what was given."""
+    """Errors that whole classes of lengths share. Add them to the given values."""
 
     pixel_size: float  # relative; true distances are (1 + pixel_size) times the measured ones
     pixel_size_sd: float
     radius_class: Array  # (c,) [m] from given to true radius, beside radius_offset
     radius_class_sd: Array  # (c,) [m]
     walls_follow: bool  # the walls were measured with the same pixel size
-    found: bool  # False: all of it is zero
+    found: bool  # False: all errors are zero
     radius_offset: float = 0.0  # [m] from given to true radius, of all grains
     radius_offset_sd: float = 0.0
-    told_apart: bool = True  # whether the gaps tell the pixel size from the offset of the radii
+    separable: bool = True  # whether the gaps separate the pixel size from the offset of the radii
 
     def correct(self, sequence: MeasuredSequence, radius_class: NDArray[np.integer] | None) -> MeasuredSequence:
-        """Apply them. radius_class (n,): the class of each grain, as they were found with."""
+        """Apply the errors; radius_class (n,): the class of each grain, as for `find_scale`."""
         if not self.found:
             return sequence
         scale = 1.0 + self.pixel_size
@@ -68,15 +72,15 @@ class ScaleErrors:
 
 
 @dataclass(frozen=True, slots=True)
-class _Piles:
-    """Where the gaps of each pair of classes pile up."""
+class _GapPeaks:
+    """Peaks of the gap distributions, one for each pair of classes."""
 
     first: NDArray[np.int64]  # (p,) class
     second: NDArray[np.int64]  # (p,) class
     distance: Array  # (p,) [m] sum of the given radii
-    excess: Array  # (p,) [m] gap beyond contact
-    sd: Array  # (p,) [m] by the scatter of the pairs
-    doubt: float  # [m] that all share
+    excess: Array  # (p,) [m] position of the peak beyond contact
+    sd: Array  # (p,) [m] by the width of the peak and its number of pairs
+    common_sd: float  # [m] of an error that all peaks share
 
 
 def find_scale(
@@ -85,56 +89,86 @@ def find_scale(
     overlap: float,
     radius_class: NDArray[np.integer] | None = None,
 ) -> ScaleErrors:
-    """Find the errors of the pixel size and of radius classes, as far as `priors` allows either.
+    """Estimate the errors of the pixel size, of all radii, and of radius classes.
 
-    overlap [m]: mean elastic overlap of a touching pair; radius_class (n,) int: class 0, 1, … of each grain.
+    Parameters
+    ----------
+    sequence : MeasuredSequence
+    priors : CalibrationPriors
+        Scales σ_ε, λ_ω and λ_δ of the priors; zero: exact.
+    overlap : float
+        Mean elastic overlap ō [m] of a touching pair.
+    radius_class : int array (n,), optional
+        Class 0, 1, … of each grain.
+
+    Returns
+    -------
+    ScaleErrors
+        All zero, with standard deviations, where the evidence does not exceed MIN_LIKELIHOOD_GAIN.
+
+    Notes
+    -----
+    Peaks at t_p beyond contact, of width w_p and n_p distinct pairs, minimise
+
+        J(x) = (t + M x)ᵀ C⁻¹ (t + M x) + (ε/σ_ε)² + 2 |ω|/λ_ω + 2 Σ |δR|/λ_δ,
+        C = diag(w_p²/n_p) + ((0.5 ō)² + (0.1 median w)²) 1 1ᵀ,
+
+    over x = (ε, ω, δR), M with rows (R_a + R_b, −2, −1 for a, −1 for b), by 60 re-weighted least-squares steps in which
+    a Laplace prior is a Gaussian one of variance λ |x|. The errors are applied if J(0) − J(x) ≥ 20.
     """
     classes = np.zeros(sequence.grain_count, np.int64) if radius_class is None else radius_class.astype(np.int64)
     count = int(classes.max(initial=0)) + 1
-    nothing = ScaleErrors(
+    unchanged = ScaleErrors(
         0.0, priors.pixel_size, np.zeros(count), np.full(count, priors.radius_class),
         walls_follow=False, found=False, radius_offset_sd=priors.radius_offset,
     )  # fmt: skip
     if priors.pixel_size == 0.0 and priors.radius_class == 0.0 and priors.radius_offset == 0.0:
-        return nothing
-    piles = _find_piles(sequence.thinned(FRAMES), classes, overlap)
-    if piles is None:
-        return nothing
-    errors, sd, gain = _explain(piles, count, priors)
-    # Each with all that the other may be: one of them has to be sure.
-    apart = bool(np.any(np.abs(errors[:2]) > TOLD * sd[:2])) or 0.0 in (priors.pixel_size, priors.radius_offset)
-    if gain < DECISIVE:
+        return unchanged
+    peaks = _find_peaks(sequence.thinned(FRAMES), classes, overlap)
+    if peaks is None:
+        return unchanged
+    errors, sd, gain = _estimate_errors(peaks, count, priors)
+    # Each standard deviation contains the other error: one of the two has to be significant.
+    separable = bool(np.any(np.abs(errors[:2]) > SIGNIFICANT_SDS * sd[:2])) or 0.0 in (
+        priors.pixel_size,
+        priors.radius_offset,
+    )
+    if gain < MIN_LIKELIHOOD_GAIN:
         return replace(
-            nothing, pixel_size_sd=float(sd[0]), radius_offset_sd=float(sd[1]), told_apart=apart, radius_class_sd=sd[2:]
+            unchanged,
+            pixel_size_sd=float(sd[0]),
+            radius_offset_sd=float(sd[1]),
+            separable=separable,
+            radius_class_sd=sd[2:],
         )
     found = ScaleErrors(
         float(errors[0]), float(sd[0]), errors[2:], sd[2:], walls_follow=False, found=True,
-        radius_offset=float(errors[1]), radius_offset_sd=float(sd[1]), told_apart=apart,
+        radius_offset=float(errors[1]), radius_offset_sd=float(sd[1]), separable=separable,
     )  # fmt: skip
     return replace(found, walls_follow=_walls_follow(sequence.thinned(FRAMES), found, radius_class))
 
 
-def _find_piles(sequence: MeasuredSequence, classes: NDArray[np.int64], overlap: float) -> _Piles | None:
+def _find_peaks(sequence: MeasuredSequence, classes: NDArray[np.int64], overlap: float) -> _GapPeaks | None:
     diameter = 2.0 * float(sequence.radius.mean())
     rows = find_gap_rows(sequence, REACH * diameter, wall_reach=-np.inf)
     gap = measure_gaps(rows, sequence.position, sequence.endpoints, sequence.radius, cell=sequence.cell).gap
     pair_class = np.sort(np.stack([classes[rows.i], classes[rows.j]], axis=1), axis=1)
-    piles = []
+    peaks = []
     for first, second in np.unique(pair_class, axis=0):
         chosen = (pair_class == (first, second)).all(axis=1)
-        place, width, pairs = _pile(gap[chosen], rows.pair[chosen], diameter)
-        if pairs >= LEAST_PAIRS:
+        place, width, pairs = _find_peak(gap[chosen], rows.pair[chosen], diameter)
+        if pairs >= MIN_PAIRS:
             distance = float(np.mean(sequence.radius[rows.i[chosen]] + sequence.radius[rows.j[chosen]]))
-            piles.append((first, second, distance, place + overlap, width / np.sqrt(pairs), width))
-    if not piles:
+            peaks.append((first, second, distance, place + overlap, width / np.sqrt(pairs), width))
+    if not peaks:
         return None
-    first, second, distance, excess, sd, width = (np.array(column) for column in zip(*piles, strict=True))
-    doubt = np.hypot(OVERLAP_DOUBT * overlap, TAIL_DOUBT * np.median(width))
-    return _Piles(first.astype(np.int64), second.astype(np.int64), distance, excess, sd, float(doubt))
+    first, second, distance, excess, sd, width = (np.array(column) for column in zip(*peaks, strict=True))
+    common_sd = np.hypot(OVERLAP_SD * overlap, TAIL_SD * np.median(width))
+    return _GapPeaks(first.astype(np.int64), second.astype(np.int64), distance, excess, sd, float(common_sd))
 
 
-def _pile(gap: Array, pair: NDArray[np.int32], diameter: float) -> tuple[float, float, int]:
-    """Place and width [m] of the densest gaps, and how many distinct pairs are there."""
+def _find_peak(gap: Array, pair: NDArray[np.int32], diameter: float) -> tuple[float, float, int]:
+    """Find position and width [m] of the peak of the gap distribution, and its number of distinct pairs."""
     within = np.abs(gap) < REACH * diameter
     gap, pair = gap[within], pair[within]
     if len(gap) == 0:
@@ -156,16 +190,16 @@ def _densest(gap: Array, kernel: float) -> float:
     return float(bins[np.argmax(smooth)] + 0.125 * kernel)
 
 
-def _explain(piles: _Piles, count: int, priors: CalibrationPriors) -> tuple[Array, Array, float]:
-    """The most probable errors (2 + c,), ε, ω and δR, their standard deviations, and what is gained over none."""
-    rows = np.arange(len(piles.first))
+def _estimate_errors(peaks: _GapPeaks, count: int, priors: CalibrationPriors) -> tuple[Array, Array, float]:
+    """Estimate the errors (2 + c,), ε, ω and δR, their standard deviations, and the gain J(0) − J(x)."""
+    rows = np.arange(len(peaks.first))
     matrix = np.zeros((len(rows), 2 + count))
-    matrix[:, 0] = piles.distance
+    matrix[:, 0] = peaks.distance
     matrix[:, 1] = -2.0
-    np.add.at(matrix, (rows, 2 + piles.first), -1.0)
-    np.add.at(matrix, (rows, 2 + piles.second), -1.0)
-    precision = np.linalg.inv(np.diag(piles.sd**2) + piles.doubt**2)
-    target = -piles.excess
+    np.add.at(matrix, (rows, 2 + peaks.first), -1.0)
+    np.add.at(matrix, (rows, 2 + peaks.second), -1.0)
+    precision = np.linalg.inv(np.diag(peaks.sd**2) + peaks.common_sd**2)
+    target = -peaks.excess
     limit = np.concatenate([[priors.pixel_size, priors.radius_offset], np.full(count, priors.radius_class)])
     free = limit > 0.0
     gaussian = (np.arange(2 + count) < 1)[free]
@@ -176,20 +210,20 @@ def _explain(piles: _Piles, count: int, priors: CalibrationPriors) -> tuple[Arra
     errors = np.zeros(len(limit))
     for _ in range(REWEIGHTINGS):
         errors = np.linalg.solve(normal + np.diag(1.0 / variance), right)
-        # An exponential prior of scale λ weighs like a Gaussian one of variance λ |δ|.
+        # A Laplace prior of scale λ has the gradient of a Gaussian one of variance λ |δ|.
         variance = np.where(gaussian, limit**2, limit * np.maximum(np.abs(errors), NEGLIGIBLE * limit))
     residual = target - matrix @ errors
     cost = np.where(gaussian, (errors / limit) ** 2, 2.0 * np.abs(errors) / limit).sum()
     gain = target @ precision @ target - residual @ precision @ residual - cost
-    spread = np.where(gaussian, limit**2, np.maximum(variance, limit**2))
+    prior_variance = np.where(gaussian, limit**2, np.maximum(variance, limit**2))
     all_errors, sd = np.zeros(2 + count), np.zeros(2 + count)
     all_errors[free] = errors
-    sd[free] = np.sqrt(np.diag(np.linalg.inv(normal + np.diag(1.0 / spread))))
+    sd[free] = np.sqrt(np.diag(np.linalg.inv(normal + np.diag(1.0 / prior_variance))))
     return all_errors, sd, float(gain)
 
 
 def _walls_follow(sequence: MeasuredSequence, found: ScaleErrors, radius_class: NDArray[np.integer] | None) -> bool:
-    """Whether the walls fit the grains better when the pixel size changes them, too."""
+    """Return whether the walls fit the grains better if the pixel size scales them, too."""
     if sequence.wall_count == 0:
         return False
     stay, follow = (
@@ -199,9 +233,9 @@ def _walls_follow(sequence: MeasuredSequence, found: ScaleErrors, radius_class: 
 
 
 def _misfit(sequence: MeasuredSequence) -> float:
-    """How far the walls stand off their nearest grains, or cut into them [m], summed over the walls."""
+    """Sum over the walls the absolute median gap [m] of their nearest grains."""
     side = all_sides(sequence.side, sequence.wall_count)
-    depth, _ = reach_of_wall(sequence.endpoints[:, None], side, sequence.position[:, :, None])
+    depth, _ = wall_distance(sequence.endpoints[:, None], side, sequence.position[:, :, None])
     gap = depth - sequence.radius[:, None]
     gap = np.where(sequence.present[..., None], gap, np.inf)
     return float(np.abs(np.median(gap.min(axis=1), axis=0)).sum())

@@ -1,20 +1,29 @@
-"""One-sided robust weights: which measured gaps speak of a contact, and how wide the gaps of contacts are."""
+"""One-sided robust weights of measured gaps, and the standard deviation of touching gaps."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver.bodies.grains import Array
+from ..bodies.grains import Array
 
-FINAL_SCALE = 2.0  # final s over the noise of a gap: with less, gaps of contacts are cut off by their own noise
-DEEPEST = 2.0  # times s: a deeper overlap is the error of a track
+FINAL_SCALE = 2.0  # final s over the noise of a gap: a smaller one would cut off contacts by their own noise
+MAX_DEPTH = 2.0  # times s: a deeper overlap is a tracking error
 NORMAL_MEDIAN = 0.6745  # median of |N(0, 1)|
 
 
 def contact_width(gap: Array, overlap: float) -> float:
-    """Estimate the standard deviation of the gaps of touching pairs, from their overlapping side alone [m].
+    """Estimate the standard deviation [m] of touching gaps from their overlapping side, which open gaps do not reach.
 
-    Open gaps lie on the other side and do not count. gap (m,) [m]; overlap [m] is the typical elastic one.
+    Parameters
+    ----------
+    gap : array (m,)
+        Gaps [m].
+    overlap : float
+        Typical elastic overlap ō [m].
+
+    Notes
+    -----
+    The median of −(g + ō) over g < −ō, divided by 0.6745, the median of |N(0, 1)|; 0 without overlaps.
     """
     depth = -(gap + overlap)
     depth = depth[depth > 0.0]
@@ -22,21 +31,33 @@ def contact_width(gap: Array, overlap: float) -> float:
 
 
 def weigh_gaps(excess: Array) -> Array:
-    """Weight (m,) of gaps that exceed contact by `excess` (m,) times s.
+    """Compute the weights (m,) of gaps that exceed contact by `excess` (m,) times s.
 
-    An open gap counts less the wider it is. An overlap counts in full, however it fits, until it is deeper
-    than any error of centres or noise makes it.
+    Notes
+    -----
+    W(e) = (1 + e²)⁻² for open gaps, e ≥ 0; 1 for overlaps, −2 ≤ e < 0; (2/e)² for deeper ones, which no error of
+    centres or noise explains.
     """
     opened = (1.0 + np.maximum(excess, 0.0) ** 2) ** -2.0
-    return opened * np.minimum(1.0, DEEPEST / np.maximum(-excess, DEEPEST)) ** 2
+    return opened * np.minimum(1.0, MAX_DEPTH / np.maximum(-excess, MAX_DEPTH)) ** 2
 
 
 def weighting_bias(s: Array, sigma: Array) -> Array:
-    """How far below contact the weighted mean of the gaps of touching pairs lies (m,) [m].
+    """Compute by how much the weighted mean of touching gaps lies below contact (m,) [m].
 
-    s (m,) [m] is the scale of the weights, sigma (m,) [m] the noise that positions bring to a gap. Noise that
-    opens a gap is down-weighted, noise that closes it is not: unless this is made good, all contacts are
-    drawn apart.
+    Noise that opens a gap reduces its weight, noise that closes it does not. Without this term all contacts would be
+    fitted as overlapping.
+
+    Parameters
+    ----------
+    s : array (m,)
+        Scale of the weights [m].
+    sigma : array (m,)
+        Standard deviation [m] of a gap by the noise of positions.
+
+    Notes
+    -----
+    β = −∫ σ ξ W(σ ξ/s) φ(ξ) dξ / ∫ W(σ ξ/s) φ(ξ) dξ, φ the standard normal density, from a table in σ/s.
     """
     noise = np.linspace(-6.0, 6.0, 241)
     ratio = np.linspace(0.0, 1.0 / FINAL_SCALE, 41)  # sigma / s is never greater

@@ -1,42 +1,45 @@
-"""Who touches whom: coordination numbers and rattlers."""
+"""Coordination numbers and rattlers."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
+from ..bodies.grains import Array
+from .contacts import Contacts
 
-LEVELS = 8  # of P(bears force), over which rattlers are counted
+LEVELS = 8  # thresholds of P(bears force) over which the number of rattlers is averaged
 
 
 def contacts_per_grain(contacts: Contacts, bearing: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Number of bearing contacts of every grain (n,), those with walls included."""
+    """Return the number of bearing contacts of every grain (n,), those with walls included."""
     i, j = contacts.i[bearing], contacts.j[bearing]
     n = contacts.grain_count
     return np.bincount(i, minlength=n) + np.bincount(j[j < n], minlength=n)[:n]
 
 
 def rattlers(contacts: Contacts, bearing: NDArray[np.bool_], present: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Grains that cannot be in balance: fewer than two bearing contacts, found by peeling (n,)."""
+    """Return the rattlers (n,): grains with fewer than two bearing contacts, removed until none is left."""
     bearing = bearing.copy()
     n = contacts.grain_count
     pair = contacts.j < n
     while True:
         loose = present & (contacts_per_grain(contacts, bearing) < 2)
-        lost = bearing & loose[contacts.i]
-        lost[pair] |= bearing[pair] & loose[contacts.j[pair]]
-        if not lost.any():
+        removed = bearing & loose[contacts.i]
+        removed[pair] |= bearing[pair] & loose[contacts.j[pair]]
+        if not removed.any():
             return loose
-        bearing &= ~lost
+        bearing &= ~removed
 
 
 def expected_rattlers(contacts: Contacts, bears: Array, present: NDArray[np.bool_]) -> float:
-    """Expected number of rattlers, from P(bears force) of the contacts (c,).
+    """Return the expected number of rattlers, from P(bears force) of the contacts (c,).
 
-    A mean over LEVELS of the probability from which on a contact counts: contacts of one grain are doubtful together,
-    and the grains that one level alone finds are fewer than there are, for a doubt frees more grains than it holds.
+    Notes
+    -----
+    The mean number of rattlers over LEVELS thresholds of the probability. The probabilities of the contacts of a grain
+    are correlated, and a single threshold gives too few rattlers: an uncertain contact releases more grains than it
+    holds.
     """
     levels = (np.arange(LEVELS) + 0.5) / LEVELS
     return float(np.mean([rattlers(contacts, bears > level, present).sum() for level in levels]))
@@ -50,10 +53,25 @@ def coordination_number(
     without_rattlers: bool = False,
     weight: Array | None = None,
 ) -> float:
-    """Mean number of contacts of a present grain; a contact with a wall counts once. 0 without grains.
+    """Return the mean number of contacts of the present grains; a contact with a wall counts once.
 
-    bearing (c,): which contacts count, and which hold a grain, so that it is no rattler; weight (c,): how likely each
-    contact, bearing or not, bears force, where counts are to be what is expected; None: as bearing says.
+    Parameters
+    ----------
+    contacts
+        Contacts of the frame.
+    bearing : (c,) bool
+        Contacts that bear force; they decide which grains are rattlers.
+    present : (n,) bool
+        Grains that are counted.
+    without_rattlers
+        Exclude rattlers and their contacts.
+    weight : (c,), optional
+        P(bears force) of every contact, for the expected number; 1 for bearing contacts and 0 for others by default.
+
+    Returns
+    -------
+    float
+        The coordination number; 0 without grains.
     """
     loose = rattlers(contacts, bearing, present) if without_rattlers else np.zeros(contacts.grain_count, np.bool_)
     pair, weight = ~contacts.with_wall, bearing.astype(np.float64) if weight is None else weight

@@ -1,4 +1,4 @@
-"""Contacts: pairs of bodies close enough to touch, with their point, normal, gap and a stable key."""
+"""Contacts: pairs of bodies with their point, normal and gap, and a key that is the same in every frame."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from jaxtyping import Float, Int32
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.cell import Cell
-from solver.bodies.grains import Array, Grains
-from solver.bodies.near_discs import find_near_discs
-from solver.bodies.quantity import Quantity
-from solver.bodies.wall_shapes import Sides, beside_wall, reach_of_wall
-from solver.bodies.walls import Walls
-from solver.contacts.pairs import Keys, make_keys, split_keys
+from ..bodies.cell import Cell
+from ..bodies.disc_pairs import find_disc_pairs
+from ..bodies.grains import Array, Grains
+from ..bodies.wall_shapes import Sides, beside_wall, wall_distance
+from ..bodies.walls import Walls
+from ..quantity import Quantity
+from .pairs import Keys, make_keys, split_keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Contacts:
     shift: Annotated[
         Float[Array, "c 2"] | None,
         Quantity("to be added to the centre of j for the image that i touches", "m", "contact xy", since=2),
-    ] = None  # there is no periodic cell
+    ] = None  # None: no periodic cell
 
     @property
     def count(self) -> int:
@@ -58,7 +58,7 @@ class Contacts:
 
     @property
     def key(self) -> Keys:
-        """A number that names the pair in every frame of a sequence (c,), ascending."""
+        """Keys of the pairs (c,), ascending, the same in every frame of a sequence."""
         return make_keys(self.i, self.j, self.body_count)
 
     @property
@@ -66,7 +66,7 @@ class Contacts:
         return self.j >= self.grain_count
 
     def second_centre(self, position: Array) -> Array:
-        """Centre of j as i touches it (c, 2) [m], where j is a grain; else NaN. position (n, 2) [m]."""
+        """Return the centre (c, 2) [m] of the image of j that i touches; NaN for a wall. position (n, 2) [m]."""
         centre = np.full((self.count, 2), np.nan)
         pair = ~self.with_wall
         centre[pair] = position[self.j[pair]]
@@ -74,17 +74,17 @@ class Contacts:
 
     @property
     def gauge(self) -> NDArray[np.bool_]:
-        """Contacts the sum of whose f_n stands for an unknown scale (c,): those with walls, or all without walls."""
+        """Contacts (c,) whose Σ f_n normalises forces of unknown scale: those with walls, or all without walls."""
         wall = self.with_wall
         return wall if wall.any() else np.ones(self.count, np.bool_)
 
     @property
     def tangent(self) -> Array:
-        """The normal turned by +90° (c, 2)."""
+        """The normal rotated by +90° (c, 2)."""
         return np.stack([-self.normal[:, 1], self.normal[:, 0]], axis=1)
 
     def select(self, rows: NDArray) -> Contacts:
-        """Keep some rows (mask, or ascending indices)."""
+        """Return some rows, given by a mask or by ascending indices."""
         return Contacts(
             self.i[rows], self.j[rows], self.gap[rows], self.normal[rows], self.point[rows],
             self.grain_count, self.wall_count, None if self.shift is None else self.shift[rows],
@@ -100,16 +100,28 @@ def detect_contacts(
     *,
     wall_threshold: float | None = None,
 ) -> Contacts:
-    """Find every pair whose gap is below the threshold.
+    """Find every pair of bodies whose gap is below a threshold.
 
-    position (n, 2) [m]; present (n,); threshold [m] between grains and, unless
-    `wall_threshold` is given, between grain and wall too.
+    Parameters
+    ----------
+    grains
+        Radii, and boundary grains, which have no contacts with each other and with walls.
+    position : (n, 2)
+        Centres [m].
+    present : (n,) bool
+        Grains that take part.
+    walls
+        Walls or cell of the frame.
+    threshold
+        Greatest gap [m].
+    wall_threshold
+        Greatest gap [m] between a grain and a wall; `threshold` by default.
     """
     wall_threshold = threshold if wall_threshold is None else wall_threshold
     i, j = _grain_pairs(grains.radius, position, present, threshold, walls.cell)
     if grains.boundary is not None:
-        some = ~(grains.boundary[i] & grains.boundary[j])  # between what moves as it was seen are no contacts
-        i, j = i[some], j[some]
+        kept = ~(grains.boundary[i] & grains.boundary[j])  # the motion of both is imposed
+        i, j = i[kept], j[kept]
     wi, wj = _wall_pairs(grains.radius, position, present & grains.free, walls, wall_threshold)
     return measure_contacts(grains, position, walls, np.concatenate([i, wi]), np.concatenate([j, wj + grains.count]))
 
@@ -117,7 +129,13 @@ def detect_contacts(
 def measure_contacts(
     grains: Grains, position: Array, walls: Walls, i: NDArray[np.integer], j: NDArray[np.integer]
 ) -> Contacts:
-    """Measure normal, gap and point of the named pairs i, j (c,), whatever their distance."""
+    """Measure normal, gap and point of given pairs i, j (c,) at any distance.
+
+    Raises
+    ------
+    ValueError
+        Two grains have the same centre.
+    """
     n, key = grains.count, make_keys(i, j, grains.count + walls.count)
     i, j = i.astype(np.int32), j.astype(np.int32)
     if np.any(key[1:] < key[:-1]):
@@ -125,7 +143,7 @@ def measure_contacts(
         i, j = i[order], j[order]
     normal, gap, point, shift = np.empty((len(i), 2)), np.empty(len(i)), np.empty((len(i), 2)), None
     wall = np.flatnonzero(j >= n)
-    distance, normal[wall] = walls.reach(j[wall] - n, position[i[wall]])
+    distance, normal[wall] = walls.distance(j[wall] - n, position[i[wall]])
     gap[wall] = distance - grains.radius[i[wall]]
     if walls.cell is not None:
         pair, shift = j < n, np.zeros((len(i), 2))
@@ -138,7 +156,7 @@ def measure_contacts(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _measure(i, j, position, radius, shift, gap, normal, point):  # type: ignore[no-untyped-def]
-    """Set gap, normal and point of all pairs, of walls the point alone; gives a row of a distance of zero, or −1."""
+    """Set gap, normal and point of the pairs, of walls only the point; return a row of zero distance, or −1."""
     for c in range(len(i)):
         a, b = i[c], j[c]
         if b < len(radius):
@@ -151,13 +169,13 @@ def _measure(i, j, position, radius, shift, gap, normal, point):  # type: ignore
                 return c
             normal[c, 0], normal[c, 1] = x / distance, y / distance
             gap[c] = distance - radius[a] - radius[b]
-        out = radius[a] + 0.5 * gap[c]
-        point[c, 0], point[c, 1] = position[a, 0] + normal[c, 0] * out, position[a, 1] + normal[c, 1] * out
+        arm = radius[a] + 0.5 * gap[c]
+        point[c, 0], point[c, 1] = position[a, 0] + normal[c, 0] * arm, position[a, 1] + normal[c, 1] * arm
     return -1
 
 
 def measure_pairs(grains: Grains, position: Array, walls: Walls, key: Keys) -> Contacts:
-    """Measure the pairs that are named by key (c,), whatever their distance."""
+    """Measure the pairs of given keys (c,) at any distance."""
     return measure_contacts(grains, position, walls, *split_keys(key, grains.count + walls.count))
 
 
@@ -168,25 +186,25 @@ def _grain_pairs(
     if len(rows) < 2:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     if cell is None:
-        pairs = rows[find_near_discs(position[rows], radius[rows], threshold)]
+        pairs = rows[find_disc_pairs(position[rows], radius[rows], threshold)]
         return pairs[:, 0], pairs[:, 1]
-    place, owner = _surroundings(cell, position, rows, 2.0 * radius[rows].max() + threshold)
-    pairs = find_near_discs(place, radius[owner], threshold)
-    i, j = owner[pairs[pairs[:, 0] < len(rows)]].T  # of each pair and its images one lies in the cell by its first disc
+    point, owner = _with_images(cell, position, rows, 2.0 * radius[rows].max() + threshold)
+    pairs = find_disc_pairs(point, radius[owner], threshold)
+    i, j = owner[pairs[pairs[:, 0] < len(rows)]].T  # exactly one image of each pair has its first disc in the cell
     once = np.unique(i[i < j] * len(radius) + j[i < j])
     return once // len(radius), once % len(radius)
 
 
-def _surroundings(cell: Cell, position: Array, rows: NDArray[np.intp], reach: float) -> tuple[Array, NDArray[np.intp]]:
-    place, owner = cell.with_surroundings(position[rows], reach)
-    return place, rows[owner]
+def _with_images(cell: Cell, position: Array, rows: NDArray[np.intp], reach: float) -> tuple[Array, NDArray[np.intp]]:
+    point, owner = cell.with_images(position[rows], reach)
+    return point, rows[owner]
 
 
 def _wall_pairs(
     radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """A grain meets a straight wall only beside it: its centre must project onto it, give or take one radius."""
-    gap = reach_of_wall(walls.endpoints[None], _row(walls.side), position[:, None])[0] - radius[:, None]
+    """Find pairs of grain and wall; the centre must project onto a straight wall, within one radius of its ends."""
+    gap = wall_distance(walls.endpoints[None], _row(walls.side), position[:, None])[0] - radius[:, None]
     i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & present[:, None])
     side = None if walls.side is None else walls.side[w]
     beside = beside_wall(walls.endpoints[w], side, position[i], radius[i])
@@ -207,4 +225,4 @@ class ContactSource(IntEnum):
     DETECTED = 0
     ADDED_BY_REVIEWER = 1
     FORBIDDEN_BY_REVIEWER = 2
-    DEMANDED = 3  # not detected, but without it the forces around it do not fit the motion
+    FROM_BALANCE = 3  # not detected: added because the forces around it contradict the motion without it

@@ -1,7 +1,8 @@
-"""Pairs of bodies by key: a number that names a pair in every frame, and how sets of named pairs are matched.
+"""Keys of pairs of bodies, the same in every frame, and operations on sets of keys.
 
-Bodies are the grains and after them the walls; the key of (i, j) is i · bodies + j with i < j, so that keys ascend as
-pairs do. Nobody else takes keys apart. Sets of keys name every pair once, in any order unless said.
+Bodies are the grains followed by the walls. The key of (i, j) is i · bodies + j with i < j, so that keys ascend in the
+order of the pairs. A set of keys contains every pair once, in any order unless stated. All other modules use keys
+through these functions.
 """
 
 from __future__ import annotations
@@ -15,50 +16,50 @@ Keys = NDArray[np.int64]
 
 
 def make_keys(i: NDArray[np.integer], j: NDArray[np.integer], bodies: int) -> Keys:
-    """Name pairs of bodies i < j (c,); bodies: grains and walls together."""
+    """Return the keys of pairs i < j (c,); bodies: number of grains and walls together."""
     return np.asarray(i).astype(np.int64) * bodies + j
 
 
 def make_key(a: int, b: int, bodies: int) -> int:
-    """Name one pair, given from either side."""
+    """Return the key of one pair, given in either order."""
     return min(a, b) * bodies + max(a, b)
 
 
 def split_keys(key: Keys, bodies: int) -> tuple[Keys, Keys]:
-    """Tell the bodies i and j of every pair (c,)."""
+    """Return the bodies i and j of every pair (c,)."""
     return key // bodies, key % bodies
 
 
 def split_key(key: int, bodies: int) -> tuple[int, int]:
-    """Tell the bodies i and j of one pair."""
+    """Return the bodies i and j of one pair."""
     return divmod(key, bodies)
 
 
-def are_there(key: Keys, present: NDArray[np.bool_], bodies: int) -> NDArray[np.bool_]:
-    """Which pairs (c,) have both bodies there; present (n,) of the grains, walls always are."""
+def are_present(key: Keys, present: NDArray[np.bool_], bodies: int) -> NDArray[np.bool_]:
+    """Return which pairs (c,) have both bodies present; present (n,) of the grains, walls are always present."""
     i, j = split_keys(key, bodies)
     here = np.concatenate([present, np.ones(bodies - len(present), np.bool_)])
     return here[i] & here[j]
 
 
 def are_among(key: Keys, others: Keys) -> NDArray[np.bool_]:
-    """Which pairs (c,) others name too."""
+    """Return which pairs (c,) are also in the other set."""
     return np.isin(key, others)
 
 
 def join_keys(*keys: Keys) -> Keys:
-    """Every pair that any of the sets names, ascending."""
+    """Return the union of the sets, ascending."""
     return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
 
 
 def common_rows(key: Keys, others: Keys) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of the pairs that both sets name, in the one and in the other, by ascending key."""
+    """Return the rows of the common pairs in the one and in the other set, by ascending key."""
     _, here, there = np.intersect1d(key, others, assume_unique=True, return_indices=True)
     return here, there
 
 
 def find_rows(key: Keys, former: Keys) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Row of every pair (c,) among former ones, and whether it is there at all; else the row means nothing."""
+    """Return the row of every pair (c,) in a former set, and whether it is there; otherwise the row is arbitrary."""
     if len(former) == 0:
         return np.zeros(len(key), np.intp), np.zeros(len(key), np.bool_)
     order = np.argsort(former, kind="stable")
@@ -66,8 +67,8 @@ def find_rows(key: Keys, former: Keys) -> tuple[NDArray[np.intp], NDArray[np.boo
     return row, former[row] == key
 
 
-def recall(key: Keys, former: Keys, value: NDArray[Any], *, fill: float = 0.0) -> NDArray[Any]:
-    """Values (m, …) of former pairs (m,) on these (c, …); `fill` where a pair was not among them."""
+def match_values(key: Keys, former: Keys, value: NDArray[Any], *, fill: float = 0.0) -> NDArray[Any]:
+    """Return the values (c, …) of pairs from those of former pairs (m, …); `fill` where a pair is not among them."""
     row, known = find_rows(key, former)
     found = np.full((len(key), *value.shape[1:]), fill, value.dtype)
     found[known] = value[row[known]]
@@ -77,7 +78,7 @@ def recall(key: Keys, former: Keys, value: NDArray[Any], *, fill: float = 0.0) -
 def align(
     key: Keys, value: NDArray[Any], other_key: Keys, other: NDArray[Any]
 ) -> tuple[Keys, NDArray[np.float64], NDArray[np.float64]]:
-    """Bring values (c, …) and (t, …) of two sets onto the union of their pairs: its keys, and both; absent is 0."""
+    """Return the union of two sets of pairs and their values (c, …), (t, …) on it; 0 where a pair is absent."""
     union = join_keys(key, other_key)
     one, two = np.zeros((len(union), *value.shape[1:])), np.zeros((len(union), *other.shape[1:]))
     one[np.searchsorted(union, key)] = value

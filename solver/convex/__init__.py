@@ -1,1 +1,1 @@
-"""The other method: convex programs that read the sliding, and the friction that the motion shows. Stands on nlgs."""
+"""Convex programs for contact forces from measured sliding, and friction estimated from the motion."""

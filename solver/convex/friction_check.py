@@ -1,4 +1,7 @@
-"""Is the given coefficient of friction the one that the motion shows? Too low a one is the worst error of all."""
+"""Comparison of the given coefficient of friction with the one estimated from the motion.
+
+A coefficient that is too low is the worst error of all.
+"""
 
 from __future__ import annotations
 
@@ -9,53 +12,53 @@ from typing import Annotated
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Packing
-from solver.bodies.quantity import Quantity
-from solver.convex.friction_estimate import FACTORS, SlidingFrame, estimate_friction
-from solver.convex.members import measured_slip
-from solver.convex.program import assemble_balance
-from solver.detection.touch_probability import ContactProbabilitySettings, probable_contacts, window_of
-from solver.together import work_together
+from ..bodies.grains import Array
+from ..bodies.motion import Snapshot
+from ..bodies.packing import Packing
+from ..detection.touch_probability import ContactProbabilitySettings, probable_contacts, window_of
+from ..parallel import parallel_map
+from ..quantity import Quantity
+from .ensemble_members import measured_slip
+from .friction_estimate import FACTORS, SlidingFrame, estimate_friction
+from .program import assemble_balance
 
-# The least power gap lies below the true friction: by this factor on simulated packings, give or take the scatter
-# (packings of 500 and 1172 grains, μ = 0.15, 0.25 and 0.4).
-KNOWN_BIAS = 0.92
-BIAS_SCATTER = 0.07
-# Of walls, over the true one: 0.83 to 1.06 (a core in a ring and a shear box, 200 rods, μ = 0.15 and 0.4 at walls,
-# 0.25 between rods).
-WALL_BIAS_SCATTER = 0.12
-WALL_SCATTER = 0.15  # relative standard deviation over the frames above which nothing is said of walls
+# The minimum of the power gap lies below the true friction: estimated over true friction on simulated packings, and its
+# relative standard deviation (packings of 500 and 1172 grains, μ = 0.15, 0.25 and 0.4).
+BIAS = 0.92
+BIAS_SD = 0.07
+# Of walls, estimated over true friction: 0.83 to 1.06 (a core in a ring and a shear box, 200 rods, μ = 0.15 and 0.4 at
+# walls, 0.25 between rods).
+WALL_BIAS_SD = 0.12
+MAX_WALL_SD = 0.15  # relative standard deviation over the frames; above it, walls get no estimate
 WALL_FACTORS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.45, 1.7, 2.0, 2.4)
-FEWEST_AT_WALLS = 20  # contacts
-INTERVAL = 2.0  # standard deviations
-FRAMES = 8  # consecutive photographs that the check looks at
+MIN_WALL_CONTACTS = 20
+COVERAGE_FACTOR = 2.0  # standard deviations in the half-width of an interval
+FRAMES = 8  # consecutive photographs of a check
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionCheck:
-    """The friction that the motion shows, over the one that was given."""
+    """The friction estimated from the motion beside the given one."""
 
     given: Annotated[float, Quantity("friction that was given")]
-    measured: Annotated[float, Quantity("friction that the motion shows; NaN where nothing slides")]
+    measured: Annotated[float, Quantity("friction estimated from the motion; NaN without sliding")]
     low: Annotated[float, Quantity("lower end of the interval of two standard deviations")]
     high: Annotated[float, Quantity("upper end of that interval")]
-    first: Annotated[int, Quantity("first of the frames looked at", absent=0)]
-    last: Annotated[int, Quantity("last of the frames looked at", absent=0)]
+    first: Annotated[int, Quantity("first frame of the check", absent=0)]
+    last: Annotated[int, Quantity("last frame of the check", absent=0)]
     enclosed: Annotated[bool, Quantity("whether the friction lies within the trials", absent=False)]
-    trial: Annotated[Array, Quantity("factors on the given friction that were tried", dims="friction_trial")]
+    trial: Annotated[Array, Quantity("trial factors on the given friction", dims="friction_trial")]
     gap: Annotated[Array, Quantity("relative power gap of every trial", dims="friction_trial")]
 
     wall_measured: Annotated[
-        float, Quantity("friction of walls that the motion shows and that was used; NaN: as between grains", since=2)
+        float, Quantity("friction of walls estimated from the motion and used; NaN: as between grains", since=2)
     ] = float("nan")
     wall_low: Annotated[float, Quantity("lower end of its interval", since=2)] = float("nan")
     wall_high: Annotated[float, Quantity("upper end of its interval", since=2)] = float("nan")
 
     @property
     def agrees(self) -> bool:
-        """Whether the given friction is within the interval, or nothing can be said."""
+        """Whether the given friction lies within the interval, or no estimate exists."""
         return not self.enclosed or self.low <= self.given <= self.high
 
 
@@ -68,28 +71,39 @@ def check_friction(
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> FrictionCheck:
-    """Measure the friction from the sliding in the frames first … last, each over (k − 1, k + 1).
+    """Estimate the friction from the sliding in the frames first … last, each over (k − 1, k + 1).
 
-    force_unit [N]: a typical contact force; workers: threads, on which no bit depends.
-    Errors: ValueError unless 1 ≤ first ≤ last < number of frames − 1.
+    Parameters
+    ----------
+    first, last : int
+        Frames of the check.
+    force_unit : float
+        Typical contact force [N].
+    workers : int, optional
+        Threads; the result does not depend on their number.
+
+    Raises
+    ------
+    ValueError
+        Unless 1 ≤ first ≤ last < number of frames − 1.
     """
     if not 1 <= first <= last < len(snapshots) - 1:
         raise ValueError(f"frames {first} … {last} have no neighbours on both sides in {len(snapshots)} frames")
     frames = _sliding_frames(packing, snapshots, range(first, last + 1), force_unit, settings, workers)
     found = estimate_friction(frames, FACTORS, workers=workers)
     given = packing.material.friction
-    measured = given * found.factor / KNOWN_BIAS
-    spread = 0.0 if np.isnan(found.factor_sd) else found.factor_sd / max(found.factor, 1e-12)
-    width = INTERVAL * float(np.hypot(spread, BIAS_SCATTER))
+    measured = given * found.factor / BIAS
+    relative_sd = 0.0 if np.isnan(found.factor_sd) else found.factor_sd / max(found.factor, 1e-12)
+    half_width = COVERAGE_FACTOR * float(np.hypot(relative_sd, BIAS_SD))
     return FrictionCheck(
-        given, measured, measured * (1.0 - width), measured * (1.0 + width), first, last, found.enclosed,
+        given, measured, measured * (1.0 - half_width), measured * (1.0 + half_width), first, last, found.enclosed,
         found.trial, found.gap,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class WallFriction:
-    """The friction of walls that the motion shows, with its interval of two standard deviations."""
+    """The friction of walls estimated from the motion, with its interval of two standard deviations."""
 
     measured: float
     low: float
@@ -105,20 +119,23 @@ def measure_wall_friction(
     settings: ContactProbabilitySettings,
     workers: int | None = 1,
 ) -> WallFriction | None:
-    """Measure the friction of walls as `check_friction` does that of all contacts, that between grains being known.
+    """Estimate the friction of walls as `check_friction` does, with known friction between grains.
 
-    None where too few rods are at walls, or where what slides there does not tell it.
+    Returns
+    -------
+    WallFriction or None
+        None with fewer than MIN_WALL_CONTACTS contacts with walls, or if the sliding does not determine the friction.
     """
     frames = _sliding_frames(packing, snapshots, range(first, last + 1), force_unit, settings, workers)
-    if np.mean([np.count_nonzero(frame.contacts.with_wall) for frame in frames]) < FEWEST_AT_WALLS:
+    if np.mean([np.count_nonzero(frame.contacts.with_wall) for frame in frames]) < MIN_WALL_CONTACTS:
         return None
     found = estimate_friction(frames, WALL_FACTORS, of_walls=True, workers=workers)
-    spread = found.factor_sd / max(found.factor, 1e-12)
-    if not found.enclosed or not spread < WALL_SCATTER:
+    relative_sd = found.factor_sd / max(found.factor, 1e-12)
+    if not found.enclosed or not relative_sd < MAX_WALL_SD:
         return None
     measured = packing.material.wall_friction * found.factor
-    width = INTERVAL * float(np.hypot(spread, WALL_BIAS_SCATTER))
-    return WallFriction(measured, measured * max(1.0 - width, 0.0), measured * (1.0 + width))
+    half_width = COVERAGE_FACTOR * float(np.hypot(relative_sd, WALL_BIAS_SD))
+    return WallFriction(measured, measured * max(1.0 - half_width, 0.0), measured * (1.0 + half_width))
 
 
 def _sliding_frames(
@@ -129,7 +146,7 @@ def _sliding_frames(
     settings: ContactProbabilitySettings,
     workers: int | None,
 ) -> list[SlidingFrame]:
-    return work_together(
+    return parallel_map(
         [partial(_sliding_frame, packing, snapshots, k, force_unit, settings) for k in numbers], workers
     )
 
@@ -146,7 +163,7 @@ def _sliding_frame(
     balance = assemble_balance(
         contacts, packing.grains, walls, present=snapshot.present, friction=friction, force_unit=force_unit,
         gravity=packing.material.gravity,
-        # The power gap does not depend on the scale of the forces, so any total will do.
+        # The power gap does not depend on the scale of the forces, so any total is valid.
         wall_normal_total=None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1),
     )  # fmt: skip
     slip = measured_slip(contacts, packing.grains, walls, (snapshots[k - 1], snapshots[k + 1]))

@@ -1,10 +1,10 @@
-"""The coefficient of friction, measured from the motion: the one that leaves the least power unexplained.
+"""The coefficient of friction, estimated from the motion as the minimum of the relative power gap.
 
-Where bodies slide, friction works at its limit against the sliding. With a coefficient that is too low, force sets in
-equilibrium need friction that does not oppose the measured sliding; with one that is too high they cannot bring
-friction to its limit. The relative power gap of a convex member is least near the true coefficient, on simulated
-packings 0-12 % below it for coefficients of 0.15 and 0.25, 11-20 % below it for 0.4: a check on an
-assumed coefficient, no replacement of a tilt test. The spread over frames does not contain this bias.
+Where bodies slide, friction acts at its limit against the sliding. With a coefficient that is too low, force sets in
+equilibrium need friction that does not oppose the measured sliding. With one that is too high, friction cannot reach
+its limit. The relative power gap of a convex member has its minimum near the true coefficient: on simulated packings
+0-12 % below it for coefficients of 0.15 and 0.25, 11-20 % below it for 0.4. The estimate checks an assumed coefficient;
+it does not replace a tilt test. The standard deviation over frames does not contain this bias.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from functools import partial
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
-from solver.convex.program import Balance, ConvexSettings, solve_member
-from solver.nlgs.warm_start import ForceMemory
-from solver.together import work_together
+from ..bodies.grains import Array
+from ..contacts.contacts import Contacts
+from ..nlgs.force_memory import ForceMemory
+from ..parallel import parallel_map
+from .program import Balance, ConvexSettings, solve_convex_member
 
 FACTORS = (0.5, 0.6, 0.7, 0.8, 0.88, 0.94, 1.0, 1.06, 1.14, 1.25, 1.45, 1.7, 2.0)  # of the assumed coefficient
-SIDE = 2  # trials that are wanted on either side of the least gap
+SIDE = 2  # trials on either side of the minimum
 
 
 @dataclass(frozen=True, slots=True)
 class SlidingFrame:
-    """What a convex member reads at one frame."""
+    """Input of a convex member at one frame."""
 
     balance: Balance  # with the assumed friction
     contacts: Contacts
@@ -37,19 +37,36 @@ class SlidingFrame:
 
 @dataclass(frozen=True, slots=True)
 class FrictionEstimate:
-    """The factor by which the assumed friction is to be multiplied, and how it was found."""
+    """Estimated over assumed friction, with the trials."""
 
     factor: float
-    factor_sd: float  # spread of the estimate over the frames, jackknife; NaN with fewer than three frames
-    trial: Array  # (q,) factors tried, ascending
+    factor_sd: float  # jackknife standard deviation over the frames; NaN with fewer than three frames
+    trial: Array  # (q,) trial factors, ascending
     gap: Array  # (q,) relative power gap, mean over the frames
-    enclosed: bool  # False: the least gap is at the first or last trial: the friction lies beyond, or nothing slides
+    enclosed: bool  # False: the minimum is at the first or last trial, so friction lies beyond, or nothing slides
 
 
 def relative_power_gap(slip: Array, friction: Array, fn: Array, ft: Array) -> float:
-    """Give 1 + Σ f_t û_t / Σ μ f_n |û_t|: 0 if all friction works at its limit against the sliding, 1 if none does.
+    """Compute the relative power gap of a force field.
 
-    slip (c,), of `soft_slip`; friction (c,); fn, ft (c,) [N]. NaN where nothing slides under force.
+    Parameters
+    ----------
+    slip : (c,)
+        û_t of `soft_slip`.
+    friction : (c,)
+        Coefficient of friction.
+    fn, ft : (c,)
+        Forces [N].
+
+    Returns
+    -------
+    float
+        0 if all friction acts at its limit against the sliding, 1 without friction; NaN where nothing slides under
+        force.
+
+    Notes
+    -----
+    gap = 1 + Σ f_t û_t / Σ μ f_n |û_t|
     """
     possible = float(np.sum(friction * fn * np.abs(slip)))
     return 1.0 + float(np.sum(ft * slip)) / possible if possible > 0 else np.nan
@@ -63,36 +80,49 @@ def estimate_friction(
     of_walls: bool = False,
     workers: int | None = 1,
 ) -> FrictionEstimate:
-    """Find the friction that explains the sliding of consecutive frames best, as a factor on the assumed one.
+    """Estimate the friction from the sliding of consecutive frames, as a factor on the assumed one.
 
-    Friction between grains and with walls is changed by the same factor (those with walls must not be zero); of_walls:
-    that with walls alone, that between grains being known. Each
-    trial is a chain of its own through the frames; of the factors only those about the valley that is met from the
-    one nearest to 1 are tried. workers: threads that try them; no bit depends on it.
-    Errors: ValueError without frames or with fewer than three factors.
+    Every trial solves all frames with its own previous forces. Trials start at the factor nearest to 1 and continue
+    until they bracket the minimum.
+
+    Parameters
+    ----------
+    frames : sequence of SlidingFrame
+        Consecutive frames.
+    factors : sequence of float
+        Trial factors, at least three.
+    of_walls : bool
+        Scale the friction of walls alone. Otherwise one factor scales all friction; that of walls must not be zero.
+    workers : int, optional
+        Threads; the result does not depend on their number.
+
+    Raises
+    ------
+    ValueError
+        Without frames or with fewer than three factors.
     """
     trial = np.sort(np.asarray(factors, dtype=np.float64))
     if not len(frames) or len(trial) < 3:
         raise ValueError("friction needs at least one frame and three trial factors")
-    trial, gap = _walk_into_valley(
-        trial, lambda factor: np.array(_gaps_of_a_chain(frames, factor, settings, of_walls)), workers
+    trial, gap = _bracket_minimum(
+        trial, lambda factor: np.array(_power_gaps(frames, factor, settings, of_walls)), workers
     )
     gap = gap[np.isfinite(gap).all(axis=1)]
     if not len(gap):
         return FrictionEstimate(np.nan, np.nan, trial, np.full(len(trial), np.nan), False)
-    factor, enclosed = _least(trial, gap.mean(axis=0))
+    factor, enclosed = _minimum(trial, gap.mean(axis=0))
     return FrictionEstimate(factor, _jackknife(trial, gap), trial, gap.mean(axis=0), enclosed)
 
 
-def _walk_into_valley(trial: Array, gaps_of: Callable[[float], Array], workers: int | None = 1) -> tuple[Array, Array]:
-    """Try neighbour after neighbour until two lie on either side of the least gap, whichever frame is left out.
+def _bracket_minimum(trial: Array, gaps_of: Callable[[float], Array], workers: int | None = 1) -> tuple[Array, Array]:
+    """Evaluate neighbouring trials (q,) until SIDE of them lie on either side of every leave-one-out minimum.
 
-    trial (q,), ascending; gaps_of a factor: those of all frames (f,). The factors tried (p,), and their gaps (f, p).
+    Returns the evaluated factors (p,) and their gaps (f, p).
     """
     first = last = int(np.argmin(np.abs(np.log(trial))))
-    # These are asked for in nearly every walk, which begins downwards: side by side.
-    sure = [q for q in (first, first - 1, first - 2, first + 1) if 0 <= q < len(trial)]
-    known = dict(zip(sure, work_together([partial(gaps_of, float(trial[q])) for q in sure], workers), strict=True))
+    # Nearly every search needs these trials, since it begins downwards: they run in parallel.
+    initial = [q for q in (first, first - 1, first - 2, first + 1) if 0 <= q < len(trial)]
+    known = dict(zip(initial, parallel_map([partial(gaps_of, float(trial[q])) for q in initial], workers), strict=True))
 
     def gaps_at(q: int) -> Array:
         return known[q] if q in known else gaps_of(float(trial[q]))
@@ -114,24 +144,24 @@ def _walk_into_valley(trial: Array, gaps_of: Callable[[float], Array], workers: 
     return trial[first : last + 1], gap
 
 
-def _gaps_of_a_chain(
+def _power_gaps(
     frames: Sequence[SlidingFrame], factor: float, settings: ConvexSettings | None, of_walls: bool
 ) -> list[float]:
     memory = ForceMemory.empty()
     gaps = []
     for frame in frames:
-        tried = np.where(frame.contacts.with_wall | (not of_walls), factor, 1.0)
-        balance = replace(frame.balance, friction=tried * frame.balance.friction)
-        former = memory.recall(frame.contacts)
-        forces = solve_member(balance, frame.slip, frame.probability, former[:, 0], former[:, 1], settings)
-        everyone = np.ones(frame.contacts.grain_count, dtype=bool)
-        memory = memory.renew(frame.contacts, np.column_stack([forces.fn, forces.ft]), everyone)
+        scale = np.where(frame.contacts.with_wall | (not of_walls), factor, 1.0)
+        balance = replace(frame.balance, friction=scale * frame.balance.friction)
+        previous = memory.recall(frame.contacts)
+        forces = solve_convex_member(balance, frame.slip, frame.probability, previous[:, 0], previous[:, 1], settings)
+        all_present = np.ones(frame.contacts.grain_count, dtype=bool)
+        memory = memory.renew(frame.contacts, np.column_stack([forces.fn, forces.ft]), all_present)
         gaps.append(relative_power_gap(frame.slip, balance.friction, forces.fn, forces.ft))
     return gaps
 
 
-def _least(trial: Array, gap: Array) -> tuple[float, bool]:
-    """Minimum of the parabola through the least gap and its two neighbours, in the logarithm of the factor."""
+def _minimum(trial: Array, gap: Array) -> tuple[float, bool]:
+    """Minimum of the parabola through the smallest gap and its two neighbours, in the logarithm of the factor."""
     q = int(np.argmin(gap))
     if q in (0, len(trial) - 1):
         return float(trial[q]), False
@@ -147,10 +177,10 @@ def _jackknife(trial: Array, gap: Array) -> float:
     count = len(gap)
     if count < 3:
         return np.nan
-    without = [_least(trial, mean)[0] for mean in _means_without_one(gap)]
+    without = [_minimum(trial, mean)[0] for mean in _means_without_one(gap)]
     return float(np.sqrt((count - 1) * np.var(without)))
 
 
 def _means_without_one(gap: Array) -> list[Array]:
-    """Mean gap of every trial (q,) without the first frame, without the second, …; none of fewer than three frames."""
+    """Leave-one-out mean gaps (q,) of the trials; empty with fewer than three frames."""
     return [np.delete(gap, f, axis=0).mean(axis=0) for f in range(len(gap))] if len(gap) > 2 else []

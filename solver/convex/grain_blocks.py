@@ -1,7 +1,8 @@
-"""The equilibrium matrix H in blocks of three rows: a grain's two forces and its torque, or what loaded walls demand.
+"""The equilibrium matrix H in blocks of three rows: the two force equations and the torque equation of a grain.
 
-A contact acts on its two bodies alone. With 2 × 2 numbers E for every contact, H E Hᵀ therefore is a matrix of 3 × 3
-blocks between neighbours, and its Cholesky factor has one pattern whatever E is.
+The equations of loaded walls fill further nodes of three rows. A contact acts on its two bodies alone. With a 2 × 2
+matrix E for every contact, H E Hᵀ is a matrix of 3 × 3 blocks between neighbours. The pattern of its Cholesky factor
+does not depend on E.
 """
 
 from __future__ import annotations
@@ -11,23 +12,23 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from solver.bodies.grains import Array
-from solver.convex.legs import FILLED, LEG, ROWS
-from solver.factor.pattern import Ids, Pattern, find_pattern
+from ..bodies.grains import Array
+from ..factor.pattern import Ids, Pattern, find_pattern
+from .contact_jacobian import JACOBIAN_SIZE, PADDED_ROWS, ROWS
 
 
 class GrainBlocks(NamedTuple):
-    """H and b of a balance, contact by contact; nodes are rows in threes, named by their order of elimination.
+    """H and b sorted by contacts; a node is three rows and is numbered in the order of elimination.
 
-    A leg is what a contact does to a node: f_n to its rows, then f_t.
+    A Jacobian block holds the column of f_n and the column of f_t of a contact in the rows of a node.
     """
 
-    leg_start: Ids  # (c + 1,) first leg of every contact; its legs ascend by node
-    node: Ids  # (l,) that each leg stands on
-    leg: Array  # (8 l,)
-    entry_start: Ids  # (c + 1,) where the entries of every contact begin in `entry`
-    entry: Ids  # (e,) of the pattern: leg by leg, with the contact's first leg … with itself
-    load: Array  # (4 n,) b by nodes, 0 in rows that fill up a node
+    jacobian_start: Ids  # (c + 1,) first block of every contact; the blocks of a contact ascend by node
+    node: Ids  # (l,) node of every block
+    jacobian: Array  # (8 l,)
+    entry_start: Ids  # (c + 1,) first entry of every contact in `entry`
+    entry: Ids  # (e,) of the pattern: each block with the first block of its contact … with itself
+    load: Array  # (4 n,) b by nodes, 0 in padding
     pattern: Pattern
 
     @property
@@ -38,38 +39,42 @@ class GrainBlocks(NamedTuple):
 def block_balance(matrix: sparse.csr_matrix, load: Array, grain_count: int, contacts: int) -> GrainBlocks:
     """Sort H (m, 2c) and b (m,) of n grains and c contacts into blocks.
 
-    Rows of H: x of all grains, y of all, torque of all, then those of walls.
+    The rows of H are x of all grains, y of all grains, torque of all grains, then those of walls.
     """
     node, component = _nodes_of_rows(len(load), grain_count)
     entries, count = matrix.tocoo(), int(node.max(initial=-1)) + 1
     pair = entries.col.astype(np.int64) % contacts * count + node[entries.row]  # beyond 32 bits from 50 000 grains on
-    which, place = np.unique(pair, return_inverse=True)
-    contact, of = which // count, which % count
-    leg = np.zeros((len(which), LEG))
-    np.add.at(leg, (place, entries.col // contacts * FILLED + component[entries.row]), entries.data)
+    block, place = np.unique(pair, return_inverse=True)
+    contact, node_of_block = block // count, block % count
+    jacobian = np.zeros((len(block), JACOBIAN_SIZE))
+    np.add.at(jacobian, (place, entries.col // contacts * PADDED_ROWS + component[entries.row]), entries.data)
 
-    legs = np.bincount(contact, minlength=contacts)
-    couples = [np.flatnonzero(contact[d:] == contact[: len(contact) - d]) for d in range(1, legs.max(initial=1))]
-    first = np.concatenate([*couples, np.zeros(0, np.int64)])
-    second = np.concatenate([*(each + d for d, each in enumerate(couples, start=1)), np.zeros(0, np.int64)])
-    pattern = find_pattern(count, of[first], of[second])
+    block_count = np.bincount(contact, minlength=contacts)
+    coupled = [np.flatnonzero(contact[d:] == contact[: len(contact) - d]) for d in range(1, block_count.max(initial=1))]
+    first = np.concatenate([*coupled, np.zeros(0, np.int64)])
+    second = np.concatenate([*(each + d for d, each in enumerate(coupled, start=1)), np.zeros(0, np.int64)])
+    pattern = find_pattern(count, node_of_block[first], node_of_block[second])
 
-    order = np.lexsort((pattern.place[of], contact))
-    of, leg = of[order], leg[order]
-    leg_start, entry_start = _starts(legs), _starts(legs * (legs + 1) // 2)
+    order = np.lexsort((pattern.place[node_of_block], contact))
+    node_of_block, jacobian = node_of_block[order], jacobian[order]
+    jacobian_start, entry_start = _starts(block_count), _starts(block_count * (block_count + 1) // 2)
     entry = np.empty(entry_start[-1], np.int64)
-    for x in range(legs.max(initial=0)):
-        having = np.flatnonzero(legs > x)
+    for x in range(block_count.max(initial=0)):
+        with_block = np.flatnonzero(block_count > x)
         for y in range(x + 1):
-            at = entry_start[having] + x * (x + 1) // 2 + y
-            entry[at] = pattern.locate(of[leg_start[having] + x], of[leg_start[having] + y])
-    by_node = np.zeros((count, FILLED))
+            at = entry_start[with_block] + x * (x + 1) // 2 + y
+            entry[at] = pattern.locate(
+                node_of_block[jacobian_start[with_block] + x], node_of_block[jacobian_start[with_block] + y]
+            )
+    by_node = np.zeros((count, PADDED_ROWS))
     by_node[pattern.place[node], component] = load
-    return GrainBlocks(leg_start, pattern.place[of], leg.ravel(), entry_start, entry, by_node.ravel(), pattern)
+    return GrainBlocks(
+        jacobian_start, pattern.place[node_of_block], jacobian.ravel(), entry_start, entry, by_node.ravel(), pattern
+    )
 
 
 def _nodes_of_rows(row_count: int, grain_count: int) -> tuple[Ids, Ids]:
-    """Node and component (m,) of every row: a node for each grain, then walls' rows three by three."""
+    """Node and component (m,) of every row: one node per grain, then one per three rows of walls."""
     rest = np.arange(row_count - ROWS * grain_count)
     node = np.concatenate([np.tile(np.arange(grain_count), ROWS), grain_count + rest // ROWS])
     return node, np.concatenate([np.repeat(np.arange(ROWS), grain_count), rest % ROWS])

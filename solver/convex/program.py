@@ -1,13 +1,13 @@
-"""Forces in equilibrium that spend the least against the measured sliding: a convex program.
+"""The convex program: forces in equilibrium of least power gap against the measured sliding.
 
-Where two bodies slide, Coulomb's law fixes friction: f_t = −μ f_n sign(u_t), and then f_n μ|u_t| + f_t u_t = 0; for
-every other admissible force it is positive. Minimising the sum of it over all force sets in equilibrium
-reads the forces from the motion of one interval, without any mass or stiffness:
+Where two bodies slide, Coulomb's law fixes friction: f_t = −μ f_n sign(u_t). Then f_n μ|u_t| + f_t u_t = 0; this term
+is positive for every other admissible force. The program minimises its sum over all force sets in equilibrium and so
+estimates the forces from the motion of one interval, without any mass or stiffness:
 
-    minimise  Σ f_n [μ|û_t| + doubt · max(0, −ln 2P)] + f_t û_t + λ/2 |f − f_previous|² + ρ/2 |H f − b|²
+    minimise  Σ f_n [μ|û_t| + ambiguity_penalty · max(0, −ln 2P)] + f_t û_t + λ/2 |f − f_previous|² + ρ/2 |H f − b|²
     where     |f_t| ≤ μ f_n,    û_t = soft(u_t / s, noise)
 
-All forces inside are in units of `force_unit`, torques over the mean radius.
+Inside, forces are in units of `force_unit` and torques are divided by the mean radius.
 """
 
 from __future__ import annotations
@@ -18,38 +18,39 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
-from solver.contacts.kinematics import equilibrium_matrix, external_load
-from solver.convex.grain_blocks import GrainBlocks, block_balance
-from solver.convex.interior_point import solve_program
-from solver.convex.interior_point_kernels import Program
+from ..bodies.grains import Array, Grains
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
+from ..contacts.kinematics import equilibrium_matrix, external_load
+from .grain_blocks import GrainBlocks, block_balance
+from .interior_point import solve_program
+from .interior_point_kernels import Program
 
-SLIP_SIGMAS = 2.8  # noise of u_t in standard deviations of a position: two grains that move and turn, two photographs
+# Standard deviation of u_t over that of a position: two grains, translation and rotation, two photographs.
+SLIP_SIGMAS = 2.8
 
 
 @dataclass(frozen=True, slots=True)
 class ConvexSettings:
-    """Weights of the program, all without dimension."""
+    """Dimensionless weights of the program."""
 
-    history: float = 3e-3  # λ, pull towards the previous forces
-    balance: float = 1e3  # ρ, price of an unbalance
-    doubt: float = 0.3  # price of force on a contact that may not exist
-    slip_noise: float = 1.5 * SLIP_SIGMAS  # [σ] a slip below this is taken as none
-    polish: float = 0.5  # λ of the polish
-    tolerance: float = 3e-8  # of the interior point; leaves forces wrong by less than a thousandth
+    history: float = 3e-3  # λ, proximal weight of the previous forces
+    balance: float = 1e3  # ρ, penalty weight of the force residual
+    ambiguity_penalty: float = 0.3  # cost of force on a contact whose existence is uncertain
+    slip_noise: float = 1.5 * SLIP_SIGMAS  # [σ of a position] smaller slips count as zero
+    projection_weight: float = 0.5  # λ of the projection onto equilibrium
+    tolerance: float = 3e-8  # of the interior-point method; force errors then stay below 0.1 %
 
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """The equilibrium H f = b of one frame and its friction, without dimension."""
+    """Dimensionless equilibrium H f = b of one frame, and the friction coefficients."""
 
     matrix: sparse.csr_matrix  # (m, 2c)
     load: Array  # (m,)
     friction: Array  # (c,)
     force_unit: float  # [N]
-    grains: GrainBlocks  # the same equilibrium grain by grain; whatever the friction
+    grains: GrainBlocks  # H and b in blocks of three rows per grain; independent of friction
 
     @property
     def contact_count(self) -> int:
@@ -58,13 +59,13 @@ class Balance:
 
 @dataclass(frozen=True, slots=True)
 class ConvexForces:
-    """Forces of one program and how its solve ended."""
+    """Solution of one program, and how the solve ended."""
 
     fn: Array  # (c,) [N]
     ft: Array  # (c,) [N]
     iterations: int
     converged: bool
-    ending: str  # in words
+    termination: str  # sentence for messages
 
 
 def assemble_balance(
@@ -78,12 +79,30 @@ def assemble_balance(
     gravity: tuple[float, float] = (0.0, 0.0),
     wall_normal_total: float | None = None,
 ) -> Balance:
-    """Assemble the balance of every present grain and of every plate under load.
+    """Assemble the equilibrium equations of every present free grain and every loaded plate.
 
-    present (n,); friction (c,); force_unit [N], a typical contact force. Without a plate under load (and
-    without weight) the forces are known up to a factor only, and zero would be the answer: `wall_normal_total` [N] then
-    fixes the sum of f_n over all contacts with walls, or over all where there are no walls. Boundary grains are in no
-    balance. Errors: ValueError if neither is there.
+    Parameters
+    ----------
+    present : (n,)
+        Grains found in the photograph.
+    friction : (c,)
+        Coefficient of friction of each contact.
+    force_unit : float
+        Typical contact force [N].
+    gravity : tuple
+        Acceleration [m/s²].
+    wall_normal_total : float, optional
+        Sum of f_n [N] over all contacts with walls, or over all contacts if there are no walls. Required without
+        a loaded plate and without weight, where the forces are determined only up to a factor.
+
+    Raises
+    ------
+    ValueError
+        If neither a load, nor gravity, nor `wall_normal_total` fixes the scale of the forces.
+
+    Notes
+    -----
+    Grains of the boundary have no equilibrium equations.
     """
     n, present = grains.count, present & grains.free
     if not walls.loaded.any() and wall_normal_total is None and not any(gravity):
@@ -92,7 +111,7 @@ def assemble_balance(
     load = external_load(grains.mass, walls, gravity)
     weight = np.full(len(load), 1.0 / force_unit)
     weight[2 * n : 3 * n] /= grains.radius[present].mean() if present.any() else 1.0
-    # The matrix acts on forces that are already in force_unit; only b still needs it.
+    # The matrix acts on forces in units of force_unit; only b is converted.
     matrix = sparse.diags_array(weight * force_unit) @ matrix
     load = weight * load
     rows = np.concatenate([np.tile(present, 3), np.ones(len(load) - 3 * n, dtype=bool)])
@@ -107,17 +126,32 @@ def assemble_balance(
 
 
 def soft_slip(ut: Array, scale: float, sigma: Array | float, settings: ConvexSettings | None = None) -> Array:
-    """Give û_t (c,): the measured sliding over `scale` [m], shrunk towards zero by its noise.
+    """Compute the dimensionless sliding û_t by soft thresholding.
 
-    ut (c,) [m], NaN where unknown: such a contact tells nothing; sigma [m], standard deviation of a position component,
-    (c,) or one number.
+    Parameters
+    ----------
+    ut : (c,)
+        Measured sliding [m]; NaN where unknown.
+    scale : float
+        Displacement scale s [m].
+    sigma : (c,) or float
+        Standard deviation of a position component [m].
+
+    Returns
+    -------
+    (c,)
+        û_t; zero where the sliding is unknown or below the noise.
+
+    Notes
+    -----
+    û_t = sign(u_t) max(|u_t| − k σ, 0) / s with k = `settings.slip_noise`.
     """
     settings = settings or ConvexSettings()
     slip = np.nan_to_num(np.asarray(ut, dtype=np.float64), nan=0.0)
     return np.sign(slip) * np.maximum(np.abs(slip) - settings.slip_noise * sigma, 0.0) / scale
 
 
-def solve_member(
+def solve_convex_member(
     balance: Balance,
     slip: Array,
     probability: Array,
@@ -125,36 +159,56 @@ def solve_member(
     previous_ft: Array,
     settings: ConvexSettings | None = None,
 ) -> ConvexForces:
-    """Solve the program for one interval's motion.
+    """Solve the program of this module for the motion of one interval.
 
-    slip (c,), of `soft_slip`; probability (c,), P(touch), 1 where sure; previous_fn, previous_ft (c,) [N], the former
-    forces of this same member on today's contacts, zero where new.
+    Parameters
+    ----------
+    slip : (c,)
+        û_t of `soft_slip`.
+    probability : (c,)
+        P(touch), 1 for certain contacts.
+    previous_fn, previous_ft : (c,)
+        Previous forces of the same ensemble member on the present contacts [N]; zero on new contacts.
     """
     settings = settings or ConvexSettings()
     with np.errstate(divide="ignore"):
-        doubt = np.maximum(0.0, -np.log(2.0 * probability))
-    cost = np.concatenate([balance.friction * np.abs(slip) + settings.doubt * np.minimum(doubt, 100.0), slip])
+        ambiguity = np.maximum(0.0, -np.log(2.0 * probability))
+    cost = np.concatenate(
+        [balance.friction * np.abs(slip) + settings.ambiguity_penalty * np.minimum(ambiguity, 100.0), slip]
+    )
     return _solve(balance, cost, previous_fn, previous_ft, settings.history, settings)
 
 
-def polish(balance: Balance, mean_fn: Array, mean_ft: Array, settings: ConvexSettings | None = None) -> ConvexForces:
-    """Bring a mean of fields (c,) [N] into balance with the least change, inside the Coulomb cone."""
+def project_onto_equilibrium(
+    balance: Balance, mean_fn: Array, mean_ft: Array, settings: ConvexSettings | None = None
+) -> ConvexForces:
+    """Project a mean force field onto equilibrium inside the Coulomb cone.
+
+    Parameters
+    ----------
+    mean_fn, mean_ft : (c,)
+        Mean forces [N].
+
+    Notes
+    -----
+    Minimises λ/2 |f − f_mean|² + ρ/2 |H f − b|² over the Coulomb cones, with λ = `settings.projection_weight`.
+    """
     settings = settings or ConvexSettings()
     cost = np.zeros(2 * balance.contact_count)
-    return _solve(balance, cost, mean_fn, mean_ft, settings.polish, settings)
+    return _solve(balance, cost, mean_fn, mean_ft, settings.projection_weight, settings)
 
 
 def _solve(
-    balance: Balance, cost: Array, centre_fn: Array, centre_ft: Array, pull: float, settings: ConvexSettings
+    balance: Balance, cost: Array, centre_fn: Array, centre_ft: Array, proximal_weight: float, settings: ConvexSettings
 ) -> ConvexForces:
-    """Minimise cost·f + pull/2 |f − centre|² + ρ/2 |H f − b|² over the Coulomb cones."""
+    """Minimise cost·f + λ/2 |f − centre|² + ρ/2 |H f − b|² over the Coulomb cones."""
     c = balance.contact_count
     if c == 0:
         return ConvexForces(np.empty(0), np.empty(0), 0, True, "no contacts")
     program = Program(
         balance.friction, np.ascontiguousarray(cost.reshape(2, c).T),
-        np.column_stack([centre_fn, centre_ft]) / balance.force_unit, pull, settings.balance,
+        np.column_stack([centre_fn, centre_ft]) / balance.force_unit, proximal_weight, settings.balance,
     )  # fmt: skip
     found = solve_program(balance.grains, program, settings.tolerance)
     force = found.force * balance.force_unit
-    return ConvexForces(force[:, 0], force[:, 1], found.steps, found.ending.usable, found.ending.value)
+    return ConvexForces(force[:, 0], force[:, 1], found.steps, found.termination.usable, found.termination.value)

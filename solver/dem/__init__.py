@@ -1,1 +1,1 @@
-"""Explicit discrete-element simulation: the truth of synthetic experiments. Touches no other room."""
+"""Explicit discrete-element simulation: the truth of synthetic experiments."""

@@ -1,1 +1,1 @@
-"""Who does touch, inferred from many photographs. Stands on contacts."""
+"""Detection of contacts from a window of photographs; depends on contacts."""

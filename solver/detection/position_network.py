@@ -1,4 +1,4 @@
-"""Pairs that touch as springs between positions: a sparse least-squares problem in the grains' displacements."""
+"""Touching pairs as springs between positions: a sparse least-squares problem in the grains' displacements."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.detection.touch_probability import Candidates
-from solver.factor.blocks import PAIR
-from solver.factor.cholesky import factorize, solve
-from solver.factor.inverse import invert_on_pattern
-from solver.factor.pattern import Ids, Pattern, find_pattern
+from ..bodies.grains import Array, Grains
+from ..factor.blocks import PAIR
+from ..factor.cholesky import factorize, solve
+from ..factor.inverse import invert_on_pattern
+from ..factor.pattern import Ids, Pattern, find_pattern
+from .touch_probability import TouchCandidates
 
 XY = 2  # components of a displacement
 
 
 class Springs(NamedTuple):
-    """Where every pair stands; nodes are the grains, by their order of elimination."""
+    """Nodes and matrix entries of every pair; nodes are the grains in their order of elimination."""
 
     i: Ids  # (c,)
-    j: Ids  # (c,) where the other is a wall, i
+    j: Ids  # (c,) equal to i where the other body is a wall
     wall: NDArray[np.bool_]  # (c,)
-    entry: Ids  # (c,) of the pattern, where i meets j
+    entry: Ids  # (c,) entry (i, j) of the pattern
 
 
 @dataclass(frozen=True, slots=True)
-class Refinement:
-    """What the messages make of one photograph."""
+class RefinedPositions:
+    """Positions and gaps of one photograph after the update by the messages of the pairs."""
 
-    displacement: Array  # (n, 2) [m] of every grain
-    gap: Array  # (c,) [m] of every pair, NaN where it is not known
+    displacement: Array  # (n, 2) [m] correction of every position
+    gap: Array  # (c,) [m] refined gaps, NaN where unknown
     gap_variance: Array  # (c,) [m²]
-    slide_variance: Array  # (c,) [m²] of the pair's relative position along its tangent
+    sliding_variance: Array  # (c,) [m²] of the pair's relative position along its tangent
 
 
 @dataclass(frozen=True, slots=True)
 class PositionNetwork:
-    """The candidates of a block of frames."""
+    """Sparse system of the candidate pairs of a block of frames."""
 
     springs: Springs
     pattern: Pattern
 
     @classmethod
-    def of(cls, grains: Grains, pairs: Candidates) -> PositionNetwork:
+    def of(cls, grains: Grains, pairs: TouchCandidates) -> PositionNetwork:
         wall = pairs.j >= grains.count
         i = pairs.i.astype(np.int64)
         j = np.where(wall, i, pairs.j)
@@ -54,11 +54,30 @@ class PositionNetwork:
         springs = Springs(pattern.place[i], pattern.place[j], wall, pattern.locate(i, j))
         return cls(springs, pattern)
 
-    def refine(self, normal: Array, gap: Array, weight: Array, pull: Array, sigma: Array) -> Refinement:
-        """Find the displacements that agree best with the messages of the pairs.
+    def refine(self, normal: Array, gap: Array, weight: Array, pull: Array, sigma: Array) -> RefinedPositions:
+        """Find the displacements that fit the measured positions and the messages of the pairs best.
 
-        normal (c, 2); gap (c,) [m] as measured, NaN where unknown; weight (c,) [1/m²] and pull (c,) [1/m] of the
-        messages; sigma (n,) [m] of the positions.
+        Parameters
+        ----------
+        normal : (c, 2)
+            Normals of the pairs.
+        gap : (c,)
+            Measured gaps [m], NaN where unknown.
+        weight : (c,)
+            Precision w of the messages [1/m²].
+        pull : (c,)
+            Precision times mean, h, of the messages [1/m].
+        sigma : (n,)
+            Standard deviation of a position component [m].
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            The system is not positive definite.
+
+        Notes
+        -----
+        Minimises Σ_i |x_i|² / σ_i² + Σ_c (w_c g_c² − 2 h_c g_c) with g_c = gap_c + n_c·(x_j − x_i).
         """
         pattern, n = self.pattern, self.pattern.node_count
         known = np.isfinite(gap)
@@ -69,7 +88,7 @@ class PositionNetwork:
         blocks, right, where = np.zeros(XY**2 * pattern.entry_count), np.zeros(XY * n), np.empty(n, np.int64)
         _assemble(pattern, self.springs, normal, weight, pull - weight * length, precision, blocks, right)
         if not factorize(pattern, blocks, where, PAIR):
-            raise np.linalg.LinAlgError("the positions' precision is not positive definite")
+            raise np.linalg.LinAlgError("the precision matrix of the positions is not positive definite")
         solve(pattern, blocks, right, PAIR)
         inverse, unit = np.empty_like(blocks), np.empty_like(blocks)
         invert_on_pattern(pattern, blocks, inverse, unit, where, PAIR)
@@ -77,7 +96,7 @@ class PositionNetwork:
         between = np.where(self.springs.wall[:, None], 0.0, moved[self.springs.j]) - moved[self.springs.i]
         nan = np.where(known, 0.0, np.nan)
         tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        return Refinement(
+        return RefinedPositions(
             moved[pattern.place],
             length + np.einsum("ca,ca->c", normal, between) + nan,
             self._variance(inverse, normal) + nan,
@@ -85,7 +104,7 @@ class PositionNetwork:
         )
 
     def _variance(self, inverse: Array, direction: Array) -> Array:
-        """Of the pairs' relative positions along directions (c, 2) (c,) [m²]."""
+        """Return the variance (c,) [m²] of the pairs' relative positions along directions (c, 2)."""
         variance = np.empty(len(direction))
         _measure_variance(self.pattern, self.springs, inverse, direction, variance)
         return np.maximum(variance, 1e-30)
@@ -93,7 +112,7 @@ class PositionNetwork:
 
 @njit(cache=True, nogil=True)
 def _assemble(pattern, springs, normal, weight, force, precision, blocks, right):  # type: ignore[no-untyped-def]
-    """Σ w n nᵀ of the springs and the positions' own precision; force (c,): pull along the normals."""
+    """Assemble Σ w n nᵀ of the springs and 1/σ² of the positions; force (c,): right-hand side along the normals."""
     for k in range(len(precision)):
         for a in range(XY):
             blocks[4 * pattern.start[k] + 3 * a] += precision[k]

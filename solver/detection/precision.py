@@ -1,9 +1,9 @@
-"""How precise the positions are and how far touching surfaces overlap, read from the gaps themselves.
+"""Precision of the positions and overlap of touching surfaces, measured from the gaps.
 
-Rods that touch in three photographs in a row have the same gap in all of them, whatever it is: what their gaps scatter
-in time is noise of the positions, g₋ − 2g + g₊ having twelve times the variance of a position component. What
-is left of their negative gaps once that noise is taken off is overlap: elasticity, roughness and errors of the radii.
-A negative mean gap says by itself that a pair touches, so neither needs a threshold that would depend on the answer.
+Rods that touch in three consecutive photographs have the same gap in all of them. The variation of the gap in time is
+noise of the positions: g₋ − 2g + g₊ has twelve times the variance of a position component. The mean square of the
+negative gaps minus that noise is the overlap: elasticity, roughness and errors of the radii. A pair with a negative
+mean gap touches, so that neither estimate needs a threshold that depends on the result.
 """
 
 from __future__ import annotations
@@ -13,36 +13,46 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.motion import Snapshot
-from solver.contacts.contacts import detect_contacts, measure_contacts
+from ..bodies.grains import Array, Grains
+from ..bodies.motion import Snapshot
+from ..contacts.contacts import detect_contacts, measure_contacts
 
-REACH = 0.02  # [mean diameter] pairs beyond it cannot touch
-FEWEST = 200  # gaps below which nothing is claimed
-TRIPLES = 24  # photographs looked at, spread evenly
+REACH = 0.02  # [mean diameter] greatest gap of a pair that is used
+MIN_GAPS = 200  # fewer give no estimate
+TRIPLES = 24  # number of photographs used, evenly spaced
 NORMAL = 1.4826  # standard deviation over median absolute deviation
-UNSURE = 0.1  # share of the noise's variance by which it may be off where it is taken away
-CONTRADICTION = 1.3  # factor between stated and measured precision from which on the measured one counts
+VARIANCE_ERROR = 0.1  # relative uncertainty of the noise variance that is subtracted
+CONTRADICTION = 1.3  # ratio of measured and stated precision above which the measured one is used
 
 
 @dataclass(frozen=True, slots=True)
 class Precision:
-    """What the gaps say."""
+    """Precision and overlap as measured from the gaps."""
 
     sigma: float  # [m] standard deviation of a position component
-    overlap: float  # [m] rms over touching pairs, noise taken off
-    count: int  # gaps that it rests on
+    overlap: float  # [m] rms over touching pairs, noise subtracted
+    count: int  # number of gaps used
 
 
 def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precision | None:
-    """Measure the precision of positions; None where fewer than FEWEST gaps in a row tell."""
+    """Measure the standard deviation of the positions and the overlap of touching pairs.
+
+    Returns
+    -------
+    Precision or None
+        None where fewer than MIN_GAPS pairs touch in three consecutive photographs.
+
+    Notes
+    -----
+    σ = 1.4826 median |g₋ − 2g + g₊| / √12 and overlap² = ⟨ḡ²⟩ − ⅔ σ² over pairs with mean gap ḡ ≤ 0.
+    """
     if len(snapshots) < 3:
         return None
     middles = np.unique(np.linspace(1, len(snapshots) - 2, min(TRIPLES, len(snapshots) - 2)).astype(int))
-    gaps = np.concatenate([_gaps_in_a_row(grains, snapshots[k - 1 : k + 2]) for k in middles], axis=1)
+    gaps = np.concatenate([_consecutive_gaps(grains, snapshots[k - 1 : k + 2]) for k in middles], axis=1)
     mean = gaps.mean(axis=0)
     gaps, mean = gaps[:, mean <= 0.0], mean[mean <= 0.0]
-    if len(mean) < FEWEST:
+    if len(mean) < MIN_GAPS:
         return None
     sigma = NORMAL * float(np.median(np.abs(gaps[0] - 2.0 * gaps[1] + gaps[2]))) / np.sqrt(12.0)
     overlap = float(np.sqrt(max(np.mean(mean**2) - 2.0 / 3.0 * sigma**2, 0.0)))
@@ -50,36 +60,48 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
 
 
 def contradiction(found: Precision, stated: float) -> float:
-    """Measured over stated standard deviation [m] where the measurement contradicts it, else 1."""
+    """Return measured over stated standard deviation [m] where it exceeds CONTRADICTION either way, otherwise 1."""
     factor = found.sigma / stated
     return 1.0 if 1.0 / CONTRADICTION <= factor <= CONTRADICTION else factor
 
 
 def describe_contradiction(found: Precision, factor: float) -> str:
-    """What contradicts the stated precision, in words; factor: measured over stated."""
-    told = f"{1e6 * found.sigma:.2g} µm from photograph to photograph, {factor:.2g} times the stated precision"
-    return f"positions scatter by {told}, as the gaps of touching rods show"
+    """Return a clause that states the contradiction; factor: measured over stated standard deviation."""
+    measured = f"{1e6 * found.sigma:.2g} µm, {factor:.2g} times the stated precision"
+    return f"the gaps of touching rods give positions a standard deviation of {measured}"
 
 
-def believed_precision(found: Precision, stated: Sequence[float], overlap: float) -> tuple[float, float]:
-    """Factor on the stated standard deviations (f,) [m], and the overlap [m] to go on with.
+def corrected_precision(found: Precision, stated: Sequence[float], overlap: float) -> tuple[float, float]:
+    """Return the factor on the stated standard deviations and the overlap to use.
 
-    overlap [m] is the assumed one. Both stay as they are where the measurement does not contradict them.
+    Parameters
+    ----------
+    found
+        Measured precision and overlap.
+    stated : (f,)
+        Stated standard deviations [m].
+    overlap
+        Assumed overlap [m].
+
+    Returns
+    -------
+    factor, overlap : float
+        1 and the assumed overlap [m] where the measurement does not contradict them.
     """
     factor = contradiction(found, float(np.median(stated)))
-    # What the noise hides of the overlap is not held against the assumption.
-    unsure = UNSURE * found.sigma**2
-    variance = float(np.clip(overlap**2, found.overlap**2 - unsure, found.overlap**2 + unsure))
+    # The assumed overlap is kept within the uncertainty that the noise leaves.
+    tolerance = VARIANCE_ERROR * found.sigma**2
+    variance = float(np.clip(overlap**2, found.overlap**2 - tolerance, found.overlap**2 + tolerance))
     return factor, float(np.sqrt(variance))
 
 
-def with_precision(snapshots: Sequence[Snapshot], factor: float) -> list[Snapshot]:
-    """The snapshots with all standard deviations multiplied."""
+def scale_precision(snapshots: Sequence[Snapshot], factor: float) -> list[Snapshot]:
+    """Return the snapshots with all standard deviations multiplied by a factor."""
     return [replace(each, sigma=factor * each.sigma) for each in snapshots]
 
 
-def _gaps_in_a_row(grains: Grains, three: Sequence[Snapshot]) -> Array:
-    """Gaps (3, c) [m] of near pairs of grains that all three snapshots show."""
+def _consecutive_gaps(grains: Grains, three: Sequence[Snapshot]) -> Array:
+    """Return the gaps (3, c) [m] of candidate pairs of grains in three consecutive snapshots."""
     walls = [s.walls for s in three]
     present = three[0].present & three[1].present & three[2].present
     near = detect_contacts(grains, three[1].position, present, walls[1], REACH * 2.0 * float(grains.radius.mean()))

@@ -1,10 +1,9 @@
 """Probability that two bodies touch, from their measured gaps in a window of photographs.
 
-A single photograph cannot tell a contact from a gap smaller than its noise; a history can. Every
-candidate pair is a hidden Markov chain: it touches, or it is open by one of a few gaps, and
-from one photograph to the next it moves by about as much as neighbours do. The forward-backward
-smoother then weighs all photographs of the window together. Radii and centres must be free of constant errors:
-an error that stays is not noise.
+A single photograph cannot distinguish a contact from a gap smaller than the noise; a sequence can. Every candidate
+pair is a hidden Markov chain: it touches or is open by one of a number of gaps, and between photographs its gap changes
+by about the relative displacement of neighbours. The forward-backward smoother combines all photographs of the window.
+Radii and centres must be free of constant errors, which are not noise.
 """
 
 from __future__ import annotations
@@ -15,32 +14,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, Grains
-from solver.bodies.motion import Snapshot
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
-from solver.contacts.pairs import join_keys, split_keys
-from solver.detection.displacement import displacement_scale
-from solver.detection.touch_probability_kernels import CLOSES, DECAY, OPENS, SPREADS, smooth_candidates
+from ..bodies.grains import Array, Grains
+from ..bodies.motion import Snapshot
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts, detect_contacts, measure_contacts
+from ..contacts.pairs import join_keys, split_keys
+from .displacement import displacement_scale
+from .touch_probability_kernels import CLOSES, DECAY, OPENS, STAYS_OPEN, smooth_candidates
 
-OPEN_STATES = 48  # open gaps, spaced quadratically: fine where touching is decided
-STAY = 0.95  # probability that a contact lasts one interval
-LIKELIHOOD_FLOOR = 1e-12  # of a measurement in any state: no single outlier decides
-LOWEST_GAP = -5.0  # [σ_g] a deeper overlap says no more than this one: it is clipped, never an outlier
-FIRST_TOUCH = 0.5  # probability of touching before anything is measured
-LEAST_SIGMA = 1e-6  # [mean radius] of a gap: less than any photograph can show
-BACK, AHEAD = 4, 3  # frames of a window before and after its own
+OPEN_STATES = 48  # open gaps, spaced quadratically: finest near zero
+STAY = 0.95  # probability that a contact persists over one interval
+LIKELIHOOD_FLOOR = 1e-12  # of a measurement in any state, so that no single outlier decides
+LOWEST_GAP = -5.0  # [σ_g] deeper overlaps are clipped to this one and never are outliers
+FIRST_TOUCH = 0.5  # prior probability of touching
+LEAST_SIGMA = 1e-6  # [mean radius] of a gap: below the resolution of any photograph
+BACK, AHEAD = 4, 3  # frames of a window before and after its frame
 
 
 @dataclass(frozen=True, slots=True)
 class ContactProbabilitySettings:
-    """What the measured gaps are worth."""
+    """Noise of the measured gaps, and selection of the candidate pairs."""
 
     overlap: float = 0.0  # [m] typical elastic overlap of a contact that bears force
     radius_sd: float = 0.0  # [m] standard deviation of a grain's radius
-    margin: float = 20e-6  # [m] a pair beyond margin + reach · σ (overlap, 3 radius_sd) in every frame is out
+    margin: float = 20e-6  # [m] candidates have a gap below margin + reach · σ (+ overlap, 3 radius_sd) in some frame
     reach: float = 6.0  # [σ]
-    least: float = 3e-3  # a pair with less probability is dropped
+    least: float = 3e-3  # P(touch) below which a pair is no contact
 
     def __post_init__(self) -> None:
         if min(self.overlap, self.radius_sd, self.margin, self.reach, self.least) < 0:
@@ -48,8 +47,8 @@ class ContactProbabilitySettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
-    """Pairs that might touch in some frame of a window, ordered by key."""
+class TouchCandidates:
+    """Pairs that may touch in some frame of a window, ordered by key."""
 
     i: NDArray[np.int32]  # (c,)
     j: NDArray[np.int32]  # (c,) j >= number of grains is a wall
@@ -63,15 +62,15 @@ class Candidates:
 
 @dataclass(frozen=True, slots=True)
 class SmoothedGaps:
-    """What a window of photographs makes of its candidates."""
+    """Posterior of the candidates' true gaps, given all photographs of a window."""
 
     touch: Array  # (f, c) P(touch)
-    mean: Array  # (f, c) [m] of the true gap; NaN where nothing is known
+    mean: Array  # (f, c) [m] of the true gap; NaN without measurements
     variance: Array  # (f, c) [m²] of the true gap
 
 
 def window_of(frame: int, frame_count: int) -> range:
-    """Give the frames whose photographs decide about a frame: k − 4 … k + 3, cut at the ends."""
+    """Return the frames k − BACK … k + AHEAD of the window of frame k, cut at the ends of the sequence."""
     return range(max(frame - BACK, 0), min(frame + AHEAD + 1, frame_count))
 
 
@@ -83,11 +82,28 @@ def probable_contacts(
     *,
     frame: Snapshot | None = None,
 ) -> tuple[Contacts, Array]:
-    """Find the pairs that probably touch in one frame of a window, with their P(touch) (c,).
+    """Find the pairs that probably touch in one frame of a window.
 
-    window: consecutive snapshots, as measured; row: the frame asked about, counted in the window. Pairs below
-    `settings.least` and pairs of a missing grain are left out. `frame`: the same snapshot with stand-ins for
-    missing grains (`bridge_lost`); their pairs are then judged by the other photographs and measured here.
+    Parameters
+    ----------
+    grains
+        Grains with their radii.
+    window
+        Consecutive snapshots as measured.
+    row
+        The frame, counted in the window.
+    settings
+        Noise and selection; defaults where not given.
+    frame
+        The same snapshot with missing grains interpolated (`interpolate_lost_grains`); P(touch) of their pairs comes
+        from the other photographs.
+
+    Returns
+    -------
+    contacts
+        Pairs with P(touch) above `settings.least`; those of a missing grain are omitted.
+    touch : (c,)
+        P(touch).
     """
     settings = settings or ContactProbabilitySettings()
     frame = window[row] if frame is None else frame
@@ -96,7 +112,7 @@ def probable_contacts(
     sigma = np.repeat([[snapshot.sigma] for snapshot in window], grains.count, axis=1).astype(np.float64)
     walls = [snapshot.walls for snapshot in window]
     seen = np.where(present[:, :, None], position, np.nan)
-    candidates = find_candidates(grains, position, present, sigma, walls, settings)
+    candidates = find_touch_candidates(grains, position, present, sigma, walls, settings)
     scale = np.array(
         [displacement_scale(seen[f], seen[f + 1], 0.5 * (sigma[f] + sigma[f + 1])) for f in range(len(window) - 1)]
     )
@@ -107,18 +123,30 @@ def probable_contacts(
     return found, touch[keep]
 
 
-def find_candidates(
+def find_touch_candidates(
     grains: Grains,
     position: Array,
     present: NDArray[np.bool_],
     sigma: Array,
     walls: Sequence[Walls],
     settings: ContactProbabilitySettings,
-) -> Candidates:
-    """Find the pairs that come near each other in any frame of the window, and measure them in all.
+) -> TouchCandidates:
+    """Find the pairs with a small gap in any frame of the window, and measure them in all frames.
 
-    position (f, n, 2) [m]; present (f, n); sigma (f, n) [m], standard deviation of a position component;
-    walls: f of them.
+    Parameters
+    ----------
+    grains
+        Grains with their radii.
+    position : (f, n, 2)
+        Positions [m].
+    present : (f, n) bool
+        Grains seen in every frame.
+    sigma : (f, n)
+        Standard deviation of a position component [m].
+    walls
+        Walls of every frame.
+    settings
+        Noise and selection.
     """
     n = grains.count
     size = n + (walls[0].count if walls else 0)
@@ -129,34 +157,49 @@ def find_candidates(
     i, j = (each.astype(np.int32) for each in split_keys(join_keys(*(contacts.key for contacts in near)), size))
 
     gap = np.empty((len(position), len(i)))
-    deviation = np.empty_like(gap)
+    gap_sd = np.empty_like(gap)
     wall = j >= n
     partner = np.where(wall, 0, j)
     for f in range(len(position)):
         gap[f] = measure_contacts(grains, np.where(present[f][:, None], position[f], np.nan), walls[f], i, j).gap
         variance = sigma[f] ** 2 + settings.radius_sd**2
-        deviation[f] = np.sqrt(variance[i] + np.where(wall, 0.0, variance[partner]) + settings.overlap**2)
-    deviation = np.maximum(deviation, LEAST_SIGMA * grains.radius.mean())
-    return Candidates(i, j, gap, deviation)
+        gap_sd[f] = np.sqrt(variance[i] + np.where(wall, 0.0, variance[partner]) + settings.overlap**2)
+    gap_sd = np.maximum(gap_sd, LEAST_SIGMA * grains.radius.mean())
+    return TouchCandidates(i, j, gap, gap_sd)
 
 
 def touch_probability(
     gap: Array, sigma: Array, scale: Array, settings: ContactProbabilitySettings | None = None
 ) -> Array:
-    """Give P(touch) of every candidate in every frame of the window (f, c).
-
-    gap (f, c) [m] as measured, NaN where unknown; sigma (f, c) [m], its standard deviation; scale (f − 1,) [m], the
-    typical relative displacement of neighbours in each interval. Errors: ValueError where a sigma of a known
-    gap or a scale is not positive.
-    """
+    """Return P(touch) of every candidate in every frame of the window (f, c); arguments as of `smooth_gaps`."""
     settings = settings or ContactProbabilitySettings()
     return smooth_gaps(gap, sigma, scale, settings).touch
 
 
 def smooth_gaps(gap: Array, sigma: Array, scale: Array, settings: ContactProbabilitySettings) -> SmoothedGaps:
-    """Weigh all photographs of a window together: P(touch), and what they make of the true gaps.
+    """Compute P(touch) and the posterior of the true gaps from all photographs of a window.
 
-    Arguments and errors as of `touch_probability`.
+    Parameters
+    ----------
+    gap : (f, c)
+        Measured gaps [m], NaN where unknown.
+    sigma : (f, c)
+        Standard deviation of the measured gaps [m].
+    scale : (f − 1,)
+        Scale s of the relative displacement of neighbours in each interval [m].
+    settings
+        Overlap and selection.
+
+    Raises
+    ------
+    ValueError
+        A sigma of a known gap or a scale is not positive, or the number of scales is wrong.
+
+    Notes
+    -----
+    Forward-backward smoother over a touching state (g = 0) and 48 open states g_q. Emission N(measured gap + overlap/2;
+    g, σ_g), at least 1e-12. Transitions: touch → touch 0.95, touch → g ∝ exp(−g/s), g → g' Laplace(s),
+    g → touch ½ exp(−g/s).
     """
     frames, candidates = gap.shape
     known = np.isfinite(gap)
@@ -186,27 +229,27 @@ def smooth_gaps(gap: Array, sigma: Array, scale: Array, settings: ContactProbabi
 
 def _reach(sigma: Array, settings: ContactProbabilitySettings) -> float:
     widest = float(np.max(sigma, initial=0.0))
-    # Part of what is measured as overlap are errors of radii, which leave gaps as often.
+    # Part of the measured overlap is errors of the radii, which produce gaps equally often.
     return settings.reach * float(np.hypot(widest, settings.overlap / np.sqrt(2.0))) + (
         settings.margin + 3.0 * settings.radius_sd
     )
 
 
 def _states(widest: float) -> tuple[Array, Array]:
-    """Gaps of the states (q,) [m] and the width of the interval each stands for (q,) [m]; state 0 touches."""
+    """Return the gaps of the states (q,) [m] and the widths of their intervals (q,) [m]; state 0 touches."""
     edge = widest * (np.arange(OPEN_STATES + 1) / OPEN_STATES) ** 2
     middle = widest * ((np.arange(OPEN_STATES) + 0.5) / OPEN_STATES) ** 2
     return np.concatenate([[0.0], middle]), np.concatenate([[0.0], np.diff(edge)])
 
 
 def find_transition(state_gap: Array, width: Array, scale: float) -> Array:
-    """How states follow one another in one interval, in rows (4, q) as the kernel reads them."""
+    """Return the transition of one interval as rows (4, q) of the kernel; scale [m]: s of the Laplace law."""
     rows = np.zeros((4, len(state_gap)))
     rows[DECAY, 2:] = np.exp(-np.diff(state_gap[1:]) / scale)
     opened = np.exp(-(state_gap - state_gap[1])[1:] / scale) * width[1:]
     rows[OPENS, 1:] = (1.0 - STAY) * opened / opened.sum()
-    # A gap that would close by more than itself touches: the Laplace law's mass below zero.
+    # A gap that closes by more than its size touches: the mass of the Laplace law below zero.
     rows[CLOSES, 1:] = 0.5 * np.exp(-state_gap[1:] / scale)
     moved = np.exp(-np.abs(state_gap[1:, None] - state_gap[None, 1:]) / scale) * width[None, 1:]
-    rows[SPREADS, 1:] = (1.0 - rows[CLOSES, 1:]) / moved.sum(axis=1)
+    rows[STAYS_OPEN, 1:] = (1.0 - rows[CLOSES, 1:]) / moved.sum(axis=1)
     return rows

@@ -1,7 +1,7 @@
-"""The hidden Markov smoother's loop over candidate pairs, frames and states.
+"""Kernel of the hidden Markov smoother: loop over candidate pairs, frames and states.
 
-How far a gap moves in an interval follows Laplace's law, exp(−|g − g'| / scale): sums with it over all states are two
-recursions along the states, one up and one down, instead of a product with a matrix.
+The change of a gap in an interval follows the Laplace law exp(−|g − g'| / scale). Sums over all states with this law
+are two recursions along the states, upwards and downwards, instead of a product with a matrix.
 """
 
 from __future__ import annotations
@@ -9,12 +9,20 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.bodies.grains import Array
+from ..bodies.grains import Array
 
-# Rows of a transition, by state: what is left of Laplace's law from the state below to this one; probability that a
-# contact opens to this state; that it closes from it; and that it does not, over the law's sum over all open states.
-DECAY, OPENS, CLOSES, SPREADS = range(4)
-E2, E3, E4, E5, E6, E7, E8 = 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, 1 / 5040, 1 / 40320  # of the exponential's series
+# Rows of a transition, by state: decay of the Laplace law from the state below to this one; probability that a contact
+# opens to this state; that it closes from it; and that it stays open, over the sum of the law over all open states.
+DECAY, OPENS, CLOSES, STAYS_OPEN = range(4)
+E2, E3, E4, E5, E6, E7, E8 = (
+    1 / 2,
+    1 / 6,
+    1 / 24,
+    1 / 120,
+    1 / 720,
+    1 / 5040,
+    1 / 40320,
+)  # exponential series
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,7 +59,7 @@ def smooth_candidates(
                 continue
             s = sigma[f, c]
             measured = min(max(measured, lowest * s), state_gap[states - 1])
-            _bell(state_gap, measured, 1.0 / s, farthest, floor, emission[f])
+            _gaussian(state_gap, measured, 1.0 / s, farthest, floor, emission[f])
 
         total = 0.0
         for q in range(states):
@@ -62,12 +70,12 @@ def smooth_candidates(
         for f in range(1, frames):
             step, before = transition[f - 1], alpha[f - 1]
             for r in range(1, states):
-                value[r] = before[r] * step[SPREADS, r]
+                value[r] = before[r] * step[STAYS_OPEN, r]
             closed = stay * before[0]
             for r in range(1, states):
                 closed += before[r] * step[CLOSES, r]
             alpha[f, 0] = closed
-            _blur(value, step[DECAY], up, down)
+            _laplace_sums(value, step[DECAY], up, down)
             for r in range(1, states):
                 alpha[f, r] = (up[r] + down[r]) * extent[r] + before[0] * step[OPENS, r]
             total = 0.0
@@ -77,7 +85,7 @@ def smooth_candidates(
             for r in range(states):
                 alpha[f, r] /= total
 
-        # β is kept up to a factor, which cancels in the share of the touching state.
+        # β is known up to a factor, which cancels in the probability of the touching state.
         for q in range(states):
             beta[0, q] = 1.0
         touch[frames - 1, c] = alpha[frames - 1, 0]
@@ -92,27 +100,27 @@ def smooth_candidates(
                 b = beta[0, r] * emission[f + 1, r]
                 opened += b * step[OPENS, r]
                 value[r] = b * extent[r]
-            _blur(value, step[DECAY], up, down)
+            _laplace_sums(value, step[DECAY], up, down)
             for q in range(1, states):
-                beta[1, q] = (up[q] + down[q]) * step[SPREADS, q] + touching * step[CLOSES, q]
+                beta[1, q] = (up[q] + down[q]) * step[STAYS_OPEN, q] + touching * step[CLOSES, q]
             beta[1, 0] = stay * touching + opened
             total = 0.0
-            share = 0.0
+            evidence = 0.0
             for q in range(states):
                 total += beta[1, q]
-                share += alpha[f, q] * beta[1, q]
+                evidence += alpha[f, q] * beta[1, q]
             for q in range(states):
                 beta[0, q] = beta[1, q] / total
-            touch[f, c] = alpha[f, 0] * beta[1, 0] / share
+            touch[f, c] = alpha[f, 0] * beta[1, 0] / evidence
             mean[f, c], variance[f, c] = _moments(alpha[f], beta[0], gap[f, c], error[f, c], state_gap, width)
 
 
 @njit(cache=True, error_model="numpy")
-def _bell(state_gap, measured, sharp, farthest, floor, out):  # type: ignore[no-untyped-def]
-    """Set out to exp(−z²/2) of every state, or the floor, z being its distance from what was measured times `sharp`.
+def _gaussian(state_gap, measured, sharp, farthest, floor, out):  # type: ignore[no-untyped-def]
+    """Set `out` to max(exp(−z²/2), floor) of every state, with z = (measured − gap of the state) · sharp.
 
-    The exponential is that of a 128th, by its series, squared seven times: right to 1e-9, and the compiler takes
-    several states at once.
+    The exponential of a 128th of the argument, by its series, is squared seven times: exact to 1e-9, and vectorised by
+    the compiler.
     """
     for q in range(len(out)):
         z = (measured - state_gap[q]) * sharp
@@ -130,11 +138,11 @@ def _bell(state_gap, measured, sharp, farthest, floor, out):  # type: ignore[no-
 
 
 @njit(inline="always")
-def _blur(value, decay, up, down):  # type: ignore[no-untyped-def]
-    """Set up + down to Σ_q value_q exp(−|g − g_q| / scale) for every open state, the first one being 1.
+def _laplace_sums(value, decay, up, down):  # type: ignore[no-untyped-def]
+    """Set up + down to Σ_q value_q exp(−|g − g_q| / scale) for every open state; the first open state is 1.
 
-    Both ways at once and by fours: what one four adds is known before what comes to it from those before, so that not
-    every step waits for the last.
+    Both recursions run at once and in blocks of four: the terms of a block are computed before the carry from the block
+    before, which shortens the chain of dependent operations.
     """
     above, below, states = 0.0, 0.0, len(value)
     fours = (states - 1) // 4
@@ -174,14 +182,14 @@ def _blur(value, decay, up, down):  # type: ignore[no-untyped-def]
 def _moments(
     alpha: Array, beta: Array, measured: float, error: float, state_gap: Array, width: Array
 ) -> tuple[float, float]:
-    """Mean and variance of the true gap, a mixture of one normal law per state."""
+    """Return mean and variance of the true gap, a mixture of one normal distribution per state."""
     total, first, second = 0.0, 0.0, 0.0
     for q in range(len(state_gap)):
-        share = alpha[q] * beta[q]
+        weight = alpha[q] * beta[q]
         gain = 0.0 if np.isnan(measured) else width[q] / (width[q] + error)
         middle = state_gap[q] if gain == 0.0 else state_gap[q] + gain * (measured - state_gap[q])
-        total += share
-        first += share * middle
-        second += share * (middle * middle + width[q] * (1.0 - gain))
+        total += weight
+        first += weight * middle
+        second += weight * (middle * middle + width[q] * (1.0 - gain))
     first /= total
     return first, max(second / total - first * first, 0.0)

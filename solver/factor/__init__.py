@@ -1,1 +1,1 @@
-"""Sparse matrices of small blocks, a block row for each of many neighbours, factorised. Knows no grain."""
+"""Cholesky factorisation of sparse matrices of small dense blocks; independent of grains."""

@@ -1,6 +1,6 @@
-"""Cholesky's factor of a sparse matrix of small blocks, and solutions with it.
+"""Cholesky factorisation of a sparse matrix of small blocks, and solution with the factor.
 
-A matrix is its lower blocks in the order of `Pattern`, flat, as `blocks` lays them out.
+A matrix is stored as its lower blocks in the order of `Pattern`, flat, in the layout of `blocks`.
 """
 
 from __future__ import annotations
@@ -9,22 +9,36 @@ from math import sqrt
 
 from numba import njit
 
-from solver.factor.blocks import area_of, lanes_of, scale_column, take_from_rows, take_products, take_rows
+from .blocks import backward_substitution, block_size, forward_substitution, padded_rows, scale_column, schur_update
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def factorize(pattern, blocks, where, block):  # type: ignore[no-untyped-def]
-    """Turn a matrix into its factor L; its diagonal blocks are inverted where they stand. Whether it is definite.
+def factorize(pattern, blocks, row_offset, block):  # type: ignore[no-untyped-def]
+    """Factorise A = L Lᵀ in place, with inverted diagonal blocks.
 
-    blocks: flat, in and out; where (n,) integers: scratch; block: PAIR or TRIPLE.
+    Parameters
+    ----------
+    pattern : Pattern
+        Entries of the factor.
+    blocks : flat array
+        Lower blocks of A, replaced by those of L.
+    row_offset : (n,) int
+        Scratch.
+    block : tuple
+        PAIR or TRIPLE, the size of the blocks.
+
+    Returns
+    -------
+    bool
+        Whether A is positive definite.
     """
-    area = area_of(block)
+    area = block_size(block)
     start, row, left_start, left = pattern.start, pattern.row, pattern.left_start, pattern.left
     for j in range(len(start) - 1):
         for p in range(start[j], start[j + 1]):
-            where[row[p]] = p * area
+            row_offset[row[p]] = p * area
         for q in range(left_start[j], left_start[j + 1]):
-            take_products(row, blocks, where, left[q], start[pattern.column[left[q]] + 1], block)
+            schur_update(row, blocks, row_offset, left[q], start[pattern.column[left[q]] + 1], block)
         if not _invert_factor(blocks, start[j] * area, block):
             return False
         scale_column(blocks, start[j], start[j + 1], block)
@@ -33,8 +47,8 @@ def factorize(pattern, blocks, where, block):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _invert_factor(blocks, d, block):  # type: ignore[no-untyped-def]
-    """Put the inverse of its factor in place of a block on the diagonal; above it, zeros."""
-    lanes = lanes_of(block)
+    """Replace a diagonal block by the inverse of its Cholesky factor, with zeros above the diagonal."""
+    lanes = padded_rows(block)
     for a in range(len(block)):
         for b in range(a + 1):
             total = blocks[d + b * lanes + a]
@@ -57,12 +71,21 @@ def _invert_factor(blocks, d, block):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve(pattern, blocks, right, block):  # type: ignore[no-untyped-def]
-    """Solve with a factor, in place.
+def solve(pattern, blocks, rhs, block):  # type: ignore[no-untyped-def]
+    """Solve L Lᵀ x = b in place.
 
-    right: flat, rows of nodes in the order of elimination, filled up as the columns of blocks are, with zeros.
+    Parameters
+    ----------
+    pattern : Pattern
+        Entries of the factor.
+    blocks : flat array
+        The factor, of `factorize`.
+    rhs : flat array
+        b, replaced by x: vectors of the nodes in the order of elimination, padded with zeros like columns of blocks.
+    block : tuple
+        PAIR or TRIPLE, the size of the blocks.
     """
-    size, lanes, area = len(block), lanes_of(block), area_of(block)
+    size, lanes, area = len(block), padded_rows(block), block_size(block)
     start, row = pattern.start, pattern.row
     n = len(start) - 1
     for j in range(n):
@@ -70,14 +93,14 @@ def solve(pattern, blocks, right, block):  # type: ignore[no-untyped-def]
         for a in range(size - 1, -1, -1):
             total = 0.0
             for m in range(a + 1):
-                total += blocks[d + m * lanes + a] * right[x + m]
-            right[x + a] = total
-        take_from_rows(row, blocks, start[j] + 1, start[j + 1], right, x, block)
+                total += blocks[d + m * lanes + a] * rhs[x + m]
+            rhs[x + a] = total
+        forward_substitution(row, blocks, start[j] + 1, start[j + 1], rhs, x, block)
     for j in range(n - 1, -1, -1):
         d, x = start[j] * area, j * lanes
-        take_rows(row, blocks, start[j] + 1, start[j + 1], right, x, block)
+        backward_substitution(row, blocks, start[j] + 1, start[j + 1], rhs, x, block)
         for a in range(size):
             total = 0.0
             for m in range(a, size):
-                total += blocks[d + a * lanes + m] * right[x + m]
-            right[x + a] = total
+                total += blocks[d + a * lanes + m] * rhs[x + m]
+            rhs[x + a] = total

@@ -1,29 +1,45 @@
-"""The entries of an inverse where its matrix's factor has some: variances without the whole inverse."""
+"""Entries of an inverse on the pattern of the Cholesky factor: variances without the whole inverse."""
 
 from __future__ import annotations
 
 from numba import njit
 
-from solver.factor.blocks import area_of, lanes_of
+from .blocks import block_size, padded_rows
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def invert_on_pattern(pattern, blocks, inverse, unit, where, block):  # type: ignore[no-untyped-def]
-    """Set inverse to the blocks of A⁻¹ on the pattern of A's factor, as blocks, whole ones on the diagonal.
+def invert_on_pattern(pattern, blocks, inverse, unit, row_offset, block):  # type: ignore[no-untyped-def]
+    """Compute the blocks of A⁻¹ on the pattern of A's factor.
 
-    blocks: the factor, of `factorize`, laid out as `blocks` says, like the inverse; unit: scratch of the same size;
-    where (n,) integers: scratch. After Takahashi, Fagan & Chen 1973: what lies on the pattern follows from the factor
-    alone, last column first.
+    Parameters
+    ----------
+    pattern : Pattern
+        Entries of the factor.
+    blocks : flat array
+        The factor, of `factorize`.
+    inverse : flat array
+        Result in the same layout; diagonal blocks are complete.
+    unit : flat array
+        Scratch of the same size.
+    row_offset : (n,) int
+        Scratch.
+    block : tuple
+        PAIR or TRIPLE, the size of the blocks.
+
+    Notes
+    -----
+    Takahashi, Fagan & Chen 1973: with U = L / L_jj, Z_ij = −Σ_k Z_ik U_kj. The entries on the pattern follow from the
+    factor alone, last column first.
     """
-    size, lanes, area = len(block), lanes_of(block), area_of(block)
+    size, lanes, area = len(block), padded_rows(block), block_size(block)
     start, row = pattern.start, pattern.row
-    for k in range(len(where)):
-        where[k] = -1
+    for k in range(len(row_offset)):
+        row_offset[k] = -1
     for j in range(len(start) - 2, -1, -1):
         d = start[j] * area
-        # The column of a factor whose diagonal blocks are unit matrices: U = L / L_jj.
+        # Column of the factor with unit diagonal blocks: U = L / L_jj.
         for p in range(start[j] + 1, start[j + 1]):
-            where[row[p]] = p * area
+            row_offset[row[p]] = p * area
             for a in range(size):
                 for b in range(size):
                     total = 0.0
@@ -31,12 +47,12 @@ def invert_on_pattern(pattern, blocks, inverse, unit, where, block):  # type: ig
                         total += blocks[p * area + m * lanes + a] * blocks[d + b * lanes + m]
                     unit[p * area + b * lanes + a] = total
                     inverse[p * area + b * lanes + a] = 0.0
-        # Z_ij = −Σ_k Z_ik U_kj; each known block of the symmetric Z serves both of its rows.
+        # Z_ij = −Σ_k Z_ik U_kj; each known block of the symmetric Z contributes to both of its rows.
         for q in range(start[j] + 1, start[j + 1]):
             u, first = q * area, start[row[q]]
             _subtract_product(inverse, u, first * area, unit, u, block)
             for e in range(first + 1, start[row[q] + 1]):
-                t = where[row[e]]
+                t = row_offset[row[e]]
                 if t >= 0:
                     _subtract_product(inverse, t, e * area, unit, u, block)
                     _subtract_transposed_product(inverse, u, inverse, e * area, unit, t, block)
@@ -48,13 +64,13 @@ def invert_on_pattern(pattern, blocks, inverse, unit, where, block):  # type: ig
                 inverse[d + b * lanes + a] = total
         for p in range(start[j] + 1, start[j + 1]):
             _subtract_transposed_product(inverse, d, unit, p * area, inverse, p * area, block)
-            where[row[p]] = -1
+            row_offset[row[p]] = -1
 
 
 @njit(inline="always")
 def _subtract_product(inverse, t, e, unit, u, block):  # type: ignore[no-untyped-def]
-    """From the block at t take that at e times the unit block at u."""
-    size, lanes = len(block), lanes_of(block)
+    """Subtract the block at e times the unit block at u from the block at t."""
+    size, lanes = len(block), padded_rows(block)
     for a in range(size):
         for b in range(size):
             total = 0.0
@@ -65,8 +81,8 @@ def _subtract_product(inverse, t, e, unit, u, block):  # type: ignore[no-untyped
 
 @njit(inline="always")
 def _subtract_transposed_product(inverse, t, first, e, second, u, block):  # type: ignore[no-untyped-def]
-    """From the block at t take the transposed first block at e times the second at u."""
-    size, lanes = len(block), lanes_of(block)
+    """Subtract the transposed first block at e times the second at u from the block at t."""
+    size, lanes = len(block), padded_rows(block)
     for a in range(size):
         for b in range(size):
             total = 0.0

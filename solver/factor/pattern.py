@@ -1,7 +1,7 @@
-"""Where the Cholesky factor of a matrix of blocks has entries: all that follows from who is coupled with whom.
+"""Symbolic factorisation: the entries of the Cholesky factor of a sparse block matrix.
 
-Neighbours in a plane eliminate one another with little fill if those with few neighbours go first (minimum degree:
-SciPy's SuperLU orders so). The pattern serves every matrix with these couplings, whatever its numbers.
+Neighbours in a plane cause little fill if nodes with few neighbours are eliminated first (the minimum-degree order of
+SciPy's SuperLU). The pattern holds for every matrix with the same couplings.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ Ids = NDArray[np.int64]
 
 
 class Pattern(NamedTuple):
-    """Entries of the factor column by column, rows and columns in the order of elimination."""
+    """Entries of the factor, column by column; rows and columns in the order of elimination."""
 
-    place: Ids  # (n,) of each node in the order of elimination
-    start: Ids  # (n + 1,) first entry of every column: its diagonal
-    row: Ids  # (k,) of every entry, ascending in a column
-    column: Ids  # (k,)
-    left_start: Ids  # (n + 1,) where the entries of every row begin in `left`
+    place: Ids  # (n,) position of each node in the order of elimination
+    start: Ids  # (n + 1,) first entry of every column, its diagonal
+    row: Ids  # (k,) row of every entry, ascending in a column
+    column: Ids  # (k,) column of every entry
+    left_start: Ids  # (n + 1,) first entry of every row in `left`
     left: Ids  # (k − n,) entries left of the diagonal, row by row
 
     @property
@@ -36,7 +36,13 @@ class Pattern(NamedTuple):
         return len(self.row)
 
     def locate(self, a: Ids, b: Ids) -> Ids:
-        """Entries of coupled nodes a and b (m,), in either order. Errors: ValueError if a pair is not coupled."""
+        """Find the entries (m,) of coupled nodes a and b (m,), in either order.
+
+        Raises
+        ------
+        ValueError
+            If a pair is not coupled.
+        """
         first, second = self.place[a], self.place[b]
         low, high = np.minimum(first, second), np.maximum(first, second)
         key = self.column * self.node_count + self.row
@@ -48,13 +54,23 @@ class Pattern(NamedTuple):
 
 
 def find_pattern(node_count: int, a: Ids, b: Ids) -> Pattern:
-    """Order the nodes and find the factor's entries; a, b (m,): nodes that are coupled, in any order and number."""
+    """Order the nodes and find the entries of the factor.
+
+    Parameters
+    ----------
+    node_count : int
+        Number of nodes.
+    a, b : (m,)
+        Coupled nodes, in any order; repetitions are allowed.
+    """
     graph = coo_array((np.ones(2 * len(a)), (np.append(a, b), np.append(b, a))), shape=(node_count, node_count)).tocsc()
     place = _order_by_degree(graph)
     first, second = place[a], place[b]
     low, high = np.minimum(first, second), np.maximum(first, second)
-    apart = low < high
-    lower = coo_array((np.ones(apart.sum()), (high[apart], low[apart])), shape=(node_count, node_count)).tocsr()
+    distinct = low < high
+    lower = coo_array(
+        (np.ones(distinct.sum()), (high[distinct], low[distinct])), shape=(node_count, node_count)
+    ).tocsr()
     lower.sum_duplicates()
     neighbour_start, neighbour = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
     size, left_size = np.empty(node_count, np.int64), np.empty(node_count, np.int64)
@@ -77,12 +93,12 @@ def _order_by_degree(graph) -> Ids:  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _count(neighbour_start, neighbour, parent, seen, size, left_size):  # type: ignore[no-untyped-def]
-    """Liu's elimination tree, and the number of entries of every column and left of every diagonal."""
+    """Build Liu's elimination tree; count the entries of every column and left of every diagonal."""
     for i in range(len(parent)):
         parent[i], seen[i], size[i], left_size[i] = -1, i, 1, 0
         for p in range(neighbour_start[i], neighbour_start[i + 1]):
             k = neighbour[p]
-            while seen[k] != i:  # the row's entries are a path of the tree from each neighbour up to the row
+            while seen[k] != i:  # the entries of a row are paths of the tree from each neighbour up to the row
                 if parent[k] == -1:
                     parent[k] = i
                 seen[k] = i
@@ -93,7 +109,7 @@ def _count(neighbour_start, neighbour, parent, seen, size, left_size):  # type: 
 
 @njit(cache=True)
 def _fill(neighbour_start, neighbour, parent, seen, free, left_start, row, left):  # type: ignore[no-untyped-def]
-    """free (n,): the next free entry of every column; rows come in ascending order, and so do a column's entries."""
+    """Fill the entries in ascending order of rows; free (n,): next free entry of every column."""
     for i in range(len(parent)):
         seen[i] = i
         row[free[i]] = i

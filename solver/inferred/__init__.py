@@ -1,1 +1,1 @@
-"""What no photograph shows, inferred from what it shows: rods that were never seen, rotations that nobody measured."""
+"""Quantities that were not measured: rods that no photograph shows, rotations without texture."""

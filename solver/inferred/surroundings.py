@@ -1,4 +1,4 @@
-"""What is around a place of a packing that no grain fills, in every photograph."""
+"""Grains and walls around a hole of a packing, in every photograph."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import IN, STRAIGHT, Sides, all_sides, circle_of, reach_of_wall
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import IN, STRAIGHT, Sides, all_sides, circle_parameters, wall_distance
 
-NEIGHBOURS = 8  # whose motion carries a place on
-NEAR_ROOM = 12  # nearest centres among which those that a rod may touch are sought
-SAME_PLACE = 0.02  # radii: places nearer than that are one
-FLAT = 1e4  # radius of the circle that stands for a wall, over that of the greatest rod
-AROUND = 0.35  # of its radius: bodies as near as that may hold a rod
+NEIGHBOURS = 8  # whose mean motion a place follows
+NEAREST = 12  # centres that are tested for contact with a rod
+SAME_PLACE = 0.02  # radii: nearer places count as one
+FLAT = 1e4  # radius of the circle that replaces a wall, over that of the greatest rod
+AROUND = 0.35  # of its radius: greatest gap of bodies that may hold a rod
 ROUNDS = 30  # of re-weighting
-DRIFT = 0.1  # radii that a rod may stray between photographs from where its neighbours carry it
+DRIFT = 0.1  # radii: standard deviation of a rod's motion relative to its neighbours between photographs
 
 
 class Surroundings:
-    """The grains and walls of a sequence, with a search tree for every photograph. Walls count as flat circles."""
+    """Grains and walls of a sequence, with a search tree per photograph. Walls are circles of very large radius."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class Surroundings:
         return len(self.position)
 
     def carry(self, place: Array, k: int, to: int) -> Array:
-        """Where the motion of what is around takes a place (2,) of photograph k by photograph `to`."""
+        """Move a place (2,) of photograph k with the mean motion of its neighbours to photograph `to`."""
         _, near = self._tree[k].query(place, k=min(NEIGHBOURS, len(self._rows[k])))
         rows = self._rows[k][np.atleast_1d(near)]
         rows = rows[self.present[to, rows]]
@@ -51,26 +51,39 @@ class Surroundings:
         return place + np.mean(self.position[to, rows] - self.position[k, rows], axis=0)
 
     def gaps(self, place: Array, k: int, size: float) -> Array:
-        """Gaps (b,) [m] of a rod of this size at a place to the grains and walls around it."""
+        """Compute the gaps (b,) [m] of a rod of this size at a place to the grains and walls around it."""
         centre, rim = self._bodies(place, k, 2.0 * size)
         return np.linalg.norm(centre - place, axis=1) - rim - size
 
     def find_places(self, k: int, size: float, apart: float, deep: float, near: Array | None) -> Array:
-        """Places (p, 2) in photograph k where a rod of this size touches three bodies or more and overlaps none.
+        """Find places (p, 2) in photograph k where a rod touches at least three bodies and overlaps none.
 
-        Those with most touches first, and none twice. A body touches that is no farther apart and overlaps no
-        deeper [m]; near (q, 2): only around these places, None: everywhere.
+        Parameters
+        ----------
+        k : int
+            Photograph.
+        size : float
+            Radius [m] of the rod.
+        apart, deep : float
+            Greatest gap and greatest overlap [m] of a body that touches.
+        near : array (q, 2), optional
+            Search around these places [m] only; None: everywhere.
+
+        Returns
+        -------
+        array (p, 2)
+            Places [m], those with most contacts first, without duplicates.
         """
         crossing = self._crossings(k, size, near)
         if not len(crossing):
             return crossing
         rows = self._rows[k]
-        # Nearly all of them overlap the grain whose centre is nearest, which is found quickly.
+        # Most places overlap the grain with the nearest centre: this fast test removes them.
         away, nearest = self._tree[k].query(crossing)
         crossing = crossing[away - self.radius[rows[nearest]] - size > -deep]
         if not len(crossing):
             return crossing
-        _, nearest = self._tree[k].query(crossing, k=min(NEAR_ROOM, len(rows)))
+        _, nearest = self._tree[k].query(crossing, k=min(NEAREST, len(rows)))
         distance = np.linalg.norm(crossing[:, None] - self.position[k][rows[nearest]], axis=2)
         gap = np.column_stack([
             distance - self.radius[rows[nearest]] - size,
@@ -86,7 +99,7 @@ class Surroundings:
         return np.array(places).reshape(-1, 2)
 
     def _crossings(self, k: int, size: float, near: Array | None) -> Array:
-        """Places (p, 2) where a rod of this size touches two grains, or a grain and a wall."""
+        """Compute places (p, 2) where a rod of this size touches two grains, or a grain and a wall."""
         rows, tree = self._rows[k], self._tree[k]
         centre, rim = self.position[k][rows], self.radius[rows]
         if near is None:
@@ -105,14 +118,20 @@ class Surroundings:
             at = beside[close]
             if side == STRAIGHT:
                 wall, wide = self._flat(depth[close, w], outward[close, w], centre[at]), FLAT * self._widest + size
-            else:  # where a rod that touches the circle has its centre
-                middle, wide, _ = circle_of(self._walls[k, w])
+            else:  # circle of the centres of rods that touch the wall
+                middle, wide, _ = circle_parameters(self._walls[k, w])
                 wall, wide = np.broadcast_to(middle, (len(at), 2)), float(wide) + (-size if side == IN else size)
             found.append(_cross(centre[at], rim[at] + size, wall, np.full(len(at), wide)))
         return np.concatenate(found)
 
     def hold(self, start: Array, k: int, size: float) -> tuple[Array, float]:
-        """Where the bodies around hold a rod of this size near `start` (2,); and a component's deviation [m]."""
+        """Fit the place of a rod near `start` (2,) to the bodies around it; return it and its standard deviation [m].
+
+        Notes
+        -----
+        The place x minimises Σ w g²/σ² + |x − start|²/(0.1 R)² by Gauss-Newton steps, g the gaps and σ their noise;
+        w = 1 for overlaps, (1 + (g/s)²)⁻² for gaps, with s shrinking to the noise.
+        """
         drift, place, scale = DRIFT * size, start, AROUND * size
         finest = 2.0 * self.noise + 1e-4 * size
         information = np.eye(2) / drift**2
@@ -123,7 +142,7 @@ class Surroundings:
             gap = distance - rim - size
             near = gap < AROUND * size
             gap, toward = gap[near], (apart / distance[:, None])[near]
-            # Overlaps count in full; a gap the less, the wider it is: that body may not touch.
+            # Wide gaps have little weight: those bodies may not touch.
             weight = np.where(gap < 0.0, 1.0, 1.0 / (1.0 + (gap / scale) ** 2) ** 2) / self.noise**2
             information = toward.T @ (weight[:, None] * toward) + np.eye(2) / drift**2
             step = np.linalg.solve(information, toward.T @ (weight * gap) + (start - place) / drift**2)
@@ -132,7 +151,7 @@ class Surroundings:
         return place, float(np.sqrt(0.5 * np.trace(np.linalg.inv(information))))
 
     def _bodies(self, place: Array, k: int, reach: float) -> tuple[Array, Array]:
-        """Centres (b, 2) and radii (b,) [m] of the grains whose rims are within reach of a place, and of all walls."""
+        """Return centres (b, 2) and radii (b,) [m] of grains with rims within reach of a place and of all walls."""
         rows = self._rows[k][self._tree[k].query_ball_point(place, reach + self._widest)]
         depth, outward = self._reach(k, place[None])
         flat = self._flat(depth[0], outward[0], np.broadcast_to(place, outward[0].shape))
@@ -142,16 +161,16 @@ class Surroundings:
         )
 
     def _reach(self, k: int, place: Array) -> tuple[Array, Array]:
-        """Distance (p, w) [m] of places (p, 2) from the walls of photograph k, and outward normals (p, w, 2)."""
-        return reach_of_wall(self._walls[k][None], self._side[None], place[:, None])
+        """Compute distances (p, w) [m] of places (p, 2) from the walls in photograph k, and outward normals."""
+        return wall_distance(self._walls[k][None], self._side[None], place[:, None])
 
     def _flat(self, depth: Array, outward: Array, near: Array) -> Array:
-        """Centres (m, 2) of great circles that are the wall to places `near` (m, 2), so far before it (m,) [m]."""
+        """Compute centres (m, 2) of large circles that replace the wall at `depth` (m,) [m] beyond places (m, 2)."""
         return near + (depth + FLAT * self._widest)[:, None] * outward
 
 
 def _cross(one: Array, first: Array, two: Array, second: Array) -> Array:
-    """Points (p, 2) where circles about one (m, 2) and two (m, 2), of radii first and second (m,), cross."""
+    """Compute the intersections (p, 2) of circles about one and two (m, 2), of radii first and second (m,)."""
     apart = two - one
     distance = np.linalg.norm(apart, axis=1)
     meet = (distance < first + second) & (distance > np.abs(first - second)) & (distance > 0.0)

@@ -1,9 +1,9 @@
-"""Rods that no photograph shows: where they must be, from the holes that they leave and the neighbours that hold them.
+"""Rods that no photograph shows, inferred from holes of the packing and from neighbours that would hold them.
 
-A rod that bears force is held by its neighbours: one of the right radius touches three of them at once, in photograph
-after photograph, which a rod of another radius or in another place does by chance only. Such places are looked for in
-every hole, followed with the motion of what is around, and taken one after the other, the surest first: each makes the
-holes beside it smaller.
+A rod that bears force is held by its neighbours: with the right radius it touches at least three of them at once, in
+every photograph, which a rod of another radius or at another place does only by chance. Such places are searched in
+every hole, tracked with the motion of their neighbours, and accepted one after the other, those with most contacts
+first.
 """
 
 from __future__ import annotations
@@ -13,34 +13,43 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import Sides
-from solver.inferred.surroundings import Surroundings
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import Sides
+from .surroundings import Surroundings
 
-MISFIT = 5.0  # standard deviations of a gap within which a body touches the rod …
-COARSE = 0.3  # of a radius: beyond it nothing tells a rod that touches from one that does not
-SURFACE = 1e-3  # … the share of its radius …
-OVERLAPS = 2.0  # … and, where grains are soft, their mean overlaps: they are distributed nearly as exp(−δ / ⟨δ⟩) …
-DEEPEST = 5.0  # … up to so many of them, in the strongest contacts
-TOUCHES_FREE = 2  # bodies that any rod can be made to touch
-LEAST_HELD = 0.45  # mean number of touches beyond those, over photographs, that is no chance …
-LEAST_TOUCHES = 5.0  # … and the least number in all photographs together
-TOLERATED = 0.25  # share of the photographs in which the rod may overlap something
+MISFIT = 5.0  # standard deviations of a gap: tolerance of contact with the rod …
+COARSE = 0.3  # of a radius: with a larger tolerance contacts cannot be detected
+SURFACE = 1e-3  # … plus this fraction of its radius …
+OVERLAPS = 2.0  # … plus, for soft grains, mean overlaps, which are distributed nearly as exp(−δ / ⟨δ⟩) …
+DEEPEST = 5.0  # … mean overlaps in the strongest contacts
+TOUCHES_FREE = 2  # bodies that any rod can touch by its choice of place
+LEAST_HELD = 0.45  # mean number of further contacts per photograph that is significant …
+LEAST_TOUCHES = 5.0  # … and their least number in all photographs together
+TOLERATED = 0.25  # fraction of photographs in which the rod may overlap another body
 CROWDED = 0.5  # of the smaller radius: two rods nearer than that are one
-STARTS = 4  # photographs in which places are looked for, spread evenly
-TRIED = 12  # radii that are tried where rods come in no classes
-PASSES = 6  # each sees what the one before it found
+STARTS = 4  # photographs in which places are searched, evenly spaced
+TRIED = 12  # trial radii where rods have no classes
+PASSES = 6  # each with the rods of the one before
 FEWEST_FRAMES, FEWEST_GRAINS = 3, 8
 
 
 @dataclass(frozen=True, slots=True)
+class UnseenRodSettings:
+    """What is known of the rods."""
+
+    noise: float  # [m] standard deviation of a position component
+    sizes: Array | None = None  # (q,) [m] radii of the rods; None: any
+    overlap: float = 0.0  # [m] mean overlap of touching grains where they are soft
+
+
+@dataclass(frozen=True, slots=True)
 class UnseenRods:
-    """Rods that were inferred."""
+    """Inferred rods."""
 
     radius: Array  # (u,) [m]
     position: Array  # (f, u, 2) [m]
     sigma: Array  # (f, u) [m] standard deviation of a position component
-    held: Array  # (u,) bodies that it touches beyond two, mean over photographs
+    held: Array  # (u,) contacts beyond two, mean over photographs
 
     @property
     def count(self) -> int:
@@ -49,7 +58,7 @@ class UnseenRods:
 
 @dataclass(frozen=True, slots=True)
 class _Tolerance:
-    """Gaps [m] within which a body touches a rod."""
+    """Greatest gap and overlap [m] of a body that touches a rod."""
 
     apart: float
     deep: float  # overlapping
@@ -61,7 +70,7 @@ class _Rod:
     position: Array  # (f, 2)
     sigma: Array  # (f,)
     held: float
-    overlapping: float  # share of photographs
+    overlapping: float  # fraction of photographs
 
 
 def infer_unseen(
@@ -69,20 +78,33 @@ def infer_unseen(
     position: Array,
     present: NDArray[np.bool_],
     endpoints: Array,
-    noise: float,
-    sizes: Array | None = None,
+    settings: UnseenRodSettings,
     side: Sides = None,
-    *,
-    overlap: float = 0.0,
 ) -> UnseenRods:
-    """Infer the rods of a packing that were never seen.
+    """Infer the rods of a packing that no photograph shows.
 
-    radius (n,) [m]; position (f, n, 2) [m]; present (f, n); endpoints (f, w, 2, 2) [m]; noise [m]: standard deviation
-    of a position component; sizes (q,) [m]: the radii that rods have, None: any; side (w,): which walls are
-    circles; overlap [m]: mean overlap of touching grains where they are soft. Grains that are missing in some
-    photographs only leave no hole that lasts.
+    Parameters
+    ----------
+    radius : array (n,)
+        Radii [m].
+    position : array (f, n, 2)
+        Centres [m].
+    present : bool array (f, n)
+        Whether each grain is present; grains missing in some photographs leave no lasting hole.
+    endpoints : array (f, w, 2, 2)
+        Ends of the walls [m].
+    settings : UnseenRodSettings
+        Noise, radius classes and overlap.
+    side : array (w,), optional
+        Which walls are circles.
+
+    Returns
+    -------
+    UnseenRods
+        None with fewer than three photographs, without walls, or where noise hides contacts.
     """
-    shown = present.sum(axis=1) >= FEWEST_GRAINS  # a photograph that failed tells nothing
+    noise, sizes, overlap = settings.noise, settings.sizes, settings.overlap
+    shown = present.sum(axis=1) >= FEWEST_GRAINS  # without failed photographs
     position, present, endpoints = position[shown], present[shown], endpoints[shown]
     frames = len(position)
     rods: list[_Rod] = []
@@ -90,13 +112,13 @@ def infer_unseen(
         sizes = np.quantile(radius, np.linspace(0.0, 1.0, TRIED))
     exact = MISFIT * np.sqrt(2.0) * noise + SURFACE * float(radius.mean())
     tolerance = _Tolerance(exact + OVERLAPS * overlap, exact + DEEPEST * overlap)
-    # Soft rods are looked for as if all were smaller by what they overlap on average: their gaps scatter about nothing.
+    # Soft rods are reduced by half the mean overlap, so that their gaps vary about zero.
     radius, sizes, noise = radius - 0.5 * overlap, sizes - 0.5 * overlap, float(np.hypot(noise, overlap / np.sqrt(2.0)))
     if frames >= FEWEST_FRAMES and endpoints.shape[1] and tolerance.apart < COARSE * float(np.min(sizes)):
         near: Array | None = None
         for _ in range(PASSES):
             around = Surroundings(*_with(radius, position, present, rods), endpoints, noise, side)
-            new = _surest(_propose(around, sizes, near, tolerance), tolerance)
+            new = _select_supported(_propose(around, sizes, near, tolerance), tolerance)
             if not new:
                 break
             rods += new
@@ -123,7 +145,7 @@ def _with(
 
 
 def _propose(around: Surroundings, sizes: Array, near: Array | None, tolerance: _Tolerance) -> list[_Rod]:
-    """Every rod that would be held somewhere, followed through all photographs; near (f, q, 2): only around these."""
+    """List all rods with at least three contacts in some photograph, tracked; near (f, q, 2): only around these."""
     proposed: list[_Rod] = []
     for k in np.unique(np.linspace(0, around.frame_count - 1, STARTS).round().astype(int)).tolist():
         for size in sizes.tolist():
@@ -131,17 +153,17 @@ def _propose(around: Surroundings, sizes: Array, near: Array | None, tolerance: 
                 k, size, tolerance.apart, tolerance.deep, None if near is None else near[k]
             ):
                 if not any(_is_at(each, k, place, size) for each in proposed):
-                    proposed.append(_follow(around, place, k, size, tolerance))
+                    proposed.append(_track(around, place, k, size, tolerance))
     return proposed
 
 
 def _is_at(rod: _Rod, k: int, place: Array, size: float) -> bool:
-    """Whether a rod has been followed to this very place."""
+    """Return whether a rod was tracked to this place."""
     return rod.radius == size and float(np.hypot(*(rod.position[k] - place))) < 0.02 * size
 
 
-def _follow(around: Surroundings, place: Array, k: int, size: float, tolerance: _Tolerance) -> _Rod:
-    """Follow a rod from its place in photograph k to all others."""
+def _track(around: Surroundings, place: Array, k: int, size: float, tolerance: _Tolerance) -> _Rod:
+    """Track a rod from its place in photograph k through all others."""
     frames = around.frame_count
     position, sigma = np.empty((frames, 2)), np.empty(frames)
     held, overlaps = np.zeros(frames), np.zeros(frames, bool)
@@ -155,8 +177,8 @@ def _follow(around: Surroundings, place: Array, k: int, size: float, tolerance: 
     return _Rod(size, position, sigma, float(np.maximum(held, 0.0).mean()), float(overlaps.mean()))
 
 
-def _surest(proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
-    """Those that are held, none of which overlaps a surer one."""
+def _select_supported(proposed: list[_Rod], tolerance: _Tolerance) -> list[_Rod]:
+    """Select rods with enough contacts, none of which overlaps one with more."""
     chosen: list[_Rod] = []
     least = max(LEAST_HELD, LEAST_TOUCHES / len(proposed[0].position)) if proposed else 0.0
     fit = [each for each in proposed if each.held >= least and each.overlapping <= TOLERATED]

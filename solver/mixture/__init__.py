@@ -1,4 +1,1 @@
-"""Two witnesses of the same forces, the motion and the positions, heard together.
-
-Stands on convex and posterior.
-"""
+"""The motion estimate and the position-only estimate of the same forces, combined."""

@@ -1,1 +1,1 @@
-"""One method: nonlinear Gauss-Seidel on one interval. Stands on detection and statistics."""
+"""Nonlinear Gauss-Seidel on one interval."""

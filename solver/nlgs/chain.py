@@ -6,34 +6,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import FrameMotion
-from solver.bodies.packing import Packing
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
-from solver.detection.networks import Network
-from solver.nlgs.interval import Interval
-from solver.nlgs.problem import ContactProblem, inertial_impedance, kinematic_impedance
-from solver.nlgs.solve import NlgsSettings, Solution, solve, unbalance_of
-from solver.nlgs.sweep_record import Keep, SweepHistory, SweepRecorder
-from solver.nlgs.warm_start import ForceMemory
+from ..bodies.grains import Array
+from ..bodies.motion import FrameMotion
+from ..bodies.packing import Packing
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
+from ..detection.contact_networks import Network
+from .force_memory import ForceMemory
+from .interval import Interval
+from .problem import ContactProblem, inertial_impedance, kinematic_impedance
+from .solve import NlgsSettings, Solution, relative_force_residual, solve
+from .sweep_record import Keep, SweepHistory, SweepRecorder
 
 
 @dataclass(frozen=True, slots=True)
 class ChainSettings:
-    kappa: float | None = 0.05  # kinematic number; None: as the paper's time step gives it
+    """Settings of the Gauss-Seidel chain."""
+
+    kappa: float | None = 0.05  # kinematic number; None: from the paper's time step
     substeps: int = 5  # per interval
-    spin_up: int = 10  # sub-steps without former forces
-    sweeps: int = 1000  # per sub-step; more of them regularise less
+    spin_up: int = 10  # sub-steps of an interval without previous forces
+    sweeps: int = 1000  # per sub-step; more sweeps regularise less
     relaxation: float = 1.0  # above 1 selects another solution
     force_change: float | None = None  # the paper's ε_f as a stopping level
-    reference_pressure: float = 1e4  # [Pa] scale of the forces where no wall carries a pressure
+    reference_pressure: float = 1e4  # [Pa] scale of the forces if no wall carries a pressure
     keep: Keep = "log"  # which sweeps keep their forces
 
 
 @dataclass(frozen=True, slots=True)
 class ChainStep:
-    """What one interval gave."""
+    """Result of one interval."""
 
     contacts: Contacts  # of the frame
     walls: Walls
@@ -41,16 +43,19 @@ class ChainStep:
     sweeps: int  # of all sub-steps
     history: SweepHistory
     kappa: float
-    old_unbalance: float  # ū, NaN without former forces
+    old_unbalance: float  # ū, NaN without previous forces
     memory: ForceMemory
     problem: ContactProblem  # of the last sub-step
-    former: Array | None  # (c, 2) [N] forces of the former frame on these contacts; None: there were none
+    previous_force: Array | None  # (c, 2) [N] of the previous frame on these contacts; None without any
 
 
 def force_scale(packing: Packing, settings: ChainSettings) -> float:
-    """f₀ = σ L d [N], with the mean diameter and the mean pressure of the plates, or that of the packing's weight.
+    """Compute the force scale f₀ of a packing [N].
 
-    The weight presses on average with half of what all of it does on a square packing's base.
+    Notes
+    -----
+    f₀ = σ L d with the mean diameter d and the mean pressure σ of the plates. Without plates, σ is the mean pressure of
+    the weight in a square packing, half the pressure on its base. Without weight, σ is `reference_pressure`.
     """
     diameter = 2.0 * float(packing.grains.radius.mean())
     loaded = np.isfinite(packing.pressure)
@@ -64,46 +69,46 @@ def force_scale(packing: Packing, settings: ChainSettings) -> float:
 def advance_chain(
     packing: Packing, motion: FrameMotion, memory: ForceMemory, settings: ChainSettings, network: Network
 ) -> ChainStep:
-    """Take the forces of the former frame through one interval, on the contacts of a network."""
-    return advance_through(Interval(packing, motion, network), memory, settings)
+    """Advance the forces of the previous frame through one interval, on the contacts of a network."""
+    return advance_chain_through(Interval(packing, motion, network), memory, settings)
 
 
-def advance_through(interval: Interval, memory: ForceMemory, settings: ChainSettings) -> ChainStep:
-    """The same through an interval that other chains go through, too."""
+def advance_chain_through(interval: Interval, memory: ForceMemory, settings: ChainSettings) -> ChainStep:
+    """Advance the forces through an interval that several chains share."""
     packing, motion = interval.packing, interval.motion
-    fresh = len(memory.key) == 0
-    steps = (settings.spin_up if fresh else settings.substeps) if motion.spans else 1
-    sweeps = settings.sweeps if motion.spans else settings.sweeps * settings.substeps
+    cold_start = len(memory.key) == 0
+    steps = (settings.spin_up if cold_start else settings.substeps) if motion.ends_here else 1
+    sweeps = settings.sweeps if motion.ends_here else settings.sweeps * settings.substeps
     impedance, kappa = _impedance(packing, motion, settings, steps)
     nlgs = NlgsSettings(sweeps, settings.force_change, None, settings.relaxation)
     recorder = SweepRecorder(steps * sweeps, settings.keep)
 
     def solve_step(problem: ContactProblem, contacts: Contacts, guess: Array) -> Solution:
         recorder.begin(problem, contacts)
-        # Where a stopping level is looked at, every sweep is measured.
+        # With a stopping level, every sweep is measured.
         every = recorder.strides() if nlgs.force_change is None else 1
-        return solve(problem, nlgs, guess=guess, observer=recorder.hear, every=every, measured=recorder.measured)
+        return solve(problem, nlgs, guess=guess, observer=recorder.on_sweep, every=every, measured=recorder.measured)
 
-    carried, done = memory, 0
+    initial_memory, sweeps_done = memory, 0
     for step in range(1, steps):
         problem, contacts, _ = interval.at(step / steps, impedance)
         solution = solve_step(problem, contacts, memory.recall(contacts))
         memory = memory.renew(contacts, solution.force, motion.grains.present)
-        done += solution.sweeps
+        sweeps_done += solution.sweeps
     problem, contacts, walls = interval.at(1.0, impedance)
     solution = solve_step(problem, contacts, memory.recall(contacts))
-    former = None if fresh else carried.recall(contacts)
+    previous_force = None if cold_start else initial_memory.recall(contacts)
     return ChainStep(
         contacts=contacts,
         walls=walls,
         solution=solution,
-        sweeps=done + solution.sweeps,
+        sweeps=sweeps_done + solution.sweeps,
         history=recorder.history(contacts),
         kappa=kappa,
-        old_unbalance=np.nan if former is None else unbalance_of(problem, former)[1],
+        old_unbalance=np.nan if previous_force is None else relative_force_residual(problem, previous_force)[1],
         memory=memory.renew(contacts, solution.force, motion.grains.present),
         problem=problem,
-        former=former,
+        previous_force=previous_force,
     )
 
 

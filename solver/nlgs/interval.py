@@ -1,4 +1,4 @@
-"""What all chains through one interval have in common: its contacts, their order and the problems, each made once."""
+"""Contacts, visiting order and contact problems of one interval, shared by all chains and computed once."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.bodies.grains import Array, GrainMotion
-from solver.bodies.motion import FrameMotion
-from solver.bodies.packing import Packing
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
-from solver.detection.networks import Network
-from solver.nlgs.problem import ContactProblem, assemble
-from solver.nlgs.sweeping.ordering import VisitingOrder, order_contacts
+from ..bodies.grains import Array, GrainMotion
+from ..bodies.motion import FrameMotion
+from ..bodies.packing import Packing
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
+from ..detection.contact_networks import Network
+from .problem import ContactProblem, assemble
+from .sweeping.ordering import VisitingOrder, order_contacts
 
 
 class Instant(NamedTuple):
-    """An instant of an interval, as a chain of some impedance solves it."""
+    """Contact problem of a chain at one instant of an interval."""
 
     problem: ContactProblem
     contacts: Contacts
@@ -28,7 +28,7 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Network:
-    """Bodies and contacts of an instant, and the problems that were made of them, each with its impedance."""
+    """Bodies and contacts at an instant, and the assembled problems with their impedances."""
 
     state: GrainMotion
     walls: Walls
@@ -39,7 +39,7 @@ class _Network:
 
 
 class Interval:
-    """The instants of an interval. Chains may ask from several threads: who comes second waits and finds it done."""
+    """The instants of an interval. Thread-safe: a second request waits for the first and uses its result."""
 
     def __init__(self, packing: Packing, motion: FrameMotion, network: Network) -> None:
         self.packing, self.motion = packing, motion
@@ -48,24 +48,24 @@ class Interval:
         self._known: dict[float, _Network] = {}
 
     def at(self, fraction: float, impedance: Array) -> Instant:
-        """The instant after a fraction of the interval, for grains of this impedance (n,) [N s/m]."""
+        """Return the instant at a fraction of the interval for grains of this impedance (n,) [N s/m]."""
         with self._lock:
-            here = self._known.get(fraction)
-            if here is None:
-                here = self._known[fraction] = self._measure(fraction)
-            for known, problem in here.problems:
+            network = self._known.get(fraction)
+            if network is None:
+                network = self._known[fraction] = self._measure(fraction)
+            for known, problem in network.problems:
                 if np.array_equal(known, impedance):
-                    return Instant(problem, here.contacts, here.walls)
+                    return Instant(problem, network.contacts, network.walls)
             problem = assemble(
-                self.packing.grains, here.state, here.walls, here.contacts, self.packing.material, impedance,
-                closing=here.closing, order=here.order,
+                self.packing.grains, network.state, network.walls, network.contacts, self.packing.material, impedance,
+                closing=network.closing, order=network.order,
             )  # fmt: skip
-            here.problems.append((impedance, problem))
-            return Instant(problem, here.contacts, here.walls)
+            network.problems.append((impedance, problem))
+            return Instant(problem, network.contacts, network.walls)
 
     def _measure(self, fraction: float) -> _Network:
         state, walls = self.motion.at(fraction, self._load)
-        contacts, reluctance = self._network.at(fraction, self.packing.grains, state, walls)
-        # Reluctance counts in displacements of a step, so the time of a step cancels.
-        closing = None if reluctance is None else self.motion.velocity_rms * reluctance
+        contacts, closing_distance = self._network.at(fraction, self.packing.grains, state, walls)
+        # Reluctance is in displacements of a step, so the time of a step cancels.
+        closing = None if closing_distance is None else self.motion.velocity_rms * closing_distance
         return _Network(state, walls, contacts, closing, order_contacts(contacts), [])

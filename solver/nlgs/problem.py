@@ -1,10 +1,9 @@
-"""One frame's contact problem, assembled and validated once.
+"""The contact problem of one frame, assembled and validated once.
 
-The unknown forces act on bodies that resist with an *impedance* Z [N s/m]: the velocity that forces f
-produce is v = v_measured + ΣF / Z. The paper's scheme has Z = m / ((1−η) δt). Measured grain velocities then
-do not influence the forces at all, because that Z is some nine orders too small; the kinematic number κ
-sets Z = κ f₀ / v_rms · m / m̄ / (1−η) instead, with f₀ = σ L d, so that undoing the whole measured motion costs
-forces of κ f₀. Rotation resists with ½ Z R², as solid rods do.
+The unknown forces act on bodies of *impedance* Z [N s/m]: forces produce the velocity v = v_measured + ΣF / Z. The
+paper's scheme has Z = m / ((1−η) δt). Measured grain velocities then do not influence the forces, because this Z is
+some nine orders of magnitude too small. The kinematic number κ sets Z = κ f₀ / v_rms · m / m̄ / (1−η) instead, with
+f₀ = σ L d: forces of κ f₀ cancel the whole measured motion. The rotational impedance is ½ Z R², as of solid rods.
 """
 
 from __future__ import annotations
@@ -15,34 +14,35 @@ import numpy as np
 from jaxtyping import Float, Int32, Int64
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array, GrainMotion, Grains
-from solver.bodies.packing import Material
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
-from solver.nlgs.sweeping.ordering import GROUP, VisitingOrder, order_contacts
+from ..bodies.grains import Array, GrainMotion, Grains
+from ..bodies.packing import Material
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
+from .sweeping.ordering import GROUP, VisitingOrder, order_contacts
 
 PLATE_IMPEDANCE = 30.0  # of a loaded plate, in mean grain impedances
 CACHE_LINE = 64  # bytes
 
 
 class ContactProblem(NamedTuple):
-    """What the kernels read: packed records in visiting order, p contacts between grains first, then q with walls.
+    """Packed records in visiting order for the kernels: p contacts between grains, then q contacts with walls.
 
-    Contacts between grains lie in blocks of L = GROUP, one row per quantity, so that a block is read as vectors; the
-    last block is filled up with zeros. The first `grouped` of them are in groups that share no grain.
-    At most ten fields: numba's dispatch slows beyond.
+    Contacts between grains are stored in blocks of L = GROUP, one row per quantity, so that a block is read as vectors.
+    The last block is padded with zeros. The first `grouped` contacts are in groups that share no grain. The dispatch of
+    numba slows beyond ten fields.
     """
 
     body: Float[Array, "n 4"]  # free velocity vx, vy, ω R [m/s] and 1/Z [m/(N s)]
     plate: Float[Array, "w 2"]  # free normal velocity beyond the measured one [m/s] and 1/Z, 0 where motion is imposed
     pair_body: Int32[np.ndarray, "blocks 2 L"]  # grains i, j
-    # nx, ny, 1/W_nn, and what is added to u_n [m/s]: gap to close and motion of the cell between both; to u_t: where
-    # there is a cell
+    # nx, ny, 1/W_nn, offset of u_n [m/s] (closing velocity and motion of the cell between both grains); offset of u_t
+    # with a cell
     pair: Float[Array, "blocks rows L"]
     grouped: int  # a multiple of L, at most p
-    wall_body: Int32[np.ndarray, "q 2"]  # grain, wall
-    # nx, ny, 1/W_nn, 1/W_tt, and what is added to u_n, u_t [m/s]: motion of the wall, gap to close
-    wall: Float[Array, "q 6"]
+    wall_body: Int32[np.ndarray, "q 2"]  # grain, and the plate that the wall belongs to or the wall itself
+    # nx, ny, 1/W_nn, 1/W_tt, offsets of u_n, u_t [m/s]: motion of the wall, closing velocity; n·p, t·p with p the
+    # direction in which the plate is free
+    wall: Float[Array, "q 8"]
     friction: Float[Array, "2"]  # between grains, with walls
     external: Float[Array, "n 2"]  # [N] weight of the grains
     rows: Int64[np.ndarray, " c"]  # c = p + q: record → row of Contacts
@@ -51,9 +51,32 @@ class ContactProblem(NamedTuple):
 def kinematic_impedance(
     grains: Grains, *, kappa: float, force_scale: float, velocity_scale: float, formal_weight: float = 0.0
 ) -> Array:
-    """Impedance of every grain (n,) [N s/m] for a kinematic number κ.
+    """Compute the impedance of every grain for a kinematic number.
 
-    force_scale: f₀ = σ L d [N]; velocity_scale: v_rms [m/s].
+    Parameters
+    ----------
+    kappa : float
+        Kinematic number κ.
+    force_scale : float
+        f₀ = σ L d [N].
+    velocity_scale : float
+        v_rms [m/s].
+    formal_weight : float
+        η.
+
+    Returns
+    -------
+    (n,)
+        Impedance [N s/m].
+
+    Raises
+    ------
+    ValueError
+        If κ or a scale is not positive.
+
+    Notes
+    -----
+    Z = κ f₀ / v_rms / (1−η) · m / m̄
     """
     if not (kappa > 0 and force_scale > 0 and velocity_scale > 0):
         raise ValueError("κ, the force scale and the velocity scale must be positive")
@@ -62,7 +85,7 @@ def kinematic_impedance(
 
 
 def inertial_impedance(grains: Grains, *, interval: float, formal_weight: float = 0.0) -> Array:
-    """Impedance of every grain (n,) [N s/m] as the paper's time step gives it: m / ((1−η) δt)."""
+    """Compute the impedance of every grain (n,) [N s/m] from the paper's time step: Z = m / ((1−η) δt)."""
     if not interval > 0:
         raise ValueError("the interval must be positive")
     return grains.mass / interval / (1.0 - formal_weight)
@@ -79,15 +102,27 @@ def assemble(
     closing: Array | None = None,
     order: VisitingOrder | None = None,
 ) -> ContactProblem:
-    """Assemble the contact problem of one frame (or sub-step).
+    """Assemble the contact problem of one frame or sub-step.
 
-    impedance (n,) [N s/m]; closing (c,) [m/s], the velocity at which a contact must close before it bears force
-    (a doubtful contact's extra gap over the time of the step), 0 if absent; order: of `order_contacts`, if it is known.
+    Parameters
+    ----------
+    impedance : (n,)
+        Impedance of every grain [N s/m].
+    closing : (c,), optional
+        Velocity at which a contact must close before it carries force [m/s]: the extra gap of an ambiguous contact over
+        the time of the step. Zero if absent.
+    order : VisitingOrder, optional
+        Result of `order_contacts`, if it is known.
+
+    Raises
+    ------
+    ValueError
+        If a contact refers to a grain that is not present.
     """
     n = grains.count
     if np.any(~motion.present[contacts.i]) or np.any(~motion.present[contacts.j[contacts.j < n]]):
         raise ValueError("a contact names a grain that is not present")
-    moved = motion.present & grains.free  # by forces; the others move as they were seen
+    moved = motion.present & grains.free  # by forces; the others keep their measured velocity
     compliance = np.where(grains.free, 1.0 / impedance, 0.0)
     weight = grains.weight(material.gravity)
     weight[~moved] = 0.0
@@ -114,15 +149,19 @@ def assemble(
         pair[-1] = pair[-1] + np.einsum("ij,ij->i", drift, contacts.normal[rows_pair])
         pair.append(np.einsum("ij,ij->i", drift, contacts.tangent[rows_pair]))
 
-    wall_body = np.stack([i[rows_wall], j[rows_wall] - n], axis=1)
-    wall_w = compliance[wall_body[:, 0]]
-    velocity = walls.velocity_at(wall_body[:, 1], point[rows_wall])
+    of_wall = j[rows_wall] - n
+    carrier, along_normal, along_tangent = walls.plate_components(of_wall, contacts.normal[rows_wall])
+    wall_body = np.stack([i[rows_wall], carrier], axis=1)
+    wall_w, plate_w = compliance[wall_body[:, 0]], plate[carrier, 1]
+    velocity = walls.velocity_at(of_wall, point[rows_wall])
     wall = np.column_stack([
         contacts.normal[rows_wall],
-        _inverse(wall_w + plate[wall_body[:, 1], 1]),
-        _inverse(3.0 * wall_w),
+        _inverse(wall_w + along_normal**2 * plate_w),
+        _inverse(3.0 * wall_w + along_tangent**2 * plate_w),
         np.einsum("ij,ij->i", velocity, contacts.normal[rows_wall]) + closing[rows_wall],
         np.einsum("ij,ij->i", velocity, contacts.tangent[rows_wall]),
+        along_normal,
+        along_tangent,
     ])  # fmt: skip
 
     return ContactProblem(
@@ -140,20 +179,20 @@ def assemble(
 
 
 def _inverse(value: Array) -> Array:
-    """1 / value (c,); 0 where that is 0: between two bodies whose motion is imposed, forces change nothing."""
+    """1 / value (c,), and 0 where value is 0: forces do not change the motion of two bodies with imposed motion."""
     return np.divide(1.0, value, out=np.zeros_like(value), where=value > 0.0)
 
 
 def aligned_zeros(shape: tuple[int, ...], kind: type = np.float64) -> NDArray:
-    """Zeros on the bounds of a cache line, which no vector then straddles."""
+    """Allocate zeros aligned to a cache line, so that no vector crosses two lines."""
     size = int(np.prod(shape)) * np.dtype(kind).itemsize
-    room = np.zeros(size + CACHE_LINE, np.uint8)
-    start = -room.ctypes.data % CACHE_LINE
-    return room[start : start + size].view(kind).reshape(shape)
+    buffer = np.zeros(size + CACHE_LINE, np.uint8)
+    start = -buffer.ctypes.data % CACHE_LINE
+    return buffer[start : start + size].view(kind).reshape(shape)
 
 
 def _blocks(record: NDArray) -> NDArray:
-    """Records (p, k) in blocks (ceil(p / GROUP), k, GROUP), the last one filled up with zeros."""
+    """Arrange records (p, k) in blocks (ceil(p / GROUP), k, GROUP), the last one padded with zeros."""
     count, width = record.shape
     blocks = -(-count // GROUP)
     padded = np.zeros((blocks * GROUP, width), record.dtype)

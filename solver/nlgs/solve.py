@@ -1,8 +1,7 @@
-"""Nonlinear Gauss-Seidel: settings, one's hand on every sweep, and the solution.
+"""Nonlinear Gauss-Seidel: settings, iteration by sweeps, and the solution.
 
-`sweeps` is the method, driven by hand; `solve` runs it to an end that is a value with a sentence. Whoever listens
-sets the strides of the compiled loop and what it measures on its way, and nothing else: with or without a listener
-the forces are the same bits.
+`sweeps` iterates under the control of the caller; `solve` runs it until a stopping criterion. An observer sets only the
+strides of the compiled loop and the sweeps that are measured: the forces are bit-identical with and without it.
 """
 
 from __future__ import annotations
@@ -16,27 +15,33 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from solver.bodies.grains import Array
-from solver.nlgs.acceleration import PERIOD, Acceleration
-from solver.nlgs.problem import ContactProblem, aligned_zeros
-from solver.nlgs.sweeping.kernels import (
+from ..bodies.grains import Array
+from .acceleration import PERIOD, Acceleration
+from .problem import ContactProblem, aligned_zeros
+from .sweeping.kernels import (
     advance,
     apply_forces,
+    measure_force_residual,
     measure_forces,
     measure_natural_map,
     measure_state,
-    measure_unbalance,
 )
-from solver.nlgs.sweeping.measured_sweeps import advance_and_measure, find_rest, rest_shape
+from .sweeping.measured_sweeps import advance_and_measure, equilibrium_shape, find_equilibrium
 
 
 @dataclass(frozen=True, slots=True)
 class NlgsSettings:
-    sweeps: int = 5000  # at most; in a kinematic chain, where more sweeps hurt, exactly
-    force_change: float | None = None  # stop at the paper's ε_f
-    natural_map: float | None = None  # stop at this relative residual
+    """Settings of a nonlinear Gauss-Seidel solve."""
+
+    sweeps: int = (
+        5000  # greatest number of sweeps; exact number in a kinematic chain, where more sweeps worsen the forces
+    )
+    force_change: float | None = None  # stopping level of the paper's ε_f
+    natural_map: float | None = None  # stopping level of the relative natural-map residual
     relaxation: float = 1.0  # above 1 selects another solution
-    acceleration: int = 0  # Anderson's window, 8 does well; for static loads alone; 0: plain sweeps
+    acceleration: int = (
+        0  # window of the Anderson acceleration, for static loads only (8 is a good value); 0: plain sweeps
+    )
 
     def __post_init__(self) -> None:
         if self.sweeps < 0:
@@ -57,12 +62,12 @@ class Stop(Enum):
 
 
 class Sweep(NamedTuple):
-    """The state after a sweep that is heard. `force` is live memory: copy what you keep."""
+    """The state after an observed sweep. `force` is the working array of the solver: copy it to keep it."""
 
     number: int  # 1 … sweeps
     force: Float[Array, "c 2"]  # [N] in visiting order
-    # Of the sweeps since the one heard before, this one last: greatest |Δf| / |f| in the sweep, relative
-    # natural-map residual after it, worst |ΣF| on a grain / mean f_n. NaN where not measured; this sweep's always are.
+    # Of the sweeps since the previous observed one, this one last: greatest |Δf| / |f| in the sweep, relative
+    # natural-map residual after it, worst |ΣF| on a grain / mean f_n. NaN where not measured; this sweep always is.
     residuals: Float[Array, "s 3"]
 
     @property
@@ -80,6 +85,8 @@ class Sweep(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Solution:
+    """Forces of a solve with their residuals."""
+
     fn: Float[Array, " c"]  # [N] in the order of the contacts
     ft: Float[Array, " c"]  # [N]
     stop: Stop
@@ -102,22 +109,36 @@ def sweeps(
     every: int | Iterable[int] = 1,
     measured: bool = False,
 ) -> Iterator[Sweep]:
-    """Advance `every` sweeps at a time from a guess: without end, or by strides that come to one.
+    """Iterate over sweeps from a guess.
 
-    guess (c, 2) [N], forces (f_n, f_t) in the order of the contacts; zero if absent. measured: the sweeps
-    that are not heard are measured, too. With acceleration the forces take a step every
-    PERIOD sweeps, heard or not.
+    Parameters
+    ----------
+    guess : (c, 2), optional
+        Forces (f_n, f_t) in the order of the contacts [N]; zero if absent.
+    every : int or iterable of int
+        Sweeps per compiled call: one number for an endless iteration, or the successive strides.
+    measured : bool
+        Measure also the sweeps between the observed ones.
+
+    Yields
+    ------
+    Sweep
+        The state after each stride.
+
+    Notes
+    -----
+    With acceleration the forces take an Anderson step every PERIOD sweeps, whatever the strides.
     """
     force, body, plate = _start(problem, guess)
-    rest, number = np.empty(rest_shape(len(body))), 0
-    find_rest(problem, rest)
+    equilibrium, number = np.empty(equilibrium_shape(len(body))), 0
+    find_equilibrium(problem, equilibrium)
 
     def advance_by(rows: Array) -> None:
         if not measured:
             rows[:-1] = np.nan
             advance(problem, body, plate, force, len(rows) - 1, settings.relaxation)
             rows = rows[-1:]
-        advance_and_measure(problem, body, plate, force, rest, settings.relaxation, rows)
+        advance_and_measure(problem, body, plate, force, equilibrium, settings.relaxation, rows)
 
     acceleration = Acceleration(problem, force, settings.acceleration) if settings.acceleration else None
     for stride in repeat(every) if isinstance(every, int) else every:
@@ -132,7 +153,7 @@ def sweeps(
             part = residuals[row : row + PERIOD - number % PERIOD]
             advance_by(part)
             row, number = row + len(part), number + len(part)
-            if number % PERIOD == 0 and acceleration.settle(body, plate, force):
+            if number % PERIOD == 0 and acceleration.accept_or_undo(body, plate, force):
                 part[-1, 1:] = measure_state(problem, body, plate, force)
         yield Sweep(number, force, residuals)
 
@@ -148,8 +169,16 @@ def solve(
 ) -> Solution:
     """Sweep until a stopping level or the number of sweeps is reached.
 
-    The observer hears a sweep every `every` sweeps, or after each of the given strides, and the last one; at these
-    sweeps the stopping levels are looked at. measured: as for `sweeps`.
+    Parameters
+    ----------
+    guess : (c, 2), optional
+        Forces (f_n, f_t) in the order of the contacts [N]; zero if absent.
+    observer : callable, optional
+        Called with a `Sweep` after every stride and after the last sweep.
+    every : int or iterable of int
+        Sweeps per stride, or the successive strides. Stopping levels are checked after each stride.
+    measured : bool
+        Measure also the sweeps between the observed ones.
     """
     if len(problem.rows) == 0:
         return Solution(np.empty(0), np.empty(0), Stop.EMPTY, 0, 0.0, 0.0, 0.0)
@@ -175,31 +204,31 @@ def solve(
     return _finish(problem, force, stop, number)
 
 
-def unbalance_of(problem: ContactProblem, force: Array) -> tuple[float, float]:
-    """Worst and mean |ΣF| on a grain over the mean f_n, for forces (c, 2) [N] in the order of the contacts."""
+def relative_force_residual(problem: ContactProblem, force: Array) -> tuple[float, float]:
+    """Compute worst and mean |ΣF| on a grain over the mean f_n, for forces (c, 2) [N] in the order of the contacts."""
     force, body, _ = _start(problem, force)
     _, _, mean = measure_forces(force, force)
-    worst, mean_size = measure_unbalance(problem, body)
+    worst, mean_size = measure_force_residual(problem, body)
     return (worst / mean, mean_size / mean) if mean > 0 else (0.0, 0.0)
 
 
 def to_contact_order(problem: ContactProblem, force: Array) -> Array:
-    """Forces in visiting order (…, c, 2) to the order of the contacts."""
+    """Reorder forces (…, c, 2) from visiting order to the order of the contacts."""
     result = np.empty_like(force)
     result[..., problem.rows, :] = force
     return result
 
 
 def _strides(every: int | Iterable[int], total: int) -> Iterator[int]:
-    """Strides that end at a number of sweeps."""
-    left = total
+    """Strides that add up to the number of sweeps."""
+    remaining = total
     for stride in repeat(every) if isinstance(every, int) else every:
-        if left == 0:
+        if remaining == 0:
             return
-        yield min(stride, left)
-        left -= min(stride, left)
-    if left > 0:
-        yield left
+        yield min(stride, remaining)
+        remaining -= min(stride, remaining)
+    if remaining > 0:
+        yield remaining
 
 
 def _start(problem: ContactProblem, guess: Array | None) -> tuple[Array, Array, Array]:
@@ -213,9 +242,9 @@ def _start(problem: ContactProblem, guess: Array | None) -> tuple[Array, Array, 
 
 def _finish(problem: ContactProblem, force: Array, stop: Stop, number: int) -> Solution:
     body, plate = np.empty_like(problem.body), np.empty_like(problem.plate)
-    apply_forces(problem, body, plate, force)  # anew, so that rounding of many sweeps is not taken for balance
+    apply_forces(problem, body, plate, force)  # recomputed, to drop the rounding errors of many sweeps
     _, norm, mean = measure_forces(force, force)
-    worst, mean_size = measure_unbalance(problem, body)
+    worst, mean_size = measure_force_residual(problem, body)
     ordered = to_contact_order(problem, force)
     scale = 1.0 / mean if mean > 0 else 0.0
     return Solution(

@@ -1,7 +1,7 @@
-"""A listener that keeps what a frame's sweeps did: the exact residuals of all, the forces of some.
+"""An observer that records the sweeps of a frame: the exact residuals of all sweeps, the forces of some.
 
-To measure a sweep takes about as long as to do one. Where no forces are kept but the last ones, the residuals of a
-sub-step's last sweep are measured alone; other rows hold NaN.
+Measuring a sweep takes about as long as the sweep. If only the last forces are kept, only the last sweep of a sub-step
+is measured; other rows are NaN.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import Quantity
-from solver.contacts.contacts import Contacts
-from solver.contacts.pairs import find_rows
-from solver.nlgs.problem import ContactProblem
-from solver.nlgs.solve import Sweep
+from ..bodies.grains import Array
+from ..contacts.contacts import Contacts
+from ..contacts.pairs import find_rows
+from ..quantity import Quantity
+from .problem import ContactProblem
+from .solve import Sweep
 
 Keep = Literal["log", "all", "none"]
 FIRST = 8  # sweeps kept one by one before the spacing becomes logarithmic
@@ -26,7 +26,7 @@ LOG_SPACED = 40  # sweeps kept of a frame
 
 
 def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
-    """Which of a frame's sweeps (0 … total − 1) keep their forces; the last one always does."""
+    """Select the sweeps of a frame (0 … total − 1) whose forces are kept; the last one is always kept."""
     if total == 0:
         return np.empty(0, np.int64)
     if keep == "all":
@@ -39,50 +39,50 @@ def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """A sub-step, and the forces that were kept of its sweeps."""
+    """A sub-step and the kept forces of its sweeps."""
 
     problem: ContactProblem
     contacts: Contacts
     force: list[NDArray[np.float32]]  # (2, c) [N] each, f_n and f_t in visiting order
 
     def place_of(self, contacts: Contacts) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Where other contacts (c,) stand in the visiting order, and which of them the sub-step knows at all."""
+        """Rows of other contacts (c,) in the visiting order, and which of them exist in the sub-step."""
         return find_rows(contacts.key, self.contacts.key[self.problem.rows])
 
 
 class SweepRecorder:
-    """Hears the sweeps of a frame's successive sub-steps."""
+    """Records the sweeps of the successive sub-steps of a frame."""
 
     def __init__(self, expected: int, keep: Keep) -> None:
-        self.measured = keep != "none"  # every sweep, not those alone that are heard
-        self._wanted = recorded_sweeps(expected, keep)
+        self.measured = keep != "none"  # whether sweeps between the observed ones are measured
+        self._kept_sweeps = recorded_sweeps(expected, keep)
         self._recorded: list[int] = []
         self._count = 0
         self._residuals: list[Array] = [np.empty((0, 3))]
         self._steps: list[_Step] = []
 
     def begin(self, problem: ContactProblem, contacts: Contacts) -> None:
-        """From now on sweeps are those of this problem."""
+        """Begin a sub-step: the following sweeps belong to this problem."""
         self._steps.append(_Step(problem, contacts, []))
 
     def strides(self) -> Iterator[int]:
-        """How many sweeps there are from now to the next one that keeps its forces, then to the one after it, …"""
+        """Numbers of sweeps to the next kept sweep, from there to the one after it, …"""
         count = self._count
-        for wanted in self._wanted[len(self._recorded) :].tolist():
-            yield wanted + 1 - count
-            count = wanted + 1
+        for kept in self._kept_sweeps[len(self._recorded) :].tolist():
+            yield kept + 1 - count
+            count = kept + 1
 
-    def hear(self, sweep: Sweep) -> None:
-        """Take the residuals up to this sweep, and its forces if they are to be kept."""
+    def on_sweep(self, sweep: Sweep) -> None:
+        """Store the residuals up to this sweep, and its forces if they are to be kept."""
         self._residuals.append(sweep.residuals)
         self._count += len(sweep.residuals)
         last, kept = self._count - 1, len(self._recorded)
-        if kept < len(self._wanted) and last == self._wanted[kept]:
+        if kept < len(self._kept_sweeps) and last == self._kept_sweeps[kept]:
             self._steps[-1].force.append(np.ascontiguousarray(sweep.force.T, np.float32))
             self._recorded.append(last)
 
     def history(self, contacts: Contacts) -> SweepHistory:
-        """All that was heard, the forces on the frame's own contacts."""
+        """Build the record of all sweeps, with forces on the contacts of the frame."""
         force_change, natural_map, unbalance = np.concatenate(self._residuals).T.copy()
         force = np.zeros((2, len(self._recorded), contacts.count), np.float32)
         row = 0
@@ -104,7 +104,7 @@ class SweepRecorder:
 
 @dataclass(frozen=True, slots=True)
 class SweepHistory:
-    """What one frame's sweeps did: a row of residuals for every sweep, NaN where not measured; forces of some."""
+    """Residuals of every sweep of a frame, NaN where not measured, and the forces of kept sweeps."""
 
     force_change: Annotated[Array, Quantity("greatest |Δf| / |f| of a contact, the paper's ε_f", dims="sweep")]
     natural_map: Annotated[Array, Quantity("relative natural-map residual", dims="sweep")]

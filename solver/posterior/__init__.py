@@ -1,4 +1,1 @@
-"""A second estimator: a posterior over contacts, forces and centre errors, from positions alone.
-
-Stands on detection.
-"""
+"""The posterior of contacts, forces and centre errors from positions alone: an estimator that uses no motion."""

@@ -1,4 +1,4 @@
-"""What one frame tells of its forces by positions alone: pairs within reach, what is known of errors and of loads."""
+"""Evidence of one frame without motion: candidate pairs, standard deviations of errors, known loads."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
+from ..bodies.grains import Array
+from ..contacts.contacts import Contacts
 
 
 @dataclass(frozen=True, slots=True)
 class FrameEvidence:
-    """What one frame tells of its forces without any motion."""
+    """Everything that the posterior of one frame is conditioned on."""
 
-    contacts: Contacts  # (c) pairs within reach, by their gaps
-    prior: Float[Array, " c"]  # P(bears) before gap and balance are looked at
+    contacts: Contacts  # (c) pairs within reach, with their gaps
+    prior: Float[Array, " c"]  # prior probability that the pair bears force
     friction: Float[Array, " c"]
     radius: Float[Array, " n"]  # [m]
-    centre_deviation: Float[Array, " n"]  # [m] standard deviation of an error of a centre's coordinate
-    radius_deviation: Float[Array, " n"]  # [m] of an error of a radius; 0: exact
-    balanced: Bool[np.ndarray, " n"]  # all that pushes the grain is among the pairs; else its ΣF is free
+    centre_sd: Float[Array, " n"]  # [m] standard deviation of an error of a centre's coordinate
+    radius_sd: Float[Array, " n"]  # [m] standard deviation of an error of a radius; 0: exact
+    balanced: Bool[np.ndarray, " n"]  # all forces on the grain are among the pairs; else its ΣF is free
     known: KnownForces
-    # At the packing's edge, what pushes them from outside is not among the pairs, but is of the size of what is.
+    # At the packing's edge, outside forces are not among the pairs, but are as large as forces between grains.
     edge: Bool[np.ndarray, " n"] | None = None  # None: no grain
-    gap_deviation: Float[Array, " c"] | None = None  # [m] of an error that a gap has for itself; None: none has
+    gap_sd: Float[Array, " c"] | None = None  # [m] standard deviation of an error of this gap alone; None: none
 
     @property
     def diameter(self) -> float:
@@ -41,7 +41,10 @@ class KnownForces:
     weight: Float[Array, "n 2"]  # [N]
     group: Int[np.ndarray, " c"]  # sum that a pair's normal force is part of, −1: none
     total: Float[Array, " g"]  # [N] these sums: loads of plates, or of all walls together
+    # Factor of f_n in its sum: 1, or n·p on a wall that is fixed to a plate of normal p, whose f_t are left out.
+    factor: Float[Array, " c"] | None = None  # None: 1
 
     @property
-    def fix_the_scale(self) -> bool:
+    def scale_known(self) -> bool:
+        """Whether a load or weight determines the scale of all forces."""
         return bool(len(self.total) or np.any(self.weight))

@@ -1,7 +1,7 @@
-"""One frame by itself: which pairs bear, with how much force, where the centres are; from positions and balance alone.
+"""Posterior of one frame from positions and balance alone: bearing probabilities, forces, centre and radius errors.
 
-The posterior's mean is better than any most probable field: where evidence is weak it says so by small forces instead
-of choosing. It is sampled by chains that start alike and draw other numbers.
+The posterior's mean is better than its mode: where evidence is weak it has small forces instead of one choice. It is
+sampled by chains from the same start with different random numbers.
 """
 
 from __future__ import annotations
@@ -13,85 +13,109 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
-from solver.posterior.frame_evidence import FrameEvidence
-from solver.posterior.sampler.chain import Chain, centres_of, laws_of, pairs_of, run_chain
-from solver.posterior.settings import PosteriorSettings
-from solver.statistics.agreement import pearson
-from solver.together import work_together
+from ..bodies.grains import Array
+from ..contacts.contacts import Contacts
+from ..parallel import parallel_map
+from ..statistics.agreement import pearson
+from .frame_evidence import FrameEvidence
+from .posterior_settings import PosteriorSettings
+from .sampler.chain import ChainMeans, make_sampler_grains, make_sampler_pairs, make_schedule, run_chain
 
-# Over the draws' standard deviation: covers 68/95 % of f_n, its scale apart, on simulated packings (median of 14).
-HONEST = 2.2
+# Over the draws' standard deviation: covers 68/95 % of f_n, apart from its scale, on simulated packings (median of 14).
+COVERAGE_FACTOR = 2.2
 
 
 @dataclass(frozen=True, slots=True)
 class FramePosterior:
-    """Means over the draws of all chains together, and how far the truth may be from them.
+    """Means over the draws of all chains, with standard deviations.
 
-    How stresses along free walls compare to those under loads is beyond it: its pattern is surer than its scale.
+    The ratio of stresses along free walls to those under loads is not determined well: the pattern of forces is more
+    certain than their scale.
     """
 
     contacts: Contacts
-    fn: Float[Array, " c"]  # [N] E[z f_n], the mean over draws in which the pair bears and those in which it does not
+    fn: Float[Array, " c"]  # [N] E[z f], over draws with z = 1 and z = 0
     ft: Float[Array, " c"]  # [N]
-    fn_deviation: Float[Array, " c"]  # [N]
-    ft_deviation: Float[Array, " c"]  # [N]
-    bears: Float[Array, " c"]  # P(bears force): less than P(touches)
+    fn_sd: Float[Array, " c"]  # [N]
+    ft_sd: Float[Array, " c"]  # [N]
+    bearing_probability: Float[Array, " c"]  # E[z], P(bears force): less than P(touches)
     centre_error: Float[Array, "n 2"]  # [m] measured minus true centre
     radius_error: Float[Array, " n"]  # [m] true minus given radius
-    overlap: float  # [m] per mean force, linear
-    overlap_deviation: float  # [m]
-    offset: float  # [m] that all gaps are too large
-    offset_deviation: float  # [m]
-    trust: float  # √(var f / (var f + mean sd²)), the correlation with the truth that the posterior itself expects
-    agreement: float  # correlation of two chains; NaN of one
+    overlap: float  # [m] of a contact with the mean force, linear
+    overlap_sd: float  # [m]
+    offset: float  # [m] by which all gaps are too large
+    offset_sd: float  # [m]
+    trust: float  # correlation with the truth that the posterior itself expects
+    agreement: float  # correlation of two chains; NaN with one
 
 
 def infer_frame(
     evidence: FrameEvidence, settings: PosteriorSettings, rng: np.random.Generator, workers: int | None = None
 ) -> FramePosterior:
-    """Sample the posterior of one frame. The same generator gives the same bits, whatever runs beside it.
+    """Sample the posterior of one frame.
 
-    workers: threads that the chains share; None: one for every core.
+    Parameters
+    ----------
+    evidence : FrameEvidence
+        Gaps, prior probabilities, standard deviations of errors and known loads of the frame.
+    settings : PosteriorSettings
+        Parameters of the posterior and numbers of sweeps.
+    rng : numpy.random.Generator
+        Spawns one generator per chain: the same generator gives the same bits for any number of workers.
+    workers : int, optional
+        Threads that the chains share; None: one for every core.
+
+    Returns
+    -------
+    FramePosterior
+        Means over the kept sweeps of all chains.
+
+    Notes
+    -----
+    The posterior stands in `sampler.gibbs_sweeps`. With z, f and t of its draws and the force unit U [N],
+
+        fn = U E[z f],  ft = U E[z t],  fn_sd = 2.2 U √Var(z f),  ft_sd = 2.2 U √Var(z t),
+        trust = √(V / (V + ⟨Var(z f)⟩)),  V = variance of E[z f] over the pairs,
+
+    where 2.2 is COVERAGE_FACTOR. The overlap is κ times the mean force of bearing contacts.
     """
-    pairs, centres = pairs_of(evidence), centres_of(evidence)
-    laws = laws_of(settings, float(evidence.prior.sum()), scale_known=evidence.known.fix_the_scale)
-    tasks = [partial(run_chain, pairs, centres, laws, settings, each) for each in rng.spawn(settings.chains)]
-    return _summarise(evidence, work_together(tasks, workers))
+    pairs, grains = make_sampler_pairs(evidence), make_sampler_grains(evidence)
+    schedule = make_schedule(settings, float(evidence.prior.sum()), scale_known=evidence.known.scale_known)
+    tasks = [partial(run_chain, pairs, grains, schedule, settings, each) for each in rng.spawn(settings.chains)]
+    return _summarise(evidence, parallel_map(tasks, workers))
 
 
-def _summarise(evidence: FrameEvidence, chains: list[Chain]) -> FramePosterior:
+def _summarise(evidence: FrameEvidence, chains: list[ChainMeans]) -> FramePosterior:
     unit, diameter = evidence.known.unit, evidence.diameter
     pair = np.mean([chain.pair for chain in chains], axis=0)
     error = np.mean([chain.error for chain in chains], axis=0)
     kappa, kappa2, offset, offset2 = np.mean([chain.common for chain in chains], axis=0)
-    bears, fn, ft = pair[:, 0], pair[:, 1], pair[:, 2]
+    bearing_probability, fn, ft = pair[:, 0], pair[:, 1], pair[:, 2]
     variance = np.maximum(pair[:, 3] - fn**2, 0.0)
     variance_t = np.maximum(pair[:, 4] - ft**2, 0.0)
-    spread = float(fn.var())
-    total = spread + float(variance.mean())
-    mean_force = float(fn.sum() / max(bears.sum(), 1e-12))
+    between_pairs = float(fn.var())
+    total = between_pairs + float(variance.mean())
+    mean_force = float(fn.sum() / max(bearing_probability.sum(), 1e-12))
     return FramePosterior(
         contacts=evidence.contacts,
         fn=unit * fn,
         ft=unit * ft,
-        fn_deviation=HONEST * unit * np.sqrt(variance),
-        ft_deviation=HONEST * unit * np.sqrt(variance_t),
-        bears=bears,
+        fn_sd=COVERAGE_FACTOR * unit * np.sqrt(variance),
+        ft_sd=COVERAGE_FACTOR * unit * np.sqrt(variance_t),
+        bearing_probability=bearing_probability,
         centre_error=diameter * error[:, :2],
         radius_error=diameter * error[:, 2],
         overlap=diameter * kappa * mean_force,
-        overlap_deviation=diameter * mean_force * float(np.sqrt(max(kappa2 - kappa**2, 0.0))),
+        overlap_sd=diameter * mean_force * float(np.sqrt(max(kappa2 - kappa**2, 0.0))),
         offset=diameter * offset,
-        offset_deviation=diameter * float(np.sqrt(max(offset2 - offset**2, 0.0))),
-        trust=float(np.sqrt(spread / total)) if total > 0.0 else 0.0,
+        offset_sd=diameter * float(np.sqrt(max(offset2 - offset**2, 0.0))),
+        trust=float(np.sqrt(between_pairs / total)) if total > 0.0 else 0.0,
         agreement=_agreement(chains),
     )
 
 
-def _agreement(chains: list[Chain]) -> float:
-    """Mean correlation of a chain's forces with those of the next."""
+def _agreement(chains: list[ChainMeans]) -> float:
+    """Compute the mean correlation of normal forces between successive chains."""
     if len(chains) < 2:
         return float("nan")
     return float(np.mean([pearson(a.pair[:, 1], b.pair[:, 1]) for a, b in pairwise(chains)]))

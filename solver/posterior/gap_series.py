@@ -1,8 +1,8 @@
-"""Gaps of near pairs over a sequence: their noise from photograph to photograph, and what is left when it is smoothed.
+"""Gaps of candidate pairs over a sequence: their noise, their random walk, and their smoothing over frames.
 
-Noise of a gap and its walk are told apart by how its changes grow with time: noise adds the same to every difference,
-a walk in proportion to the frames between. The quieter changes tell the noise, for most pairs touch and stay as they
-are; the livelier ones tell how far a gap walks, for they must not be smoothed away.
+The changes of a gap over l frames separate its noise from its walk: noise adds the same variance to every difference,
+a random walk adds one in proportion to l. A low quantile of the changes gives the noise, because most pairs keep
+touching; a high quantile gives the walk, because large changes must not be smoothed away.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Packing
-from solver.contacts.contacts import detect_contacts, measure_pairs
-from solver.contacts.pairs import Keys, are_there, join_keys, split_keys
+from ..bodies.grains import Array
+from ..bodies.motion import Snapshot
+from ..bodies.packing import Packing
+from ..contacts.contacts import detect_contacts, measure_pairs
+from ..contacts.pairs import Keys, are_present, join_keys, split_keys
 
-QUIET = 0.3  # quantile of the changes that tells the noise
-LAGS = 7  # frames
-LIVELY = 0.9  # quantile of the changes that tells how far gaps walk
-FEWEST = 100  # differences below which a lag says nothing
-STIFFEST = 3.0  # most that gaps are smoothed: more hurts where contacts come and go
-DOUBTFUL = 0.1  # least share of the stated variance that is believed of a measurement
+NOISE_QUANTILE = 0.3  # of the absolute changes
+MAX_LAG = 7  # frames
+WALK_QUANTILE = 0.9  # of the absolute changes
+MIN_DIFFERENCES = 100  # a lag with fewer is not used
+MAX_SMOOTHING = 3.0  # greatest ρ: more smoothing is worse where contacts form and break
+MIN_VARIANCE_FRACTION = 0.1  # lower limit of a measured variance, over the stated one
 
 
 @dataclass(frozen=True, slots=True)
 class GapSeries:
-    """Measured gaps of every pair that is near in some frame. Rows of absent grains are NaN."""
+    """Measured gaps of every pair that is within reach in some frame; NaN where a grain is absent."""
 
     key: Keys  # (c,) ascending
     gap: Float[Array, "f c"]  # [m]
@@ -44,10 +44,10 @@ class GapSeries:
 
 @dataclass(frozen=True, slots=True)
 class GapNoise:
-    """How a gap between two grains changes from frame to frame."""
+    """Noise and random walk of a gap between two grains."""
 
     noise: float  # v [m²], variance of a measured gap in one photograph
-    walk: float  # q [m²] per frame, variance of the true change of the livelier ones
+    walk: float  # q [m²] per frame, variance of the true change, from the larger changes
 
     @property
     def sigma(self) -> float:
@@ -56,12 +56,12 @@ class GapNoise:
 
     @property
     def smoothing(self) -> float:
-        """ρ, the weight of a step between frames against a measured gap."""
-        return STIFFEST if self.walk * STIFFEST <= self.noise else self.noise / self.walk
+        """ρ = min(v/q, 3), the weight of a change between frames against that of a measured gap."""
+        return MAX_SMOOTHING if self.walk * MAX_SMOOTHING <= self.noise else self.noise / self.walk
 
 
 def measure_series(packing: Packing, snapshots: Sequence[Snapshot], reach: float) -> GapSeries:
-    """Measure, in every frame, the pairs whose gap is below `reach` [m] in some frame."""
+    """Measure, in every frame, the pairs whose gap is below `reach` [m] in at least one frame."""
     grains = packing.grains
     walls = [packing.walls_of(each) for each in snapshots]
     near = [
@@ -72,57 +72,88 @@ def measure_series(packing: Packing, snapshots: Sequence[Snapshot], reach: float
     key = join_keys(*(each.key for each in near))
     gap = np.full((len(snapshots), len(key)), np.nan)
     for k, (each, wall) in enumerate(zip(snapshots, walls, strict=True)):
-        here = are_there(key, each.present, bodies)
+        here = are_present(key, each.present, bodies)
         gap[k, here] = measure_pairs(grains, each.position, wall, key[here]).gap
     return GapSeries(key, gap, grains.count, bodies)
 
 
-def measure_noise(series: GapSeries, stated: float) -> GapNoise:
+def measure_gap_noise(series: GapSeries, stated: float) -> GapNoise:
     """Measure noise and walk of the gaps between grains.
 
-    stated [m]: standard deviation of a position component, which stands where too few photographs tell.
+    Parameters
+    ----------
+    series : GapSeries
+        Gaps of a sequence.
+    stated : float
+        Standard deviation of a position component [m], which is used where fewer than two lags have enough changes.
+
+    Notes
+    -----
+    The variance of the change over l frames is D_l = (Q_p(|Δ_l g|) / Φ⁻¹((1 + p)/2))², with Q_p the quantile p = 0.3.
+    Non-negative least squares of relative errors on
+
+        D_l = 2 v + q' l,  l = 1 … 7,
+
+    gives the noise v, at least 0.2 stated². The walk is q = max(D_1(p = 0.9) − 2 v, 0).
     """
     gap = series.gap[:, ~series.with_wall]
-    lag, spread, lively = [], [], 0.0
-    for l in range(1, min(LAGS, len(gap) - 1) + 1):
+    lag, variance, walk_variance = [], [], 0.0
+    for l in range(1, min(MAX_LAG, len(gap) - 1) + 1):
         change = np.abs(gap[l:] - gap[:-l])
         change = change[np.isfinite(change)]
-        if len(change) >= FEWEST:
+        if len(change) >= MIN_DIFFERENCES:
             lag.append(float(l))
-            spread.append(_variance_by_quantile(change, QUIET))
+            variance.append(_variance_by_quantile(change, NOISE_QUANTILE))
             if l == 1:
-                lively = _variance_by_quantile(change, LIVELY)
+                walk_variance = _variance_by_quantile(change, WALK_QUANTILE)
     if len(lag) < 2:
-        return GapNoise(2.0 * stated**2, max(lively - 4.0 * stated**2, 0.0))
-    from scipy.optimize import nnls  # a tenth of all that is imported, and not for every start
+        return GapNoise(2.0 * stated**2, max(walk_variance - 4.0 * stated**2, 0.0))
+    from scipy.optimize import nnls  # imported here: it is a tenth of all import time
 
     # Relative errors weigh the same at every lag.
-    design = np.column_stack([np.full(len(lag), 2.0), lag]) / np.array(spread)[:, None]
-    noise = max(float(nnls(design, np.ones(len(lag)))[0][0]), 2.0 * DOUBTFUL * stated**2)
-    return GapNoise(noise, max(lively - 2.0 * noise, 0.0))
+    design = np.column_stack([np.full(len(lag), 2.0), lag]) / np.array(variance)[:, None]
+    noise = max(float(nnls(design, np.ones(len(lag)))[0][0]), 2.0 * MIN_VARIANCE_FRACTION * stated**2)
+    return GapNoise(noise, max(walk_variance - 2.0 * noise, 0.0))
 
 
-def _variance_by_quantile(change: Array, share: float) -> float:
-    """Variance of a normal law of which `share` of the changes, without sign, are as small as these are."""
-    return float(np.quantile(change, share) / ndtri(0.5 + 0.5 * share)) ** 2
+def _variance_by_quantile(change: Array, fraction: float) -> float:
+    """Estimate the variance of normal changes from the quantile `fraction` of their absolute values."""
+    return float(np.quantile(change, fraction) / ndtri(0.5 + 0.5 * fraction)) ** 2
 
 
 def smooth_series(gap: Array, noise: GapNoise) -> tuple[Array, Array]:
-    """Smooth gaps (f, c) [m] over frames by (1 + ρ DᵀD)⁻¹; NaN where unknown, and left so.
+    """Smooth gaps over frames.
 
-    Also gives the share (f, c) of the noise's variance that is left, the diagonal of that matrix.
+    Parameters
+    ----------
+    gap : array (f, c)
+        Gaps [m], NaN where unknown.
+    noise : GapNoise
+        Noise and walk, which set the smoothing ρ.
+
+    Returns
+    -------
+    smooth : array (f, c)
+        Smoothed gaps [m], NaN where `gap` is.
+    variance_fraction : array (f, c)
+        Fraction of the noise's variance that remains.
+
+    Notes
+    -----
+    smooth = (S + ρ DᵀD)⁻¹ S gap, the posterior mean of a random walk: D takes differences of successive frames, S is
+    diagonal with 1 where the gap is known and 0 elsewhere. The fraction is the diagonal of (S + ρ DᵀD)⁻¹.
     """
     frames = len(gap)
     step = np.diff(np.eye(frames), axis=0)
     stiffness = noise.smoothing * step.T @ step
-    smooth, left = np.full_like(gap, np.nan), np.full_like(gap, np.nan)
-    patterns, member = np.unique(np.isfinite(gap), axis=1, return_inverse=True)
+    smooth, variance_fraction = np.full_like(gap, np.nan), np.full_like(gap, np.nan)
+    patterns, pattern_of = np.unique(np.isfinite(gap), axis=1, return_inverse=True)
     for p, seen in enumerate(patterns.T):
         if not seen.any():
             continue
-        columns = np.flatnonzero(member.ravel() == p)
+        columns = np.flatnonzero(pattern_of.ravel() == p)
         inverse = np.linalg.inv(np.diag(seen.astype(np.float64)) + stiffness + 1e-12 * np.eye(frames))
         rows = np.ix_(seen, columns)
         smooth[rows] = inverse[np.ix_(seen, seen)] @ gap[rows]
-        left[rows] = np.diag(inverse)[seen][:, None]
-    return smooth, left
+        variance_fraction[rows] = np.diag(inverse)[seen][:, None]
+    return smooth, variance_fraction

@@ -1,8 +1,8 @@
-"""What a sequence tells of each of its frames without any motion: gaps freed of noise and of errors that all share.
+"""Evidence of a sequence for each of its frames, without motion: smoothed gaps without errors that all gaps share.
 
-How hard the packing is decides how the posterior reads it, by numbers that follow from the gaps and not by cases: the
-scatter of touching gaps is noise that is left, error of centres and radii, and overlap. The overlap's part follows from
-the mean gap, for forces in a packing scatter nearly as much as their mean.
+The same equations serve hard and soft grains: the variance of touching gaps is that of residual noise, errors of
+centres and radii, and overlap. The overlap's part follows from the mean gap, because the standard deviation of contact
+forces is nearly their mean.
 """
 
 from __future__ import annotations
@@ -13,164 +13,197 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Packing
-from solver.contacts.contacts import measure_pairs
-from solver.contacts.pairs import Keys, are_among
-from solver.contacts.verdicts import NO_VERDICTS, Verdicts
-from solver.posterior.error_scatter import ErrorScatter, scatter_of
-from solver.posterior.frame_evidence import FrameEvidence, KnownForces
-from solver.posterior.gap_series import GapNoise, GapSeries
-from solver.posterior.near_gaps import NEAR, find_near_gaps, traits_of
-from solver.posterior.settings import PosteriorSettings
-from solver.posterior.touching import TouchingGaps
+from ..bodies.grains import Array
+from ..bodies.motion import Snapshot
+from ..bodies.packing import Packing
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts, measure_pairs
+from ..contacts.pairs import Keys, are_among
+from ..contacts.verdicts import NO_VERDICTS, Verdicts
+from .candidate_gaps import OPEN_REACH, find_candidate_gaps, pair_covariates
+from .error_variances import ErrorVariances, estimate_error_variances
+from .frame_evidence import FrameEvidence, KnownForces
+from .gap_series import GapNoise, GapSeries
+from .posterior_settings import PosteriorSettings
+from .touching_gaps import TouchingGaps
 
-REACH = 6.0  # standard deviations of a gap, beyond
-SCATTER = 0.8  # standard deviation of contact forces over their mean
-APART = 1.0  # standard deviations that touching pairs stand apart from which on the gaps must share an error
-SCATTER_FRAMES = 8  # photographs that tell errors of radii from errors of centres
-SEEN = 0.99  # P(bears) of a pair that people saw touch, before gap and balance are looked at
-SHARPNESS = 0.12  # bearing width over the centres' error: narrower, and the sampler sticks
+REACH = 6.0  # standard deviations of a gap, beyond OPEN_REACH
+FORCE_SD = 0.8  # standard deviation of contact forces over their mean
+SHARED_ERROR_SDS = 1.0  # mean touching gap over its standard deviation above which all gaps must share an error
+VARIANCE_FRAMES = 8  # photographs used to separate errors of radii from errors of centres
+REVIEWED_PRIOR = 0.99  # prior probability of bearing of a pair that a reviewer saw touch
+GAP_LAW_FRACTION = 0.12  # b over the centres' standard deviation: below it the sampler mixes badly
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceEvidence:
-    """Smoothed gaps of a sequence, and what they say of noise, errors and softness."""
+    """Smoothed gaps of a sequence, with the noise, errors and softness that follow from them."""
 
     packing: Packing
     snapshots: Sequence[Snapshot]
     key: Keys  # (c,) pairs within reach in some frame, ascending
     gap: Float[Array, "f c"]  # [m] smoothed and corrected; NaN where a grain is missing
-    unsmoothed: Float[Array, "f c"]  # [m] the same as measured: the noise of one frame is not that of the next
+    unsmoothed: Float[Array, "f c"]  # [m] the same without smoothing: its noise is independent between frames
     noise: GapNoise
     touching: TouchingGaps  # before the correction
     reach: float  # [m] of corrected gaps
-    corrected: bool  # whether errors that the gaps share were taken off
-    radius_correction: Float[Array, " n"]  # [m] what was taken off, per radius; zero if nothing
-    centre_deviation: Float[Array, " f"]  # [m] of a centre's coordinate
-    radius_deviation: float  # [m] of a radius
-    offset_deviation: float  # [m] of an error that all gaps still share
-    settings: PosteriorSettings  # as the sequence asks for
+    corrected: bool  # whether an error that all gaps share was subtracted
+    radius_correction: Float[Array, " n"]  # [m] that correction, per radius; zero if not corrected
+    centre_sd: Float[Array, " f"]  # [m] standard deviation of an error of a centre's coordinate
+    radius_sd: float  # [m] of an error of a radius
+    offset_sd: float  # [m] of an error that all gaps still share
+    settings: PosteriorSettings  # with the standard deviations and reach of the sequence
 
     def of_frame(
         self, k: int, *, wall_normal_total: float | None = None, verdicts: Verdicts = NO_VERDICTS
     ) -> FrameEvidence:
-        """What frame k tells. wall_normal_total [N]: known sum of f_n over all walls, where nothing else is known.
+        """Assemble the evidence of frame k.
 
-        Pairs that people forbade bear nothing; those that they saw touch bear, unless balance contradicts it strongly.
+        Parameters
+        ----------
+        k : int
+            Frame.
+        wall_normal_total : float, optional
+            Known sum [N] of f_n over all walls, used where neither a load nor weight is known.
+        verdicts : Verdicts
+            Reviewed pairs: forbidden ones are left out, forced ones have the prior probability REVIEWED_PRIOR.
         """
         packing, snapshot = self.packing, self.snapshots[k]
         walls = packing.walls_of(snapshot)
         with np.errstate(invalid="ignore"):
             near = self.gap[k] < self.reach
-        seen = are_among(self.key, verdicts.forced)
-        rows = np.flatnonzero((near | (seen & np.isfinite(self.gap[k]))) & ~are_among(self.key, verdicts.forbidden))
+        reviewed = are_among(self.key, verdicts.forced)
+        rows = np.flatnonzero((near | (reviewed & np.isfinite(self.gap[k]))) & ~are_among(self.key, verdicts.forbidden))
         contacts = measure_pairs(packing.grains, snapshot.position, walls, self.key[rows])
         contacts = replace(contacts, gap=self.gap[k, rows])
         n = packing.grains.count
         return FrameEvidence(
             contacts=contacts,
-            prior=np.where(seen[rows], SEEN, self.touching.share[k]),
+            prior=np.where(reviewed[rows], REVIEWED_PRIOR, self.touching.touching_fraction[k]),
             friction=packing.material.friction_at(contacts.with_wall),
             radius=packing.grains.radius,
-            centre_deviation=np.full(n, self.centre_deviation[k]),
-            radius_deviation=np.full(n, self.radius_deviation),
+            centre_sd=np.full(n, self.centre_sd[k]),
+            radius_sd=np.full(n, self.radius_sd),
             balanced=snapshot.present & packing.grains.free,
             edge=None if packing.grains.boundary is None else snapshot.present & packing.grains.boundary,
-            known=_known_forces(packing, walls.load, contacts.j, wall_normal_total),
+            known=_known_forces(packing, walls, contacts, wall_normal_total),
         )
 
 
-def gather_evidence(
+def gather_position_evidence(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     settings: PosteriorSettings | None = None,
     *,
     shared_error: float = 0.0,
 ) -> SequenceEvidence:
-    """Gather what the positions of a sequence tell. `Snapshot.sigma` is believed where too few photographs tell.
+    """Gather the evidence of a sequence from its positions.
 
-    shared_error [m]: standard deviation of an error that all gaps may share (radii, pixel size, perspective). 0:
-    calibrated; then an error is taken off only where touching pairs stand apart, which no overlap explains.
-    Errors: ValueError if no two bodies are near.
+    Parameters
+    ----------
+    packing : Packing
+        Grains, material and loads.
+    snapshots : sequence of Snapshot
+        Positions; their `sigma` is used where too few photographs determine the noise.
+    settings : PosteriorSettings, optional
+        Settings of the posterior before the sequence's own standard deviations replace them.
+    shared_error : float
+        Standard deviation [m] of an error that all gaps may share (radii, pixel size, perspective). 0: calibrated; an
+        error is then subtracted only where touching pairs stand apart, which no overlap explains.
+
+    Raises
+    ------
+    ValueError
+        If no two bodies are near.
+
+    Notes
+    -----
+    With a and s the mean and standard deviation of touching gaps, o = max(−a, 0) the mean overlap (0 where a shared
+    error was subtracted), σ_r² and σ_cc² the variances of radii and centres by `error_variances`, v the noise of a gap
+    (at most that stated) and ν the fraction of it that smoothing leaves, the variance of a centre's coordinate is
+
+        σ_c² = max((1 − u) d + u min(σ_cc², d), ½ ν v),
+        d = ½ max(s² − (0.8 o)² − 2 σ_r², 0),  u = min(1, 2 σ_r²/(σ_r² + d)),
+
+    and the posterior has b = 0.12 × the median of σ_c, ℓ = the reach, σ_o = the standard error of a where corrected.
     """
     settings = settings or PosteriorSettings()
     diameter = 2.0 * float(packing.grains.radius.mean())
     stated = float(np.median([each.sigma for each in snapshots]))
-    found = find_near_gaps(packing, snapshots, NEAR * diameter + REACH * np.sqrt(2.0) * stated + 3.0 * shared_error)
+    found = find_candidate_gaps(
+        packing, snapshots, OPEN_REACH * diameter + REACH * np.sqrt(2.0) * stated + 3.0 * shared_error
+    )
     series, noise, touching, wide = found.series, found.noise, found.touching, found.reach
-    corrected = shared_error > 0.0 or touching.offset > APART * touching.deviation
-    gap, left = found.smooth, found.left
+    corrected = shared_error > 0.0 or touching.offset > SHARED_ERROR_SDS * touching.sd
+    gap = found.smooth
     error = _shared_error(packing, snapshots, series, touching) if corrected else np.zeros(len(series.key))
     overlap = 0.0 if corrected else max(-touching.offset, 0.0)
-    scatter = _error_scatter(packing, snapshots, series, gap, touching, wide)
-    radius_deviation = scatter.radius_deviation(overlap)
-    # Drift of contacts passes for noise, a claim may be cautious: the lesser of both is sure. Where the smoothing of a
-    # frame differs by pair, the most of it counts.
-    smoothed = min(noise.noise, 2.0 * stated**2) * np.nanmax(left, axis=1, initial=0.0)
-    centre = np.sqrt(
-        np.maximum(_centre_variance(touching, overlap, radius_deviation**2, scatter.centre), 0.5 * smoothed)
-    )
-    offset = touching.offset_deviation if corrected else settings.offset_sd * diameter
+    variances = _error_variances(packing, snapshots, series, gap, touching, wide)
+    radius_sd = variances.radius_sd(overlap)
+    # Drift of contacts looks like noise, and the stated noise may be too large: the smaller value is a lower limit.
+    # Where pairs of a frame differ in smoothing, the largest remaining fraction counts.
+    smoothed = min(noise.noise, 2.0 * stated**2) * np.nanmax(found.variance_fraction, axis=1, initial=0.0)
+    centre = np.sqrt(np.maximum(_centre_variance(touching, overlap, radius_sd**2, variances.centre), 0.5 * smoothed))
+    offset = touching.offset_sd if corrected else settings.offset_sd * diameter
     typical = float(np.median(centre)) / diameter
-    width = SHARPNESS * typical
+    gap_law_sd = GAP_LAW_FRACTION * typical
     return SequenceEvidence(
         packing, snapshots, series.key, gap - error, series.gap - error, noise, touching,
         reach=wide - (touching.offset if corrected else 0.0),
         corrected=corrected,
         radius_correction=_radius_correction(packing, touching, corrected),
-        centre_deviation=centre,
-        radius_deviation=radius_deviation,
-        offset_deviation=offset,
+        centre_sd=centre,
+        radius_sd=radius_sd,
+        offset_sd=offset,
         settings=replace(
-            settings, width=width, start_width=max(settings.start_width, width), offset_sd=offset / diameter,
-            open_gap=wide / diameter,
+            settings, gap_law_sd=gap_law_sd, start_gap_law_sd=max(settings.start_gap_law_sd, gap_law_sd),
+            offset_sd=offset / diameter, mean_open_gap=wide / diameter,
         ),
     )  # fmt: skip
 
 
 def _centre_variance(touching: TouchingGaps, overlap: float, radius: float, covariance: float) -> float:
-    """Variance of a centre's coordinate [m²], of those of radii and of the centres' covariance in gaps that meet.
+    """Compute the variance of a centre's coordinate [m²] from that of radii and from the covariance of gaps that meet.
 
-    It is what overlap and radii leave of the scatter of touching gaps. The wider radii scatter, the less can be said by
-    that difference; the covariance does not suffer by radii, but by overlap.
+    The difference between the variance of touching gaps and those of overlap and radii is the less certain, the larger
+    the variance of radii; the covariance is biased by overlap, but not by radii.
     """
-    left = 0.5 * max(touching.deviation**2 - (SCATTER * overlap) ** 2 - 2.0 * radius, 0.0)
-    doubt = min(1.0, 2.0 * radius / (radius + left)) if radius > 0.0 else 0.0
-    return (1.0 - doubt) * left + doubt * min(covariance, left)
+    difference = 0.5 * max(touching.sd**2 - (FORCE_SD * overlap) ** 2 - 2.0 * radius, 0.0)
+    uncertainty = min(1.0, 2.0 * radius / (radius + difference)) if radius > 0.0 else 0.0
+    return (1.0 - uncertainty) * difference + uncertainty * min(covariance, difference)
 
 
 def _shared_error(packing: Packing, snapshots: Sequence[Snapshot], series: GapSeries, touching: TouchingGaps) -> Array:
-    """How much too large the gap of every pair (c,) [m] is; a wall has no radius that could be wrong."""
-    trait = traits_of(packing, snapshots, series)
+    """Compute by how much the gap of every pair (c,) [m] is too large; a wall has no radius error."""
+    covariate = pair_covariates(packing, snapshots, series)
     wall = series.with_wall
-    trait[wall, 1:] *= 0.5  # the size of a grain on a wall is its own already
-    return touching.mean_at(trait) - np.where(wall, 0.5 * touching.offset, 0.0)
+    covariate[wall, 1:] *= 0.5  # covariate 0 of a pair with a wall holds one grain's size already
+    return touching.mean_at(covariate) - np.where(wall, 0.5 * touching.offset, 0.0)
 
 
-def _error_scatter(
+def _error_variances(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     series: GapSeries,
     gap: Array,
     touching: TouchingGaps,
     reach: float,
-) -> ErrorScatter:
-    """Tell errors of radii from errors of centres in some of the frames; smoothed gaps (f, c) [m]."""
+) -> ErrorVariances:
+    """Separate errors of radii from errors of centres in some of the frames; gap (f, c) [m] is smoothed."""
     between = np.flatnonzero(~series.with_wall)
-    trait = traits_of(packing, snapshots, series)[between]
-    rows = np.unique(np.linspace(0, len(snapshots) - 1, min(SCATTER_FRAMES, len(snapshots))).astype(int))
+    covariate = pair_covariates(packing, snapshots, series)[between]
+    rows = np.unique(np.linspace(0, len(snapshots) - 1, min(VARIANCE_FRAMES, len(snapshots))).astype(int))
     gap = gap[np.ix_(rows, between)]
-    rest = gap - touching.mean_at(trait)
-    weight = replace(touching, share=touching.share[rows]).probability(gap, trait, reach)
+    rest = gap - touching.mean_at(covariate)
+    sampled = replace(touching, touching_fraction=touching.touching_fraction[rows])
+    weight = sampled.probability(gap, covariate, reach)
     frames = []
     for row, k in enumerate(rows):
         seen = weight[row] > 0.0
         walls = packing.walls_of(snapshots[k])
         contacts = measure_pairs(packing.grains, snapshots[k].position, walls, series.key[between[seen]])
         frames.append((contacts, rest[row, seen], weight[row, seen]))
-    return scatter_of(frames)
+    return estimate_error_variances(frames)
 
 
 def _radius_correction(packing: Packing, touching: TouchingGaps, corrected: bool) -> Array:
@@ -180,21 +213,23 @@ def _radius_correction(packing: Packing, touching: TouchingGaps, corrected: bool
     return 0.5 * touching.offset + touching.slope[0] * (radius / radius.mean() - 1.0)
 
 
-def _known_forces(packing: Packing, load: Array, j: np.ndarray, wall_normal_total: float | None) -> KnownForces:
-    """Loads of plates, or else the sum over all walls; the unit is near the mean force."""
+def _known_forces(packing: Packing, walls: Walls, contacts: Contacts, wall_normal_total: float | None) -> KnownForces:
+    """Collect the loads of plates, or else the sum over all walls; the unit is near the mean force."""
     n, diameter = packing.grains.count, 2.0 * float(packing.grains.radius.mean())
-    plates = np.flatnonzero(np.isfinite(load))
-    group, total = np.full(len(j), -1, np.int64), load[plates]
+    j, plates = contacts.j, np.flatnonzero(walls.loaded)
+    group, total, factor = np.full(len(j), -1, np.int64), walls.load[plates], np.ones(len(j))
+    at_wall = np.flatnonzero(contacts.with_wall)
+    plate, factor[at_wall], _ = walls.plate_components(j[at_wall] - n, contacts.normal[at_wall])
     for g, wall in enumerate(plates):
-        group[j == n + wall] = g
+        group[at_wall[plate == wall]] = g
     if len(plates):
         unit = float(np.nanmax(packing.pressure)) * packing.length * diameter
     elif np.any(packing.weight):
-        # Half the grains' weight rests on the other half: a row of them carries this on every grain.
+        # Half the weight of n grains rests on a row of √n grains.
         unit = float(np.linalg.norm(packing.weight, axis=1).mean()) * 0.5 * np.sqrt(n)
     elif wall_normal_total is not None and np.any(j >= n):
         group[j >= n], total = 0, np.array([wall_normal_total])
         unit = wall_normal_total / np.count_nonzero(j >= n)
     else:
         unit = 1.0
-    return KnownForces(unit, packing.weight, group, total)
+    return KnownForces(unit, packing.weight, group, total, factor)

@@ -1,9 +1,9 @@
-"""The reported force field: the mean of members of two kinds, brought into balance.
+"""Ensemble estimate of a frame: the weighted mean of members of two kinds, projected onto equilibrium.
 
-Two Gauss-Seidel chains of different kinematic number carry inertia and history; five convex programs read the
-sliding of intervals before, after and around the frame. Each member keeps a history of its own and counts as much as
-noise leaves of the sliding that it reads. Their errors differ in kind, which is why their mean is better than any of
-them; averaging more of one kind gains nothing.
+Two Gauss-Seidel chains of different kinematic number carry inertia and history; five convex programmes read the
+sliding of intervals before, after and around the frame. Each member keeps a history of its own, and its weight falls
+with the noise of the sliding that it reads. The errors of the two kinds differ, so their mean is better than either;
+averaging more members of one kind gains nothing.
 """
 
 from __future__ import annotations
@@ -16,45 +16,45 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.contacts.contacts import Contacts
-from solver.contacts.pairs import are_among
-from solver.convex.members import RefinedMotion, SeenSlip, Slip, advance_member, read_slip, steady_slip
-from solver.convex.program import Balance, ConvexForces, assemble_balance, polish
-from solver.detection.displacement import find_reversals, member_intervals
-from solver.detection.networks import PairProbability, ProbablePairs
-from solver.nlgs.chain import ChainStep, advance_through, force_scale
-from solver.nlgs.interval import Interval
-from solver.nlgs.warm_start import ForceMemory
-from solver.posterior.frame_posterior import FramePosterior
-from solver.sequence.demand import NO_DEMAND, ROUNDS, WINS, Demand, find_demand
-from solver.sequence.frame_contacts import TouchingPairs, find_touching
-from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.judging.judgement import SETTLED_DIFFERENCE
-from solver.statistics.agreement import relative_change
-from solver.statistics.sliding import cone_share
-from solver.together import work_together
+from ..assessment.status import SETTLED_DIFFERENCE
+from ..bodies.grains import Array
+from ..bodies.motion import Snapshot
+from ..contacts.contacts import Contacts
+from ..contacts.pairs import are_among
+from ..convex.ensemble_members import NormalisedSlip, RefinedMotion, Slip, advance_convex_member, read_slip, steady_slip
+from ..convex.program import Balance, ConvexForces, assemble_balance, project_onto_equilibrium
+from ..detection.contact_networks import PairProbability, ProbabilityNetwork
+from ..detection.displacement import find_reversals, member_intervals
+from ..nlgs.chain import ChainStep, advance_chain_through, force_scale
+from ..nlgs.force_memory import ForceMemory
+from ..nlgs.interval import Interval
+from ..parallel import parallel_map
+from ..posterior.frame_posterior import FramePosterior
+from ..statistics.agreement import relative_change
+from ..statistics.sliding import cone_fraction
+from .frame_contacts import TouchingPairs, find_touching
+from .frame_problem import FrameProblem
+from .missing_contacts import BEARING_FRACTION, NO_MISSING, ROUNDS, MissingContacts, find_missing_contacts
 
 
 @dataclass(frozen=True, slots=True)
 class EnsembleState:
-    """What the members remember of the former frame, and its network."""
+    """Forces of all members on the previous frame, and its network."""
 
     soft: ForceMemory  # the chain whose sweeps are recorded
     stiff: ForceMemory
-    other: ForceMemory  # the first chain once more, from another start; it tells how much of the start is left
+    other: ForceMemory  # the first chain from another start; the difference measures the influence of the start
     last: ForceMemory  # convex, interval (k − 1, k)
     ahead: ForceMemory  # convex, (k, k + 1)
     around: ForceMemory  # convex, (k − 1, k + 1)
     wide: ForceMemory  # convex, (k − 2, k + 2)
-    steady: ForceMemory  # convex, what (k − 1, k) and (k, k + 1) have in common
+    steady: ForceMemory  # convex, sliding common to (k − 1, k) and (k, k + 1)
     pairs: PairProbability
-    agreeing: int = 0  # frames running in which H was below its level
+    agreeing: int = 0  # consecutive frames in which H was below its level
 
     @property
     def start_forgotten(self) -> bool:
-        """Whether two starts agreed for so long that the chain from another start tells nothing more."""
+        """Whether two starts have agreed for so many frames that the chain from another start can be dropped."""
         return self.agreeing >= AGREEING_FRAMES
 
     @classmethod
@@ -62,8 +62,8 @@ class EnsembleState:
         memory = ForceMemory.empty()
         return cls(memory, memory, memory, memory, memory, memory, memory, memory, PairProbability.none())
 
-    def renewed(self, contacts: Contacts, force: Array, present: NDArray[np.bool_]) -> EnsembleState:
-        """The same network, all members going on from these forces (c, 2) [N]."""
+    def updated(self, contacts: Contacts, force: Array, present: NDArray[np.bool_]) -> EnsembleState:
+        """The same network with all members continued from these forces (c, 2) [N]."""
         memory = self.last.renew(contacts, force, present)
         return EnsembleState(
             memory, memory, self.other, memory, memory, memory, memory, memory, self.pairs, self.agreeing
@@ -71,10 +71,10 @@ class EnsembleState:
 
 
 AGREEING_FRAMES = 3  # with H below its level: it only falls until the forces are reset
-MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programs
+MEMBERS = ("soft", "stiff", "last", "ahead", "around", "wide", "steady")  # two chains, five convex programmes
 CHAINS = 2  # of the MEMBERS, the first
 
-Task = Callable[[], Any]  # one member: a ChainStep, or forces with what is remembered of them
+Task = Callable[[], Any]  # one member: a ChainStep, or forces with their memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +84,18 @@ class EnsembleForces:
     step: ChainStep  # of the first chain
     fn: Array  # (c,) [N] reported
     ft: Array  # (c,) [N]
-    probability: Array  # (c,) P(touch) as detected; 0 for a contact that only people saw
+    probability: Array  # (c,) P(touch) as detected; 0 for a contact that only a reviewer added
     member_fn: Array  # (m, c) [N] first chain, second chain, convex members that had something to read
     member_ft: Array  # (m, c) [N]
-    worth: Array  # (m,) weight of each member in the mean, at most 1
-    place: NDArray[np.intp]  # (m,) of each member in MEMBERS
+    weight: Array  # (m,) weight of each member in the mean, at most 1
+    place: NDArray[np.intp]  # (m,) index of each member in MEMBERS
     state: EnsembleState
-    start_difference: float  # H, NaN where no motion leads to the frame and once the start is forgotten
-    remark: str  # what went otherwise than it should, or empty
-    forbidden: Contacts  # detected, but not among those of `step`, for people forbade them
+    start_difference: float  # H; NaN where no motion leads to the frame and once the start is forgotten
+    remark: str  # deviations from the regular procedure; empty: none
+    forbidden: Contacts  # detected, but excluded by a reviewer
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
-    demand: Demand  # pairs among those of `step` that were not detected but demanded by the balance
-    seen_slip: SeenSlip  # around the frame where that is known, else before it or after
+    missing: MissingContacts  # pairs among those of `step` that were not detected but shown by the balance
+    seen_slip: NormalisedSlip  # around the frame where that is known, else before it or after
 
     @property
     def member_force(self) -> Array:
@@ -104,66 +104,73 @@ class EnsembleForces:
         force[:, self.place, 0], force[:, self.place, 1] = self.member_fn.T, self.member_ft.T
         return force
 
-    def cone_share(self, friction: Array) -> Array:
-        """Shares of the convex members and of the chains whose force is on the Coulomb cone (c, 2); friction (c,)."""
-        return cone_share(self.member_fn, self.member_ft, friction, self.place >= CHAINS)
+    def cone_fraction(self, friction: Array) -> Array:
+        """Fractions of the convex members and of the chains with a force on the Coulomb cone (c, 2); friction (c,)."""
+        return cone_fraction(self.member_fn, self.member_ft, friction, self.place >= CHAINS)
 
     @property
-    def spread_fn(self) -> Array:
+    def fn_sd(self) -> Array:
         """Standard deviation of f_n among the members (c,) [N]."""
-        return _spread(self.member_fn, self.worth)
+        return _weighted_sd(self.member_fn, self.weight)
 
     @property
-    def spread_ft(self) -> Array:
+    def ft_sd(self) -> Array:
         """Standard deviation of f_t among the members (c,) [N]."""
-        return _spread(self.member_ft, self.worth)
+        return _weighted_sd(self.member_ft, self.weight)
 
     @property
     def disagreement(self) -> float:
-        """D: rms spread of f_n over the rms of f_n; 0 where no contact bears force."""
+        """D: rms standard deviation of f_n over the rms of f_n; 0 where no contact bears force."""
         size = float(np.linalg.norm(self.fn))
-        return float(np.linalg.norm(_spread(self.member_fn, self.worth))) / size if size > 0 else 0.0
+        return float(np.linalg.norm(_weighted_sd(self.member_fn, self.weight))) / size if size > 0 else 0.0
 
 
 def solve_ensemble(
     problem: FrameProblem,
     state: EnsembleState,
     positions: FramePosterior | None = None,
-    demand: Demand = NO_DEMAND,
+    missing: MissingContacts = NO_MISSING,
 ) -> EnsembleForces:
-    """Solve one frame of a sequence with all members; positions: what they alone say of the frame, if they were asked.
+    """Solve one frame of a sequence with all members.
 
-    Pairs that bear force by the positions are offered to the members of the motion, and such as the balance demands;
-    demand: those that are known already.
+    Parameters
+    ----------
+    problem : FrameProblem
+    state : EnsembleState
+        Of the previous frame.
+    positions : FramePosterior, optional
+        Position-only estimate, whose bearing pairs are offered to the members.
+    missing : MissingContacts
+        Missing contacts that are known already; further ones are searched for in up to ROUNDS rounds.
     """
-    touching, chains, balance, members = _solve_members(problem, state, positions, demand)
+    touching, chains, balance, members = _solve_members(problem, state, positions, missing)
     for _ in range(ROUNDS):
-        more = find_demand(problem, touching.contacts, balance, members.convex)
+        more = find_missing_contacts(problem, touching.contacts, balance, members.convex)
         if more.count == 0:
             break
-        demand = demand.joined(more)
-        touching, chains, balance, members = _solve_members(problem, state, positions, demand)
+        missing = missing.joined(more)
+        touching, chains, balance, members = _solve_members(problem, state, positions, missing)
     fn, ft, remark = _average(problem, balance, members)
-    remark += _tell_demand(touching.contacts, fn, demand)
-    # A member that had nothing to read here goes on from the reported field.
+    remark += _describe_missing(touching.contacts, fn, missing)
+    # A member without an interval to read continues from the reported field.
     force = np.column_stack([fn, ft])
     reported = state.last.renew(touching.contacts, force, problem.snapshot.present)
-    soft, stiff = (chains.soft.memory, chains.stiff.memory) if problem.motion.spans else (reported, reported)
+    soft, stiff = (chains.soft.memory, chains.stiff.memory) if problem.motion.ends_here else (reported, reported)
     last, ahead, around, wide, steady = (reported if memory is None else memory for memory in members.memories)
     return EnsembleForces(
-        chains.soft, fn, ft, touching.told, members.force[:, :, 0], members.force[:, :, 1], np.array(members.worth),
-        np.array(members.place),
+        chains.soft, fn, ft, touching.detected, members.force[:, :, 0], members.force[:, :, 1],
+        np.array(members.weight), np.array(members.place),
         EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing),
         chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
-        touching.forbidden_probability, demand.only(touching.contacts.key), members.seen_slip,
+        touching.forbidden_probability, missing.only(touching.contacts.key), members.seen_slip,
     )  # fmt: skip
 
 
 def _solve_members(
-    problem: FrameProblem, state: EnsembleState, positions: FramePosterior | None, demand: Demand
+    problem: FrameProblem, state: EnsembleState, positions: FramePosterior | None, missing: MissingContacts
 ) -> tuple[TouchingPairs, _Chains, Balance, _Members]:
-    """All members on the contacts that were detected, offered and demanded."""
-    touching = find_touching(problem, positions, demand)
+    """Solve all members on the contacts that were detected, offered and found missing."""
+    touching = find_touching(problem, positions, missing)
     starts = _chain_starts(problem, state, touching)
     workers = problem.settings.workers
     if problem.packing.scale_is_known:  # convex members do not wait for the chains
@@ -174,29 +181,29 @@ def _solve_members(
             slips.extend(_slips(problem, touching.contacts))
             return _member_tasks(problem, state, touching, balance, slips)
 
-        found = work_together(starts, workers, members)
+        found = parallel_map(starts, workers, members)
         steps, convex = found[: len(starts)], found[len(starts) :]
     else:
-        steps = work_together(starts, workers)
+        steps = parallel_map(starts, workers)
         balance = assemble_frame_balance(problem, touching.contacts, steps[0])
         slips = list(_slips(problem, touching.contacts))
-        convex = work_together(_member_tasks(problem, state, touching, balance, slips), workers)
+        convex = parallel_map(_member_tasks(problem, state, touching, balance, slips), workers)
     chains = _compare_chains(touching.contacts, steps, state)
     return touching, chains, balance, _gather_members(slips, convex, chains)
 
 
-def _tell_demand(contacts: Contacts, fn: Array, demand: Demand) -> list[str]:
-    """How many pairs were demanded, and how many of them bear force."""
-    asked = are_among(contacts.key, demand.key)
-    if not asked.any():
+def _describe_missing(contacts: Contacts, fn: Array, missing: MissingContacts) -> list[str]:
+    """State how many missing contacts were added, and how many of them carry force."""
+    added = are_among(contacts.key, missing.key)
+    if not added.any():
         return []
-    bearing = int((fn[asked] > WINS * fn[fn > 0].mean()).sum()) if (fn > 0).any() else 0
-    return [f"the balance demanded {asked.sum()} pairs that were not detected, of which {bearing} bear force"]
+    bearing = int((fn[added] > BEARING_FRACTION * fn[fn > 0].mean()).sum()) if (fn > 0).any() else 0
+    return [f"the balance shows {added.sum()} pairs that were not detected, of which {bearing} bear force"]
 
 
 @dataclass(frozen=True, slots=True)
 class _Chains:
-    """What the Gauss-Seidel chains gave."""
+    """Results of the Gauss-Seidel chains."""
 
     soft: ChainStep
     stiff: ChainStep
@@ -207,14 +214,14 @@ class _Chains:
 
 @dataclass(frozen=True, slots=True)
 class _Members:
-    """The fields that count in the mean, and what the convex members remember."""
+    """Fields that enter the mean, and the memories of the convex members."""
 
     force: Array  # (m, c, 2) [N]
-    worth: list[float]  # (m,)
-    place: list[int]  # (m,) in MEMBERS
-    memories: list[ForceMemory | None]  # of the five convex members; None: it had nothing to read
+    weight: list[float]  # (m,)
+    place: list[int]  # (m,) index in MEMBERS
+    memories: list[ForceMemory | None]  # of the five convex members; None: no interval to read
     remarks: list[str]
-    seen_slip: SeenSlip
+    seen_slip: NormalisedSlip
 
     @property
     def convex(self) -> list[Array]:
@@ -223,40 +230,40 @@ class _Members:
 
 
 def _chain_starts(problem: FrameProblem, state: EnsembleState, touching: TouchingPairs) -> list[Task]:
-    """The two chains, and the first once more from another start where that still tells something."""
+    """The two chains, and the first once more from another start unless the start is forgotten."""
     packing, motion, contacts = problem.packing, problem.motion, touching.contacts
     chain = problem.settings.chain
-    network = ProbablePairs(state.pairs if motion.spans else touching.pairs, touching.pairs)
+    network = ProbabilityNetwork(state.pairs if motion.ends_here else touching.pairs, touching.pairs)
     assert chain.kappa is not None
-    silent = replace(chain, keep="none")
+    unrecorded = replace(chain, keep="none")
     starts = [
         (state.soft, chain),
-        (state.stiff, replace(silent, kappa=chain.kappa * problem.settings.ensemble.stiffer)),
+        (state.stiff, replace(unrecorded, kappa=chain.kappa * problem.settings.ensemble.stiffer)),
     ]
-    started_again = motion.spans and not state.start_forgotten
-    if started_again:
+    compares_starts = motion.ends_here and not state.start_forgotten
+    if compares_starts:
         other = state.other
         if len(state.soft.key) == 0:  # the first chain starts from zero: this one from uniform forces
             uniform = np.column_stack([np.full(contacts.count, force_scale(packing, chain)), np.zeros(contacts.count)])
             other = other.renew(contacts, uniform, problem.snapshot.present)
-        starts.append((other, silent))
+        starts.append((other, unrecorded))
     interval = Interval(packing, motion, network)
-    return [partial(advance_through, interval, memory, told) for memory, told in starts]
+    return [partial(advance_chain_through, interval, memory, settings) for memory, settings in starts]
 
 
 def _compare_chains(contacts: Contacts, steps: list[ChainStep], state: EnsembleState) -> _Chains:
-    """What the chains gave, and how far two starts of the first differ."""
+    """Collect the chains' results, and how far two starts of the first differ."""
     soft, stiff, *rest = steps
     if not rest:
         return _Chains(soft, stiff, state.other, np.nan, state.agreeing)
-    (again,) = rest
-    difference = relative_change(contacts.key, soft.solution.force, contacts.key, again.solution.force)
+    (other,) = rest
+    difference = relative_change(contacts.key, soft.solution.force, contacts.key, other.solution.force)
     agreeing = state.agreeing + 1 if difference <= SETTLED_DIFFERENCE else 0
-    return _Chains(soft, stiff, again.memory, difference, agreeing)
+    return _Chains(soft, stiff, other.memory, difference, agreeing)
 
 
 def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: ChainStep | None = None) -> Balance:
-    """Balance of the frame on these contacts; soft: the first chain, needed where no load tells the scale."""
+    """Balance of the frame on these contacts; soft: the first chain, needed where no load sets the scale."""
     packing, walls, wall_total = problem.packing, problem.walls, None
     if not packing.scale_is_known:  # without load and weight forces are known up to a scale: that of the first chain
         assert soft is not None
@@ -272,12 +279,19 @@ def assemble_frame_balance(problem: FrameProblem, contacts: Contacts, soft: Chai
 def _member_tasks(
     problem: FrameProblem, state: EnsembleState, touching: TouchingPairs, balance: Balance, slips: Sequence[Slip | None]
 ) -> list[Task]:
-    """The convex members that have something to read."""
+    """The convex members that have an interval to read."""
     former = (state.last, state.ahead, state.around, state.wide, state.steady)
     convex = problem.settings.ensemble.convex
     return [
         partial(
-            advance_member, balance, touching.contacts, problem.snapshot, slip, touching.probability, memory, convex
+            advance_convex_member,
+            balance,
+            touching.contacts,
+            problem.snapshot,
+            slip,
+            touching.probability,
+            memory,
+            convex,
         )
         for slip, memory in zip(slips, former, strict=True)
         if slip is not None
@@ -287,9 +301,9 @@ def _member_tasks(
 def _gather_members(
     slips: Sequence[Slip | None], convex: Sequence[tuple[ConvexForces, ForceMemory]], chains: _Chains
 ) -> _Members:
-    """All members that came to an end; convex: what those gave that had something to read."""
+    """Collect all members that converged; convex: results of those with an interval to read."""
     fields = [chains.soft.solution.force, chains.stiff.solution.force]
-    worth, place = [1.0, 1.0], [0, 1]
+    weight, place = [1.0, 1.0], [0, 1]
     memories: list[ForceMemory | None] = []
     remarks: list[str] = []
     found = iter(convex)
@@ -297,40 +311,40 @@ def _gather_members(
         if slip is None:
             memories.append(None)
             continue
-        forces, renewed = next(found)
+        forces, updated = next(found)
         if forces.converged:
             fields.append(np.column_stack([forces.fn, forces.ft]))
-            worth.append(slip.worth)
+            weight.append(slip.weight)
             place.append(number)
         else:
-            remarks.append(f"a convex member was left out ({forces.ending})")
-        memories.append(renewed)
-    return _Members(np.stack(fields), worth, place, memories, remarks, _seen_slip(slips))
+            remarks.append(f"a convex member was left out ({forces.termination})")
+        memories.append(updated)
+    return _Members(np.stack(fields), weight, place, memories, remarks, _seen_slip(slips))
 
 
 def _average(problem: FrameProblem, balance: Balance, members: _Members) -> tuple[Array, Array, list[str]]:
-    """The mean of the members in balance, f_n and f_t (c,) [N]; and what went otherwise than it should."""
-    mean = np.average(members.force, axis=0, weights=members.worth)
-    polished = polish(balance, mean[:, 0], mean[:, 1], problem.settings.ensemble.convex)
-    if polished.converged:
-        return polished.fn, polished.ft, []
-    return mean[:, 0], mean[:, 1], [f"the mean was not polished ({polished.ending})"]
+    """Weighted mean of the members projected onto equilibrium, f_n and f_t (c,) [N]; and remarks."""
+    mean = np.average(members.force, axis=0, weights=members.weight)
+    projected = project_onto_equilibrium(balance, mean[:, 0], mean[:, 1], problem.settings.ensemble.convex)
+    if projected.converged:
+        return projected.fn, projected.ft, []
+    return mean[:, 0], mean[:, 1], [f"the mean was not projected onto equilibrium ({projected.termination})"]
 
 
-def _spread(member: Array, worth: Array) -> Array:
-    mean = np.average(member, axis=0, weights=worth)
-    return np.sqrt(np.average((member - mean) ** 2, axis=0, weights=worth))
+def _weighted_sd(member: Array, weight: Array) -> Array:
+    mean = np.average(member, axis=0, weights=weight)
+    return np.sqrt(np.average((member - mean) ** 2, axis=0, weights=weight))
 
 
 def _slips(problem: FrameProblem, contacts: Contacts) -> tuple[Slip | None, ...]:
-    """What the convex members read at frame k: the intervals of `member_intervals`, then what outlasts the frame."""
+    """Slips that the convex members read at frame k: by interval, then the one common to both neighbours."""
     snapshots, refined, convex = problem.sequence.snapshots, problem.refined, problem.settings.ensemble.convex
     assert refined is not None
 
     def slip(interval: tuple[int, int]) -> Slip:
         ends = snapshots[interval[0]], snapshots[interval[1]]
-        deviation = refined.slide_deviation(contacts, interval, (ends[0].sigma, ends[1].sigma))
-        motion = RefinedMotion((refined.position_at(interval[0]), refined.position_at(interval[1])), deviation)
+        slide_sd = refined.sliding_sd(contacts, interval, (ends[0].sigma, ends[1].sigma))
+        motion = RefinedMotion((refined.position_at(interval[0]), refined.position_at(interval[1])), slide_sd)
         return read_slip(contacts, problem.packing.grains, problem.walls, ends, convex, motion)
 
     slips = [None if interval is None else slip(interval) for interval in _intervals(snapshots, problem.k)]
@@ -338,10 +352,10 @@ def _slips(problem: FrameProblem, contacts: Contacts) -> tuple[Slip | None, ...]
     return (*slips, None if before is None or after is None else steady_slip(before, after))
 
 
-def _seen_slip(slips: Sequence[Slip | None]) -> SeenSlip:
-    """Of the intervals around the frame, before and after it the first that there is."""
+def _seen_slip(slips: Sequence[Slip | None]) -> NormalisedSlip:
+    """Slip of the first available interval: around the frame, before it, after it."""
     before, after, around = slips[:3]
-    seen = next(slip.seen for slip in (around, before, after) if slip is not None)
+    seen = next(slip.normalised for slip in (around, before, after) if slip is not None)
     assert seen is not None
     return seen
 

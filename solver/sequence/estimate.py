@@ -1,4 +1,4 @@
-"""One attempt at a frame, by the ensemble or by a single chain, and the evidence that it is judged by."""
+"""Estimate of one frame, by the ensemble or by a single chain, and the evidence for its assessment."""
 
 from __future__ import annotations
 
@@ -6,61 +6,64 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.holes import find_holes
-from solver.bodies.motion import shear_over
-from solver.contacts.contacts import Contacts, detect_contacts
-from solver.contacts.pairs import align, are_among
-from solver.convex.members import SeenSlip
-from solver.detection.networks import NearPairs
-from solver.mixture.balancing import bring_into_balance
-from solver.mixture.mixing import Field, Mixture, mix_on, worth_of_motion
-from solver.nlgs.chain import ChainStep, advance_chain
-from solver.nlgs.warm_start import ForceMemory
-from solver.posterior.frame_posterior import FramePosterior
-from solver.sequence.demand import NO_DEMAND, Demand
-from solver.sequence.ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
-from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.judging.information import measure_information, motion_scale
-from solver.sequence.judging.judgement import Evidence, is_suspect, trust
-from solver.sequence.state import SequenceState
-from solver.statistics.agreement import pearson
-from solver.statistics.balance import worst_unbalance
-from solver.statistics.stress import love_weber_stress, packing_area
+from ..assessment.evidence import Evidence
+from ..assessment.expected_correlation import expect_correlation
+from ..assessment.mixture_trust import LEAST_WEIGHT, evident_position_weight, motion_reliability
+from ..assessment.motion_information import measure_motion_information, motion_scale
+from ..assessment.status import is_suspect
+from ..baselines.motion_free import overlap_balance
+from ..bodies.grains import Array
+from ..bodies.holes import find_holes
+from ..bodies.motion import shear_over
+from ..contacts.contacts import Contacts, detect_contacts
+from ..contacts.pairs import Keys, align, are_among
+from ..convex.ensemble_members import NormalisedSlip
+from ..detection.contact_networks import ThresholdNetwork
+from ..mixture.equilibrium_projection import project_mixed_field
+from ..mixture.frame_mixture import ForceEstimate, Mixture, mix_on_contacts, motion_weight
+from ..nlgs.chain import ChainStep, advance_chain
+from ..nlgs.force_memory import ForceMemory
+from ..posterior.frame_posterior import FramePosterior
+from ..statistics.agreement import pearson
+from ..statistics.balance import worst_force_residual
+from ..statistics.stress import love_weber_stress, packing_area
+from .ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
+from .frame_problem import FrameProblem
+from .missing_contacts import NO_MISSING, MissingContacts
+from .state import SequenceState
 
-NEGLIGIBLE_KAPPA = 1e-5  # below it measured motion has no influence on the forces
-# Trust of the motion's field from which on positions alone are not asked: between .9 and .92 they add .011 to the
-# correlation with the truth, between .92 and .94 .006, beyond .94 nothing (worlds of 300 rods, seed 0).
-MOTION_SUFFICES = 0.93
+NEGLIGIBLE_KAPPA = 1e-5  # below it the measured motion does not influence the forces
+# A frame is steady where so much is expected of it; agreements then hold for so many frames.
+STEADY = 0.97
+STEADY_FRAMES = 4
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """The chain, and the field to be reported on its contacts."""
+    """The recorded chain, and the field to be reported on its contacts."""
 
     step: ChainStep
     fn: Array  # (c,) [N]
     ft: Array  # (c,) [N]
     probability: Array  # (c,), NaN where not computed
     members: EnsembleState
-    forbidden: Contacts  # detected, but left out for people forbade them
+    forbidden: Contacts  # detected, but excluded by a reviewer
     forbidden_probability: Array  # (m,)
     remark: str = ""
-    spread_fn: Array | None = None  # (c,) [N] among the members, None of a single chain
-    spread_ft: Array | None = None  # (c,) [N]
+    fn_sd: Array | None = None  # (c,) [N] among the members, None of a single chain
+    ft_sd: Array | None = None  # (c,) [N]
     member_force: Array | None = None  # (c, m, 2) [N]
-    cone_share: Array | None = (
-        None  # (c, 2) of the convex members and of the chains on the Coulomb cone; None: no members
-    )
-    seen_slip: SeenSlip | None = None  # None: no members
+    # (c, 2) fractions of the convex members and of the chains on the Coulomb cone; None: no members
+    cone_fraction: Array | None = None
+    seen_slip: NormalisedSlip | None = None  # None: no members
     disagreement: float = np.nan  # D
     start_difference: float = np.nan  # H
-    motion: Field | None = None  # what the motion alone says, where it was mixed
-    mixture: Mixture | None = None  # with what positions alone say; None: they were not asked
-    overlap: float = np.nan  # [m] per mean force, as the positions show it
+    motion: ForceEstimate | None = None  # the motion estimate, where it was mixed
+    mixture: Mixture | None = None  # with the position-only estimate; None: not computed
+    overlap: float = np.nan  # [m] per mean force, by the position-only estimate
     threshold: float = 0.0  # [m] of the gap, of a single chain
-    demand: Demand = NO_DEMAND  # pairs that were not detected, but that the balance demands
+    missing: MissingContacts = NO_MISSING  # pairs that were not detected but that the balance shows
 
     @property
     def contacts(self) -> Contacts:
@@ -72,79 +75,141 @@ class Estimate:
 
 
 def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
-    """Solve a frame from the state that the frame before it left behind."""
+    """Solve a frame from the state of the previous frame."""
     if problem.refined is None:
         return _estimate_by_chain(problem, state)
-    alone = None
-    if not _ask_whatever_is_found(problem):
-        alone = _by_motion_alone(problem, state)
-        estimate, evidence = alone
-        if problem.sequence.positions is None or not _says_little(problem, evidence) or not estimate.fn.any():
-            return alone
-    assert problem.sequence.positions is not None
-    positions = problem.sequence.positions.at(problem.k, problem.verdicts)
-    if positions is not None and positions.fn.any():
-        offered = _estimate_by_ensemble(problem, state, positions, NO_DEMAND if alone is None else alone[0].demand)
+    positions = problem.sequence.positions
+    if positions is None:
+        return _motion_estimate(problem, state)
+    if not _always_uses_positions(problem):
+        alone, evidence = _motion_estimate(problem, state)
+        return _combine(problem, alone, evidence, state) if alone.fn.any() else (alone, evidence)
+    posterior = positions.at(problem.k, problem.verdicts)
+    if posterior is not None and posterior.fn.any():
+        offered = _estimate_by_ensemble(problem, state, posterior, NO_MISSING)
         if offered.fn.any():
-            told = trust(gather_evidence(problem, offered, state))
-            mixed = _mix(problem, offered, positions, told)
-            return mixed, gather_evidence(problem, mixed, state)
-    return _by_motion_alone(problem, state) if alone is None else alone
+            found = _Agreement.of(problem, offered, posterior)
+            evidence = gather_evidence(problem, offered, state, found)
+            mixed = _mix(problem, offered, posterior, motion_reliability(evidence))
+            return mixed, gather_evidence(problem, mixed, state, found)
+    return _motion_estimate(problem, state)
 
 
-def _by_motion_alone(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
-    estimate = _estimate_by_ensemble(problem, state, None, NO_DEMAND)
+def _combine(
+    problem: FrameProblem, alone: Estimate, evidence: Evidence, state: SequenceState
+) -> tuple[Estimate, Evidence]:
+    """Compare the motion estimate of hard grains with the position-only estimate; mix both as the evidence weighs them.
+
+    In steady frames the agreements of the last few frames hold: the position-only estimate takes as long as the frame.
+    """
+    before = state.evidence
+    if not np.isnan(before.agreement) and before.agreement_age + 1 < STEADY_FRAMES:
+        found = _Agreement.carried(before)
+        carried = gather_evidence(problem, alone, state, found)
+        weight = evident_position_weight(carried.correction, carried.position_agreement)
+        if weight < LEAST_WEIGHT and expect_correlation(carried) > STEADY and before.position_weight == 0.0:
+            return alone, carried
+    assert problem.sequence.positions is not None
+    posterior = problem.sequence.positions.at(problem.k, problem.verdicts)
+    if posterior is None or not posterior.fn.any():
+        return alone, evidence
+    found = _Agreement.of(problem, alone, posterior)
+    evidence = gather_evidence(problem, alone, state, found)
+    weight = evident_position_weight(evidence.correction, evidence.position_agreement)
+    if weight < LEAST_WEIGHT:
+        return alone, evidence
+    mixed = _mix(problem, alone, posterior, motion_reliability(evidence), position_weight=weight)
+    return mixed, gather_evidence(problem, mixed, state, found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Agreement:
+    """Correlations of f_n between the estimates of a frame, over the contacts of either."""
+
+    estimates: float = np.nan  # motion and positions
+    positions: float = np.nan  # positions and the balance of overlaps
+    overlaps: float = np.nan  # motion and the balance of overlaps
+    age: int = 0  # frames since they were computed
+
+    @classmethod
+    def of(cls, problem: FrameProblem, estimate: Estimate, posterior: FramePosterior) -> _Agreement:
+        sequence, overlap = problem.sequence, problem.settings.overlap
+        assert overlap is not None
+        noise = float(np.hypot(problem.snapshot.sigma, overlap))  # surfaces are no smoother than that
+        contacts, force = overlap_balance(problem.packing, sequence.snapshots, problem.k, noise)
+        motion, geometry = (estimate.contacts.key, estimate.fn), (posterior.contacts.key, posterior.fn)
+        balance = contacts.key, force[:, 0]
+        return cls(_agree(motion, geometry), _agree(geometry, balance), _agree(motion, balance))
+
+    @classmethod
+    def carried(cls, evidence: Evidence) -> _Agreement:
+        return cls(
+            evidence.agreement, evidence.position_agreement, evidence.overlap_agreement, evidence.agreement_age + 1
+        )
+
+
+def _agree(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
+    _, first, second = align(*one, *two)
+    return pearson(first, second)
+
+
+def _motion_estimate(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
+    estimate = _estimate_by_ensemble(problem, state, None, NO_MISSING)
     return estimate, gather_evidence(problem, estimate, state)
 
 
-def _ask_whatever_is_found(problem: FrameProblem) -> bool:
-    """Whether positions are asked whatever the motion says: its field without them then need not be known."""
+def _always_uses_positions(problem: FrameProblem) -> bool:
+    """Whether the position-only estimate is used whatever the motion shows."""
     settings = problem.settings
     if problem.sequence.positions is None:
         return False
-    if settings.positions == "always" or settings.soft or not problem.motion.spans:
+    if settings.positions == "always" or settings.soft or not problem.motion.ends_here:
         return True
     # Loading without sliding looks like agreement, and no load contradicts it.
     return not problem.packing.scale_is_known
 
 
-def _says_little(problem: FrameProblem, evidence: Evidence) -> bool:
-    """Whether the motion says so little of this frame that positions alone are to be asked, too."""
-    # That rods were inferred lowers the trust, but positions know nothing better of them.
-    return not trust(replace(evidence, inferred=0)) >= MOTION_SUFFICES
+def _mix(
+    problem: FrameProblem,
+    estimate: Estimate,
+    positions: FramePosterior,
+    reliability: float,
+    position_weight: float | None = None,
+) -> Estimate:
+    """Mix the motion estimate with the position-only estimate, and project the mixture onto equilibrium.
 
-
-def _mix(problem: FrameProblem, estimate: Estimate, positions: FramePosterior, motion_trust: float) -> Estimate:
-    """The motion's field mixed with what positions say, and brought into balance."""
+    reliability: of the motion estimate, NaN where no motion leads to the frame; position_weight: None: from it.
+    """
     contacts = estimate.contacts
-    assert estimate.spread_fn is not None
-    assert estimate.spread_ft is not None
-    field = Field(estimate.fn, estimate.ft, estimate.spread_fn, estimate.spread_ft)
+    assert estimate.fn_sd is not None
+    assert estimate.ft_sd is not None
+    field = ForceEstimate(estimate.fn, estimate.ft, estimate.fn_sd, estimate.ft_sd)
     known, soft = problem.packing.scale_is_known, problem.settings.soft_trust if problem.settings.soft else None
-    worth = 1.0
+    weight = 1.0
     if problem.settings.soft:
-        seen = problem.settings.overlap_seen
-        worth = worth_of_motion(positions.overlap, motion_scale(problem)) if seen else 0.0
-    mixture = mix_on(contacts, field, positions, motion_trust, own_scale=known, soft_trust=soft, worth=worth)
+        seen = problem.settings.measured_overlap
+        weight = motion_weight(positions.overlap, motion_scale(problem.motion, problem.snapshot.sigma)) if seen else 0.0
+    mixture = mix_on_contacts(
+        contacts, field, positions, reliability, scale_known=known, soft_trust=soft, weight=weight,
+        position_weight=position_weight,
+    )  # fmt: skip
     balance = assemble_frame_balance(problem, contacts, estimate.step)
     convex = problem.settings.ensemble.convex
-    polished = bring_into_balance(
-        balance, mixture.fn, mixture.ft, mixture.spread_fn, convex, hardness=worth
-    )  # fmt: skip
-    fn, ft = (polished.fn, polished.ft) if polished.converged else (mixture.fn, mixture.ft)
+    projected = project_mixed_field(balance, mixture.fn, mixture.ft, mixture.fn_sd, convex)
+    fn, ft = (projected.fn, projected.ft) if projected.converged else (mixture.fn, mixture.ft)
     members = estimate.members
-    if not problem.motion.spans:  # no member has a history of its own yet
-        members = members.renewed(contacts, np.column_stack([fn, ft]), problem.snapshot.present)
-    told = f"positions alone count {100 * mixture.share:.0f} % here"
+    if not problem.motion.ends_here:  # no member has a history of its own yet
+        members = members.updated(contacts, np.column_stack([fn, ft]), problem.snapshot.present)
+    remark = f"the position-only estimate has a weight of {100 * mixture.position_weight:.0f} %"
     return replace(
-        estimate, fn=fn, ft=ft, members=members, spread_fn=mixture.spread_fn, spread_ft=mixture.spread_ft,
+        estimate, fn=fn, ft=ft, members=members, fn_sd=mixture.fn_sd, ft_sd=mixture.ft_sd,
         motion=field, mixture=mixture, overlap=positions.overlap,
-        remark="; ".join(part for part in (estimate.remark, told) if part),
+        remark="; ".join(part for part in (estimate.remark, remark) if part),
     )  # fmt: skip
 
 
 def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
-    """Half the trace of the stress of the motion's field [Pa], which is comparable from frame to frame."""
+    """Half the trace of the stress of the motion estimate [Pa], comparable from frame to frame."""
     fn, ft = (estimate.fn, estimate.ft) if estimate.motion is None else (estimate.motion.fn, estimate.motion.ft)
     position, walls = problem.snapshot.position, estimate.step.walls
     area = packing_area(walls, position[problem.snapshot.present])
@@ -152,25 +217,28 @@ def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
     return 0.5 * float(np.trace(stress))
 
 
-def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceState) -> Evidence:
-    """Evidence on the reported field; ε and ū are the chain's."""
+def gather_evidence(
+    problem: FrameProblem, estimate: Estimate, state: SequenceState, agreement: _Agreement | None = None
+) -> Evidence:
+    """Gather the evidence of the reported field; ε and ū are those of the recorded chain."""
+    agreement = _Agreement() if agreement is None else agreement
     packing, snapshot, step = problem.packing, problem.snapshot, estimate.step
     pressure = mean_stress(problem, estimate)
     load = packing.mean_pressure(snapshot)
-    # Back from a faulty frame is no jump, nor is what the measured loads did.
+    # A return from a faulty frame is no jump, nor is a change of the measured loads.
     before = packing.mean_pressure(problem.sequence.snapshots[max(problem.k - 1, 0)])
-    risen = load / before if before > 0 and load > 0 else 1.0
-    former = [risen * p for p in (state.pressure, state.sound_pressure) if p > 0]
+    load_ratio = load / before if before > 0 and load > 0 else 1.0
+    former = [load_ratio * p for p in (state.pressure, state.sound_pressure) if p > 0]
     jump = min((abs(pressure - p) / p for p in former), default=np.nan)
     return Evidence(
         reset=len(state.members.soft.key) == 0,
-        # Inertia alone corrects nothing that could be measured: there is no ε then.
+        # Inertia alone makes no measurable correction: ε is undefined then.
         correction=step.solution.mean_unbalance / step.kappa if step.kappa > NEGLIGIBLE_KAPPA else np.nan,
         disagreement=estimate.disagreement,
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
-        load_share=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
-        unbalance=worst_unbalance(
+        load_fraction=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
+        unbalance=worst_force_residual(
             step.contacts, estimate.fn, estimate.ft, packing.weight, snapshot.present & packing.grains.free
         ),
         shear=shear_over(problem.motion),
@@ -181,17 +249,23 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         holes=len(find_holes(packing.grains, snapshot.position, snapshot.present, step.walls)),
         grains=int(snapshot.present.sum()),
         reach=estimate.threshold / (2.0 * float(packing.grains.radius.mean())),
-        assessed=problem.motion.spans,
+        assessed=problem.motion.ends_here,
         mixed_trust=np.nan if estimate.mixture is None else estimate.mixture.trust,
-        positions_share=0.0 if estimate.mixture is None else estimate.mixture.share,
-        unseen_share=1.0 - float(problem.seen.sum()) / max(problem.sequence.known, 1),
-        information=measure_information(problem, estimate.contacts, estimate.fn, step.walls),
+        position_weight=0.0 if estimate.mixture is None else estimate.mixture.position_weight,
+        unseen_fraction=1.0 - float(problem.seen.sum()) / max(problem.sequence.known, 1),
+        information=measure_motion_information(
+            packing, snapshot, problem.motion, estimate.contacts, estimate.fn, step.walls, soft=problem.settings.soft
+        ),
+        agreement=agreement.estimates,
+        position_agreement=agreement.positions,
+        overlap_agreement=agreement.overlaps,
+        agreement_age=agreement.age,
         force_change=_force_change(estimate, state),
     )
 
 
 def _force_change(estimate: Estimate, state: SequenceState) -> float:
-    """1 − correlation of f_n with that of the frame before, a contact that only one has counting as zero."""
+    """1 − correlation of f_n with that of the previous frame; a contact that only one has counts as zero."""
     if len(state.reported.key) == 0:
         return np.nan
     _, now, then = align(estimate.contacts.key, estimate.fn, state.reported.key, state.reported.force[:, 0])
@@ -203,7 +277,7 @@ def _estimate_by_chain(problem: FrameProblem, state: SequenceState) -> tuple[Est
     threshold = settings.threshold
     if threshold is None:
         assert settings.overlap is not None
-        # The gap of a touching pair scatters by √2 σ and by the overlap.
+        # The gap of a touching pair varies by √2 σ and by the overlap.
         threshold = settings.threshold_sigmas * float(np.hypot(sigma, settings.overlap / np.sqrt(2.0)))
     estimate = _advance_chain(problem, state, threshold, threshold)
     evidence = gather_evidence(problem, estimate, state)
@@ -217,19 +291,19 @@ def _estimate_by_chain(problem: FrameProblem, state: SequenceState) -> tuple[Est
 
 
 def _advance_chain(problem: FrameProblem, state: SequenceState, reach: float, threshold: float) -> Estimate:
-    """One attempt of a single chain, on pairs nearer than `reach` [m]; threshold [m]: what counts as detected."""
+    """Advance a single chain on pairs nearer than `reach` [m]; threshold [m]: gap up to which a pair is detected."""
     packing, snapshot, verdicts = problem.packing, problem.snapshot, problem.verdicts
     memory, chain = state.members.soft, problem.settings.chain
-    step = advance_chain(packing, problem.motion, memory, chain, NearPairs(reach, verdicts))
+    step = advance_chain(packing, problem.motion, memory, chain, ThresholdNetwork(reach, verdicts))
     near = detect_contacts(packing.grains, snapshot.position, snapshot.present, step.walls, threshold)
-    only_people_saw = are_among(step.contacts.key, verdicts.forced) & ~are_among(step.contacts.key, near.key)
+    only_reviewed = are_among(step.contacts.key, verdicts.forced) & ~are_among(step.contacts.key, near.key)
     forbidden = near.select(are_among(near.key, verdicts.forbidden))
     return Estimate(
         step,
         step.solution.fn,
         step.solution.ft,
-        np.where(only_people_saw, 0.0, np.nan),
-        replace(state.members, soft=step.memory if problem.motion.spans else ForceMemory.empty()),
+        np.where(only_reviewed, 0.0, np.nan),
+        replace(state.members, soft=step.memory if problem.motion.ends_here else ForceMemory.empty()),
         forbidden,
         np.full(forbidden.count, np.nan),
         threshold=reach,
@@ -237,12 +311,13 @@ def _advance_chain(problem: FrameProblem, state: SequenceState, reach: float, th
 
 
 def _estimate_by_ensemble(
-    problem: FrameProblem, state: SequenceState, positions: FramePosterior | None, demand: Demand
+    problem: FrameProblem, state: SequenceState, positions: FramePosterior | None, missing: MissingContacts
 ) -> Estimate:
-    found = solve_ensemble(problem, state.members, positions, demand)
+    found = solve_ensemble(problem, state.members, positions, missing)
     friction = problem.packing.material.friction_at(found.step.contacts.with_wall)
     return Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
-        found.remark, found.spread_fn, found.spread_ft, found.member_force if problem.settings.keep_members else None,
-        found.cone_share(friction), found.seen_slip, found.disagreement, found.start_difference, demand=found.demand,
+        found.remark, found.fn_sd, found.ft_sd, found.member_force if problem.settings.keep_members else None,
+        found.cone_fraction(friction), found.seen_slip, found.disagreement, found.start_difference,
+        missing=found.missing,
     )  # fmt: skip

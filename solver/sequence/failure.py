@@ -1,7 +1,7 @@
-"""A frame that could not be solved: how that is known, what is reported of it, what it leaves behind.
+"""Failed frames: their detection, their report, and the state after them.
 
-One bad photograph, or one frame that breaks a method, must not cost the frames around it: such a frame is reported as
-failed and without forces, the frame after it starts afresh, and whoever needs its positions gets its neighbours'.
+One unusable photograph must not cost the frames around it: it is reported as failed and without forces, the next frame
+starts afresh, and its positions are interpolated where they are needed.
 """
 
 from __future__ import annotations
@@ -12,41 +12,43 @@ from typing import Any
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.bodies.quantity import columns, quantities
-from solver.contacts.contacts import Contacts
-from solver.nlgs.starts import COLD_SWEEPS
-from solver.nlgs.sweep_record import SweepHistory
-from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.ensemble import MEMBERS
-from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.state import NOTHING_KNOWN, SequenceState
+from ..bodies.grains import Array
+from ..bodies.motion import Snapshot
+from ..contacts.contacts import Contacts
+from ..frame_forces import FrameForces, FrameStatus
+from ..nlgs.force_memory import ForceMemory
+from ..nlgs.start_residuals import COLD_SWEEPS
+from ..nlgs.sweep_record import SweepHistory
+from ..quantity import columns, quantities
+from .ensemble import MEMBERS
+from .state import NO_EVIDENCE, SequenceState
 
-FEWEST_SEEN = 0.1  # share of the grains that any frame shows, below which a frame has shown nothing
+FEWEST_SEEN = 0.1  # fraction of all tracked grains below which a frame is unusable
 GROSS_UNBALANCE = 1.0  # mean |ΣF| of a grain over the mean f_n: forces drawn at random reach it
 MUST_BE_FINITE = ("fn", "ft", "nlgs_fn", "nlgs_ft", "fn_sd", "ft_sd")
 
 
 def find_unseen(snapshots: Sequence[Snapshot]) -> dict[int, str]:
-    """Frames from which nothing can be solved, and why."""
+    """Unusable frames with the reason."""
     known = int(np.any([each.present for each in snapshots], axis=0).sum()) if snapshots else 0
     faults = {k: _fault_of_snapshot(each, known) for k, each in enumerate(snapshots)}
     return {k: fault for k, fault in faults.items() if fault}
 
 
 def find_fault(frame: FrameForces) -> str:
-    """Why the outcome of a solve is none, or nothing."""
+    """Reason why the result of a solve is unusable; empty where it is usable."""
     for name in MUST_BE_FINITE:
         bad = int((~np.isfinite(getattr(frame, name))).sum())
         if bad:
             return f"{bad} of {frame.contacts.count} contacts have no finite {name}"
     if not np.isfinite(frame.unbalance):
-        return "the unbalance of its forces is not finite"
+        return "the force residual of its grains is not finite"
     unbalance = np.empty(0) if frame.grain_unbalance is None else frame.grain_unbalance
     known = unbalance[np.isfinite(unbalance)]
     if len(known) and known.mean() > GROSS_UNBALANCE:
-        return f"its forces balance nothing: grains are out of balance by {known.mean():.2g} mean forces on average"
+        return (
+            f"its forces are not in equilibrium: grains are out of balance by {known.mean():.2g} mean forces on average"
+        )
     return ""
 
 
@@ -83,10 +85,10 @@ def failed_frame(k: int, reason: str, grain_count: int, wall_count: int, *, with
 
 
 def forget_forces(state: SequenceState) -> SequenceState:
-    """The state after a frame that failed: that of the last one that was solved, its forces forgotten."""
+    """State after a failed frame: that of the last solved frame without its forces."""
     return replace(
         state.without_forces(), age_key=np.empty(0, np.int64), age=np.empty(0, np.int32), pressure=np.nan,
-        evidence=NOTHING_KNOWN, frames_since_reset=0, frames_since_event=0, reported=ForceMemory.empty(),
+        evidence=NO_EVIDENCE, frames_since_reset=0, frames_since_event=0, reported=ForceMemory.empty(),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""One frame as it is to be solved: where the bodies are, how they got there, and what is known of it from outside."""
+"""One frame to be solved: positions of the bodies, the motion that leads there, contacts and verdicts given."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.motion import FrameMotion, Snapshot
-from solver.bodies.packing import Packing
-from solver.bodies.walls import Walls
-from solver.contacts.verdicts import NO_VERDICTS, Verdicts
-from solver.detection.refinement import RefinedBlock
-from solver.mixture.positions import Positions
-from solver.sequence.settings import SequenceSettings
+from ..bodies.motion import FrameMotion, Snapshot
+from ..bodies.packing import Packing
+from ..bodies.walls import Walls
+from ..contacts.verdicts import NO_VERDICTS, Verdicts
+from ..detection.refinement import RefinedBlock
+from ..mixture.position_estimates import PositionEstimates
+from .settings import SequenceSettings
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceProblem:
-    """A whole sequence: what does not change from frame to frame."""
+    """A whole sequence: data that all frames share."""
 
     packing: Packing
     snapshots: Sequence[Snapshot]
     settings: SequenceSettings
     inferred: int = 0  # grains that no photograph shows
-    positions: Positions | None = None  # as a witness of their own; None: never asked
+    positions: PositionEstimates | None = None  # position-only estimates; None: not used
     known: int = 0  # grains that any frame shows
 
 

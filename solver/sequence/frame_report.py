@@ -1,4 +1,4 @@
-"""What is reported of a solved frame: contacts of stand-ins dropped, forbidden ones listed."""
+"""Report of a solved frame: contacts of bridged grains dropped, excluded contacts listed, trust and intervals added."""
 
 from __future__ import annotations
 
@@ -7,81 +7,95 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.quantity import columns
-from solver.bodies.strain import displacement_gradient, logarithmic_strain, shear_of
-from solver.contacts.contacts import Contacts, ContactSource, ContactState
-from solver.contacts.kinematics import relative_motion
-from solver.contacts.pairs import are_among, are_there, recall
-from solver.contacts.verdicts import sources
-from solver.nlgs.starts import measure_starts
-from solver.sequence.estimate import Estimate
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frame_problem import FrameProblem
-from solver.sequence.judging.doubts import lower_bound, tell_doubts
-from solver.sequence.judging.intervals import calibrate_deviations
-from solver.sequence.judging.judgement import (
-    Evidence,
-    Standing,
-    free_standard_deviation,
-    hidden_share,
-    tangential_standard_deviation,
-    unseen_doubt,
-)
-from solver.sequence.state import SequenceState
-from solver.statistics.balance import grain_unbalance
-from solver.statistics.bearing import bearing_probability
-from solver.statistics.force_statistics import mean_normal_force, mobilisation
-from solver.statistics.sliding import SlidingSigns, contact_state, sliding_probability
+from ..assessment.evidence import Evidence
+from ..assessment.force_intervals import calibrate_sd
+from ..assessment.formula_sd import normal_sd, tangential_sd
+from ..assessment.penalties import assess, describe_penalties
+from ..assessment.status import StatusDecision
+from ..assessment.trust import hidden_fraction, unseen_penalty
+from ..bodies.grains import Array
+from ..bodies.strain import displacement_gradient, logarithmic_strain, shear_strain
+from ..contacts.contacts import Contacts, ContactSource, ContactState
+from ..contacts.kinematics import relative_motion
+from ..contacts.pairs import are_among, are_present, match_values
+from ..contacts.verdicts import contact_sources
+from ..frame_forces import FrameForces
+from ..nlgs.start_residuals import measure_start_residuals
+from ..quantity import columns
+from ..statistics.balance import grain_unbalance
+from ..statistics.bearing import bearing_probability
+from ..statistics.force_statistics import mean_normal_force, mobilisation
+from ..statistics.sliding import SlidingEvidence, contact_state, sliding_probability
+from .estimate import Estimate
+from .frame_problem import FrameProblem
+from .state import SequenceState
 
 
 def report_frame(
-    problem: FrameProblem, estimate: Estimate, evidence: Evidence, standing: Standing, ages: NDArray[np.int32]
+    problem: FrameProblem, estimate: Estimate, evidence: Evidence, decision: StatusDecision, ages: NDArray[np.int32]
 ) -> tuple[FrameForces, Evidence]:
-    """Report an estimate that was judged; gives the evidence as completed by what the report hides.
+    """Report an estimate.
 
-    ages (c,) of the estimate's contacts.
+    Parameters
+    ----------
+    problem : FrameProblem
+    estimate : Estimate
+    evidence : Evidence
+    decision : StatusDecision
+    ages : ndarray, shape (c,)
+        Frames since every contact was last absent.
+
+    Returns
+    -------
+    FrameForces
+    Evidence
+        Completed by the contacts that the report hides.
     """
-    frame = _show_forbidden(problem, _describe(problem, estimate, evidence, standing, ages), estimate)
+    frame = _list_excluded(problem, _describe(problem, estimate, evidence, decision, ages), estimate)
     if problem.bridged.any():
         frame = _without_bridged(frame, problem.bridged)
-        evidence = replace(evidence, hidden_share=frame.hidden_share)
+        evidence = replace(evidence, hidden_fraction=frame.hidden_fraction)
     unbalance = grain_unbalance(
         frame.contacts, frame.fn, frame.ft, problem.packing.weight, problem.seen & problem.packing.grains.free
     )
-    told = replace(frame, trust=lower_bound(evidence), doubt=tell_doubts(evidence), grain_unbalance=unbalance)
+    assessed = assess(evidence)
+    reported = replace(
+        frame, trust=assessed.trust, expected_correlation=assessed.expected_correlation,
+        trust_penalties=describe_penalties(evidence), grain_unbalance=unbalance,
+    )  # fmt: skip
     first = problem.k == 0 and estimate.mixture is not None
-    if estimate.spread_fn is not None and (problem.motion.spans or first):  # of other fields no truth has told enough
-        told = calibrate_deviations(told)
-    return told, evidence
+    # Only these fields were calibrated on packings with known forces.
+    if estimate.fn_sd is not None and (problem.motion.ends_here or first):
+        reported = calibrate_sd(reported)
+    return reported, evidence
 
 
 def find_ages(contacts: Contacts, state: SequenceState) -> NDArray[np.int32]:
     """Frames since every contact was last absent (c,)."""
-    return recall(contacts.key, state.age_key, state.age, fill=-1) + np.int32(1)
+    return match_values(contacts.key, state.age_key, state.age, fill=-1) + np.int32(1)
 
 
-def _odds(problem: FrameProblem, estimate: Estimate) -> tuple[Array, Array]:
+def _contact_probabilities(problem: FrameProblem, estimate: Estimate) -> tuple[Array, Array]:
     """P(bears force) and P(slides, if it does) of the contacts (c,)."""
     contacts, fn, ft = estimate.contacts, estimate.fn, estimate.ft
-    people_saw = estimate.probability == 0.0  # detected is only what has more
-    bears = bearing_probability(fn, np.where(people_saw, 1.0, estimate.probability))
+    reviewed = estimate.probability == 0.0  # detected contacts have more
+    bears = bearing_probability(fn, np.where(reviewed, 1.0, estimate.probability))
     friction = problem.packing.material.friction_at(contacts.with_wall)
     return bears, sliding_probability(mobilisation(fn, ft, friction), _signs(problem, estimate, friction))
 
 
-def _signs(problem: FrameProblem, estimate: Estimate, friction: Array) -> SlidingSigns | None:
-    """What tells whether contacts slide; friction (c,)."""
-    if estimate.cone_share is None or estimate.seen_slip is None:
+def _signs(problem: FrameProblem, estimate: Estimate, friction: Array) -> SlidingEvidence | None:
+    """Signs of sliding of every contact; friction (c,)."""
+    if estimate.cone_fraction is None or estimate.seen_slip is None:
         return None
     fn, ft, mean = estimate.fn, estimate.ft, mean_normal_force(estimate.fn)
     weight = _heavier(estimate.contacts, problem.packing.weight)
     limit = float(friction @ np.maximum(fn, 0.0))
     borne = float(np.abs(ft).sum()) / limit if limit > 0 else 0.0
-    return SlidingSigns(
-        estimate.cone_share, -estimate.seen_slip.over_noise * np.sign(ft), estimate.seen_slip.over_scale,
+    return SlidingEvidence(
+        estimate.cone_fraction, -estimate.seen_slip.over_noise * np.sign(ft), estimate.seen_slip.over_scale,
         weight / mean if mean > 0 else np.zeros_like(fn),
-        0.0 if estimate.mixture is None else estimate.mixture.share, problem.settings.soft,
+        0.0 if estimate.mixture is None else estimate.mixture.position_weight, problem.settings.soft,
         borne if problem.k == 0 else None,
     )  # fmt: skip
 
@@ -93,16 +107,16 @@ def _heavier(contacts: Contacts, weight: Array) -> Array:
 
 
 def _describe(
-    problem: FrameProblem, estimate: Estimate, evidence: Evidence, standing: Standing, ages: NDArray[np.int32]
+    problem: FrameProblem, estimate: Estimate, evidence: Evidence, decision: StatusDecision, ages: NDArray[np.int32]
 ) -> FrameForces:
-    """All that the estimate says, its trust not yet drawn."""
+    """Report without trust and intervals."""
     material, contacts, step = problem.packing.material, estimate.contacts, estimate.step
     fn, ft = estimate.fn, estimate.ft
     un, ut = _measured_motion(problem, contacts, estimate)
-    starts = measure_starts(step)
-    bears, slides = _odds(problem, estimate)
+    starts = measure_start_residuals(step)
+    bears, slides = _contact_probabilities(problem, estimate)
     strain = _strain_since_start(problem)
-    reason = (estimate.remark, standing.reason, step.solution.stop.value)
+    reason = (estimate.remark, decision.reason, step.solution.stop.value)
     return FrameForces(
         frame=problem.k,
         contacts=contacts,
@@ -116,9 +130,9 @@ def _describe(
         age=ages,
         source=_sources(problem, estimate),
         probability=estimate.probability,
-        fn_sd=free_standard_deviation(fn, estimate.spread_fn),
-        ft_sd=tangential_standard_deviation(fn, material.friction, estimate.spread_ft),
-        status=standing.status,
+        fn_sd=normal_sd(fn, estimate.fn_sd),
+        ft_sd=tangential_sd(fn, material.friction, estimate.ft_sd),
+        status=decision.status,
         reason="; ".join(part for part in reason if part),
         sweeps=step.sweeps,
         natural_map=step.solution.natural_map,
@@ -133,25 +147,27 @@ def _describe(
         history=step.history,
         member_force=estimate.member_force,
         force_change=evidence.force_change,
+        agreement=evidence.agreement,
         strain=strain,
-        shear=shear_of(strain),
-        shear_step=evidence.shear if problem.motion.spans else 0.0,
+        shear=shear_strain(strain),
+        shear_step=evidence.shear if problem.motion.ends_here else 0.0,
         warm_residual=starts.warm,
         cold_residual=starts.cold,
-        sweeps_saved=starts.saved,
+        sweeps_saved=starts.sweeps_saved,
         bearing_probability=bears,
         sliding_probability=slides,
         overlap=estimate.overlap,
-        positions_share=0.0 if estimate.mixture is None else estimate.mixture.share,
+        friction=material.friction_at(contacts.with_wall),
+        position_weight=0.0 if estimate.mixture is None else estimate.mixture.position_weight,
         soft=int(problem.settings.soft),
-        unseen_doubt=unseen_doubt(evidence),
+        unseen_penalty=unseen_penalty(evidence),
     )
 
 
 def _sources(problem: FrameProblem, estimate: Estimate) -> NDArray[np.uint8]:
-    source = sources(estimate.contacts, estimate.probability, problem.verdicts)
-    demanded = are_among(estimate.contacts.key, estimate.demand.key) & (source == ContactSource.DETECTED)
-    source[demanded] = ContactSource.DEMANDED
+    source = contact_sources(estimate.contacts, estimate.probability, problem.verdicts)
+    missing = are_among(estimate.contacts.key, estimate.missing.key) & (source == ContactSource.DETECTED)
+    source[missing] = ContactSource.FROM_BALANCE
     return source
 
 
@@ -169,21 +185,21 @@ def _measured_motion(problem: FrameProblem, contacts: Contacts, estimate: Estima
 
 
 def _without_bridged(frame: FrameForces, bridged: NDArray[np.bool_]) -> FrameForces:
-    """Drop the contacts of grains (n,) that only stood in: they were not seen, so nothing is reported of them."""
+    """Drop the contacts of grains (n,) that were bridged: no photograph shows them."""
     contacts, history = frame.contacts, frame.history
-    keep = are_there(contacts.key, ~bridged, contacts.body_count)
+    keep = are_present(contacts.key, ~bridged, contacts.body_count)
     return replace(
         frame,
-        hidden_share=hidden_share(frame.fn, keep),
+        hidden_fraction=hidden_fraction(frame.fn, keep),
         contacts=contacts.select(keep),
         history=replace(history, fn=history.fn[:, keep], ft=history.ft[:, keep]),
-        reason=f"{bridged.sum()} lost grains were bridged, and nothing is shown of their contacts; {frame.reason}",
+        reason=f"{bridged.sum()} lost grains were bridged, and their contacts are left out; {frame.reason}",
         **{name: value[keep] for name, value in _columns(frame).items()},
     )
 
 
-def _show_forbidden(problem: FrameProblem, frame: FrameForces, estimate: Estimate) -> FrameForces:
-    """List contacts that were detected but forbidden, without force and marked as such."""
+def _list_excluded(problem: FrameProblem, frame: FrameForces, estimate: Estimate) -> FrameForces:
+    """List contacts that were detected but excluded by a reviewer, without force and marked as such."""
     forbidden, contacts, history = estimate.forbidden, frame.contacts, frame.history
     if forbidden.count == 0:
         return frame
@@ -193,6 +209,7 @@ def _show_forbidden(problem: FrameProblem, frame: FrameForces, estimate: Estimat
         "state": np.full(forbidden.count, ContactState.OPEN),
         "source": np.full(forbidden.count, ContactSource.FORBIDDEN_BY_REVIEWER),
         "probability": estimate.forbidden_probability, "un": un, "ut": ut,
+        "friction": problem.packing.material.friction_at(forbidden.with_wall),
         "bearing_probability": np.zeros(forbidden.count), "sliding_probability": np.zeros(forbidden.count),
     }  # fmt: skip
     listed = {
@@ -219,11 +236,11 @@ def _show_forbidden(problem: FrameProblem, frame: FrameForces, estimate: Estimat
 
 
 def _columns(frame: FrameForces) -> dict[str, NDArray]:
-    """What the frame says of every contact, by the name of the field."""
+    """Columns with a value for every contact, by the name of the field."""
     return {name: value for name in columns(FrameForces, "contact") if (value := getattr(frame, name)) is not None}
 
 
-def _rows_of(column: NDArray, count: int, told: NDArray | None) -> NDArray:
-    """Rows to add to a column: what is told, or zeros."""
-    rows = np.zeros((count, *column.shape[1:])) if told is None else told
+def _rows_of(column: NDArray, count: int, given: NDArray | None) -> NDArray:
+    """Rows to add to a column: the given ones, or zeros."""
+    rows = np.zeros((count, *column.shape[1:])) if given is None else given
     return np.asarray(rows, column.dtype)

@@ -1,6 +1,6 @@
-"""Frames in order: each is solved from what the one before it left behind, and judged.
+"""Sequence of frames: each is solved from the state of the previous one.
 
-Whatever goes wrong in one frame, the frames around it are solved: it is reported as failed.
+A frame that cannot be solved is reported as failed; the frames around it are solved.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver.bodies.bridging import bridge_frames
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Packing
-from solver.contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
-from solver.detection.precision import believed_precision, describe_contradiction, measure_precision, with_precision
-from solver.detection.refinement import BLOCK, RefinedBlock, block_of, refine
-from solver.detection.touch_probability import AHEAD
-from solver.mixture.positions import Positions
-from solver.posterior.frame_posterior import FramePosterior
-from solver.sequence.failure import describe_error, failed_frame, find_fault, find_unseen, forget_forces
-from solver.sequence.frame import pose_frame, solve_frame
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frame_problem import SequenceProblem
-from solver.sequence.settings import SequenceSettings
-from solver.sequence.state import SequenceState
-from solver.together import one_ahead
+from ..bodies.interpolation import interpolate_ignored_frames
+from ..bodies.motion import Snapshot
+from ..bodies.packing import Packing
+from ..contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
+from ..detection.precision import corrected_precision, describe_contradiction, measure_precision, scale_precision
+from ..detection.refinement import BLOCK, RefinedBlock, block_of, refine
+from ..detection.touch_probability import AHEAD
+from ..frame_forces import FrameForces
+from ..mixture.position_estimates import PositionEstimates
+from ..parallel import prefetch
+from ..posterior.frame_posterior import FramePosterior
+from .failure import describe_error, failed_frame, find_fault, find_unseen, forget_forces
+from .frame import pose_frame, solve_frame
+from .frame_problem import SequenceProblem
+from .settings import SequenceSettings
+from .state import SequenceState
 
 
 def solve_sequence(
@@ -41,15 +41,41 @@ def solve_sequence(
     observer: Callable[[int, Exception], None] | None = None,
     ahead: bool = False,
 ) -> Iterator[tuple[FrameForces, SequenceState]]:
-    """Solve the frames first, first + 1, … one after the other; yields each frame with the state after it.
+    """Solve the frames first, first + 1, … one after the other.
 
-    The motion that leads to a frame is that since the last frame that was solved. Nothing leads to frame 0: it takes
-    the motion that follows it. After it a single chain starts afresh, the ensemble from what its convex members read
-    of frame 0.
-    verdicts: what people said of frames, by frame. failed: frames that are not to be solved, and why; others that
-    show nothing, or cannot be solved, join them. observer: hears what a frame could not be solved for. ahead: all
-    frames will be asked for, so that what the next ones share is prepared meanwhile.
-    Raises ValueError where times do not ascend.
+    The motion that leads to a frame is that since the last solved frame. No motion leads to frame 0: it is solved with
+    the motion that follows it. After it a single chain starts from zero; the ensemble continues from the convex
+    members' forces.
+
+    Parameters
+    ----------
+    packing : Packing
+    snapshots : sequence of Snapshot
+        Of all frames, with ascending times.
+    settings : SequenceSettings
+    state : SequenceState, optional
+        After the frame before `first`; None: nothing is solved yet.
+    first : int
+        Frame to begin with.
+    verdicts : mapping of int to Verdicts, optional
+        Of reviewers, by frame.
+    failed : mapping of int to str, optional
+        Frames that are not to be solved, with the reason; unusable ones are added.
+    observer : callable, optional
+        Called with frame and exception where a frame cannot be solved.
+    ahead : bool
+        Whether all frames will be requested, so that the next block can be prepared concurrently.
+
+    Yields
+    ------
+    FrameForces
+    SequenceState
+        After the frame.
+
+    Raises
+    ------
+    ValueError
+        Times do not ascend.
     """
     verdicts = {} if verdicts is None else verdicts
     ready = _prepare(packing, snapshots, settings, verdicts, failed)
@@ -63,7 +89,7 @@ def solve_sequence(
                 problem = pose_frame(ready.sequence, k, state, blocks.find(k), verdicts.get(k, NO_VERDICTS))
                 frame, following = solve_frame(problem, state)
                 reason = find_fault(frame)
-            except MemoryError:  # not the frame's fault
+            except MemoryError:  # no fault of the frame
                 raise
             except Exception as error:
                 reason = f"it could not be solved ({describe_error(error)})"
@@ -79,7 +105,7 @@ def solve_sequence(
         yield frame, state
 
 
-def solve_first_again(
+def solve_first_frame(
     packing: Packing,
     snapshots: Sequence[Snapshot],
     settings: SequenceSettings,
@@ -89,22 +115,22 @@ def solve_first_again(
     verdicts: Mapping[int, Verdicts] | None = None,
     failed: Mapping[int, str] | None = None,
 ) -> tuple[FrameForces, SequenceState]:
-    """Solve frame 0 once more, with what is told of it now that the frames after it are known; why: its reason says.
+    """Solve frame 0 with a given posterior in place of its position-only estimate; why: becomes part of its reason.
 
-    Arguments as of `solve_sequence`. Raises what a frame raises that cannot be solved.
+    Parameters as of `solve_sequence`. Raises whatever makes the frame unsolvable.
     """
     verdicts = {} if verdicts is None else verdicts
     ready = _prepare(packing, snapshots, settings, verdicts, failed, {0: positions})
     refined = _Blocks(ready.sequence).find_first()
     problem = pose_frame(ready.sequence, 0, SequenceState.first(packing), refined, verdicts.get(0, NO_VERDICTS))
     frame, state = solve_frame(problem, SequenceState.first(packing))
-    told = [ready.remark, why, frame.reason]
-    return replace(frame, reason="; ".join(each for each in told if each)), state
+    reasons = [ready.remark, why, frame.reason]
+    return replace(frame, reason="; ".join(each for each in reasons if each)), state
 
 
 @dataclass(frozen=True, slots=True)
 class _Ready:
-    """A sequence that is ready to be solved."""
+    """A sequence ready to be solved."""
 
     sequence: SequenceProblem
     failed: Mapping[int, str]
@@ -117,32 +143,29 @@ def _prepare(
     settings: SequenceSettings,
     verdicts: Mapping[int, Verdicts],
     failed: Mapping[int, str] | None,
-    told: Mapping[int, FramePosterior] | None = None,
+    posteriors: Mapping[int, FramePosterior] | None = None,
 ) -> _Ready:
-    """Bridge what cannot be believed, measure the precision; told: what the positions of some frames say already."""
+    """Interpolate unusable frames and measure the precision; posteriors: given instead of position-only estimates."""
     _check_times(snapshots)
     failed = find_unseen(snapshots) | dict(failed or {})
     settings, remark = settings.for_radii(packing.grains.radius), ""
     known = int(np.any([each.present for each in snapshots], axis=0).sum()) if snapshots else 0
-    unbelieved = find_ignored(verdicts) | failed.keys()
-    if unbelieved.issuperset(range(len(snapshots))):
-        failed = dict.fromkeys(range(len(snapshots)), "no frame is believed that it could be solved beside") | failed
+    excluded = find_ignored(verdicts) | failed.keys()
+    if excluded.issuperset(range(len(snapshots))):
+        failed = dict.fromkeys(range(len(snapshots)), "no frame is usable beside it") | failed
     else:
-        snapshots = bridge_frames(snapshots, unbelieved)
+        snapshots = interpolate_ignored_frames(snapshots, excluded)
         snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
-    asked = settings.asks_positions and len(snapshots) > 1
     positions = None
-    if asked:
-        positions = Positions(
-            packing, snapshots, settings.posterior, settings.workers, told, first_again=settings.first_again
-        )
+    if settings.uses_positions and len(snapshots) > 1:
+        positions = PositionEstimates(packing, snapshots, settings.posterior, settings.workers, posteriors)
     return _Ready(SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known), failed, remark)
 
 
 def _check_times(snapshots: Sequence[Snapshot]) -> None:
     for before, after in pairwise(snapshots):
         if not after.time > before.time:
-            raise ValueError(f"the time of a frame ({after.time} s) is not after that of the frame before it")
+            raise ValueError(f"the time of a frame ({after.time} s) is not after that of the previous frame")
 
 
 class _Blocks:
@@ -163,7 +186,7 @@ class _Blocks:
         number, _, _ = block_of(k, len(snapshots))
         if number != self._number:
             if self._number is None or number != self._number + 1:
-                self._coming = one_ahead(self._refine_from(k), self._workers)
+                self._coming = prefetch(self._refine_from(k), self._workers)
             self._number = None  # until it is there: where it cannot be made, the next frame tries again
             self._block, self._number = next(self._coming), number
         return self._block
@@ -176,7 +199,7 @@ class _Blocks:
             yield self._refine(start, end)
 
     def find_first(self) -> RefinedBlock | None:
-        """What frame 0 alone is solved from: the window after it, for the rest of its block tells it nothing more."""
+        """Refine the window that frame 0 depends on."""
         if self._sequence.settings.estimator != "ensemble" or len(self._sequence.snapshots) < 2:
             return None
         return self._refine(0, AHEAD + 1)
@@ -189,18 +212,18 @@ class _Blocks:
 def _with_measured_precision(
     packing: Packing, snapshots: Sequence[Snapshot], settings: SequenceSettings
 ) -> tuple[Sequence[Snapshot], SequenceSettings, str]:
-    """Put what the gaps say of the precision in the place of what is stated, and say so."""
+    """Replace the stated precision by the measured one where they contradict; returns a remark."""
     found = measure_precision(packing.grains, snapshots) if settings.measure_precision else None
     if found is None:
         return snapshots, settings, ""
     assert settings.overlap is not None
-    factor, overlap = believed_precision(found, [each.sigma for each in snapshots], settings.overlap)
-    if settings.estimator == "nlgs":  # its threshold is all that it has against errors that stay
+    factor, overlap = corrected_precision(found, [each.sigma for each in snapshots], settings.overlap)
+    if settings.estimator == "nlgs":  # its only protection from constant errors is the threshold
         factor = max(factor, 1.0)
     remark = ""
     if factor != 1.0:
         remark = describe_contradiction(found, factor)
-        snapshots = with_precision(snapshots, factor)
+        snapshots = scale_precision(snapshots, factor)
     if settings.measure_overlap:
         ensemble = settings.ensemble
         probability = replace(ensemble.probability, overlap=overlap)

@@ -1,22 +1,23 @@
-"""How a sequence is solved: the defaults live here."""
+"""Settings of a sequence, with their defaults."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from solver.bodies.grains import Array
-from solver.convex.program import ConvexSettings
-from solver.detection.touch_probability import ContactProbabilitySettings
-from solver.mixture.softness import SEEN_AT_MOST
-from solver.nlgs.chain import ChainSettings
-from solver.posterior.settings import PosteriorSettings
-
-SURFACE = 3e-4  # typical overlap or roughness of touching surfaces in mean diameters
+from ..assessment.mixture_trust import MAX_TRUST_MEASURED
+from ..bodies.grains import Array
+from ..contacts.surface import typical_overlap
+from ..convex.program import ConvexSettings
+from ..detection.touch_probability import ContactProbabilitySettings
+from ..nlgs.chain import ChainSettings
+from ..posterior.posterior_settings import PosteriorSettings
 
 
 @dataclass(frozen=True, slots=True)
 class EnsembleSettings:
+    """Settings of the ensemble's members."""
+
     stiffer: float = 2.0  # kinematic number of the second chain over that of the first
     convex: ConvexSettings = field(default_factory=ConvexSettings)
     probability: ContactProbabilitySettings = field(default_factory=ContactProbabilitySettings)
@@ -24,45 +25,39 @@ class EnsembleSettings:
 
 @dataclass(frozen=True, slots=True)
 class SequenceSettings:
+    """Settings of `solve_sequence`."""
+
     estimator: Literal["ensemble", "nlgs"] = "ensemble"
     chain: ChainSettings = field(default_factory=ChainSettings)  # nlgs: the estimator; ensemble: its first member
     ensemble: EnsembleSettings = field(default_factory=EnsembleSettings)
-    positions: Literal["needed", "always", "never"] = "needed"  # ensemble: ask positions alone where motion says little
+    positions: Literal["needed", "always", "never"] = "needed"  # ensemble: when the position-only estimate is used
     posterior: PosteriorSettings = field(default_factory=PosteriorSettings)
-    first_again: bool = False  # positions of the first frame are asked again when all are known: beforehand, briefly
-    soft: bool = False  # grains overlap by more than noise and errors: positions are asked of every frame
-    overlap_seen: float = 0.0  # [m] mean overlap of soft grains by their gaps; 0: these do not show it
-    soft_trust: float = SEEN_AT_MOST  # the most that their overlaps are believed
+    soft: bool = False  # grains overlap by more than noise and errors: every frame uses positions
+    measured_overlap: float = 0.0  # [m] mean overlap of soft grains by their gaps; 0: not visible
+    soft_trust: float = MAX_TRUST_MEASURED  # largest trust in forces from their overlaps
     keep_members: bool = False  # ensemble: keep the field of every member
     measure_precision: bool = True  # from the gaps, where they contradict what is stated
-    measure_overlap: bool = True  # likewise
+    measure_overlap: bool = True  # from the gaps, where they contradict a given one
     overlap: float | None = None  # [m] typical overlap or roughness of touching surfaces; None: `typical_overlap`
     threshold_sigmas: float = 6.0  # nlgs: gap threshold in standard deviations of a position, overlap included
     threshold: float | None = None  # [m], instead of threshold_sigmas
-    workers: int | None = None  # threads that members of a frame share; None: one for every core. No bit depends on it
+    # Threads for the members of a frame; None: one for every core. Results do not depend on it.
+    workers: int | None = None
     reset_to_zero: bool = False  # the paper's reset at a rearrangement
-    reset_frames: frozenset[int] = frozenset()  # frames that start from zero forces whatever is found
+    reset_frames: frozenset[int] = frozenset()  # frames that always start from zero forces
     kept_frames: frozenset[int] = frozenset()  # frames that never do
 
     @property
-    def asks_positions(self) -> bool:
-        """Whether positions alone may be asked of forces and radii."""
+    def uses_positions(self) -> bool:
+        """Whether the position-only estimate may be used for forces and radii."""
         return self.estimator == "ensemble" and self.positions != "never"
 
     def without_sweeps(self) -> SequenceSettings:
-        """The same where only the final forces are wanted: no sweep keeps its own."""
+        """The same without the forces of single sweeps."""
         return replace(self, chain=replace(self.chain, keep="none"))
 
     def for_radii(self, radius: Array) -> SequenceSettings:
-        """The same for grains of these radii (n,) [m], their overlap told to all that ask for it."""
+        """The same with the typical overlap for grains of these radii (n,) [m]."""
         overlap = typical_overlap(radius) if self.overlap is None else self.overlap
         probability = replace(self.ensemble.probability, overlap=overlap)
         return replace(self, overlap=overlap, ensemble=replace(self.ensemble, probability=probability))
-
-
-def typical_overlap(radius: Array) -> float:
-    """How far touching surfaces overlap or stand apart by elasticity and roughness [m]; radius (n,) [m].
-
-    A missed contact costs far more than a false one, so it is rather too large than too small.
-    """
-    return SURFACE * 2.0 * float(radius.mean())

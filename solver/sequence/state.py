@@ -1,4 +1,4 @@
-"""What one frame hands to the next: with it a sequence goes on where it stopped, bit for bit."""
+"""State between frames: with it a sequence continues where it stopped, bit for bit."""
 
 from __future__ import annotations
 
@@ -7,19 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.motion import LastSeen
-from solver.bodies.packing import Packing
-from solver.contacts.pairs import Keys
-from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.ensemble import EnsembleState
-from solver.sequence.judging.judgement import Evidence
+from ..assessment.evidence import Evidence
+from ..bodies.grains import Array
+from ..bodies.motion import LastSeen
+from ..bodies.packing import Packing
+from ..contacts.pairs import Keys
+from ..nlgs.force_memory import ForceMemory
+from .ensemble import EnsembleState
 
-NOTHING_KNOWN = Evidence(True, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0)
+NO_EVIDENCE = Evidence(True, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceState:
+    """State after a frame."""
+
     members: EnsembleState
     age_key: Keys  # (m,) contacts of the last frame, ascending
     age: NDArray[np.int32]  # (m,) frames
@@ -28,10 +30,10 @@ class SequenceState:
     endpoints: Array  # (w, 2, 2) [m] of the last frame
     pressure: float  # [Pa] mean stress of the last frame, NaN: none
     sound_pressure: float  # [Pa] of the last frame that was not suspect
-    evidence: Evidence  # what the last frame was judged by
+    evidence: Evidence  # of the last frame
     frames_since_reset: int
     frames_since_event: int
-    reported: ForceMemory  # the last frame's forces, as they were reported
+    reported: ForceMemory  # forces reported of the last frame
     cell: Array | None = None  # (2, 2) [m] of the last frame
 
     @classmethod
@@ -39,9 +41,9 @@ class SequenceState:
         walls = len(packing.pressure)
         return cls(
             EnsembleState.first(), np.empty(0, np.int64), np.empty(0, np.int32), LastSeen.never(packing.grains.count),
-            np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NOTHING_KNOWN, 0, 0, ForceMemory.empty(),
+            np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NO_EVIDENCE, 0, 0, ForceMemory.empty(),
         )  # fmt: skip
 
     def without_forces(self) -> SequenceState:
-        """The same history of the motion, but no former forces to start from."""
+        """The same history of the motion without previous forces to start from."""
         return replace(self, members=EnsembleState.first())

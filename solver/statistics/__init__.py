@@ -1,1 +1,1 @@
-"""What forces say, whoever found them. Stands on contacts."""
+"""Statistics of given contact forces; depends on contacts."""

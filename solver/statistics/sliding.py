@@ -1,11 +1,11 @@
-"""Which of the contacts that bear force slide: probabilities, so that counts are not biased.
+"""Probability that a contact that bears force slides, for unbiased counts.
 
-A reported field is a mean of several, which takes forces that are on the Coulomb cone a little off it: counting what
-is on the cone counts hardly any that slide. What the photographs show of the sliding itself tells more than the
-forces that were made of it, above all where grains are soft, for overlaps know nothing of friction. Weight tells,
-too: a heap that comes to rest takes its contacts off the cone by which they slid a moment before. All probabilities
-are logistic functions fitted on discrete-element truths (`rodsight study numbers` prints how statistics weighted with
-them do on others).
+The reported forces are a mean over several ensemble members, which moves forces from the Coulomb cone to its inside:
+counting forces on the cone finds hardly any sliding contact. The measured sliding displacement is stronger evidence
+than the forces, above all for soft grains, whose overlaps do not depend on friction. The weight matters, too: in a
+heap that comes to rest, contacts that slid a moment before leave the cone. All probabilities are logistic functions
+fitted on discrete-element simulations (`rodsight study numbers` compares statistics weighted with them on other
+simulations).
 """
 
 from __future__ import annotations
@@ -15,87 +15,121 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import ContactState
-from solver.statistics.bearing import logistic
+from ..bodies.grains import Array
+from ..contacts.contacts import ContactState
+from .bearing import logistic
 
-# Log odds: constant, (|f_t| / μ f_n)², share of the convex members on the cone, of the chains on it; sliding seen
-# against f_t, and seen by much; sliding far; weight; share of the positions of soft grains, and of hard ones. Fitted on
-# seeds 4 to 6 of fifteen worlds of 300 rods, the share that slides held in each.
+# Coefficients of the log odds: constant, (|f_t| / μ f_n)², fraction of the convex members on the cone, of the chains on
+# it; measured sliding against f_t, with scales SLIDING_SD and LARGE_SLIDING_SD; sliding with scale SLIDING_SCALE;
+# weight; weight of the position-only estimate for soft and for hard grains. Fitted on seeds 4 to 6 of fifteen test
+# cases of 300 rods at their true fractions of sliding contacts.
 SLIDING = (-4.35, 1.03, 1.99, 1.09, 1.92, -1.72, 1.40, -3.01, 0.91, 0.51)
-SEEN = 4.0  # standard deviations of a sliding at which it counts half
-MUCH = 12.0  # the same of what may be over: a leap within the interval, where photographs are far apart
-FAR = 1.0  # of what neighbours move by: the same of its size
-HEAVY = 0.1  # of the mean force: the same of weight
+SLIDING_SD = 4.0  # [σ] sliding at which its term is one half
+LARGE_SLIDING_SD = 12.0  # [σ] the same for large sliding, as by a jump between distant photographs
+SLIDING_SCALE = 1.0  # of the displacement scale: sliding at which its term is one half
+WEIGHT_SCALE = 0.1  # of the mean force: weight at which its term is one half
 SLIDING_AT_FIRST = (-6.10, 2.29, 9.60)  # constant, (|f_t| / μ f_n)², Σ|f_t| / Σ μ f_n; weight as above
 SLIDING_WITHOUT_MEMBERS = (-3.84, 1.68, 2.34)  # constant, (|f_t| / μ f_n)², (|f_t| / μ f_n)⁸
-TOLD_WRONG = 1.0  # power of the friction told over the true one in the odds of what was found with it
-LEAST_DOUBT = 1e-9
+FRICTION_POWER = 1.0  # power of given over true friction in the odds
+LEAST_COMPLEMENT = 1e-9  # lower bound of 1 − P(slides)
 EVEN = 0.5  # P(slides) above which a contact counts as sliding
-ON_THE_CONE = 0.995  # of μ f_n: a member's force is there
+ON_CONE = 0.995  # |f_t| / (μ f_n) above which the force of a member is on the Coulomb cone
 
 
 @dataclass(frozen=True, slots=True)
-class SlidingSigns:
-    """What tells of contacts (c,) whether they slide, beside the reported force."""
+class SlidingEvidence:
+    """Evidence of sliding at contacts (c,), in addition to the reported force."""
 
-    cone_share: Array  # (c, 2) of the convex members and of the chains whose force is on the Coulomb cone
-    slip: Array  # (c,) measured sliding over its standard deviation, positive against f_t; 0 where it is unknown
-    reach: Array  # (c,) measured sliding over what neighbours move by
+    cone_fraction: Array  # (c, 2) fractions of convex members and of chains whose force is on the Coulomb cone
+    slip: Array  # (c,) measured sliding over its standard deviation, positive against f_t; 0 where unknown
+    relative_slip: Array  # (c,) measured sliding over the displacement scale
     weight: Array  # (c,) of the heavier grain, over the mean f_n
-    positions_share: float  # of the positions in the reported field
-    soft: bool  # whether positions told forces by overlaps
-    borne: float | None = None  # Σ|f_t| / Σ μ f_n of a frame that no motion leads to; None: one does
+    position_weight: float  # of the position-only estimate in the reported field
+    soft: bool  # whether forces were derived from overlaps
+    mobilised_friction: float | None = None  # Σ|f_t| / Σ μ f_n of a frame without motion before it; otherwise None
 
 
-def sliding_probability(mobilised: Array, signs: SlidingSigns | None) -> Array:
-    """P(slides) of contacts (c,) that bear force, from |f_t| / (μ f_n) of the reported field.
+def sliding_probability(mobilised: Array, evidence: SlidingEvidence | None) -> Array:
+    """Return P(slides) of contacts that bear force.
 
-    signs: None where there are no members. In a frame that no motion leads to, what slides afterwards need not slide
-    yet: it is the friction of the whole field that tells a packing that was sheared before from one that is fresh.
+    Parameters
+    ----------
+    mobilised : (c,)
+        |f_t| / (μ f_n) of the reported forces.
+    evidence
+        Further evidence; None without ensemble members.
+
+    Returns
+    -------
+    (c,)
+        Probability.
+
+    Notes
+    -----
+    A logistic function of the terms of SLIDING. In a frame without motion before it, the sliding afterwards is no
+    evidence: the mobilised friction of the whole field distinguishes a sheared packing from a fresh one.
     """
     used = np.minimum(mobilised, 1.0)
-    if signs is None:
+    if evidence is None:
         constant, square, eighth = SLIDING_WITHOUT_MEMBERS
         return logistic(constant + square * used**2 + eighth * used**8)
-    heavy = SLIDING[7] * signs.weight / (signs.weight + HEAVY)
-    if signs.borne is not None:
-        constant, square, borne = SLIDING_AT_FIRST
-        return logistic(constant + square * used**2 + borne * signs.borne + heavy)
-    constant, square, convex, chains, against, much, far, _, of_soft, of_hard = SLIDING
-    slip = np.maximum(signs.slip, 0.0)
-    odds = constant + square * used**2 + convex * signs.cone_share[:, 0] + chains * signs.cone_share[:, 1]
-    odds += against * _saturating(slip, SEEN) + much * _saturating(slip, MUCH) + far * _saturating(signs.reach, FAR)
-    return logistic(odds + heavy + (of_soft if signs.soft else of_hard) * signs.positions_share)
+    weight = SLIDING[7] * evidence.weight / (evidence.weight + WEIGHT_SCALE)
+    if evidence.mobilised_friction is not None:
+        constant, square, mean = SLIDING_AT_FIRST
+        return logistic(constant + square * used**2 + mean * evidence.mobilised_friction + weight)
+    constant, square, convex, chains, slides, slides_far, relative, _, of_soft, of_hard = SLIDING
+    slip = np.maximum(evidence.slip, 0.0)
+    odds = constant + square * used**2 + convex * evidence.cone_fraction[:, 0] + chains * evidence.cone_fraction[:, 1]
+    odds += (
+        slides * _saturating(slip, SLIDING_SD)
+        + slides_far * _saturating(slip, LARGE_SLIDING_SD)
+        + relative * _saturating(evidence.relative_slip, SLIDING_SCALE)
+    )
+    return logistic(odds + weight + (of_soft if evidence.soft else of_hard) * evidence.position_weight)
 
 
-def slides_at(slides: Array, told: float, friction: float, share: float = 1.0) -> Array:
-    """P(slides) (c,) where forces were found with a friction that was told, but another one holds.
+def sliding_probability_at(sliding: Array, given: float, friction: float, motion_weight: float = 1.0) -> Array:
+    """Return P(slides) for another friction than the one that the forces were computed with.
 
-    share: of the motion in the reported field, for it alone needs a friction.
+    Parameters
+    ----------
+    sliding : (c,)
+        P(slides) with the given friction.
+    given
+        Friction that the forces were computed with.
+    friction
+        True friction.
+    motion_weight
+        Weight w of the motion estimate in the reported field; the position-only estimate does not depend on friction.
+
+    Notes
+    -----
+    p' / (1 − p') = p / (1 − p) · (μ_given / μ)^w.
     """
-    odds = slides / np.maximum(1.0 - slides, LEAST_DOUBT) * (told / friction) ** (TOLD_WRONG * share)
+    odds = (
+        sliding / np.maximum(1.0 - sliding, LEAST_COMPLEMENT) * (given / friction) ** (FRICTION_POWER * motion_weight)
+    )
     return odds / (1.0 + odds)
 
 
-def contact_state(fn: Array, slides: Array) -> NDArray[np.uint8]:
-    """ContactState of forces fn (c,) [N] that slide with a probability (c,)."""
-    state = np.where(slides > EVEN, ContactState.SLIDING, ContactState.STICKING).astype(np.uint8)
+def contact_state(fn: Array, sliding: Array) -> NDArray[np.uint8]:
+    """Return the ContactState of contacts with forces fn (c,) [N] and P(slides) (c,)."""
+    state = np.where(sliding > EVEN, ContactState.SLIDING, ContactState.STICKING).astype(np.uint8)
     state[fn <= 0] = ContactState.OPEN
     return state
 
 
-def cone_share(fn: Array, ft: Array, friction: Array, convex: NDArray[np.bool_]) -> Array:
-    """Shares of the convex members and of the others whose force is on the Coulomb cone (c, 2).
+def cone_fraction(fn: Array, ft: Array, friction: Array, convex: NDArray[np.bool_]) -> Array:
+    """Return the fractions of the convex members and of the others whose force is on the Coulomb cone (c, 2).
 
-    fn, ft (m, c) [N] of the members; friction (c,); convex (m,). A kind without members has share 0.
+    fn, ft (m, c) [N] of the members; friction (c,); convex (m,). A kind without members has fraction 0.
     """
     bearing = fn > 0
-    on = bearing & (np.abs(ft) >= ON_THE_CONE * friction * fn)
+    on = bearing & (np.abs(ft) >= ON_CONE * friction * fn)
     kinds = [on[convex], on[~convex]]
     return np.column_stack([each.mean(axis=0) if len(each) else np.zeros(fn.shape[1]) for each in kinds])
 
 
 def _saturating(value: Array, half: float) -> Array:
-    """From 0 to 1, a half at `half`."""
+    """Return x² / (x² + half²), from 0 to 1."""
     return value**2 / (value**2 + half**2)

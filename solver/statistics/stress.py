@@ -1,29 +1,34 @@
-"""Stress from contact forces (Love-Weber), its principal values, and the two friction angles."""
+"""Stress from contact forces (Love–Weber), its principal values, and the two friction angles."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import IN, OUT
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
+from ..bodies.grains import Array
+from ..bodies.wall_shapes import IN, OUT
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
 
-CORNERS = 2048  # of the polygon that stands for a circle
+CORNERS = 2048  # of the polygon that approximates a circle
 
 
 def polygon_area(corners: Array) -> float:
-    """Area of a polygon (m, 2) [m], counter-clockwise positive [m²]."""
+    """Return the area of a polygon (m, 2) [m], counter-clockwise positive [m²]."""
     x, y = corners[:, 0], corners[:, 1]
     return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def packing_area(walls: Walls, fallback: Array) -> float:
-    """Area between the walls [m²]: the polygon their lines bound, in the order of their directions, or of the cell.
+    """Return the area of the packing [m²].
 
-    A circle around the packing is cut by these lines; one within it is taken off. fallback (n, 2) [m]: points whose
-    convex hull counts where the walls do not close anything.
+    Parameters
+    ----------
+    walls
+        The area is that of the cell, or of the polygon bounded by the lines of the straight walls, in the order of
+        their directions. A circle around the packing is cut by these lines; the area of inner circles is subtracted.
+    fallback : (n, 2)
+        Points [m] whose convex hull is used where the walls do not enclose an area.
     """
     if walls.cell is not None:
         return walls.cell.area
@@ -36,10 +41,10 @@ def packing_area(walls: Walls, fallback: Array) -> float:
 
 
 def _area_in_circle(walls: Walls, circle: int) -> float:
-    """Area [m²] of a circle on the packing's side of all straight walls: of a polygon that has the circle's area."""
-    turn = 2.0 * np.pi / CORNERS
-    radius = 0.5 * walls.length[circle] * np.sqrt(turn / np.sin(turn))
-    angle = turn * np.arange(CORNERS)
+    """Return the area [m²] of a circle cut by all straight walls; the circle is a polygon of equal area."""
+    step = 2.0 * np.pi / CORNERS
+    radius = 0.5 * walls.length[circle] * np.sqrt(step / np.sin(step))
+    angle = step * np.arange(CORNERS)
     corners = walls.centre[circle] + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     for w in np.flatnonzero(~walls.curved):
         inside = (walls.endpoints[w, 0] - corners) @ walls.outward[w]
@@ -76,12 +81,12 @@ def _area_between_lines(walls: Walls, straight: NDArray[np.intp], fallback: Arra
 
 
 def contact_force_vectors(contacts: Contacts, fn: Array, ft: Array) -> Array:
-    """Force that i exerts on j (c, 2) [N]."""
+    """Return the force that i exerts on j (c, 2) [N]."""
     return fn[:, None] * contacts.normal + ft[:, None] * contacts.tangent
 
 
 def branch_vectors(contacts: Contacts, position: Array) -> Array:
-    """From the centre of i to the centre of j, or to the contact point on a wall (c, 2) [m]."""
+    """Return the vector from the centre of i to the centre of j, or to the contact point on a wall (c, 2) [m]."""
     end = contacts.point.copy()
     pair = ~contacts.with_wall
     end[pair] = contacts.second_centre(position)[pair]
@@ -89,18 +94,46 @@ def branch_vectors(contacts: Contacts, position: Array) -> Array:
 
 
 def love_weber_stress(contacts: Contacts, fn: Array, ft: Array, position: Array, area: float, length: float) -> Array:
-    """σ = Σ f ⊗ ℓ / (A L) (2, 2) [Pa], compression positive.
+    """Compute the Love–Weber stress of the packing (2, 2) [Pa], compression positive.
 
-    position (n, 2) [m]; area of the packing [m²]; length of the rods [m].
+    Parameters
+    ----------
+    contacts
+        Contacts of the frame, c in number.
+    fn, ft : (c,)
+        Forces that i exerts on j [N].
+    position : (n, 2)
+        Centres [m].
+    area
+        Area A of the packing [m²].
+    length
+        Length L of the rods [m].
+
+    Notes
+    -----
+    σ = Σ f ⊗ ℓ / (A L) with branch vectors ℓ.
     """
     force, branch = contact_force_vectors(contacts, fn, ft), branch_vectors(contacts, position)
     return np.einsum("ca,cb->ab", force, branch) / (area * length)
 
 
 def grain_stresses(contacts: Contacts, fn: Array, ft: Array, radius: Array, length: float) -> Array:
-    """σ = Σ f ⊗ R n / V of every grain (n, 2, 2) [Pa] over its own volume, compression positive.
+    """Compute the stress of every grain over its own volume (n, 2, 2) [Pa], compression positive.
 
-    radius (n,) and length [m] of the rods. Weighted with their volumes they add up to the stress of the packing.
+    Parameters
+    ----------
+    contacts
+        Contacts of the frame, c in number.
+    fn, ft : (c,)
+        Forces that i exerts on j [N].
+    radius : (n,)
+        Radii R [m].
+    length
+        Length of the rods [m].
+
+    Notes
+    -----
+    σ = Σ f ⊗ R n / V. The sum weighted with the volumes V is the stress of the packing.
     """
     dyad = contact_force_vectors(contacts, fn, ft)[:, :, None] * contacts.normal[:, None, :]
     total = np.zeros((len(radius), 2, 2))
@@ -111,7 +144,7 @@ def grain_stresses(contacts: Contacts, fn: Array, ft: Array, radius: Array, leng
 
 
 def principal_stresses(stress: Array) -> tuple[float, float, float]:
-    """σ₁ ≥ σ₂ [Pa] and the direction of σ₁ [rad] in (−π/2, π/2], of the symmetric part."""
+    """Return σ₁ ≥ σ₂ [Pa] and the direction of σ₁ [rad] in (−π/2, π/2], of the symmetric part."""
     symmetric = 0.5 * (stress + stress.T)
     values, vectors = np.linalg.eigh(symmetric)
     x, y = vectors[:, 1]
@@ -124,13 +157,13 @@ def principal_stresses(stress: Array) -> tuple[float, float, float]:
 
 
 def friction_angle(stress: Array) -> float:
-    """Macroscopic friction angle asin((σ₁ − σ₂) / (σ₁ + σ₂)) [rad]; 0 without stress."""
+    """Return the macroscopic friction angle asin((σ₁ − σ₂) / (σ₁ + σ₂)) [rad]; 0 without stress."""
     major, minor, _ = principal_stresses(stress)
     return float(np.arcsin(np.clip((major - minor) / (major + minor), -1.0, 1.0))) if major + minor > 0 else 0.0
 
 
 def wall_forces(contacts: Contacts, fn: Array, ft: Array) -> Array:
-    """Force that the packing exerts on every wall (w, 2) [N]."""
+    """Return the force that the packing exerts on every wall (w, 2) [N]."""
     on_wall = contacts.with_wall
     total = np.zeros((contacts.wall_count, 2))
     np.add.at(total, contacts.j[on_wall] - contacts.grain_count, contact_force_vectors(contacts, fn, ft)[on_wall])
@@ -138,7 +171,7 @@ def wall_forces(contacts: Contacts, fn: Array, ft: Array) -> Array:
 
 
 def sums_on_walls(contacts: Contacts, fn: Array, ft: Array) -> Array:
-    """Sums of the normal and of the tangential forces on every wall (w, 2) [N]; of a circle no force comes of them."""
+    """Return the sums of the normal and of the tangential forces on every wall (w, 2) [N], for circles, too."""
     on_wall = contacts.with_wall
     total = np.zeros((contacts.wall_count, 2))
     np.add.at(total, contacts.j[on_wall] - contacts.grain_count, np.column_stack([fn, ft])[on_wall])
@@ -146,9 +179,9 @@ def sums_on_walls(contacts: Contacts, fn: Array, ft: Array) -> Array:
 
 
 def wall_ratio_angle(walls: Walls, force: Array) -> float:
-    """atan(|T| / N) [rad] of the first loaded wall; NaN without one, or without load on it.
+    """Return atan(|T| / N) [rad] of the first loaded wall; NaN without one, or where N ≤ 0.
 
-    force (w, 2) [N]: sums of the normal and of the tangential forces on every wall.
+    force (w, 2) [N]: sums N and T of the normal and tangential forces on every wall.
     """
     if not walls.loaded.any():
         return float("nan")

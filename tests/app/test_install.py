@@ -1,4 +1,4 @@
-"""The package as users have it: in an editable install and in the wheel, beside programs of their own."""
+"""The installed package, editable and from the wheel, beside a user's own programs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import pytest
 pytestmark = pytest.mark.screen  # a wheel is built, and processes are started
 
 TREE = Path(__file__).parents[2]
-OWN = 'print("the user\'s own")\n'
 
 
 @pytest.fixture(scope="module")
@@ -35,45 +34,47 @@ def run(code: str, folder: Path, *paths: Path) -> subprocess.CompletedProcess[st
 
 @pytest.fixture
 def notebook_folder(tmp_path: Path) -> Path:
-    """Where somebody works who has programs called app.py and solver.py."""
-    for name in ("app.py", "solver.py"):
-        (tmp_path / name).write_text(OWN)
+    """A working folder of a user with programs called app.py and solver.py."""
+    for name in ("app", "solver"):
+        (tmp_path / f"{name}.py").write_text(f'print("the user\'s own {name}")\n')
     return tmp_path
 
 
-USE = (
-    "import rodsight, rodsight.pipeline, rodsight.cli.main; from pathlib import Path;"
-    "print(Path(rodsight.__file__).resolve().parent); import app"
+OURS = "import rodsight, rodsight.pipeline, rodsight.solver.nlgs.solve, rodsight.cli.main"
+THEIRS = "import app, solver"
+FOLDERS = (
+    "from pathlib import Path;"
+    "print(*(Path(each.__file__).resolve().parent for each in (rodsight, rodsight.solver)), sep='\\n')"
 )
+ORDERS = pytest.mark.parametrize("order", [(OURS, THEIRS), (THEIRS, OURS)], ids=["ours first", "theirs first"])
 
 
-def test_an_editable_install_works_beside_an_app_and_a_solver_of_the_users(notebook_folder):
-    told = run(USE, notebook_folder, TREE / ".editable", TREE)
-    assert told.returncode == 0, told.stderr
-    assert told.stdout.splitlines() == [str(TREE / "app"), "the user's own"]
+def import_both(order: tuple[str, str], folder: Path, *paths: Path) -> set[str]:
+    """Return the lines printed by a program that imports rodsight and the user's own app.py and solver.py."""
+    process = run(";".join((*order, FOLDERS)), folder, *paths)
+    assert process.returncode == 0, process.stderr
+    return set(process.stdout.splitlines())
 
 
-def test_the_wheel_works_beside_an_app_and_a_solver_of_the_users(notebook_folder, wheel):
-    told = run(USE, notebook_folder, wheel)
-    assert told.returncode == 0, told.stderr
-    assert told.stdout.splitlines() == [str(wheel / "rodsight"), "the user's own"]
+@ORDERS
+def test_an_editable_install_works_beside_an_app_and_a_solver_of_the_users(notebook_folder, order):
+    lines = import_both(order, notebook_folder, TREE / ".editable")
+    assert lines == {"the user's own app", "the user's own solver", str(TREE / "app"), str(TREE / "solver")}
+
+
+@ORDERS
+def test_the_wheel_works_beside_an_app_and_a_solver_of_the_users(notebook_folder, wheel, order):
+    lines = import_both(order, notebook_folder, wheel)
+    installed = wheel / "rodsight"
+    assert lines == {"the user's own app", "the user's own solver", str(installed), str(installed / "solver")}
 
 
 def test_the_wheel_holds_the_package_its_data_and_no_tests(wheel):
-    assert sorted(each.name for each in wheel.iterdir() if not each.name.endswith(".dist-info")) == [
-        "rodsight",
-        "solver",
-    ]
+    assert [each.name for each in wheel.iterdir() if not each.name.endswith(".dist-info")] == ["rodsight"]
     for name in (
-        "py.typed", "review/page/index.html", "recording/viewing/single_page.html", "docs/troubleshooting.md",
-        "docs/pictures/experiment.png", "docs/notebooks/is_it_to_be_trusted.ipynb", "manual/page.html",
-        "manual/cures.toml", "campaign/report.html",
+        "py.typed", "workbench/page/steps/review.js", "recording/viewing/pages/single_page.html",
+        "docs/troubleshooting.md", "docs/pictures/experiment.png", "docs/notebooks/is_it_to_be_trusted.ipynb",
+        "manual/page.html", "manual/cures.toml", "campaigns/report.html",
     ):  # fmt: skip
         assert (wheel / "rodsight" / name).is_file(), name
-    assert (wheel / "solver" / "py.typed").is_file()
-
-
-def test_another_module_called_solver_is_named_and_not_used(notebook_folder):
-    told = run("import solver, rodsight", notebook_folder, TREE / ".editable", TREE)
-    assert told.returncode == 1
-    assert "another module is loaded as 'solver'" in told.stderr
+    assert (wheel / "rodsight" / "solver" / "py.typed").is_file()

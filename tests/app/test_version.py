@@ -1,4 +1,4 @@
-"""The version of a tree is its last tag's, and it can be built without any."""
+"""The version of a tree is that of its last tag; a tree without tags can be built, too."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import rodsight
-from rodsight.version import NEXT, version_of_tree
+from rodsight.process.version import NEXT, version_of_tree
 
 NOBODY = ("-c", "user.name=nobody", "-c", "user.email=nobody@example.org", "-c", "tag.gpgSign=false")
 
@@ -23,7 +23,7 @@ def tree(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_tag_is_the_version_and_commits_after_it_lead_to_the_next(tree):
+def test_a_tag_is_the_version_and_later_commits_count_towards_the_next(tree):
     assert version_of_tree(tree) == f"{NEXT}.dev0"
     git(tree, "tag", "v1.2.3")
     git(tree, "tag", "notes-4")
@@ -44,6 +44,6 @@ def test_a_machine_without_git_builds_as_well(tree, monkeypatch):
     assert version_of_tree(tree) == f"{NEXT}.dev0"
 
 
-def test_what_is_installed_says_its_version():
+def test_the_installed_package_has_a_version():
     assert rodsight.__version__.split(".")[0].isdigit()
     assert "__version__" in dir(rodsight)

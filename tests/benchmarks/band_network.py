@@ -1,19 +1,18 @@
-"""The yardstick of refinement: the same least squares in banded form, factor and inverse within the band."""
+"""Reference of the refinement: the same least squares in banded form, factor and inverse within the band."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from rodsight.solver.bodies.grains import Array
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from solver.bodies.grains import Array
-
 
 class BandNetwork:
-    """Pairs (c,) of grains, without walls, in Cuthill and McKee's order."""
+    """Pairs (c,) of grains, without walls, in the reverse Cuthill-McKee order."""
 
     def __init__(self, count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> None:
         graph = coo_array((np.ones(2 * len(i)), (np.append(i, j), np.append(j, i))), shape=(count, count)).tocsr()
@@ -52,7 +51,7 @@ class BandNetwork:
 
 @njit(cache=True)
 def _invert(factor: Array, inverse: Array) -> None:
-    """factor (n, b + 1): factor[k, d] = L[k + d, k]; inverse, likewise, out."""
+    """Invert within the band; factor, inverse (n, b + 1): factor[k, d] = L[k + d, k], inverse[k, d] = A⁻¹[k + d, k]."""
     n, width = factor.shape
     row = np.empty(width)
     for k in range(n - 1, -1, -1):

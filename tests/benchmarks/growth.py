@@ -1,6 +1,6 @@
-"""What a whole run takes as packings and sequences grow: tracks of any size, simulated or laid beside one another once.
+"""Growth of the time and memory of a run with the size of packing and sequence.
 
-python -m tests.benchmarks.growth draws the stored table anew.
+Tracks are simulated, or periodic copies of a simulated cell. python -m tests.benchmarks.growth draws the stored table.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from rodsight.atomic import write_atomically
+from rodsight.process.atomic import write_atomically
 from rodsight.synthetic.synthesis import synthesize
 
 from tests.benchmarks.history import PICTURE, ROOT
 from tests.benchmarks.tiled_packing import NOISE, tiled_packing
-from tests.benchmarks.timing import Row, Took, processor_name
+from tests.benchmarks.timing import Duration, Row, processor_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,43 +32,45 @@ BETWEEN_WALLS, IN_A_CELL = "rods between walls", "rods of a periodic cell"
 COLOURS = {BETWEEN_WALLS: "#0072b2", IN_A_CELL: "#d55e00"}
 WALLED = ((250, 24), (1172, 24), (5000, 8), (10_000, 6))  # rods, frames
 LONG = (250, (24, 150, 600))  # rods, frames of as many sequences
-STEP = 0.05  # [°] of shear between two frames of those: together they must not shear too far
+STEP = 0.05  # [°] of shear between two frames of those, small for a limited total shear
 TILES = (1, 3, 5)  # of a cell of 450 rods, each way; 15 are 101 250
 AIMS = {1172: "≤ .20 s", 4050: "≤ 1 s", 5000: "≤ 1 s", 10_000: "≤ 2.5 s", 11_250: "≤ 2.5 s", 101_250: "≤ 60 s"}
 SEED = 1
 
 
 class Job(NamedTuple):
-    """One run on tracks, from the reading to the recording."""
+    """One run on tracks, from reading to recording."""
 
     date: str
     machine: str
     kind: str
     rods: int
     frames: int
-    solving: float  # [s] of the processor, all frames
+    solving: float  # [s] processor time of all frames
     solving_clock: float  # [s]
-    recording: float  # [s] of the processor
+    recording: float  # [s] processor time
     recording_clock: float  # [s]
     peak: float  # [MB]
 
 
 def growth(folder: Path, tiles: Sequence[int], *, keep: bool) -> Iterator[tuple[str, list[Row]]]:
-    """Tables of answers, of sizes and of lengths; keep: add to the stored table and draw it."""
+    """Measure response times and growth with size and length; keep: store the table and draw it."""
     jobs: list[Job] = []
-    answers, sizes, lengths = [], [], []
-    for kind, place in _packings(folder, tiles):
-        found = run_job(place)
-        jobs.append(_job_of(kind, found))
+    responses, sizes, lengths = [], [], []
+    for kind, path in _packings(folder, tiles):
+        result = run_benchmark_job(path)
+        jobs.append(_job_of(kind, result))
         sizes += _rows_of(jobs[-1], _power([each for each in jobs if each.kind == kind]))
-        what = f"{found['rods']} {kind}"
-        answers.append(Row(f"forces without one contact, locally, {what}", str(Took(*found["without"])), "≤ 150 ms"))
-        if found["again"]:
-            answers.append(Row(f"one frame solved again, {what}", str(Took(*found["again"])), "≤ .4 s"))
-    yield "Answers while one looks", answers
+        label = f"{result['rods']} {kind}"
+        responses.append(
+            Row(f"forces without one contact, locally, {label}", str(Duration(*result["without"])), "≤ 150 ms")
+        )
+        if result["again"]:
+            responses.append(Row(f"one frame solved again, {label}", str(Duration(*result["again"])), "≤ .4 s"))
+    yield "Response times", responses
     yield "Growth with the packing, on tracks", sizes
-    for place in _sequences(folder):
-        jobs.append(_job_of(BETWEEN_WALLS, run_job(place)))
+    for path in _sequences(folder):
+        jobs.append(_job_of(BETWEEN_WALLS, run_benchmark_job(path)))
         lengths += _rows_of(jobs[-1], "")
     yield "Growth with the sequence, on tracks", lengths
     if keep:
@@ -76,11 +78,11 @@ def growth(folder: Path, tiles: Sequence[int], *, keep: bool) -> Iterator[tuple[
         draw(read())
 
 
-def run_job(experiment: Path) -> dict:
-    """What `tests.benchmarks.job` tells of an experiment, run in a process of its own."""
+def run_benchmark_job(experiment: Path) -> dict:
+    """Run `tests.benchmarks.job` on an experiment in a process of its own, and return its result."""
     command = [sys.executable, "-m", "tests.benchmarks.job", str(experiment)]
-    told = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout
-    return json.loads(told.splitlines()[-1])
+    text = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout
+    return json.loads(text.splitlines()[-1])
 
 
 def _packings(folder: Path, tiles: Sequence[int]) -> Iterator[tuple[str, Path]]:
@@ -97,27 +99,27 @@ def _sequences(folder: Path) -> Iterator[Path]:
 
 
 def _walled(folder: Path, rods: int, frames: int, **options: float) -> Path:
-    """The tracks of a packing sheared between walls, simulated where they are not there yet."""
-    place = folder / "walled" / " ".join([f"{rods} rods, {frames} frames", *map(str, options.values())])
-    if not (place / "experiment.toml").exists():
-        print(f"simulating {place.name} …", file=sys.stderr, flush=True)
+    """Folder with the tracks of a packing sheared between walls; simulated if missing."""
+    path = folder / "walled" / " ".join([f"{rods} rods, {frames} frames", *map(str, options.values())])
+    if not (path / "experiment.toml").exists():
+        print(f"simulating {path.name} …", file=sys.stderr, flush=True)
         synthesize(
-            place, preset="paper", grains=rods, frames=frames, photographs=False, noise=NOISE, seed=SEED, **options
+            path, preset="paper", grains=rods, frames=frames, photographs=False, noise=NOISE, seed=SEED, **options
         )
-    return place
+    return path
 
 
-def _job_of(kind: str, found: dict) -> Job:
-    stages = found["stages"]
+def _job_of(kind: str, result: dict) -> Job:
+    stages = result["stages"]
     (solving, solving_clock), (recording, recording_clock) = stages["solving"], stages["recording"]
     return Job(
-        date.today().isoformat(), processor_name(), kind, found["rods"], found["frames"], solving, solving_clock,
-        recording, recording_clock, found["peak"],
+        date.today().isoformat(), processor_name(), kind, result["rods"], result["frames"], solving, solving_clock,
+        recording, recording_clock, result["peak"],
     )  # fmt: skip
 
 
 def _power(jobs: list[Job]) -> str:
-    """How the time of a frame grew since the next smaller packing."""
+    """Describe the growth of the time of a frame since the next smaller packing."""
     if len(jobs) < 2:
         return ""
     before, now = jobs[-2:]
@@ -125,14 +127,14 @@ def _power(jobs: list[Job]) -> str:
     return f"; growth n^{power:.2f}"
 
 
-def _rows_of(job: Job, grown: str) -> list[Row]:
-    solving = Took(job.solving, job.solving_clock) / job.frames
-    recording = Took(job.recording, job.recording_clock) / job.frames
-    what = f"{job.rods} {job.kind}, a frame of {job.frames}"
+def _rows_of(job: Job, growth_note: str) -> list[Row]:
+    solving = Duration(job.solving, job.solving_clock) / job.frames
+    recording = Duration(job.recording, job.recording_clock) / job.frames
+    label = f"{job.rods} {job.kind}, a frame of {job.frames}"
     return [
-        Row(f"solving {what}, calibration included", f"{solving}{grown}", AIMS.get(job.rods, "")),
-        Row(f"recording {what}", str(recording), "≤ .15 s"),
-        Row(f"peak of memory, {what}", f"{job.peak:.0f} MB"),
+        Row(f"solving {label}, calibration included", f"{solving}{growth_note}", AIMS.get(job.rods, "")),
+        Row(f"recording {label}", str(recording), "≤ .15 s"),
+        Row(f"peak of memory, {label}", f"{job.peak:.0f} MB"),
     ]
 
 
@@ -151,11 +153,11 @@ def read(file: Path = TABLE) -> list[Job]:
 
 
 def _write(jobs: list[Job], file: Path = TABLE) -> None:
-    told = io.StringIO()
-    writer = csv.writer(told, lineterminator="\n")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
     writer.writerow(Job._fields)
     writer.writerows([f"{value:.6g}" if isinstance(value, float) else value for value in job] for job in jobs)
-    write_atomically(file, told.getvalue().encode())
+    write_atomically(file, text.getvalue().encode())
 
 
 def draw(jobs: list[Job], picture: Path = DRAWN) -> None:
@@ -189,9 +191,9 @@ def draw(jobs: list[Job], picture: Path = DRAWN) -> None:
         _frame(length, f"a run of {LONG[0]} rods [s of the processor]", "frames", LONG[1])
         length.set_yscale("log")
         length.legend(frameon=False)
-        told = io.BytesIO()
-        page.savefig(told, format="svg", metadata={"Date": None})
-    write_atomically(picture, told.getvalue())
+        text = io.BytesIO()
+        page.savefig(text, format="svg", metadata={"Date": None})
+    write_atomically(picture, text.getvalue())
 
 
 def _frame(panel: Axes, title: str, over: str, ticks: Sequence[int]) -> None:

@@ -1,6 +1,6 @@
-"""What the benchmarks found over time: a table that every asking adds to, and its picture.
+"""History of the benchmarks: a table with the figures of every run, and its plot.
 
-python -m tests.benchmarks --append adds rows; python -m tests.benchmarks.history draws them anew.
+python -m tests.benchmarks --append adds rows; python -m tests.benchmarks.history draws them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-from rodsight.atomic import write_atomically
+from rodsight.process.atomic import write_atomically
 
 from tests.benchmarks.timing import Row, processor_name
 
@@ -25,11 +25,18 @@ ROOT = Path(__file__).parents[2]
 HISTORY = Path(__file__).parent / "history.csv"
 PICTURE = ROOT / "app" / "docs" / "pictures" / "speed_history.svg"
 COLUMNS = 3  # of panels
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")  # of machines, for every vision
+COLOURS = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc79a7",
+    "#56b4e9",
+    "#e69f00",
+)  # of machines; distinguishable with colour blindness
 
 
 class Entry(NamedTuple):
-    """A figure of one commit: median, least and greatest of its turns."""
+    """A figure of one commit: median, least and greatest of its rounds."""
 
     commit: str
     date: str
@@ -42,24 +49,24 @@ class Entry(NamedTuple):
     turns: int
 
 
-def entries_of(rows: Iterable[Row], commit: str, day: str, machine: str) -> list[Entry]:
-    """Entries of the rows that tell their turns; others print words alone."""
+def make_entries(rows: Iterable[Row], commit: str, day: str, machine: str) -> list[Entry]:
+    """Make an entry of every row with values; rows of text alone are left out."""
     return [
-        Entry(commit, day, machine, row.what, row.unit, *_spread(row.turns), len(row.turns))
+        Entry(commit, day, machine, row.label, row.unit, *_median_and_range(row.rounds), len(row.rounds))
         for row in rows
-        if row.turns
+        if row.rounds
     ]
 
 
 def append(rows: Iterable[Row], commit: str, file: Path = HISTORY) -> int:
-    """Add what was measured of a commit on this machine; gives how many figures."""
-    new = entries_of(rows, commit, date.today().isoformat(), processor_name())
+    """Append the figures of a commit on this machine; returns their number."""
+    new = make_entries(rows, commit, date.today().isoformat(), processor_name())
     _write(file, [*read(file), *new])
     return len(new)
 
 
 def read(file: Path = HISTORY) -> list[Entry]:
-    """All entries in the order in which they were added; none without a file."""
+    """Read all entries in the order of their addition; none without a file."""
     if not file.exists():
         return []
     with file.open(encoding="utf-8", newline="") as stream:
@@ -71,13 +78,13 @@ def read(file: Path = HISTORY) -> list[Entry]:
 
 
 def present_commit() -> str:
-    """The commit that lies here, with a plus where files were changed since."""
+    """Commit that is checked out, with a plus if files are modified."""
     commit = _git("rev-parse", "--short=10", "HEAD")
     return f"{commit}+" if _git("status", "--porcelain", "--untracked-files=no") else commit
 
 
 def draw(entries: list[Entry], picture: Path = PICTURE) -> None:
-    """A panel for every figure: medians over the commits, in the order of measuring, with their spread."""
+    """Draw a panel for every figure: medians over the commits in the order of measurement, with their range."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -97,9 +104,9 @@ def draw(entries: list[Entry], picture: Path = PICTURE) -> None:
             for k, machine in enumerate(machines)
         ]
         page.legend(handles=handles, loc="outside lower center", frameon=False)
-        told = io.BytesIO()
-        page.savefig(told, format="svg", metadata={"Date": None})
-    write_atomically(picture, told.getvalue())
+        text = io.BytesIO()
+        page.savefig(text, format="svg", metadata={"Date": None})
+    write_atomically(picture, text.getvalue())
 
 
 def _draw_figure(panel: Axes, entries: list[Entry], commits: list[str], machines: list[str]) -> None:
@@ -117,21 +124,21 @@ def _draw_figure(panel: Axes, entries: list[Entry], commits: list[str], machines
     panel.grid(axis="y", lw=0.3)
 
 
-def _spread(turns: tuple[float, ...]) -> tuple[float, float, float]:
-    return median(turns), min(turns), max(turns)
+def _median_and_range(rounds: tuple[float, ...]) -> tuple[float, float, float]:
+    return median(rounds), min(rounds), max(rounds)
 
 
 def _write(file: Path, entries: list[Entry]) -> None:
-    told = io.StringIO()
-    writer = csv.writer(told, lineterminator="\n")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
     writer.writerow(Entry._fields)
     writer.writerows([f"{value:.6g}" if isinstance(value, float) else value for value in entry] for entry in entries)
-    write_atomically(file, told.getvalue().encode())
+    write_atomically(file, text.getvalue().encode())
 
 
 def _git(*words: str) -> str:
-    told = subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True)
-    return told.stdout.strip()
+    text = subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True)
+    return text.stdout.strip()
 
 
 if __name__ == "__main__":

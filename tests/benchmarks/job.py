@@ -1,4 +1,4 @@
-"""One experiment from its tracks or photographs to the recording, stage by stage, in a process of its own.
+"""Times of the stages of one experiment, from tracks or photographs to the recording, in a process of its own.
 
 python -m tests.benchmarks.job EXPERIMENT OUT
 """
@@ -16,74 +16,82 @@ from pathlib import Path
 import numpy as np
 from rodsight import pipeline
 from rodsight.experiment.experiment import load_experiment
-from rodsight.inference.inference import Inputs, correct_sequence, solve_frames
-from rodsight.inference.settings import material_of, settings_of
+from rodsight.inference.correction.correct_sequence import correct_sequence
+from rodsight.inference.inference_settings import material_of, settings_of
+from rodsight.inference.inputs import Inputs
 from rodsight.results.results import Results
+from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.statistics.contact_removal import remove_contact
 
-from solver.statistics.removal import remove_contact
-from tests.benchmarks.timing import once
+from tests.benchmarks.timing import time_once
 
-ASKED = 15  # contacts taken away, one at a time
-LARGEST_AGAIN = 20_000  # rods: beyond, all that leads to one frame solved again takes many minutes
+REMOVED_CONTACTS = 15  # one at a time
+MAX_RODS_SOLVED_AGAIN = 20_000  # beyond, the frames before it take many minutes
 
 
-def run_job(folder: Path, out: Path) -> dict[str, object]:
-    """Seconds of every stage (processor, clock), frames, rods, peak memory [MB], and of two answers."""
+def run_benchmark_job(folder: Path, out: Path) -> dict[str, object]:
+    """Measure the seconds of every stage (processor, clock), frames, rods, peak memory [MB] and two response times."""
     run = pipeline.Run(load_experiment(folder), out)
-    kept: dict[str, Results] = {}
+    solved: dict[str, Results] = {}
     stages = {
-        "tracking": once(lambda: pipeline.track(run)),
-        "solving": once(lambda: kept.setdefault("results", pipeline.solve(run))),
-        "recording": once(lambda: pipeline.record(run, kept["results"], None)),
+        "tracking": time_once(lambda: pipeline.track(run)),
+        "solving": time_once(lambda: solved.setdefault("results", pipeline.solve(run))),
+        "recording": time_once(lambda: pipeline.record(run, solved["results"], None)),
     }
-    peak = peak_of_memory()
-    results = kept["results"]
+    peak = peak_memory()
+    results = solved["results"]
     frames = results.tracks.frame_count
     return {
-        "stages": {name: [took.processor, took.clock] for name, took in stages.items()},
+        "stages": {name: [duration.processor, duration.clock] for name, duration in stages.items()},
         "frames": frames,
         "rods": results.grains.count,
         "peak": peak,
         "megabytes": [round((out / name).stat().st_size / 1e6, 1) for name in ("results.h5", "recording.rrd")],
         "without": without_a_contact(results),
-        "again": again(run) if results.grains.count <= LARGEST_AGAIN else [],
+        "again": solve_again(run) if results.grains.count <= MAX_RODS_SOLVED_AGAIN else [],
     }
 
 
-def peak_of_memory() -> float:
-    """Most memory that this process had [MB]: on Linux its own, for what getrusage tells is also that of its parent."""
-    told = Path("/proc/self/status")
-    for line in told.read_text(encoding="ascii").splitlines() if told.exists() else ():
+def peak_memory() -> float:
+    """Peak memory of this process [MB]; on Linux from /proc, because getrusage includes the parent's."""
+    status = Path("/proc/self/status")
+    for line in status.read_text(encoding="ascii").splitlines() if status.exists() else ():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def without_a_contact(results: Results) -> list[float]:
-    """Median seconds (processor, clock) of the nearest forces without one of the strong contacts of a frame."""
+    """Median seconds (processor, clock) of the local solution without one of the strong contacts of a frame."""
     frame = results.frames[results.tracks.frame_count // 2]
-    friction = results.friction
     removed = partial(remove_contact, results.grains, frame.contacts, frame.fn, frame.ft)
-    friction = {"friction": results.friction, "wall_friction": results.friction}
-    took = [once(partial(removed, row, **friction)) for row in np.argsort(-frame.fn)[: 4 * ASKED : 4].tolist()]
-    return [float(np.median([each.processor for each in took])), float(np.median([each.clock for each in took]))]
+    friction = results.contact_friction(results.tracks.frame_count // 2)
+    durations = [
+        time_once(partial(removed, row, friction=friction))
+        for row in np.argsort(-frame.fn)[: 4 * REMOVED_CONTACTS : 4].tolist()
+    ]
+    return [
+        float(np.median([each.processor for each in durations])), float(np.median([each.clock for each in durations]))
+    ]  # fmt: skip
 
 
-def again(run: pipeline.Run) -> list[float]:
-    """Seconds (processor, clock) of solving one more frame where those before it are known."""
+def solve_again(run: pipeline.Run) -> list[float]:
+    """Seconds (processor, clock) of solving one more frame after the frames before it."""
     tracks, walls = pipeline.track(run)
     assert walls is not None
     config = run.experiment.config
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     sequence = correct_sequence(replace(inputs, settings=inputs.settings.without_sweeps()))
-    frames = solve_frames(sequence)
+    frames = solve_sequence(
+        sequence.packing, sequence.snapshots, sequence.settings, verdicts=sequence.verdicts, failed=sequence.failed
+    )
     for _ in range(max(tracks.frame_count - 2, 0)):
         next(frames)
-    took = once(lambda: next(frames))
-    return [took.processor, took.clock]
+    duration = time_once(lambda: next(frames))
+    return [duration.processor, duration.clock]
 
 
 if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as room:
-        target = Path(sys.argv[2]) if len(sys.argv) > 2 else Path(room)
-        print(json.dumps(run_job(Path(sys.argv[1]), target)))
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(sys.argv[2]) if len(sys.argv) > 2 else Path(folder)
+        print(json.dumps(run_benchmark_job(Path(sys.argv[1]), target)))

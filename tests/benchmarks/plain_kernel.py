@@ -1,7 +1,7 @@
-"""The yardstick: the same Gauss-Seidel scheme as one would first write it in numba.
+"""Reference kernel: the same Gauss-Seidel scheme, written plainly in numba.
 
-One array per quantity, contacts as they were found, walls as bodies of no compliance, a branch per case of Coulomb's
-law. Nothing of the solver is used, so that a slip there cannot slow or speed both.
+One array per quantity, contacts in the order of detection, walls as bodies without compliance, a branch per case of
+Coulomb's law. It shares no code with the solver, so that a fault there does not change both.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-
-from solver.bodies.grains import Array, GrainMotion, Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
-from solver.nlgs.problem import PLATE_IMPEDANCE
+from rodsight.solver.bodies.grains import Array, GrainMotion, Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts
+from rodsight.solver.nlgs.problem import PLATE_IMPEDANCE
 
 
 class PlainProblem(NamedTuple):
@@ -25,14 +24,14 @@ class PlainProblem(NamedTuple):
     ny: Array  # (c,)
     radius: Array  # (n + w,) [m], 0 of a wall
     compliance: Array  # (n + w,) [m/(N s)] of a centre
-    turning: Array  # (n + w,) [rad/(N m s)] of a rotation
+    rotational: Array  # (n + w,) [rad/(N m s)] compliance of a rotation
     plate: NDArray[np.bool_]  # (n + w,) moves along its normal alone
 
 
 def plain_problem(
     grains: Grains, walls: Walls, contacts: Contacts, impedance: Array, order: NDArray[np.int64]
 ) -> PlainProblem:
-    """Name the quantities of contacts visited in `order`; impedance (n,) [N s/m]."""
+    """Arrange the quantities of contacts in the order of visits; impedance (n,) [N s/m]."""
     n = grains.count
     plate = np.where(walls.loaded, 1.0 / (PLATE_IMPEDANCE * impedance.mean()), 0.0)
     return PlainProblem(
@@ -57,7 +56,7 @@ def plain_state(grains: Grains, motion: GrainMotion, walls: Walls, impedance: Ar
 @njit(cache=True)
 def plain_sweeps(problem, vx, vy, spin, fn, ft, friction, sweeps):  # type: ignore[no-untyped-def]
     """Sweep in place over forces fn, ft (c,) [N] in the order of the problem."""
-    i, j, nx, ny, radius, compliance, turning, plate = problem
+    i, j, nx, ny, radius, compliance, rotational, plate = problem
     for _ in range(sweeps):
         for c in range(len(i)):
             a, b = i[c], j[c]
@@ -66,9 +65,9 @@ def plain_sweeps(problem, vx, vy, spin, fn, ft, friction, sweeps):  # type: igno
             un = dx * nx[c] + dy * ny[c]
             ut = dx * tx + dy * ty - radius[a] * spin[a] - radius[b] * spin[b]
             wnn = compliance[a] + compliance[b]
-            wtt = compliance[a] + radius[a] ** 2 * turning[a]
+            wtt = compliance[a] + radius[a] ** 2 * rotational[a]
             if not plate[b]:
-                wtt += compliance[b] + radius[b] ** 2 * turning[b]
+                wtt += compliance[b] + radius[b] ** 2 * rotational[b]
             new_n = fn[c] - un / wnn
             new_t = ft[c] - ut / wtt
             if new_n <= 0.0:
@@ -84,11 +83,11 @@ def plain_sweeps(problem, vx, vy, spin, fn, ft, friction, sweeps):  # type: igno
             fx, fy = change_n * nx[c] + change_t * tx, change_n * ny[c] + change_t * ty
             vx[a] -= compliance[a] * fx
             vy[a] -= compliance[a] * fy
-            spin[a] -= turning[a] * radius[a] * change_t
+            spin[a] -= rotational[a] * radius[a] * change_t
             if plate[b]:
                 vx[b] += compliance[b] * change_n * nx[c]
                 vy[b] += compliance[b] * change_n * ny[c]
             else:
                 vx[b] += compliance[b] * fx
                 vy[b] += compliance[b] * fy
-                spin[b] -= turning[b] * radius[b] * change_t
+                spin[b] -= rotational[b] * radius[b] * change_t

@@ -34,7 +34,7 @@ def main(path):
         since = time.process_time()
         sn.fc2d_driver(problem, reaction, velocity, options)
         spent = time.process_time() - since
-        assert options.iparam[sn.SICONOS_IPARAM_ITER_DONE] >= iterations, "it stopped early"
+        assert options.iparam[sn.SICONOS_IPARAM_ITER_DONE] >= iterations, "siconos stopped early"
         return spent, float(np.abs(reaction).sum())
 
     few = min(seconds(FEW)[0] for _ in range(5))

@@ -1,4 +1,4 @@
-"""The solver beside what it is measured against: ratios of processor times, taken by turns in one process."""
+"""Ratios of the solver's processor time to references, in alternate rounds in one process."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
+from rodsight.solver.convex.interior_point import solve_program
+from rodsight.solver.nlgs.problem import ContactProblem
+from rodsight.solver.nlgs.solve import NlgsSettings, Sweep, solve
 
-from solver.convex.interior_point import solve_program
-from solver.nlgs.problem import ContactProblem
-from solver.nlgs.solve import NlgsSettings, Sweep, solve
 from tests.benchmarks.static_problems import StaticPacking, jammed_packing, static_problem
 from tests.benchmarks.test_convex_benchmark import SETTINGS, member_of, sliding_frame
-from tests.benchmarks.test_solver_benchmark import LOOSE, plain_turn, solver_turn
-from tests.benchmarks.timing import Row, by_turns, in_processor_time, several, shares
-from tests.reference.twins.convex_program import solve_plainly
+from tests.benchmarks.test_solver_benchmark import LOOSE, plain_sweeps_of, solver_sweeps
+from tests.benchmarks.timing import Row, duration_ratios, in_processor_time, time_alternately, time_rounds
+from tests.reference.twins.convex_program import solve_with_clarabel
 
-JAMMED = 10_000  # grains; beyond, only sweeps are timed
-WORK = 2e6  # contacts times sweeps of a turn
-HEARD = 1000  # sweeps
+JAMMED = 10_000  # grains; beyond, sweeps alone are timed
+WORK = 2e6  # contacts times sweeps of a round
+MEASURED_SWEEPS = 1000
 
 
 def sweep_rows(sizes: tuple[int, ...]) -> Iterator[Row]:
@@ -34,8 +34,8 @@ def load_rows(sizes: tuple[int, ...]) -> Iterator[Row]:
     aims = {1000: "≤ 10 ms", 10_000: "≤ .3 s"}
     settings = NlgsSettings(sweeps=100_000, natural_map=1e-8, acceleration=8)
     for count in sizes:
-        took = several(partial(solve, static_problem(jammed_packing(count)), settings, every=20), 3)
-        yield in_processor_time(f"static load to a natural map of 1e-8, {count} grains", took, aims.get(count, ""))
+        durations = time_rounds(partial(solve, static_problem(jammed_packing(count)), settings, every=20), 3)
+        yield in_processor_time(f"static load to a natural map of 1e-8, {count} grains", durations, aims.get(count, ""))
 
 
 def member_rows(sizes: tuple[int, ...]) -> Iterator[Row]:
@@ -45,41 +45,41 @@ def member_rows(sizes: tuple[int, ...]) -> Iterator[Row]:
         balance = frame.balance
         centre = solve_program(balance.grains, member_of(balance, 0.9 * frame.slip), SETTINGS.tolerance).force
         program = member_of(balance, frame.slip, centre)
-        ways = {
+        functions = {
             "ours": partial(solve_program, balance.grains, program, SETTINGS.tolerance),
-            "clarabel": partial(solve_plainly, balance.matrix, balance.load, program, SETTINGS.tolerance),
+            "clarabel": partial(solve_with_clarabel, balance.matrix, balance.load, program, SETTINGS.tolerance),
         }
-        found = by_turns(ways, 3)
-        ours, theirs = min(found["ours"]), min(found["clarabel"])
+        times = time_alternately(functions, 3)
+        ours, theirs = min(times["ours"]), min(times["clarabel"])
         yield Row(
             f"a convex member, {count} grains",
             f"**{ours / theirs:.3f}** of Clarabel: {1e3 * ours:.1f} against {1e3 * theirs:.0f} ms",
-            aims.get(count, ""), shares(found["ours"], found["clarabel"]), "of Clarabel",
+            aims.get(count, ""), duration_ratios(times["ours"], times["clarabel"]), "of Clarabel",
         )  # fmt: skip
 
 
 def _sweeps(case: StaticPacking, problem: ContactProblem) -> Row:
     count, contacts = case.grains.count, case.contacts.count
     sweeps = max(1, round(WORK / contacts))
-    ways = {"ours": solver_turn(problem), "plain": plain_turn(case, np.arange(contacts))}
-    found = by_turns({name: partial(way, sweeps) for name, way in ways.items()}, 9)
-    ours, plain = (1e9 * min(found[name]) / sweeps / contacts for name in ways)
-    told = f"**{ours / plain:.2f}** of a plain numba kernel: {ours:.1f} against {plain:.1f} ns per contact and sweep"
-    share = shares(found["ours"], found["plain"])
-    return Row(f"Gauss-Seidel, {count} grains, {contacts} contacts", told, "≤ .25", share, "of a plain kernel")
+    functions = {"ours": solver_sweeps(problem), "plain": plain_sweeps_of(case, np.arange(contacts))}
+    times = time_alternately({name: partial(function, sweeps) for name, function in functions.items()}, 9)
+    ours, plain = (1e9 * min(times[name]) / sweeps / contacts for name in functions)
+    text = f"**{ours / plain:.2f}** of a plain numba kernel: {ours:.1f} against {plain:.1f} ns per contact and sweep"
+    ratio = duration_ratios(times["ours"], times["plain"])
+    return Row(f"Gauss-Seidel, {count} grains, {contacts} contacts", text, "≤ .25", ratio, "of a plain kernel")
 
 
 def _residuals(case: StaticPacking, problem: ContactProblem) -> Row:
-    settings = NlgsSettings(sweeps=HEARD)
-    ways = {
-        "silent": partial(solve, problem, settings),
-        "heard": partial(solve, problem, settings, observer=_hear, every=HEARD, measured=True),
+    settings = NlgsSettings(sweeps=MEASURED_SWEEPS)
+    functions = {
+        "plain": partial(solve, problem, settings),
+        "measured": partial(solve, problem, settings, observer=_ignore, every=MEASURED_SWEEPS, measured=True),
     }
-    found = by_turns(ways)
-    told = f"**{min(found['heard']) / min(found['silent']) - 1.0:+.0%}** of the sweeps themselves"
-    more = tuple(share - 1.0 for share in shares(found["heard"], found["silent"]))
-    return Row(f"exact residuals of every sweep, {case.grains.count} grains", told, "≤ +30 %", more, "of the sweeps")
+    times = time_alternately(functions)
+    text = f"**{min(times['measured']) / min(times['plain']) - 1.0:+.0%}** of the sweeps themselves"
+    more = tuple(ratio - 1.0 for ratio in duration_ratios(times["measured"], times["plain"]))
+    return Row(f"exact residuals of every sweep, {case.grains.count} grains", text, "≤ +30 %", more, "of the sweeps")
 
 
-def _hear(sweep: Sweep) -> None:
-    """Nobody does anything with it."""
+def _ignore(sweep: Sweep) -> None:
+    """Observe a sweep without any work."""

@@ -1,8 +1,8 @@
-"""Jammed disordered packings under a static load, at any size: what the benchmarks solve.
+"""Jammed disordered packings of any size under a static load, for the benchmarks.
 
 Rods of three radii start on a jittered lattice in a box a little too small for them and are pushed apart as soft,
-frictionless discs until they are at rest (FIRE: Bitzek et al. 2006). What overlaps then is a rigid network in which
-forces in equilibrium exist; a plate on top and one on the right carry the same pressure, all else is at rest.
+frictionless discs until they are at rest (FIRE: Bitzek et al. 2006). The overlapping pairs then form a rigid network
+with forces in equilibrium; a plate on top and one on the right have the same pressure, all other walls are fixed.
 """
 
 from __future__ import annotations
@@ -11,28 +11,27 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from rodsight.solver.bodies.grains import Array, GrainMotion, Grains
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts, detect_contacts
+from rodsight.solver.nlgs.problem import ContactProblem, assemble
 from scipy.spatial import KDTree
 
-from solver.bodies.grains import Array, GrainMotion, Grains
-from solver.bodies.packing import Material
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts
-from solver.nlgs.problem import ContactProblem, assemble
-
-RADII, SHARES = (0.007, 0.008, 0.011), (0.40, 0.41, 0.19)  # [m], by number
+RADII, FRACTIONS = (0.007, 0.008, 0.011), (0.40, 0.41, 0.19)  # [m], by number
 SOLID_FRACTION = 0.86  # above the .842 at which frictionless discs jam
 LENGTH, DENSITY = 0.06, 2700.0  # [m], [kg/m³]
 PRESSURE = 50e3  # [Pa]
 FRICTION = 0.25
 IMPEDANCE = 1e3  # [1/s] times the mass; a static load's forces do not depend on it
 SKIN = 0.3  # of the mean radius
-AT_REST = 1e-3  # greatest unbalance over the mean overlap force
+AT_REST = 1e-3  # largest force residual over the mean overlap force
 ROUNDS, STEPS = 400, 200
 
 
 @dataclass(frozen=True, slots=True)
 class StaticPacking:
-    """A packing at rest, and the contacts that bear it."""
+    """A packing at rest with its contacts."""
 
     grains: Grains
     motion: GrainMotion
@@ -48,10 +47,10 @@ class StaticPacking:
 def jammed_packing(count: int, seed: int = 0, rest: float = AT_REST) -> StaticPacking:
     """Make a packing of `count` rods in a square box under pressure from above and from the right.
 
-    rest: greatest unbalance over the mean overlap force. Where only the time of a sweep counts, 2 will do.
+    rest: largest force residual over the mean overlap force; 2 suffices to time sweeps.
     """
     rng = np.random.default_rng(seed)
-    radius = rng.choice(RADII, count, p=SHARES)
+    radius = rng.choice(RADII, count, p=FRACTIONS)
     side = float(np.sqrt(np.pi * np.sum(radius**2) / SOLID_FRACTION))
     columns = int(np.ceil(np.sqrt(count)))
     site = np.stack(np.divmod(rng.permutation(columns * columns)[:count], columns)[::-1], axis=1)
@@ -68,7 +67,7 @@ def jammed_packing(count: int, seed: int = 0, rest: float = AT_REST) -> StaticPa
 
 
 def static_problem(packing: StaticPacking) -> ContactProblem:
-    """Assemble the packing's contact problem, everything at rest but for the loads."""
+    """Assemble the contact problem of the packing at rest under its loads."""
     return assemble(
         packing.grains,
         packing.motion,
@@ -95,7 +94,7 @@ def _push_apart(position: Array, radius: Array, side: float, rest: float) -> Non
 
 @njit(cache=True)
 def _relax(position, radius, side, pairs, velocity, force, state, steps, reach, rest):  # type: ignore[no-untyped-def]
-    """Take FIRE steps until a disc may have left the reach of the pair list; the unbalance over the mean force."""
+    """Advance by FIRE until a disc may leave the reach of the pair list; returns the residual over the mean force."""
     start = position.copy()
     unbalance = np.inf
     for _ in range(steps):
@@ -125,7 +124,7 @@ def _relax(position, radius, side, pairs, velocity, force, state, steps, reach, 
 
 @njit(cache=True)
 def _spring_forces(position, radius, side, pairs, force):  # type: ignore[no-untyped-def]
-    """Unit springs between overlapping discs, and against the four walls; returns the mean overlap."""
+    """Compute forces of unit springs between overlapping discs and at the four walls; returns the mean overlap."""
     force[:] = 0.0
     total, count = 0.0, 0
     for c in range(len(pairs)):

@@ -2,7 +2,7 @@
 
 pytest tests/benchmarks/test_convex_benchmark.py -o addopts= -s
 
-Contenders take turns in one process and each is judged by its fastest turn.
+The functions run in alternate rounds in one process; the fastest round of each counts.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from functools import cache
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.convex.friction_estimate import FACTORS, SlidingFrame, estimate_friction
+from rodsight.solver.convex.interior_point import solve_program
+from rodsight.solver.convex.interior_point_kernels import Program
+from rodsight.solver.convex.program import Balance, ConvexSettings, assemble_balance
+from rodsight.solver.detection.position_network import PositionNetwork
+from rodsight.solver.detection.touch_probability import TouchCandidates
 
-from solver.bodies.grains import Array
-from solver.convex.friction_estimate import FACTORS, SlidingFrame, estimate_friction
-from solver.convex.interior_point import solve_program
-from solver.convex.interior_point_kernels import Program
-from solver.convex.program import Balance, ConvexSettings, assemble_balance
-from solver.detection.position_network import PositionNetwork
-from solver.detection.touch_probability import Candidates
 from tests.benchmarks.band_network import BandNetwork
 from tests.benchmarks.static_problems import FRICTION, StaticPacking, jammed_packing
-from tests.reference.twins.convex_program import solve_plainly
+from tests.reference.twins.convex_program import solve_with_clarabel
 
 SIZES = (1000, 5000)
-TURNS = 3
+ROUNDS = 3
 FRAMES = 2  # of a friction check
 SETTINGS = ConvexSettings()
 SLIP = 0.5  # [scale of the motion] of a contact at its limit
-SAME = 1e-3  # of the field
-RATIO = {"member": 0.15, "refinement": 0.25, "friction check": 0.08}  # at most, of the other's time
+SAME = 1e-3  # relative difference of the fields
+MAX_RATIO = {"member": 0.15, "refinement": 0.25, "friction check": 0.08}  # of the reference's time
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def packing(count: int) -> StaticPacking:
 
 @cache
 def sliding_frame(count: int) -> SlidingFrame:
-    """The packing in equilibrium, what is at its limit sliding."""
+    """The packing in equilibrium, with contacts at the Coulomb limit sliding."""
     case = packing(count)
     contacts = case.contacts
     balance = assemble_balance(
@@ -69,22 +69,22 @@ def member_of(balance: Balance, slip: Array, centre: Array | None = None) -> Pro
     return Program(balance.friction, cost, centre, SETTINGS.history, SETTINGS.balance)
 
 
-def seconds(*ways: Callable[[], object]) -> list[float]:
-    """Processor time of the fastest turn of each."""
-    best = [np.inf] * len(ways)
-    ways[0]()  # compiled
-    for _ in range(TURNS):
-        for k, way in enumerate(ways):
+def seconds(*functions: Callable[[], object]) -> list[float]:
+    """Processor time of the fastest round of each function."""
+    best = [np.inf] * len(functions)
+    functions[0]()  # compiled
+    for _ in range(ROUNDS):
+        for k, function in enumerate(functions):
             since = time.process_time()
-            way()
+            function()
             best[k] = min(best[k], time.process_time() - since)
     return best
 
 
-def told(what: str, count: int, ours: float, theirs: float) -> str:
+def format_row(label: str, count: int, ours: float, theirs: float) -> str:
     return (
-        f"{what:15s}{count:6d} grains: {1e3 * ours:8.2f} ms, was {1e3 * theirs:9.2f} ms: ratio {ours / theirs:.3f} "
-        f"(aim {RATIO[what]})"
+        f"{label:15s}{count:6d} grains: {1e3 * ours:8.2f} ms, reference {1e3 * theirs:9.2f} ms: "
+        f"ratio {ours / theirs:.3f} (aim {MAX_RATIO[label]})"
     )
 
 
@@ -101,12 +101,12 @@ def test_a_member_takes_a_fraction_of_clarabels_time(
     def ours() -> Array:
         return solve_program(balance.grains, program, SETTINGS.tolerance).force
 
-    expected = solve_plainly(balance.matrix, balance.load, program)
+    expected = solve_with_clarabel(balance.matrix, balance.load, program)
     assert np.linalg.norm(ours() - expected) < SAME * np.linalg.norm(expected)
-    mine, theirs = seconds(ours, lambda: solve_plainly(balance.matrix, balance.load, program, SETTINGS.tolerance))
+    mine, theirs = seconds(ours, lambda: solve_with_clarabel(balance.matrix, balance.load, program, SETTINGS.tolerance))
     benchmark(ours)
-    table.append(told("member", count, mine, theirs))
-    assert mine < RATIO["member"] * theirs
+    table.append(format_row("member", count, mine, theirs))
+    assert mine < MAX_RATIO["member"] * theirs
 
 
 @pytest.mark.benchmark(group="refinement")
@@ -118,7 +118,7 @@ def test_a_refinement_takes_a_fraction_of_a_banded_ones_time(
     contacts = case.contacts.select(~case.contacts.with_wall)
     sigma, gap = np.full(count, 1e-5), 1e-5 * np.random.default_rng(2).normal(size=contacts.count)
     weight, pull = np.full(contacts.count, 1e10), np.zeros(contacts.count)
-    sparse = PositionNetwork.of(case.grains, Candidates(contacts.i, contacts.j, gap[None], np.ones((1, len(gap)))))
+    sparse = PositionNetwork.of(case.grains, TouchCandidates(contacts.i, contacts.j, gap[None], np.ones((1, len(gap)))))
     band = BandNetwork(count, contacts.i.astype(np.int64), contacts.j.astype(np.int64))
     found = sparse.refine(contacts.normal, gap, weight, pull, sigma)
     moved, variance = band.refine(contacts.normal, pull - weight * gap, weight, sigma)
@@ -129,8 +129,8 @@ def test_a_refinement_takes_a_fraction_of_a_banded_ones_time(
         lambda: band.refine(contacts.normal, pull - weight * gap, weight, sigma),
     )
     benchmark(sparse.refine, contacts.normal, gap, weight, pull, sigma)
-    table.append(told("refinement", count, mine, theirs))
-    assert mine < RATIO["refinement"] * theirs
+    table.append(format_row("refinement", count, mine, theirs))
+    assert mine < MAX_RATIO["refinement"] * theirs
 
 
 @pytest.mark.benchmark(group="friction check")
@@ -144,12 +144,12 @@ def test_a_friction_check_takes_a_fraction_of_all_trials_by_clarabel(
             centre = None
             for frame in frames:
                 balance = replace(frame.balance, friction=factor * frame.balance.friction)
-                centre = solve_plainly(
+                centre = solve_with_clarabel(
                     balance.matrix, balance.load, member_of(balance, frame.slip, centre), SETTINGS.tolerance
                 )
 
     assert estimate_friction(frames).factor == pytest.approx(1.0, abs=0.2)
     mine, theirs = seconds(lambda: estimate_friction(frames), by_clarabel)
     benchmark(estimate_friction, frames)
-    table.append(told("friction check", 1000, mine, theirs))
-    assert mine < RATIO["friction check"] * theirs
+    table.append(format_row("friction check", 1000, mine, theirs))
+    assert mine < MAX_RATIO["friction check"] * theirs

@@ -1,4 +1,4 @@
-"""Detection's figures where it takes too long for the fast tests, and the memory of a long sequence.
+"""Accuracy of detection on many photographs, and the memory of a long sequence.
 
 pytest tests/benchmarks/test_detection_benchmark.py --benchmark-only -s
 pytest tests/benchmarks/test_detection_benchmark.py -m slow -s
@@ -28,10 +28,10 @@ from tests.app.tracking.speckled import grid_of_rods
 
 Benchmark = Any
 
-# What counts as found: nearer than this share of the radius, and 3 px.
-FOUND, FOUND_SHARE = 3.0, 0.3
+# A detection is true within 3 px of a grain and within this fraction of its radius.
+MAX_DISTANCE, MAX_RADIUS_FRACTION = 3.0, 0.3
 
-# 20 Mpx photographs in a sequence, and what following it may take [GiB].
+# 20 Mpx photographs in a sequence, and the memory limit of tracking [GiB].
 SEQUENCE, MEMORY = 60, 2.0
 
 LABORATORIES = {
@@ -45,11 +45,11 @@ LABORATORIES = {
 
 
 def score(found: Detection, x: np.ndarray, y: np.ndarray, radius: np.ndarray, size: tuple[int, int]) -> str:
-    """Recall over the grains wholly in view, precision, errors of centre and radius against what was predicted."""
+    """Recall over the grains entirely in view, precision, errors of centre and radius over the stated ones."""
     height, width = size
     near, index = KDTree(np.stack([x, y], axis=1)).query(np.stack([found.x, found.y], axis=1))
     index = np.asarray(index, dtype=np.intp)
-    true = near < np.minimum(FOUND, FOUND_SHARE * radius[index])
+    true = near < np.minimum(MAX_DISTANCE, MAX_RADIUS_FRACTION * radius[index])
     inside = (x > radius) & (x < width - radius) & (y > radius) & (y < height - radius)
     hit = np.zeros(len(x), dtype=np.bool_)
     hit[index[true]] = True
@@ -118,7 +118,7 @@ def test_thousands_of_discs_of_sizes_one_to_ten(painted: bool) -> None:
 
 @pytest.mark.slow
 def test_a_long_sequence_of_twenty_megapixels_fits_into_two_gigabytes(tmp_path: Path) -> None:
-    """The command of its own process, so that the peak is what a user's machine sees; frames repeat two files."""
+    """The command runs in a process of its own, so that its peak memory is measured; frames repeat two files."""
     rods = grid_of_rods(17, 17, radius=58.0, pitch=264.0, margin=140.0, noise=2.0)
     assert rods.width * rods.height > 2e7
     photographs = tmp_path / "photos"

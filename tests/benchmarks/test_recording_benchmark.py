@@ -1,5 +1,5 @@
-"""Size and speed of a recording of every sweep: 60 frames of 1172 rods, 1000 sweeps each, of the true solver.
-And what it costs to watch a run while it is solved, with a page that is served and nobody who looks at it.
+"""Size and speed of a recording of every sweep: 60 frames of 1172 rods, 1000 sweeps each, of the real solver.
+And the cost of a live view of a run, with a page that is served but not open.
 
 pytest tests/benchmarks/test_recording_benchmark.py -o addopts= -s
 
@@ -24,32 +24,33 @@ from rodsight import pipeline
 from rodsight.cli.watching import watching
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.walls import read_walls
-from rodsight.inference.inference import Inputs, infer_frames
-from rodsight.inference.settings import material_of, settings_of
+from rodsight.inference.frame_store import MemoryStore
+from rodsight.inference.infer_sequence import infer_sequence
+from rodsight.inference.inference_settings import material_of, settings_of
+from rodsight.inference.inputs import Inputs
 from rodsight.recording.files.recorder import BATCHES, Recorder
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
 from rodsight.recording.look.scene import Scene
 from rodsight.recording.packing_layers.forces.network import SweepChoice
-from rodsight.recording.tabs.blueprint import Layout, make_blueprint
+from rodsight.recording.tabs.blueprint import RecordingLayout, make_blueprint
 from rodsight.recording.tabs.layout_property import send_layout
-from rodsight.recording.viewing.headless import STILL_SECONDS, HeadlessViewer, vulkan_drivers
+from rodsight.recording.viewing.headless import PICTURE_INTERVAL, HeadlessViewer, vulkan_drivers
+from rodsight.solver.parallel import available_cores
 from rodsight.synthetic.synthesis import synthesize
-
-from solver.together import available_cores
 
 pytestmark = pytest.mark.slow
 
 FRAMES, SWEEPS = 60, 1000
 LARGEST = 160e6  # [bytes] with every visible sweep, without photographs
 SECONDS = 10.0  # of processor time for logging all of it
-# What a still picture of another sweep may take, in single drawings of the same tab: the software draws it several
-# times (data fetched on demand, then twice the same), and how long that takes depends on the machine and its load.
+# Limit of the time of a picture of another sweep, in single drawings of the same tab: the viewer draws it several times
+# (data are fetched on demand, then it draws the same twice), and the time of a drawing depends on machine and load.
 SEEK_DRAWINGS = 10.0
 SEEK_TABS = ("Experiment", "Convergence", "Settling")
-SLOWED = 1.15  # times the solving stage, of a run that is watched
-CROWDED = 0.5  # less load than cores by this: else others take the core that the pictures are made on
-ROUNDS = 3  # of runs watched and not; the least time counts, which other work on the machine lengthens least
+MAX_SLOWDOWN = 1.15  # factor on the solving stage by a live view
+FREE_CORES = 0.5  # needed beside the load: other processes would use the core that draws
+ROUNDS = 3  # of runs with and without live view; the least time counts
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("choice", [SweepChoice.LOG, SweepChoice.ALL])
-def test_every_sweep_fits_into_a_file_that_can_be_sent(experiment: Path, tmp_path: Path, choice: SweepChoice):
+def test_a_recording_of_every_sweep_is_small_enough_to_send(experiment: Path, tmp_path: Path, choice: SweepChoice):
     path = tmp_path / "run.rrd"
     seconds, contacts, rows = record_as_solved(experiment, path, choice)
     size = path.stat().st_size
@@ -79,19 +80,19 @@ def test_every_sweep_fits_into_a_file_that_can_be_sent(experiment: Path, tmp_pat
         print(f"open after {time.perf_counter() - begin:.1f} s", end="")
         last = viewer.timeline("sweep")[1]
         viewer.picture()
-        print(f", first still picture after {time.perf_counter() - begin:.1f} s (9 s of them for notices to go)")
+        print(f", first complete picture after {time.perf_counter() - begin:.1f} s (9 s of them for notices to go)")
         for tab in SEEK_TABS:
             viewer.show_tab(tab)
             seek = seconds_of(viewer, (last // 3, 17, last - 5, last // 2, last // 5))
             step = seconds_of(viewer, (last // 5 + k for k in range(1, 6)))
             drawing = seconds_of(viewer, (None, None, None))
             print(f"{tab}: seek {seek:.2f} s, next sweep {step:.2f} s, one drawing {drawing:.2f} s (medians)")
-            assert seek <= SEEK_DRAWINGS * drawing + STILL_SECONDS
+            assert seek <= SEEK_DRAWINGS * drawing + PICTURE_INTERVAL
 
 
 @pytest.mark.parametrize(("preset", "frames"), [("small", 24), ("paper", 4)])
 @pytest.mark.parametrize("estimator", ["ensemble", "nlgs"])
-def test_watching_hardly_slows_the_solve(tmp_path: Path, preset: str, frames: int, estimator: str):
+def test_a_live_view_hardly_slows_the_solution(tmp_path: Path, preset: str, frames: int, estimator: str):
     folder = tmp_path / preset
     made = synthesize(folder, preset=preset, frames=frames, photographs=False, noise=1e-5, seed=4)
     settings = (f"solver.estimator={estimator}",)
@@ -106,10 +107,10 @@ def test_watching_hardly_slows_the_solve(tmp_path: Path, preset: str, frames: in
         f"{watched[0]:.2f} s ({100 * (watched[0] / alone[0] - 1):+.1f} %); processor time of the run "
         f"{alone[1]:.2f} s, watched {watched[1]:.2f} s ({100 * (watched[1] / alone[1] - 1):+.1f} %)"
     )
-    assert watched[1] <= SLOWED * alone[1]
-    if os.getloadavg()[0] > available_cores() - CROWDED:
-        pytest.skip("too much else runs on this machine for its clock to tell how long solving takes")
-    assert watched[0] <= SLOWED * alone[0]
+    assert watched[1] <= MAX_SLOWDOWN * alone[1]
+    if os.getloadavg()[0] > available_cores() - FREE_CORES:
+        pytest.skip("the load of this machine is too high to measure clock times")
+    assert watched[0] <= MAX_SLOWDOWN * alone[0]
 
 
 def solving_seconds(folder: Path, out: Path, settings: tuple[str, ...], view: str) -> tuple[float, float]:
@@ -123,7 +124,7 @@ def solving_seconds(folder: Path, out: Path, settings: tuple[str, ...], view: st
 
 
 def seconds_of(viewer: HeadlessViewer, sweeps: Iterable[int | None]) -> float:
-    """Median seconds until the tab in front stands still at another sweep; None: of drawing it once as it is."""
+    """Median seconds until the visible tab shows another sweep completely; None: of a single drawing."""
     took = []
     for sweep in sweeps:
         begin = time.perf_counter()
@@ -137,7 +138,7 @@ def seconds_of(viewer: HeadlessViewer, sweeps: Iterable[int | None]) -> float:
 
 
 def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[float, float, int]:
-    """Solve and record frame by frame; processor seconds of recording, mean number of contacts, rows of forces."""
+    """Solve, then record frame by frame; processor seconds of recording, mean number of contacts, rows of forces."""
     experiment = load_experiment(folder, ("solver.estimator=nlgs", "solver.sweeps=200", "recording.sweeps=all"))
     tracks = read_tracks(experiment)
     walls = read_walls(experiment, tracks.frame_count)
@@ -146,10 +147,14 @@ def record_as_solved(folder: Path, path: Path, choice: SweepChoice) -> tuple[flo
     settings = replace(settings_of(experiment.config), overlap=0.0).uncorrected()
     canvas = Canvas.around(tracks, None)
     stream = rr.RecordingStream("rodsight", batcher_config=BATCHES)
-    layout = Layout(canvas, material.length, tracks.frame_count, photographs=False, truth=False, wall_count=walls.count)
+    layout = RecordingLayout(
+        canvas, material.length, tracks.frame_count, photographs=False, truth=False, wall_count=walls.count
+    )
     stream.save(path, default_blueprint=make_blueprint(layout))
     recorder, seconds, contacts = Recorder(stream, sweeps=choice), 0.0, 0
-    for solved in infer_frames(Inputs(tracks, walls, material, settings)):
+    store = MemoryStore()
+    infer_sequence(Inputs(tracks, walls, material, settings), store=store, complete=False)
+    for solved in store.frames:
         forces, statistics = solved.forces, solved.statistics
         begin = time.process_time()
         if forces.frame == 0:

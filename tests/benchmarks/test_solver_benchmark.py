@@ -2,8 +2,8 @@
 
 pytest tests/benchmarks/test_solver_benchmark.py -o addopts= -s
 
-Contenders take turns in one process and each is judged by its fastest turn, so that what else the machine does
-weighs on all alike. pymunk is looked for in this environment, siconos in Debian's own Python (python3-siconos,
+The functions run in alternate rounds in one process and the fastest round of each counts, so that other processes
+slow all of them equally. pymunk is expected in this environment, siconos in Debian's own Python (python3-siconos,
 python3-scipy).
 """
 
@@ -20,33 +20,33 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.nlgs.problem import ContactProblem, aligned_zeros
+from rodsight.solver.nlgs.solve import NlgsSettings, Solution, Stop, solve
+from rodsight.solver.nlgs.sweep_record import SweepHistory, SweepRecorder
+from rodsight.solver.nlgs.sweeping.kernels import advance, apply_forces
 
-from solver.bodies.grains import Array
-from solver.nlgs.problem import ContactProblem, aligned_zeros
-from solver.nlgs.solve import NlgsSettings, Solution, Stop, solve
-from solver.nlgs.sweep_record import SweepHistory, SweepRecorder
-from solver.nlgs.sweeping.kernels import advance, apply_forces
 from tests.benchmarks.plain_kernel import plain_problem, plain_state, plain_sweeps
 from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, StaticPacking, jammed_packing, static_problem
 
 SIZES = (1000, 10_000, 100_000)
 SOLVED_SIZES = (1000, 10_000)
-LOOSE = 2.0  # rest of the greatest packing, of which only sweeps are timed
-TURNS = 12
-CONTACTS_PER_TURN = 2e6  # sweeps times contacts: some 10 ms of the solver's
+LOOSE = 2.0  # rest of the largest packing, whose sweeps alone are timed
+ROUNDS = 12
+CONTACTS_PER_ROUND = 2e6  # sweeps times contacts: some 10 ms of the solver
 TARGET = {1000: 0.45, 10_000: 0.30, 100_000: 0.30}  # of the plain kernel's time
 NANOSECONDS = 6.0  # per contact and sweep, at every size
 NOISE = 0.05  # of a ratio, between runs on a shared machine
-HEARING = 0.30  # the aim, of a silent solve, for the exact residuals of every sweep and the forces of some
-HEARING_MOST = 1.5  # reached; it was 1.7 where each was measured by itself
-HEARD_SWEEPS, HEARD_TURNS = 5000, 5  # as many as a frame's
+RECORDING_AIM = 0.30  # additional time for the exact residuals of every sweep and the forces of some, relative
+MAX_RECORDING = 1.5  # reached; 1.7 where each was measured by itself
+RECORDED_SWEEPS, RECORDING_ROUNDS = 5000, 5  # the sweeps of a frame
 RESIDUAL = 1e-8
 WINDOW = 5
-SECONDS = {1000: 0.030, 10_000: 1.0}  # the aim for a static load from zero forces
+SECONDS = {1000: 0.030, 10_000: 1.0}  # aim for a static load from zero forces
 DEBIAN_PYTHON = "/usr/bin/python3"
 
 Benchmark = Callable[..., object]
-Turn = Callable[[int], object]  # does this many sweeps
+SweepFunction = Callable[[int], object]  # executes this many sweeps
 
 
 @cache
@@ -61,27 +61,27 @@ def table() -> Iterator[list[str]]:
     print("\n\n" + "\n".join(sorted(lines)))
 
 
-def fastest(turns: dict[str, Turn], contacts: int) -> dict[str, float]:
-    """Processor time of every contender [ns] per contact and sweep."""
-    count = max(1, round(CONTACTS_PER_TURN / contacts))
-    best = dict.fromkeys(turns, np.inf)
-    for turn in turns.values():
-        turn(20)  # compiled, in the cache, and the forces past their first sweeps
-    for _ in range(TURNS):
-        for name, turn in turns.items():
+def fastest(functions: dict[str, SweepFunction], contacts: int) -> dict[str, float]:
+    """Processor time of every function [ns] per contact and sweep."""
+    count = max(1, round(CONTACTS_PER_ROUND / contacts))
+    best = dict.fromkeys(functions, np.inf)
+    for sweep in functions.values():
+        sweep(20)  # compiled, in the cache, and beyond the first sweeps
+    for _ in range(ROUNDS):
+        for name, sweep in functions.items():
             since = time.process_time()
-            turn(count)
+            sweep(count)
             best[name] = min(best[name], (time.process_time() - since) / count / contacts * 1e9)
     return best
 
 
-def solver_turn(problem: ContactProblem) -> Turn:
+def solver_sweeps(problem: ContactProblem) -> SweepFunction:
     force, body, plate = aligned_zeros((len(problem.rows), 2)), aligned_zeros(problem.body.shape), problem.plate.copy()
     apply_forces(problem, body, plate, force)
     return lambda count: advance(problem, body, plate, force, count, 1.0)
 
 
-def plain_turn(case: StaticPacking, order: NDArray[np.int64]) -> Turn:
+def plain_sweeps_of(case: StaticPacking, order: NDArray[np.int64]) -> SweepFunction:
     impedance = case.grains.mass * IMPEDANCE
     problem = plain_problem(case.grains, case.walls, case.contacts, impedance, order)
     state = plain_state(case.grains, case.motion, case.walls, impedance)
@@ -105,18 +105,18 @@ def test_the_plain_kernel_gives_the_same_forces() -> None:
 
 @pytest.mark.benchmark(group="sweep")
 @pytest.mark.parametrize("count", SIZES)
-def test_a_sweep_takes_a_fraction_of_a_plain_one(benchmark: Benchmark, table: list[str], count: int) -> None:
+def test_a_sweep_is_faster_than_one_of_the_plain_kernel(benchmark: Benchmark, table: list[str], count: int) -> None:
     case = packing(count)
     problem, contacts = static_problem(case), case.contacts.count
     found = fastest(
         {
-            "solver": solver_turn(problem),
-            "plain": plain_turn(case, np.arange(contacts)),
-            "shuffled": plain_turn(case, np.random.default_rng(0).permutation(contacts)),
+            "solver": solver_sweeps(problem),
+            "plain": plain_sweeps_of(case, np.arange(contacts)),
+            "shuffled": plain_sweeps_of(case, np.random.default_rng(0).permutation(contacts)),
         },
         contacts,
     )
-    benchmark(solver_turn(problem), 1)
+    benchmark(solver_sweeps(problem), 1)
     ratio = found["solver"] / found["plain"]
     table.append(
         f"sweep   {count:7d} grains {contacts:7d} contacts: solver {found['solver']:5.2f} ns "
@@ -126,40 +126,41 @@ def test_a_sweep_takes_a_fraction_of_a_plain_one(benchmark: Benchmark, table: li
     assert ratio < TARGET[count] + NOISE
 
 
-@pytest.mark.benchmark(group="hearing")
+@pytest.mark.benchmark(group="recording")
 @pytest.mark.parametrize("count", SOLVED_SIZES)
-def test_a_recorded_solve_takes_little_longer_than_a_silent_one(
+def test_a_recorded_solution_takes_little_longer_than_an_unrecorded_one(
     benchmark: Benchmark, table: list[str], count: int
 ) -> None:
     case = packing(count)
-    problem, settings = static_problem(case), NlgsSettings(sweeps=HEARD_SWEEPS)
+    problem, settings = static_problem(case), NlgsSettings(sweeps=RECORDED_SWEEPS)
 
     def record() -> SweepHistory:
-        recorder = SweepRecorder(HEARD_SWEEPS, "log")
+        recorder = SweepRecorder(RECORDED_SWEEPS, "log")
         recorder.begin(problem, case.contacts)
-        solve(problem, settings, observer=recorder.hear, every=recorder.strides(), measured=True)
+        solve(problem, settings, observer=recorder.on_sweep, every=recorder.strides(), measured=True)
         return recorder.history(case.contacts)
 
-    ways: dict[str, Callable[[], object]] = {
-        "silent": lambda: solve(problem, settings),
+    functions: dict[str, Callable[[], object]] = {
+        "unrecorded": lambda: solve(problem, settings),
         "recorded": record,
-        "measured": lambda: solve(problem, settings, observer=lambda _: None, every=HEARD_SWEEPS, measured=True),
+        "measured": lambda: solve(problem, settings, observer=lambda _: None, every=RECORDED_SWEEPS, measured=True),
         "called": lambda: solve(problem, settings, observer=lambda _: None, every=1),
     }
-    best = dict.fromkeys(ways, np.inf)
-    for _ in range(HEARD_TURNS):
-        for name, way in ways.items():
+    best = dict.fromkeys(functions, np.inf)
+    for _ in range(RECORDING_ROUNDS):
+        for name, function in functions.items():
             since = time.process_time()
-            way()
+            function()
             best[name] = min(best[name], time.process_time() - since)
     benchmark.pedantic(record, rounds=1)  # type: ignore[attr-defined]
-    history, more = record(), {name: seconds / best["silent"] - 1 for name, seconds in best.items()}
+    history, more = record(), {name: seconds / best["unrecorded"] - 1 for name, seconds in best.items()}
     table.append(
-        f"hearing {count:7d} grains, {HEARD_SWEEPS} sweeps: recorded as a run does {more['recorded']:+.0%} (aim "
-        f"{HEARING:+.0%}; residuals of {np.isfinite(history.natural_map).sum()}, forces of {len(history.recorded)}); "
+        f"recording {count:7d} grains, {RECORDED_SWEEPS} sweeps: as in a run {more['recorded']:+.0%} "
+        f"(aim {RECORDING_AIM:+.0%}; residuals of {np.isfinite(history.natural_map).sum()}, "
+        f"forces of {len(history.recorded)}); "
         f"residuals of every sweep {more['measured']:+.0%}, a call for every sweep {more['called']:+.0%}"
     )
-    assert more["recorded"] < HEARING_MOST + NOISE
+    assert more["recorded"] < MAX_RECORDING + NOISE
 
 
 @pytest.mark.benchmark(group="static load")
@@ -180,14 +181,14 @@ def test_a_static_load_is_solved_from_zero_forces(benchmark: Benchmark, table: l
     reached = natural_map_of(case, solution.force)
     table.append(
         f"static  {count:7d} grains: {solution.sweeps} sweeps to a residual of {reached:.1e} in {1e3 * seconds:.1f} ms "
-        f"(aim {1e3 * SECONDS[count]:.0f} ms), worst unbalance {solution.unbalance:.1e} of the mean force"
+        f"(aim {1e3 * SECONDS[count]:.0f} ms), worst residual {solution.unbalance:.1e} of the mean force"
     )
     assert solution.stop is Stop.NATURAL_MAP
     assert reached < 1.01 * RESIDUAL
 
 
 def natural_map_of(case: StaticPacking, force: Array) -> float:
-    """The residual, plainly: from the forces (c, 2) [N] on the contacts, with nothing of the solver's."""
+    """Natural-map residual of forces (c, 2) [N], computed without code of the solver."""
     contacts, n = case.contacts, case.grains.count
     impedance = np.concatenate([case.grains.mass * IMPEDANCE, np.full(case.walls.count, np.inf)])
     loaded = np.flatnonzero(case.walls.loaded)
@@ -252,17 +253,17 @@ def test_a_sweep_beside_an_iteration_of_pymunk(benchmark: Benchmark, table: list
     for body in bodies:
         body.each_arbiter(count_arbiter)
     problem, few, many = static_problem(case), 5, 105
-    turn = solver_turn(problem)
-    ours = fastest({"solver": turn}, case.contacts.count)["solver"]
-    # Finding contacts is no part of an iteration: steps with many and with few iterations are compared.
+    sweep = solver_sweeps(problem)
+    ours = fastest({"solver": sweep}, case.contacts.count)["solver"]
+    # Contact detection is no part of an iteration: the time of few iterations is subtracted.
     theirs = min(step(many) for _ in range(5)) - min(step(few) for _ in range(5))
     theirs *= 1e9 / (many - few) / met["contacts"]
-    benchmark(turn, 1)
+    benchmark(sweep, 1)
     table.append(
         f"pymunk  {count:7d} grains {round(met['contacts']):7d} contacts: solver {ours:5.2f} ns, "
         f"an iteration of pymunk {pymunk.version} {theirs:5.2f}: ratio {ours / theirs:.3f}"
     )
-    assert met["contacts"] > 0.9 * case.contacts.count  # the same packing, give or take contacts that barely touch
+    assert met["contacts"] > 0.9 * case.contacts.count  # the same packing, except for contacts that barely touch
     assert ours < theirs
 
 
@@ -274,15 +275,15 @@ def test_a_sweep_beside_an_iteration_of_siconos(benchmark: Benchmark, table: lis
         pytest.skip("siconos is not installed: apt-get install python3-siconos python3-scipy")
     case = packing(1000)
     problem = static_problem(case)
-    turn = solver_turn(problem)
+    sweep = solver_sweeps(problem)
     save_delassus(case, tmp_path / "delassus.npz")
-    ours = fastest({"solver": turn}, case.contacts.count)["solver"]
+    ours = fastest({"solver": sweep}, case.contacts.count)["solver"]
     script = Path(__file__).with_name("siconos_iterations.py")
     answer = subprocess.run(
         [DEBIAN_PYTHON, str(script), str(tmp_path / "delassus.npz")], check=True, capture_output=True, text=True
     )
     theirs = json.loads(answer.stdout.splitlines()[-1])["ns_per_contact"]
-    benchmark(turn, 1)
+    benchmark(sweep, 1)
     table.append(
         f"siconos    1000 grains {case.contacts.count:7d} contacts: solver {ours:5.2f} ns, "
         f"an iteration of fc2d_nsgs {theirs:5.2f}: ratio {ours / theirs:.3f}"
@@ -291,7 +292,7 @@ def test_a_sweep_beside_an_iteration_of_siconos(benchmark: Benchmark, table: lis
 
 
 def save_delassus(case: StaticPacking, path: Path) -> None:
-    """W = Hᵀ Z⁻¹ H (2c, 2c) and the free velocities (2c,), in coordinate form, walls without plates' motion."""
+    """Save W = Hᵀ Z⁻¹ H (2c, 2c) and the free velocities (2c,) in coordinate form, for fixed walls."""
     from scipy.sparse import coo_array, diags_array
 
     contacts, n = case.contacts, case.grains.count
@@ -312,5 +313,5 @@ def save_delassus(case: StaticPacking, path: Path) -> None:
     compliance = np.repeat(1.0 / (case.grains.mass * IMPEDANCE), 3)
     delassus = (transfer @ diags_array(compliance) @ transfer.T).tocoo()
     free = np.zeros(2 * c)
-    free[0::2] = -case.mean_force / (case.grains.mass.mean() * IMPEDANCE)  # every contact is being closed
+    free[0::2] = -case.mean_force / (case.grains.mass.mean() * IMPEDANCE)  # every contact closes
     np.savez(path, row=delassus.row, col=delassus.col, value=delassus.data, free=free, friction=FRICTION)

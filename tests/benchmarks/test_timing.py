@@ -1,10 +1,18 @@
-"""What the tables of the benchmarks are made of."""
+"""Processor and clock times, and tables of the benchmarks."""
 
 import time
 
 import pytest
 
-from tests.benchmarks.timing import Row, Took, by_turns, fastest, format_table, once, processor_name
+from tests.benchmarks.timing import (
+    Duration,
+    Row,
+    format_table,
+    processor_name,
+    time_alternately,
+    time_fastest,
+    time_once,
+)
 
 pytestmark = pytest.mark.unit
 
@@ -15,15 +23,15 @@ def spin():
         pass
 
 
-def test_seconds_of_the_processor_and_of_the_clock_are_told():
-    took = once(spin)
-    assert 0.02 <= took.processor < 10.0
-    assert took.clock >= 0.019
-    assert str(Took(0.0214, 3.21) / 2) == "10.7 ms of processor, 1.6 s of the clock"
-    assert fastest(lambda: None, 2).processor < 0.01
-    found = by_turns({"long": spin, "short": lambda: None}, 2)
-    assert min(found["long"]) >= 0.02
-    assert len(found["short"]) == 2
+def test_processor_and_clock_time_are_measured():
+    duration = time_once(spin)
+    assert 0.02 <= duration.processor < 10.0
+    assert duration.clock >= 0.019
+    assert str(Duration(0.0214, 3.21) / 2) == "10.7 ms of processor, 1.6 s of the clock"
+    assert time_fastest(lambda: None, 2).processor < 0.01
+    measured = time_alternately({"long": spin, "short": lambda: None}, 2)
+    assert min(measured["long"]) >= 0.02
+    assert len(measured["short"]) == 2
 
 
 def test_a_table_has_a_line_for_every_row():

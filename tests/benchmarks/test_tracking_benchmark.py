@@ -1,4 +1,4 @@
-"""The tracker's figures: speed per core, and exactness where it takes too long for the fast tests.
+"""Speed of the tracker per core, and its accuracy on many photographs.
 
 pytest tests/benchmarks/test_tracking_benchmark.py --benchmark-only -s
 """
@@ -54,7 +54,7 @@ def wrong_unflagged(poses: FramePoses, x: np.ndarray, y: np.ndarray) -> int:
 
 
 def cpu_seconds(tracker: Tracker, image: np.ndarray, rounds: int = 3) -> float:
-    """Processor time of one photograph, which other work on the machine does not lengthen as it does the clock's."""
+    """Median processor time of one photograph [s]."""
     spent = []
     for _ in range(rounds):
         since = time.process_time()
@@ -68,14 +68,16 @@ def report(text: str) -> None:
 
 
 def cramer_rao(clean: Tracker, noise: float) -> float:
-    """The least rms error of a displacement component between two photographs [px]; clean: of one without noise.
+    """Cramér-Rao bound of the rms error of a displacement component between two photographs [px].
+
+    clean: tracker of a photograph without noise.
 
     The photographs are s + n₁ and a·s(W⁻¹·) + b + n₂ with unknown x, y, θ, a, b; near the truth their difference is
     J·(x, y, θ, a, b) + n₂ − n₁, J = (∂s/∂x, ∂s/∂y, ∂s/∂θ, s, 1), of variance 2σ² a pixel, so that the covariance is no
     less than 2σ² (JᵀJ)⁻¹: the tracker's inverse Hessian with s and 1 projected out. Rounding to 8 bits adds 1/12 to σ².
     """
-    spread = clean.patches.hessian_inverse
-    variance = 2.0 * (noise**2 + 1.0 / 12.0) / clean.patches.norm**2 * 0.5 * (spread[:, 0, 0] + spread[:, 1, 1])
+    covariance = clean.patches.hessian_inverse
+    variance = 2.0 * (noise**2 + 1.0 / 12.0) / clean.patches.norm**2 * 0.5 * (covariance[:, 0, 0] + covariance[:, 1, 1])
     return float(np.sqrt(variance.mean()))
 
 
@@ -83,7 +85,7 @@ def cramer_rao(clean: Tracker, noise: float) -> float:
 def test_bias_and_rms_against_sub_pixel_position(benchmark: Benchmark) -> None:
     def sweep() -> None:
         parts = np.arange(0.0, 1.0, 0.125)
-        error, turn, limit = [], [], []
+        error, rotation, limit = [], [], []
         for seed in range(DRAWS):
             given = {"radius": RADIUS, "pitch": 49.0, "margin": 90.0, "seed": seed}
             rods, clean = grid_of_rods(20, 20, **given), grid_of_rods(20, 20, noise=0.0, **given)
@@ -95,16 +97,16 @@ def test_bias_and_rms_against_sub_pixel_position(benchmark: Benchmark) -> None:
                 image = rods.moved(part, part, 0.0, noise_seed=2000 + 8 * seed + k)
                 poses = tracker.follow(image, [tracker.first()])
                 error.append(np.stack([poses.x - rods.x - part, poses.y - rods.y - part]))
-                turn.append(rms(poses.rotation))
+                rotation.append(rms(poses.rotation))
         drawn = np.array(error).reshape(DRAWS, len(parts), 2, -1)
         bias = np.abs(drawn.mean(axis=(0, 3))).max()
-        spread = np.sqrt((drawn**2).mean(axis=(0, 2, 3)))
-        ratio = spread / rms(np.array(limit))
+        error_rms = np.sqrt((drawn**2).mean(axis=(0, 2, 3)))
+        ratio = error_rms / rms(np.array(limit))
         count = drawn.shape[0] * drawn.shape[3]
         report(
-            f"bias {bias:.4f} px, rms {spread.max():.4f} px, {ratio.max():.3f} (mean {ratio.mean():.3f}) x Cramér-Rao "
-            f"± {0.5 / np.sqrt(count):.3f}, rotation {max(turn):.5f} rad (r = 20, noise 2.5, {count} grains, worst "
-            "of 8 positions)"
+            f"bias {bias:.4f} px, rms {error_rms.max():.4f} px, {ratio.max():.3f} (mean {ratio.mean():.3f}) "
+            f"x Cramér-Rao ± {0.5 / np.sqrt(count):.3f}, rotation {max(rotation):.5f} rad "
+            f"(r = 20, noise 2.5, {count} grains, worst of 8 positions)"
         )
         assert bias < 0.005
         assert ratio.max() < 1.15
@@ -125,8 +127,8 @@ def test_speed_of_predicted_grains(benchmark: Benchmark, rods: Rods, tracker: Tr
 @pytest.mark.benchmark(group="tracking")
 @pytest.mark.parametrize(("shift", "degrees"), [(8.0, 20.0), (40.0, 60.0)])
 def test_speed_of_rescue(benchmark: Benchmark, rods: Rods, tracker: Tracker, shift: float, degrees: float) -> None:
-    turn = np.deg2rad(degrees) * np.where(np.arange(rods.count) % 2, 1.0, -1.0)
-    image = rods.moved(shift, 0.0, turn)
+    rotation = np.deg2rad(degrees) * np.where(np.arange(rods.count) % 2, 1.0, -1.0)
+    image = rods.moved(shift, 0.0, rotation)
     poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=3, warmup_rounds=1)
     seconds = cpu_seconds(tracker, image)
     lost = int((~poses.has_pose).sum())
@@ -139,34 +141,34 @@ def test_speed_of_rescue(benchmark: Benchmark, rods: Rods, tracker: Tracker, shi
 
 
 @pytest.mark.benchmark(group="tracking")
-def test_speed_of_rescue_where_every_grain_goes_its_own_way(benchmark: Benchmark) -> None:
+def test_speed_of_rescue_with_independent_motions(benchmark: Benchmark) -> None:
     generator = np.random.default_rng(7)
     spaced = grid_of_rods(10, 10, radius=RADIUS, pitch=105.0, margin=90.0)
     alone = Tracker(spaced.reference(), (spaced.x, spaced.y, spaced.radius), workers=1)
-    turn = generator.uniform(-np.pi, np.pi, spaced.count)
+    rotation = generator.uniform(-np.pi, np.pi, spaced.count)
     dx, dy = generator.uniform(-27.0, 27.0, (2, spaced.count))
-    image = spaced.moved(dx, dy, turn)
+    image = spaced.moved(dx, dy, rotation)
     poses = benchmark.pedantic(alone.follow, (image, [alone.first()]), rounds=3, warmup_rounds=1)
     lost = int((~poses.has_pose).sum())
     report(
-        f"jumps of up to 38 px and any angle, no two alike: {spaced.count / cpu_seconds(alone, image):.0f} grains/s, "
+        f"independent jumps of up to 38 px and any angle: {spaced.count / cpu_seconds(alone, image):.0f} grains/s, "
         f"{lost} of {spaced.count} lost, {wrong_unflagged(poses, spaced.x + dx, spaced.y + dy)} wrong unflagged"
     )
     assert lost == 0
 
 
 @pytest.mark.benchmark(group="tracking")
-@pytest.mark.parametrize("share", [0.3, 0.5])
-def test_occlusion_with_nothing_to_predict_from(benchmark: Benchmark, share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.3, 0.5])
+def test_occlusion_without_a_prediction(benchmark: Benchmark, fraction: float) -> None:
     def run() -> None:
         lost, wrong, flagged, total, squared = 0, 0, 0, 0, []
         for seed in range(DRAWS):
             rods = grid_of_rods(10, 10, radius=RADIUS, pitch=49.0, margin=90.0, seed=20 + seed)
             tracker = Tracker(rods.reference(), (rods.x, rods.y, rods.radius), workers=1)
-            turn = np.random.default_rng(seed).uniform(-np.pi, np.pi, rods.count)
+            rotation = np.random.default_rng(seed).uniform(-np.pi, np.pi, rods.count)
             for grey in (0.0, 255.0):
-                image = rods.moved(12.0, 5.0, turn)
-                cover(image, rods.x + 12.0, rods.y + 5.0, share, grey)
+                image = rods.moved(12.0, 5.0, rotation)
+                cover(image, rods.x + 12.0, rods.y + 5.0, fraction, grey)
                 poses = tracker.follow(image, [tracker.first()])
                 lost += int((~poses.has_pose).sum())
                 flagged += int((poses.status == TrackStatus.SUSPECT).sum())
@@ -174,11 +176,11 @@ def test_occlusion_with_nothing_to_predict_from(benchmark: Benchmark, share: flo
                 total += rods.count
                 squared.append(rms(np.stack([poses.x - rods.x - 12.0, poses.y - rods.y - 5.0])))
         report(
-            f"{100 * share:.0f} % of every rod covered black or white, moved by 13 px and any angle: {lost} of {total} "
-            f"lost, {flagged} suspect, {wrong} wrong unflagged, rms {rms(np.array(squared)):.4f} px"
+            f"{100 * fraction:.0f} % of every rod covered black or white, moved by 13 px and any angle: "
+            f"{lost} of {total} lost, {flagged} suspect, {wrong} wrong unflagged, rms {rms(np.array(squared)):.4f} px"
         )
         assert wrong == 0
-        assert share > 0.3 or lost == 0
+        assert fraction > 0.3 or lost == 0
 
     benchmark.pedantic(run, rounds=1)
 
@@ -198,28 +200,28 @@ def test_twenty_megapixels(benchmark: Benchmark) -> None:
 
 
 @pytest.mark.benchmark(group="tracking")
-def test_long_way_with_an_avalanche(benchmark: Benchmark) -> None:
+def test_a_long_path_with_an_avalanche(benchmark: Benchmark) -> None:
     rods = grid_of_rods(34, 34, radius=RADIUS, pitch=49.0, margin=60.0)
     wide = Rods(rods.width + 520, rods.height, rods.x, rods.y, rods.radius, rods.settings)
     generator = np.random.default_rng(1)
     tracker = Tracker(wide.reference(), (wide.x, wide.y, wide.radius), workers=2)
     middle = np.argsort(np.hypot(rods.x - 800.0, rods.y - 800.0))[:40]
-    way = np.linspace(0.0, 501.0, 31)[1:]
+    path = np.linspace(0.0, 501.0, 31)[1:]
 
     def run() -> None:
         history = [tracker.first()]
-        x, y, turn = rods.x.copy(), rods.y.copy(), np.zeros(rods.count)
+        x, y, rotation = rods.x.copy(), rods.y.copy(), np.zeros(rods.count)
         lost, wrong, worst = 0, 0, 0.0
-        for k, reached in enumerate(way):
-            moved = reached - (way[k - 1] if k else 0.0)
-            # Shear: the upper rows go farther; every rod rolls a little.
+        for k, reached in enumerate(path):
+            moved = reached - (path[k - 1] if k else 0.0)
+            # Shear: the upper rows move farther; every rod rotates a little.
             x = x + moved * (0.4 + 0.6 * rods.y / rods.y.max())
-            turn = turn + generator.normal(0.0, 0.05, rods.count)
+            rotation = rotation + generator.normal(0.0, 0.05, rods.count)
             if k == 15:
                 y[middle] += 26.0 / np.sqrt(2.0)
                 x[middle] += 26.0 / np.sqrt(2.0)
-                turn[middle] += generator.uniform(-0.9, 0.9, 40)
-            poses = tracker.follow(wide.moved(x - rods.x, y - rods.y, turn, noise_seed=100 + k), history[-3:])
+                rotation[middle] += generator.uniform(-0.9, 0.9, 40)
+            poses = tracker.follow(wide.moved(x - rods.x, y - rods.y, rotation, noise_seed=100 + k), history[-3:])
             history.append(poses)
             lost += int((~poses.has_pose).sum())
             wrong += wrong_unflagged(poses, x, y)
@@ -269,17 +271,17 @@ def test_walls_of_the_sample(benchmark: Benchmark) -> None:
 def test_search_of_brown_rods_without_speckle(benchmark: Benchmark, radius: float) -> None:
     generator = np.random.default_rng(0)
     rods = grid_of_rods(8, 8, radius=radius, pitch=2.1 * radius, margin=90.0)
-    turn = generator.uniform(-np.pi, np.pi, rods.count)
+    rotation = generator.uniform(-np.pi, np.pi, rods.count)
 
-    def photograph(dx: float, dy: float, turn: np.ndarray, noise_seed: int) -> np.ndarray:
+    def photograph(dx: float, dy: float, rotation: np.ndarray, noise_seed: int) -> np.ndarray:
         image = brown_photograph(
-            Laboratory(), rods.width, rods.height, rods.x + dx, rods.y + dy, rods.radius, turn,
+            Laboratory(), rods.width, rods.height, rods.x + dx, rods.y + dy, rods.radius, rotation,
             pattern_seed=1, noise_seed=noise_seed,
         )  # fmt: skip
         return (image @ LUMA).astype(np.float32)
 
-    tracker = Tracker(photograph(0.0, 0.0, 0.0 * turn, 1), (rods.x, rods.y, rods.radius), workers=1)
-    image = photograph(33.3, -24.2, turn, 2)
+    tracker = Tracker(photograph(0.0, 0.0, 0.0 * rotation, 1), (rods.x, rods.y, rods.radius), workers=1)
+    image = photograph(33.3, -24.2, rotation, 2)
     poses = benchmark.pedantic(tracker.follow, (image, [tracker.first()]), rounds=1, warmup_rounds=1)
     seconds = cpu_seconds(tracker, image)
     lost, wrong = int((~poses.has_pose).sum()), wrong_unflagged(poses, rods.x + 33.3, rods.y - 24.2)

@@ -1,1 +1,1 @@
-"""What may come from outside: spoiled files, refused writes, kills, strangers. `python -m tests.fuzzing` counts."""
+"""Robustness: corrupted files, failing writes, kills, hostile requests. `python -m tests.fuzzing` prints the counts."""

@@ -1,4 +1,4 @@
-"""One command on spoiled input, and what is wrong with how it ended. Many of them share a forked process."""
+"""Execution of commands on corrupted input in forked processes, and checks of their outcome."""
 
 from __future__ import annotations
 
@@ -17,130 +17,132 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from rodsight.atomic import PART
 from rodsight.cli import main as program
+from rodsight.process.atomic import PART
 
-from .shortcut import begin
+from .parser_shortcut import run_without_parser
 
-SECONDS = 10  # of processor time that a command may take
-WAITING = 120  # [s] after which it hangs
-ROOM = 1 << 30  # [bytes] that it may take beyond what the process has
-PARSED = 10  # of so many cases one goes through the parser, which takes longer than all the rest
+MAX_SECONDS = 10  # of processor time of a command
+TIMEOUT = 120  # [s]
+EXTRA_MEMORY = 1 << 30  # [bytes] beyond the memory of the process
+PARSED = 10  # one of this number of cases uses the parser, which takes most of the time
 
-Case = tuple[str, Callable[[], tuple[list[str], Path | None]]]  # its name, and what makes its command and result folder
+Case = tuple[
+    str, Callable[[], tuple[list[str], Path | None]]
+]  # name, and function that makes command and result folder
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
-    """How a command ended."""
+class Outcome:
+    """The outcome of a command."""
 
     status: int
-    said: str  # on standard error
+    errors: str  # text on standard error
     seconds: float
 
 
-def attempt(arguments: list[str], *, parsed: bool = True) -> Ended:
-    """Run a command here; an exception that leaves it is status −1 with its traceback.
+def attempt(arguments: list[str], *, parsed: bool = True) -> Outcome:
+    """Run a command in this process; an uncaught exception gives status −1 with its traceback.
 
-    parsed: by the command line's own parser, else by the shortcut.
+    parsed: use the parser of the command line, otherwise the shortcut.
     """
-    out, said, since = io.StringIO(), io.StringIO(), time.process_time()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(said):
+    out, errors, since = io.StringIO(), io.StringIO(), time.process_time()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
         try:
-            with nullcontext() if parsed else patch.object(program, "_run", begin):
+            with nullcontext() if parsed else patch.object(program, "_run", run_without_parser):
                 program.main(arguments)
             status = 0
         except SystemExit as end:
             status = int(end.code or 0)
         except BaseException:
-            return Ended(-1, traceback.format_exc(), time.process_time() - since)
-    return Ended(status, said.getvalue(), time.process_time() - since)
+            return Outcome(-1, traceback.format_exc(), time.process_time() - since)
+    return Outcome(status, errors.getvalue(), time.process_time() - since)
 
 
-def complaint(ended: Ended, out: Path | None, statuses: tuple[int, ...] = (0, 2)) -> str:
-    """What is wrong with how a command ended; empty: nothing."""
+def find_problem(ended: Outcome, out: Path | None, statuses: tuple[int, ...] = (0, 2)) -> str:
+    """Describe what is wrong with the outcome of a command; empty: nothing."""
     if ended.status not in statuses:
-        return f"status {ended.status}: {ended.said[-2000:]}"
-    if "Traceback" in ended.said:
-        return f"traceback: {ended.said[-2000:]}"
-    if ended.status and (ended.said.count("\n") != 1 or not ended.said.startswith("rodsight: ")):
-        return f"status {ended.status} is not one line: {ended.said[:500]!r}"
-    if ended.seconds > SECONDS:
+        return f"status {ended.status}: {ended.errors[-2000:]}"
+    if "Traceback" in ended.errors:
+        return f"traceback: {ended.errors[-2000:]}"
+    if ended.status and (ended.errors.count("\n") != 1 or not ended.errors.startswith("rodsight: ")):
+        return f"status {ended.status} is not one line: {ended.errors[:500]!r}"
+    if ended.seconds > MAX_SECONDS:
         return f"took {ended.seconds:.1f} s"
     if out is not None and out.exists():
         if half := [str(file) for file in out.rglob(f"*{PART}")]:
             return f"left {half}"
         if ended.status == 2 and (whole := [file.name for file in out.iterdir() if file.suffix in (".h5", ".rrd")]):
-            return f"wrote {whole} of what it refused"
+            return f"wrote {whole} although it refused the input"
     return ""
 
 
-def try_all(cases: Iterable[Case], statuses: tuple[int, ...] = (0, 2), *, batch: int = 250) -> tuple[int, list[str]]:
-    """Try cases in forked processes; gives how many there were, and what was wrong with which."""
-    count, wrong, waiting = 0, [], list(cases)
+def run_all(cases: Iterable[Case], statuses: tuple[int, ...] = (0, 2), *, batch: int = 250) -> tuple[int, list[str]]:
+    """Run cases in forked processes; return their number and the problems."""
+    count, problems, waiting = 0, [], list(cases)
     while waiting:
-        done, found = _try_some(waiting[:batch], statuses)
-        count, wrong, waiting = count + done, wrong + found, waiting[done:]
-    return count, wrong
+        done, found = _run_batch(waiting[:batch], statuses)
+        count, problems, waiting = count + done, problems + found, waiting[done:]
+    return count, problems
 
 
-def _try_some(cases: list[Case], statuses: tuple[int, ...]) -> tuple[int, list[str]]:
-    """Try cases in one forked process; gives how many it came through, the last of them perhaps its end."""
+def _run_batch(cases: list[Case], statuses: tuple[int, ...]) -> tuple[int, list[str]]:
+    """Run cases in one forked process; return the number it finished, including one that ended it, and the problems."""
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(read)
-        with os.fdopen(write, "w") as tell:
+        with os.fdopen(write, "w") as stream:
             _limit()
             for number, (name, make) in enumerate(cases):
                 try:
-                    signal.alarm(WAITING)  # which ends what hangs, inside a library, too
+                    signal.alarm(TIMEOUT)  # also ends a command that hangs inside a library
                     arguments, out = make()
                     ended = attempt(arguments, parsed=number % PARSED == 0)
-                    problem = complaint(ended, out, statuses)
+                    problem = find_problem(ended, out, statuses)
                 except BaseException:
                     arguments, problem = [], f"the test itself: {traceback.format_exc()}"
-                tell.write(json.dumps(f"{name}: {arguments}: {problem}" if problem else "") + "\n")
-                tell.flush()
+                stream.write(json.dumps(f"{name}: {arguments}: {problem}" if problem else "") + "\n")
+                stream.flush()
         os._exit(0)
     os.close(write)
-    with os.fdopen(read) as told:
-        lines = [json.loads(line) for line in told]
+    with os.fdopen(read) as stream:
+        lines = [json.loads(line) for line in stream]
     _, status = os.waitpid(child, 0)
-    wrong = [line for line in lines if line]
+    problems = [line for line in lines if line]
     if len(lines) < len(cases):
-        wrong.append(f"{cases[len(lines)][0]}: the process ended with {os.waitstatus_to_exitcode(status)}")
-        return len(lines) + 1, wrong
-    return len(lines), wrong
+        problems.append(f"{cases[len(lines)][0]}: the process ended with {os.waitstatus_to_exitcode(status)}")
+        return len(lines) + 1, problems
+    return len(lines), problems
 
 
-def in_a_fork(work: Callable[[], Any]) -> Any:
-    """What work gives (JSON), done in a process of its own; None where that process did not come to its end."""
+def run_in_fork(work: Callable[[], Any]) -> Any:
+    """Run a function in a forked process and return its JSON result; None if the process failed."""
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
         status = 1
         try:
             os.close(read)
-            with os.fdopen(write, "w") as tell:
-                json.dump(work(), tell)
+            with os.fdopen(write, "w") as stream:
+                json.dump(work(), stream)
             status = 0
         finally:
             os._exit(status)
     os.close(write)
-    with os.fdopen(read) as told:
-        content = told.read()
+    with os.fdopen(read) as stream:
+        content = stream.read()
     os.waitpid(child, 0)
     return json.loads(content) if content else None
 
 
-def attempt_in_a_fork(arguments: list[str]) -> Ended:
-    told = in_a_fork(lambda: [(ended := attempt(arguments)).status, ended.said, ended.seconds])
-    return Ended(*told) if told else Ended(-9, "it ended without a word", 0.0)
+def attempt_in_fork(arguments: list[str]) -> Outcome:
+    outcome = run_in_fork(lambda: [(ended := attempt(arguments)).status, ended.errors, ended.seconds])
+    return Outcome(*outcome) if outcome else Outcome(-9, "it ended without a message", 0.0)
 
 
 def _limit() -> None:
     pages = int(Path("/proc/self/statm").read_text().split()[0])
-    most = pages * resource.getpagesize() + ROOM
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    limit = pages * resource.getpagesize() + EXTRA_MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

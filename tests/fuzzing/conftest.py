@@ -1,4 +1,4 @@
-"""Good input of every kind, made once for all that spoil copies of it."""
+"""Valid input of every kind, made once; tests corrupt copies of it."""
 
 from __future__ import annotations
 

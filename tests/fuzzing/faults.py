@@ -1,4 +1,4 @@
-"""A machine that refuses: the n-th file that is opened, renamed, removed or listed, or that grows beyond a size."""
+"""Faults of the operating system: the n-th opened, renamed, removed or listed file fails, or file sizes are limited."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ KINDS = {"open": "open", "os.rename": "rename", "os.mkdir": "mkdir", "os.remove"
 ERRORS = (errno.ENOSPC, errno.EACCES, errno.EIO)
 
 
-class Refusing:
-    """Counts what is done to files of a folder, and refuses the n-th of a kind once."""
+class FileFault:
+    """An audit hook that counts operations on files of a folder and makes the n-th of a kind fail once."""
 
     def __init__(self, folder: Path, kind: str, number: int, error: int) -> None:
         self._folder, self._kind, self._left, self._error = os.fspath(folder), kind, number, error
@@ -37,17 +37,17 @@ class Refusing:
             self._left -= 1
 
 
-def refuse_from_now_on(refusing: Refusing) -> None:
-    """For good: a hook of this process cannot be taken away."""
-    sys.addaudithook(refusing)
+def install_fault(fault: FileFault) -> None:
+    """Install the audit hook, which cannot be removed from this process."""
+    sys.addaudithook(fault)
 
 
 def refuse_stores(number: int, error: int) -> None:
-    """Have the n-th dataset that is written or file that is opened by HDF5 refused, as its library says it."""
+    """Make the n-th write of a dataset, or its reading, fail with the message of the HDF5 library."""
     left = [number]
 
-    def refusing(work: Callable[..., Any]) -> Callable[..., Any]:
-        def worked(*given: Any, **named: Any) -> Any:
+    def failing(work: Callable[..., Any]) -> Callable[..., Any]:
+        def wrapped(*given: Any, **named: Any) -> Any:
             if left[0] == 0:
                 left[0] -= 1
                 text = f"[Errno {error}] Can't synchronously write data (file write failed: errno = {error})"
@@ -55,14 +55,14 @@ def refuse_stores(number: int, error: int) -> None:
             left[0] -= 1
             return work(*given, **named)
 
-        return worked
+        return wrapped
 
-    h5py.Group.create_dataset = refusing(h5py.Group.create_dataset)  # type: ignore[method-assign]
-    h5py.Dataset.__getitem__ = refusing(h5py.Dataset.__getitem__)  # type: ignore[method-assign]
+    h5py.Group.create_dataset = failing(h5py.Group.create_dataset)  # type: ignore[method-assign]
+    h5py.Dataset.__getitem__ = failing(h5py.Dataset.__getitem__)  # type: ignore[method-assign]
 
 
 def limit_files(size: int) -> None:
-    """Let no file grow beyond a size, as a full disk does."""
+    """Limit the size of files, as a full disk does."""
     import resource
     import signal
 

@@ -1,4 +1,4 @@
-"""Small files as other programs write them, and experiments with other boundaries than four bars."""
+"""Small files in the formats of other programs, and experiments with other boundaries than four bars."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ PEGS = {
 }
 COLUMNS = "frame=t,id=rod,x=X,y=Y,theta=turn,radius=R"
 
-# Form, files of it, and what its command needs; the command reads the file where there is one, else the folder.
+# Format, files, and options of the command, which reads a single file or the folder.
 FORMS: tuple[tuple[str, dict[str, str], tuple[str, ...]], ...] = (
     ("table", {"spots.csv": TABLE}, ("--columns", COLUMNS, "--pixel-size", "1e-3", "--y-down", "--walls", "box")),
     ("trackpy", {"linked.csv": TRACKPY}, ("--pixel-size", "1e-3", "--radius", "5")),
@@ -68,7 +68,7 @@ def write_forms(folder: Path) -> None:
 
 
 def make_bounded(tracked: Path, folder: Path) -> dict[str, tuple[str, ...]]:
-    """Experiments in circles, under measured loads, of rods and in a cell; gives the tables of each, by its name."""
+    """Write experiments with circles, measured loads, boundary grains and a cell; return the tables of each by name."""
     frames = range(3)
     poses = [line.split(",") for line in (tracked / "tracks.csv").read_text().splitlines()[1:]]
     grains = sorted({int(line[1]) for line in poses})
@@ -89,10 +89,10 @@ def make_bounded(tracked: Path, folder: Path) -> dict[str, tuple[str, ...]]:
 
 
 def _write_cell(folder: Path) -> None:
-    place = [(0.01 + 0.02 * a, 0.01 + 0.02 * b) for a in range(5) for b in range(5)]
-    rows = [f"{k},{i},{x + 1e-4 * k * y},{y},0\n" for k in range(3) for i, (x, y) in enumerate(place)]
+    match = [(0.01 + 0.02 * a, 0.01 + 0.02 * b) for a in range(5) for b in range(5)]
+    rows = [f"{k},{i},{x + 1e-4 * k * y},{y},0\n" for k in range(3) for i, (x, y) in enumerate(match)]
     (folder / "tracks.csv").write_text("frame,id,x,y,theta\n" + "".join(rows))
-    (folder / "grains.csv").write_text("id,radius\n" + "".join(f"{i},0.01\n" for i in range(len(place))))
+    (folder / "grains.csv").write_text("id,radius\n" + "".join(f"{i},0.01\n" for i in range(len(match))))
     cell = "".join(f"{k},0.1,0,{1e-5 * k},0.1\n" for k in range(3))
     (folder / "cell.csv").write_text(f"frame,ax,ay,bx,by\n{cell}")
     (folder / "experiment.toml").write_text(

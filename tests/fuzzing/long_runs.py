@@ -1,6 +1,6 @@
-"""How much memory a long run takes, stage by stage, asked of the system while it works.
+"""Memory of a long run by stage, read from the operating system while it runs.
 
-python -m tests.fuzzing --long 1000     the figures of a run, its recording and its review of so many photographs
+python -m tests.fuzzing --long 1000     a run, its recording and its review with this number of photographs
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from rodsight.experiment.units import Scale
 from rodsight.recording.viewing.recording_server import RecordingServer
-from rodsight.review.command import open_session
-from rodsight.review.reviewed_run import open_reviewed
-from rodsight.review.service.session import Viewpoint
+from rodsight.reviewing.reviewed_run import open_reviewed_run
+from rodsight.reviewing.session import ReviewSession, View
 
 from tests.program import RODSIGHT
 
-from .attempt import in_a_fork
+from .attempt import run_in_fork
 
 Memory = dict[str, dict[int, int]]  # [bytes] by stage and frames done
-EARLY, WIDTH = 50, 10  # frames after which all that is made once is made, and around which the most is taken
+EARLY, WIDTH = 50, 10  # frames after which one-time allocations are done, and window of the maximum
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20")
 
 
 def lengthen(tracked: Path, folder: Path, count: int) -> Path:
-    """An experiment of `count` photographs: those of a shorter one to and fro, each with noise of its own."""
-    chance = random.Random(count)
+    """Write an experiment of `count` photographs: those of a shorter one back and forth, with independent noise."""
+    rng = random.Random(count)
     folder.mkdir()
     poses = _by_frame(tracked / "tracks.csv")
     there_and_back = [*range(len(poses)), *range(len(poses) - 2, 0, -1)]
     order = [there_and_back[k % len(there_and_back)] for k in range(count)]
 
     def moved(row: list[str]) -> list[str]:
-        return [row[0], *(repr(float(cell) + chance.gauss(0.0, 1e-6)) for cell in row[1:3]), *row[3:]]
+        return [row[0], *(repr(float(cell) + rng.gauss(0.0, 1e-6)) for cell in row[1:3]), *row[3:]]
 
     walls = _by_frame(tracked / "walls.csv")
     _write(folder / "tracks.csv", "frame,id,x,y,theta", ((k, map(moved, poses[at])) for k, at in enumerate(order)))
@@ -50,15 +50,15 @@ def lengthen(tracked: Path, folder: Path, count: int) -> Path:
 
 
 def memory_of_run(experiment: Path, out: Path) -> Memory:
-    """What a run takes after every frame that it tells of, stage by stage."""
+    """Measure the memory of a run after every reported frame, by stage."""
     command = [*RODSIGHT, "run", str(experiment), "--out", str(out), "--progress", "lines", *FEW]
     found: Memory = {}
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
         assert run.stderr is not None
         for line in run.stderr:
             if line.startswith("{"):
-                told = json.loads(line)
-                found.setdefault(told["stage"], {})[told["done"]] = resident(run.pid)
+                event = json.loads(line)
+                found.setdefault(event["stage"], {})[event["done"]] = resident(run.pid)
         status = run.wait()
     if status:
         raise RuntimeError(f"the run ended with status {status}")
@@ -66,61 +66,62 @@ def memory_of_run(experiment: Path, out: Path) -> Memory:
 
 
 def memory_of_review(out: Path, count: int) -> Memory:
-    """What somebody takes who looks at the pairs of every photograph, one after the other."""
+    """Measure the memory of a review that shows the pairs of all photographs."""
 
     def review() -> dict[str, int]:
-        session, taken = open_session(open_reviewed(out)), {}
+        session, memory = ReviewSession(open_reviewed_run(out), Scale(1e-4, 1000)), {}
         for frame in range(count):
-            session.status(Viewpoint("anna", frame))
-            session.following(Viewpoint("anna", frame))
-            taken[str(frame + 1)] = resident(os.getpid())
-        return taken
+            session.status(View("anna", frame))
+            session.next_pair(View("anna", frame))
+            memory[str(frame + 1)] = resident(os.getpid())
+        return memory
 
-    return {"review": {int(frame): size for frame, size in (in_a_fork(review) or {}).items()}}
+    return {"review": {int(frame): size for frame, size in (run_in_fork(review) or {}).items()}}
 
 
 def memory_of_view(out: Path, count: int) -> Memory:
-    """What serving the recording takes, by the share of it that a browser has got."""
+    """Measure the memory of serving the recording, by the fraction sent."""
 
     def serve() -> dict[str, int]:
-        file, sent, taken = out / "recording.rrd", 0, {}
+        file, sent, memory = out / "recording.rrd", 0, {}
         server = RecordingServer([file])
-        for piece in server.pieces(file):
+        for piece in server.read_pieces(file):
             sent += len(piece)
             held = resident(os.getpid())
-            taken |= {str(k): held for k in range(len(taken) + 1, 1 + count * sent // file.stat().st_size)}
-        return taken
+            memory |= {str(k): held for k in range(len(memory) + 1, 1 + count * sent // file.stat().st_size)}
+        return memory
 
-    return {"view": {int(frame): size for frame, size in (in_a_fork(serve) or {}).items()}}
+    return {"view": {int(frame): size for frame, size in (run_in_fork(serve) or {}).items()}}
 
 
-def growth(taken: dict[int, int]) -> tuple[int, int, float]:
-    """The most around frame EARLY and among the last frames [bytes], and by which share it grew."""
-    last = max(taken)
-    early = max(size for frame, size in taken.items() if abs(frame - EARLY) <= WIDTH)
-    late = max(size for frame, size in taken.items() if frame > last - 2 * WIDTH)
+def growth(memory: dict[int, int]) -> tuple[int, int, float]:
+    """Return the maximum around frame EARLY and of the last frames [bytes], and its relative growth."""
+    last = max(memory)
+    early = max(size for frame, size in memory.items() if abs(frame - EARLY) <= WIDTH)
+    late = max(size for frame, size in memory.items() if frame > last - 2 * WIDTH)
     return early, late, late / early - 1.0
 
 
 def describe(found: Memory) -> Iterator[str]:
-    for stage, taken in found.items():
-        if max(taken) > EARLY:
-            early, late, share = growth(taken)
-            yield f"{stage}: {early / 1e6:.0f} MB at frame {EARLY}, {late / 1e6:.0f} MB at {max(taken)}, {share:+.1%}"
+    for stage, memory in found.items():
+        if max(memory) > EARLY:
+            early, late, increase = growth(memory)
+            first, last = f"{early / 1e6:.0f} MB at frame {EARLY}", f"{late / 1e6:.0f} MB at {max(memory)}"
+            yield f"{stage}: {first}, {last}, {increase:+.1%}"
 
 
 def resident(process: int) -> int:
-    """Bytes of memory that a process holds."""
+    """Return the resident memory of a process [bytes]."""
     pages = Path(f"/proc/{process}/statm").read_text().split()[1]
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
-def measure(tracked: Path, work: Path, count: int, tell: Callable[[str], object] = print) -> Memory:
-    """Run, record and review so many photographs; gives what that took."""
+def measure(tracked: Path, work: Path, count: int, report: Callable[[str], object] = print) -> Memory:
+    """Run, record and review this number of photographs; return and report the memory."""
     experiment, out = lengthen(tracked, work / "long", count), work / "out"
     found = memory_of_run(experiment, out) | memory_of_review(out, count) | memory_of_view(out, count)
     for line in describe(found):
-        tell(line)
+        report(line)
     return found
 
 

@@ -1,4 +1,4 @@
-"""A machine that refuses something once: the command says so in one line, and the next loses nothing."""
+"""After a fault of the operating system a command ends with one line, and the next one loses nothing."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from .attempt import attempt, attempt_in_a_fork, in_a_fork
+from .attempt import attempt, attempt_in_fork, run_in_fork
 from .cases import FEW
-from .faults import ERRORS, KINDS, Refusing, forces_of, limit_files, refuse_from_now_on, refuse_stores
+from .faults import ERRORS, KINDS, FileFault, forces_of, install_fault, limit_files, refuse_stores
 from .table import FAULTS, note
 
 QUICK = 8
@@ -21,7 +21,7 @@ QUICK = 8
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is refused to which command."""
+    """A fault during a command."""
 
     command: str
     kind: str  # of KINDS, "input", "store" or "size"
@@ -51,59 +51,61 @@ def arguments_of(command: str, originals, out: Path) -> list[str]:
     return [command, str(originals.tracked), "--out", str(out), *FEW]
 
 
-def suffer(fault: Fault, originals, out: Path) -> dict:
-    """Run the command in a forked process in which something is refused; gives how it ended."""
+def run_with_fault(fault: Fault, originals, out: Path) -> dict:
+    """Run the command with a fault in a forked process and return its outcome."""
 
     def work() -> dict:
-        refusing = None
+        file_fault = None
         if fault.kind == "size":
             limit_files(fault.number)
         elif fault.kind == "store":
             refuse_stores(fault.number, fault.error)
         else:
-            place = originals.tracked.parent if fault.kind == "input" else out
-            refusing = Refusing(place, "open" if fault.kind == "input" else fault.kind, fault.number, fault.error)
-            refuse_from_now_on(refusing)
+            match = originals.tracked.parent if fault.kind == "input" else out
+            file_fault = FileFault(match, "open" if fault.kind == "input" else fault.kind, fault.number, fault.error)
+            install_fault(file_fault)
         ended = attempt(arguments_of(fault.command, originals, out))
-        return {"status": ended.status, "said": ended.said, "refused": refusing.refused if refusing else "?"}
+        return {"status": ended.status, "errors": ended.errors, "refused": file_fault.refused if file_fault else "?"}
 
-    return in_a_fork(work) or {"status": -9, "said": "it ended without a word", "refused": "?"}
+    return run_in_fork(work) or {"status": -9, "errors": "it ended without a message", "refused": "?"}
 
 
-def wrongs(faults: list[Fault], originals, work: Path) -> tuple[int, list[str]]:
-    """What went wrong, of how many faults that were met."""
-    met, wrong = 0, []
+def collect_problems(faults: list[Fault], originals, work: Path) -> tuple[int, list[str]]:
+    """Return the number of faults that occurred, and the problems."""
+    met, problems = 0, []
     for fault in faults:
         shutil.rmtree(work, ignore_errors=True)
         out = work / "out"
-        told = suffer(fault, originals, out)
-        if not told["refused"]:
+        found = run_with_fault(fault, originals, out)
+        if not found["refused"]:
             continue
         met += 1
-        said = told["said"]
-        one_line = said.count("\n") == 1 and said.startswith("rodsight: ")
-        if told["status"] not in (0, 1, 2) or (told["status"] and not one_line) or "Traceback" in said:
-            wrong.append(f"{fault}: {told}")
+        errors = found["errors"]
+        one_line = errors.count("\n") == 1 and errors.startswith("rodsight: ")
+        if found["status"] not in (0, 1, 2) or (found["status"] and not one_line) or "Traceback" in errors:
+            problems.append(f"{fault}: {found}")
             continue
-        again = attempt_in_a_fork(arguments_of(fault.command, originals, out))
+        again = attempt_in_fork(arguments_of(fault.command, originals, out))
         if again.status:
-            wrong.append(f"{fault}: the next one ended so: {again}")
+            problems.append(f"{fault}: the next command ended with: {again}")
         elif fault.command in ("solve", "record") and not np.array_equal(forces_of(out), forces_of(originals.solved)):
-            wrong.append(f"{fault}: the next one found other forces")
+            problems.append(f"{fault}: the next command found other forces")
         elif left := [str(file) for file in work.rglob("*.part")]:
-            wrong.append(f"{fault}: left {left}")
-    return met, wrong
+            problems.append(f"{fault}: left {left}")
+    return met, problems
 
 
-def test_some_refusals_are_one_line_and_lose_nothing(originals, tmp_path):
-    met, wrong = wrongs(list(all_faults())[:: len(list(all_faults())) // QUICK], originals, tmp_path / "work")
-    assert wrong == []
+def test_some_faults_end_with_one_line_and_lose_nothing(originals, tmp_path):
+    met, problems = collect_problems(
+        list(all_faults())[:: len(list(all_faults())) // QUICK], originals, tmp_path / "work"
+    )
+    assert problems == []
     assert met >= QUICK // 2
 
 
 @pytest.mark.slow
-def test_all_refusals_are_one_line_and_lose_nothing(originals, tmp_path):
-    met, wrong = wrongs(list(all_faults()), originals, tmp_path / "work")
-    note("faults", tried=met, wrong=len(wrong))
-    assert wrong == []
+def test_all_faults_end_with_one_line_and_lose_nothing(originals, tmp_path):
+    met, problems = collect_problems(list(all_faults()), originals, tmp_path / "work")
+    note("faults", tried=met, problems=len(problems))
+    assert problems == []
     assert met >= FAULTS

@@ -1,6 +1,6 @@
-"""Strangers at the doors of the pages: other sites, other names, guessed secrets, broken requests. Nobody gets in.
+"""Hostile requests to the servers: other sites, other host names, guessed secrets, invalid requests are refused.
 
-The doors are those of a recording, of a live run's growing recording, of the review and of the workbench.
+The servers are those of a recording, of a live run's growing recording, and of the workbench.
 """
 
 from __future__ import annotations
@@ -12,16 +12,13 @@ import threading
 
 import pytest
 from rodsight.recording.viewing.recording_server import RecordingServer
-from rodsight.review.command import open_session
-from rodsight.review.reviewed_run import open_reviewed
-from rodsight.review.service.server import ReviewServer
-from rodsight.workbench.service.bench import Bench
 from rodsight.workbench.service.server import WorkbenchServer
+from rodsight.workbench.service.workbench import Workbench
 
 from .table import REQUESTS, note
 
 QUICK, SEED = 160, 6
-SECRET = b"bytes of a recording that no stranger sees"
+SECRET = b"bytes of a protected recording"
 HOSTS = (
     "evil.example",
     "evil.example:{port}",
@@ -44,14 +41,14 @@ PATHS = (
     "/re_viewer.js",
     "/?token={key}",
     "/?token=",
-    "/ask/judge",
-    "/ask/open",
-    "/look",
-    "/crop?frame=0&key=1&zoom=0",
-    "/backdrop?frame=0",
-    "/ask/home",
-    "/ask/run_start",
-    "/ask/set_scale",
+    "/api/judge",
+    "/api/review_status",
+    "/api/next_pair",
+    "/crop?at=experiment&frame=0&x=1&y=1&width=9",
+    "/api/undo_verdict",
+    "/api/home",
+    "/api/run_start",
+    "/api/set_scale",
     "/events?at=experiment",
     "/photograph?at=experiment&frame=0",
     "/crop?at=../..&frame=0&x=0&y=0&width=9",
@@ -127,35 +124,30 @@ def servers(originals, tmp_path_factory):
     for each in (file, growing):
         each.write_bytes(SECRET)
     shutil.copytree(originals.photographed, folder / "bench" / "experiment")
-    recordings, live = RecordingServer([file]), RecordingServer([growing], grows=True)
-    review = ReviewServer(open_session(open_reviewed(originals.solved)), reviewer="anna")
-    workbench = WorkbenchServer(Bench(folder / "bench"))
-    threads = [threading.Thread(target=each.serve, daemon=True) for each in (review, workbench)]
-    for thread in threads:
-        thread.start()
-    yield recordings, review, workbench, live
+    recordings, live = RecordingServer([file]), RecordingServer([growing], growing=True)
+    workbench = WorkbenchServer(Workbench(folder / "bench"))
+    thread = threading.Thread(target=workbench.serve, daemon=True)
+    thread.start()
+    yield recordings, workbench, live
     for each in (recordings, live):
         each.close()
-    for each in (review, workbench):
-        each.shutdown()
-    for thread in threads:
-        thread.join()
-    review.close()
+    workbench.shutdown()
+    thread.join()
     workbench.close()
 
 
-def request_of(chance: random.Random, port: int) -> bytes:
-    """A request of somebody who knows everything but the secrets."""
-    key = chance.choice(("guess", "", "%00", "A" * 43, "\u00e9", "null"))
-    lines = [f"{chance.choice(METHODS)} {chance.choice(PATHS)} HTTP/{chance.choice(VERSIONS)}"]
-    lines.append(f"Host: {chance.choice(HOSTS)}")
-    lines += chance.sample(HEADERS, chance.randint(0, 4))
-    body = chance.choice(BODIES)
-    if chance.random() < 0.5:
+def request_of(rng: random.Random, port: int) -> bytes:
+    """Draw a request that uses everything except the secrets."""
+    key = rng.choice(("guess", "", "%00", "A" * 43, "\u00e9", "null"))
+    lines = [f"{rng.choice(METHODS)} {rng.choice(PATHS)} HTTP/{rng.choice(VERSIONS)}"]
+    lines.append(f"Host: {rng.choice(HOSTS)}")
+    lines += rng.sample(HEADERS, rng.randint(0, 4))
+    body = rng.choice(BODIES)
+    if rng.random() < 0.5:
         lines.append(f"Content-Length: {len(body)}")
     text = "\r\n".join(lines).replace("{port}", str(port)).replace("{key}", key)
     content = f"{text}\r\n\r\n{body}".encode()
-    return content if chance.random() < 0.9 else content[: chance.randrange(len(content))]
+    return content if rng.random() < 0.9 else content[: rng.randrange(len(content))]
 
 
 def answer_to(port: int, request: bytes) -> bytes:
@@ -166,47 +158,47 @@ def answer_to(port: int, request: bytes) -> bytes:
             answer = b""
             while piece := connection.recv(65536):
                 answer += piece
-        except OSError:  # it was refused while it still spoke
+        except OSError:  # the server closed the connection
             return b""
     return answer
 
 
-def let_in(answers: bytes) -> bool:
-    """Whether something was given: a page, a recording, a cookie, a word to another site."""
+def is_admitted(answers: bytes) -> bool:
+    """Whether an answer has a page, a recording, a cookie or a permission for another site."""
     lines = [line for line in answers.split(b"\r\n") if line.startswith(b"HTTP/1.")]
     opened = any(line.split()[1][:1] in (b"2", b"3") for line in lines)
     lowered = answers.lower()
     return opened or SECRET in answers or b"set-cookie" in lowered or b"access-control-allow" in lowered
 
 
-def knock(servers, count: int, seed: int, said) -> list[str]:
-    """What went wrong with so many requests."""
-    wrong = []
+def send_requests(servers, count: int, seed: int, capture) -> list[str]:
+    """Send a number of requests and return the problems."""
+    problems = []
     for number in range(count):
         server = servers[number % len(servers)]
         request = request_of(random.Random(f"{seed} {number}"), server.gate.port)
         answer = answer_to(server.gate.port, request)
-        if let_in(answer) or b"Traceback" in answer:
-            wrong.append(f"{seed} {number}: {request[:300]!r}: {answer[:300]!r}")
-    told = said.readouterr().err
-    if told:
-        wrong.append(told[-1500:])
-    return wrong
+        if is_admitted(answer) or b"Traceback" in answer:
+            problems.append(f"{seed} {number}: {request[:300]!r}: {answer[:300]!r}")
+    printed = capture.readouterr().err
+    if printed:
+        problems.append(printed[-1500:])
+    return problems
 
 
-def test_some_strangers_are_kept_out(servers, capsys):
-    assert knock(servers, QUICK, SEED, capsys) == []
+def test_some_hostile_requests_are_refused(servers, capsys):
+    assert send_requests(servers, QUICK, SEED, capsys) == []
 
 
 @pytest.mark.slow
-def test_many_strangers_are_kept_out(servers, capsys):
-    wrong = knock(servers, 4 * REQUESTS, SEED + 1, capsys)
-    note("requests", tried=4 * REQUESTS, wrong=len(wrong))
-    assert wrong == []
+def test_many_hostile_requests_are_refused(servers, capsys):
+    problems = send_requests(servers, 4 * REQUESTS, SEED + 1, capsys)
+    note("requests", tried=4 * REQUESTS, wrong=len(problems))
+    assert problems == []
 
 
-def test_who_knows_the_secrets_is_let_in(servers):
-    recordings, _, workbench, _ = servers
+def test_requests_with_the_secret_are_admitted(servers):
+    recordings, workbench, _ = servers
     named = f"GET /?token={workbench.gate.token} HTTP/1.1\r\nHost: 127.0.0.1:{workbench.gate.port}"
     assert b" 303 " in answer_to(workbench.gate.port, f"{named}\r\nConnection: close\r\n\r\n".encode())
     port, gate = recordings.port, recordings.gate
@@ -214,10 +206,10 @@ def test_who_knows_the_secrets_is_let_in(servers):
     answer = answer_to(port, entry.encode())
     assert b" 303 " in answer
     assert b"Location: /?renderer=webgl" in answer
-    (path,) = recordings.named
-    asked = f"GET {path} HTTP/1.1\r\nHost: localhost:{port}\r\nConnection: close\r\n\r\n"
-    assert SECRET in answer_to(port, asked.encode())
-    assert SECRET not in answer_to(port, asked.replace("localhost", "evil.example").encode())
+    (path,) = recordings.recording_paths
+    request = f"GET {path} HTTP/1.1\r\nHost: localhost:{port}\r\nConnection: close\r\n\r\n"
+    assert SECRET in answer_to(port, request.encode())
+    assert SECRET not in answer_to(port, request.replace("localhost", "evil.example").encode())
     own = f"Host: localhost:{port}\r\nCookie: {gate.cookie_name}={gate.secret}"
     page = f"GET / HTTP/1.1\r\n{own}\r\nConnection: close\r\n\r\n"
     assert path.split("/")[1].encode() in answer_to(port, page.encode())

@@ -1,4 +1,4 @@
-"""Killed at any moment, again and again, a run loses nothing: the same command brings it to its end, bit for bit."""
+"""A run that is killed repeatedly loses nothing: the same command finishes it with identical bits."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from rodsight.recording.files.readback import read_forces
+from rodsight.recording.archive.readback import read_forces
 from rodsight.run_folder import TRACKED
 
-from .attempt import attempt, attempt_in_a_fork, in_a_fork
+from .attempt import attempt, attempt_in_fork, run_in_fork
 from .table import KILLS, note
 
 QUICK, SEED = 10, 4
@@ -27,7 +27,7 @@ LONGEST = 1.5  # [s] of processor time until a kill at random
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """When a process is killed: before or after its n-th replacement of a file, or after so much work."""
+    """The moment of a kill: before or after the n-th replacement of a file, or after a processor time."""
 
     number: int = -1
     after: bool = False
@@ -35,11 +35,11 @@ class Kill:
 
 
 def run_killed(arguments: list[str], kill: Kill) -> bool:
-    """Run a command in a forked process that is killed; gives whether it was, before its end."""
+    """Run a command in a forked process with a kill; return whether it was killed before its end."""
     child = os.fork()
     if child == 0:
         if kill.seconds:
-            signal.signal(signal.SIGPROF, signal.SIG_DFL)  # which ends it as a kill does, in the midst of anything
+            signal.signal(signal.SIGPROF, signal.SIG_DFL)  # its default action ends the process at any moment
             signal.setitimer(signal.ITIMER_PROF, kill.seconds)
         else:
             die_at(kill)
@@ -64,7 +64,7 @@ def die_at(kill: Kill) -> None:
 
 
 def content_of(out: Path) -> dict[str, str]:
-    """All that a run found, without when and how fast."""
+    """Return hashes of all results of a run, without times."""
     found: dict[str, bytes] = {}
     for name in ("tracks.h5", "results.h5"):
         if (out / name).exists():
@@ -76,15 +76,15 @@ def content_of(out: Path) -> dict[str, str]:
                     found[f"{name}:{path}"] = (
                         repr(values.tolist()).encode() if values.dtype.hasobject else values.tobytes()
                     )
-    told = json.loads((out / "summary.json").read_text())
-    found["summary"] = json.dumps({key: value for key, value in told.items() if key != "timings"}).encode()
+    summary = json.loads((out / "summary.json").read_text())
+    found["summary"] = json.dumps({key: value for key, value in summary.items() if key != "timings"}).encode()
     forces = read_forces(out / "recording.rrd")
     found["recording"] = b"".join(forces[frame].fn.tobytes() for frame in sorted(forces))
     return {name: hashlib.sha256(content).hexdigest() for name, content in found.items()}
 
 
 def left_in(out: Path) -> list[str]:
-    """What a run that came to its end should have cleared away; finished tracks are kept for other corrections."""
+    """Return temporary files left by a finished run; finished tracks are kept for other corrections."""
     kept = out / TRACKED / "tracking"
     return [
         str(file.relative_to(out))
@@ -93,46 +93,46 @@ def left_in(out: Path) -> list[str]:
     ]
 
 
-def kill_and_resume(experiment: Path, out: Path, count: int, chance: random.Random) -> tuple[int, list[str]]:
-    """Chains of kills, each brought to its end; gives kills that fell before an end, and what went wrong."""
+def kill_and_resume(experiment: Path, out: Path, count: int, rng: random.Random) -> tuple[int, list[str]]:
+    """Run chains of kills with a final run each; return the number of kills before the end, and the problems."""
     whole = out.with_name("whole")
-    assert attempt_in_a_fork(["run", str(experiment), "--out", str(whole), *FEW]).status == 0
-    expected, killed, wrong, number = in_a_fork(lambda: content_of(whole)), 0, [], 0
+    assert attempt_in_fork(["run", str(experiment), "--out", str(whole), *FEW]).status == 0
+    expected, killed, problems, number = run_in_fork(lambda: content_of(whole)), 0, [], 0
     while killed < count:
         shutil.rmtree(out, ignore_errors=True)
         arguments, chain = ["run", str(experiment), "--out", str(out), *FEW], []
-        for _ in range(chance.randint(1, 3)):
-            if chance.random() < 0.6:
-                chain.append(Kill(number % 24, chance.random() < 0.5))
+        for _ in range(rng.randint(1, 3)):
+            if rng.random() < 0.6:
+                chain.append(Kill(number % 24, rng.random() < 0.5))
                 number += 1
             else:
-                chain.append(Kill(seconds=chance.uniform(0.005, LONGEST)))
+                chain.append(Kill(seconds=rng.uniform(0.005, LONGEST)))
             killed += run_killed(arguments, chain[-1])
-        ended = attempt_in_a_fork(arguments)
-        if ended.status or ended.said:
-            wrong.append(f"{chain}: {ended}")
-        elif in_a_fork(lambda: content_of(out)) != expected:
-            wrong.append(f"{chain}: other bits")
+        ended = attempt_in_fork(arguments)
+        if ended.status or ended.errors:
+            problems.append(f"{chain}: {ended}")
+        elif run_in_fork(lambda: content_of(out)) != expected:
+            problems.append(f"{chain}: other bits")
         elif left := left_in(out):
-            wrong.append(f"{chain}: left {left}")
-    return killed, wrong
+            problems.append(f"{chain}: left {left}")
+    return killed, problems
 
 
 @pytest.mark.screen
 def test_a_few_kills_lose_nothing(originals, tmp_path):
-    killed, wrong = kill_and_resume(originals.tracked, tmp_path / "out", QUICK, random.Random(SEED))
-    assert wrong == []
+    killed, problems = kill_and_resume(originals.tracked, tmp_path / "out", QUICK, random.Random(SEED))
+    assert problems == []
     assert killed >= QUICK
 
 
 @pytest.mark.slow
 def test_many_kills_lose_nothing(originals, tmp_path):
-    total, wrong = 0, []
+    total, problems = 0, []
     for experiment in (originals.tracked, originals.photographed):
         work = tmp_path / experiment.name
         work.mkdir()
         killed, found = kill_and_resume(experiment, work / "out", KILLS // 2, random.Random(SEED + 1))
-        total, wrong = total + killed, wrong + found
-    note("kills", tried=total, wrong=len(wrong))
-    assert wrong == []
+        total, problems = total + killed, problems + found
+    note("kills", tried=total, wrong=len(problems))
+    assert problems == []
     assert total >= KILLS

@@ -1,1 +1,1 @@
-"""Stored runs of earlier versions, and of this one, as they were written."""
+"""Stored results of earlier versions and of this one."""

@@ -1,13 +1,13 @@
-"""The forces of a small packing as an earlier version found them, from given poses, by both estimators.
+"""The forces of a small packing by an earlier version, from given poses, with both estimators.
 
-60 rods in 4 photographs of a simulated shear, with noise, one of them lost in one photograph: everything between
-poses and statistics takes part, and it takes a few seconds. Input and output lie in forces.npz.
+60 rods in 4 photographs of a simulated shear, with noise, one of them lost in one photograph: the run covers all
+stages from poses to statistics in a few seconds. Input and output are in forces.npz.
 
-TOLERANCE: on one machine the numbers come out bit for bit, since the sweeps are sequential and the convex programs
-run on one thread. Another processor or BLAS sums in another order; that moved the forces of the sample by 2e-11 of
-their mean. A change of mechanics shows above 1e-6.
+TOLERANCE: on one machine the bits are identical, since the sweeps are sequential and the convex programs run on one
+thread. Another processor or BLAS sums in another order, which changed the forces of the sample by 2e-11 of their mean.
+A change of mechanics gives more than 1e-6.
 
-To renew, where a change of the forces is meant and said so in CHANGELOG.md:
+To renew, after an intended change of the forces that CHANGELOG.md states:
     python -c "from tests.golden.forces import renew; renew()"
 """
 
@@ -18,19 +18,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rodsight.solver.assessment.statistic_intervals import CONSTANT
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.motion import Snapshot
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.dem.dem_truth import DemSettings, DemTruth
+from rodsight.solver.dem.shear_cell import shear_photographs
+from rodsight.solver.detection.touch_probability import ContactProbabilitySettings
+from rodsight.solver.frame_forces import FrameForces
+from rodsight.solver.nlgs.chain import ChainSettings
+from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.sequence.settings import EnsembleSettings, SequenceSettings
+from rodsight.solver.statistics.frame_statistics import ContactProbabilities, FrameStatistics, frame_statistics
 from rodsight.synthetic.dense_packing import prepare_packing
-
-from solver.bodies.grains import Grains
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Material, Packing
-from solver.dem.simulation import DemSettings, DemTruth, shear_photographs
-from solver.detection.touch_probability import ContactProbabilitySettings
-from solver.nlgs.chain import ChainSettings
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import solve_sequence
-from solver.sequence.judging.statistic_intervals import DEVIATION
-from solver.sequence.settings import EnsembleSettings, SequenceSettings
-from solver.statistics.frame_statistics import FrameStatistics, Likely, frame_statistics
 
 STORED = Path(__file__).with_name("forces.npz")
 TOLERANCE = 1e-9  # of the greatest value of a column
@@ -41,7 +41,7 @@ PRESSURE, LENGTH = 50e3, 0.06  # [Pa], [m]
 CHAIN = ChainSettings(sweeps=60, spin_up=4, substeps=3)
 SETTINGS = {
     "nlgs": SequenceSettings(estimator="nlgs", chain=CHAIN, overlap=5e-6),
-    # Draws of a sampler differ for good where another processor rounds one of them the other way.
+    # Draws of a sampler differ permanently if another processor rounds one of them differently.
     "ensemble": SequenceSettings(
         chain=CHAIN,
         overlap=5e-6,
@@ -54,12 +54,12 @@ COLUMNS = (
 )  # fmt: skip
 SCALARS = (
     "status", "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust",
-    "frames_since_reset", "start_difference", "unseen_grains", "hidden_share",
+    "frames_since_reset", "start_difference", "unseen_grains", "hidden_fraction",
 )  # fmt: skip
 
 
 def solve_stored() -> dict[str, np.ndarray]:
-    """Solve the stored poses anew: every column under estimator/name."""
+    """Solve the stored poses again; return every column as estimator/name."""
     return solve(stored_poses())
 
 
@@ -74,7 +74,7 @@ def stored() -> dict[str, np.ndarray]:
 
 
 def difference(now: np.ndarray, then: np.ndarray) -> float:
-    """Greatest difference over the greatest size of what is stored; infinite where shape or gaps differ."""
+    """Return the greatest difference over the greatest stored magnitude; infinite if shapes or NaNs differ."""
     now, then = now.astype(np.float64), then.astype(np.float64)
     if now.shape != then.shape or not np.array_equal(np.isnan(now), np.isnan(then)):
         return np.inf
@@ -84,13 +84,13 @@ def difference(now: np.ndarray, then: np.ndarray) -> float:
 
 
 def renew(truth: DemTruth | None = None) -> None:
-    """Solve and store anew: the stored poses, or those of another simulation."""
+    """Solve and store the stored poses again, or those of another simulation."""
     poses = stored_poses() if truth is None else poses_of(truth)
     np.savez_compressed(STORED, **poses, **solve(poses))
 
 
 def simulate() -> DemTruth:
-    """The simulation that the stored poses are from: for renew(simulate())."""
+    """Simulate the packing of the stored poses, for renew(simulate())."""
     settings = DemSettings(pressure=PRESSURE, length=LENGTH)
     cell = prepare_packing(RODS, np.random.default_rng(3), settings)
     angles = np.deg2rad(2.0 + 0.25 * np.arange(FRAMES))
@@ -143,11 +143,8 @@ def solve(poses: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def _statistics(packing: Packing, snapshot: Snapshot, frame: FrameForces) -> FrameStatistics:
     assert frame.bearing_probability is not None
     assert frame.sliding_probability is not None
-    likely = Likely(frame.bearing_probability, frame.sliding_probability)
-    return frame_statistics(
-        frame.contacts, frame.fn, frame.ft, likely, snapshot.position, snapshot.present,
-        packing.walls(snapshot.endpoints), packing.length, grains=packing.grains, material=packing.material,
-    )  # fmt: skip
+    probabilities = ContactProbabilities(frame.bearing_probability, frame.sliding_probability)
+    return frame_statistics(frame.contacts, frame.fn, frame.ft, probabilities, snapshot, packing)
 
 
 def _columns(frames: list[FrameForces], statistics: list[FrameStatistics]) -> dict[str, np.ndarray]:
@@ -159,7 +156,7 @@ def _columns(frames: list[FrameForces], statistics: list[FrameStatistics]) -> di
     for name in SCALARS:
         columns[name] = np.array([float(getattr(frame, name)) for frame in frames])
     for each in fields(FrameStatistics):
-        if each.name in {f"{name}_sd" for name in DEVIATION}:  # set once a frame's trust is known
+        if each.name in {f"{name}_sd" for name in CONSTANT}:  # set once a frame's trust is known
             continue
         columns[f"statistics/{each.name}"] = np.stack([np.asarray(getattr(s, each.name), float) for s in statistics])
     return columns

@@ -1,8 +1,8 @@
-"""The sample's forces as an earlier version found them: what moves and splits must not change.
+"""The forces of the sample by an earlier version; refactoring must not change them.
 
 TOLERANCE: the sequential sweeps are deterministic, so that one machine gives the same bits. Another instruction set
-rounds otherwise: with kernels compiled for a generic processor and another BLAS the sample's forces moved by 2e-11 of
-the mean force at most. A change of mechanics, however small its constant, shows above 1e-6.
+rounds differently: kernels compiled for a generic processor and another BLAS changed the sample's forces by at most
+2e-11 of the mean force. A change of mechanics gives more than 1e-6.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-SETTING = "solver.positions=never"  # draws of a sampler differ for good where a processor rounds one the other way
+SETTING = "solver.positions=never"  # draws of a sampler differ permanently if a processor rounds one differently
 STORED = Path(__file__).with_name("sample.npz")
 TOLERANCE = 1e-9  # of the mean force, and of a metre
 DATASETS = ("contacts/offset", "contacts/i", "contacts/j", "forces/fn", "forces/ft", "frames/trust", "frames/status")
 
 
 def renew(results: Path) -> None:
-    """Store the forces of a run of the sample; only where a change of the forces is meant, and said so."""
+    """Store the forces of a run of the sample, after an intended change of the forces only."""
     with h5py.File(results) as run:
         plain = {name: np.asarray(run[name][()]) for name in (*DATASETS, "tracks/position")}
     kinds = {"contacts/i": np.int16, "contacts/j": np.int16, "frames/status": np.uint8}
@@ -29,7 +29,7 @@ def renew(results: Path) -> None:
 
 
 def differences(results: Path) -> dict[str, float]:
-    """The greatest difference of every dataset of a run from the stored one, forces over their mean."""
+    """Return the greatest difference of every dataset of a run from the stored one, forces over their mean."""
     found = {}
     with h5py.File(results) as run, np.load(STORED) as stored:
         for name in stored.files:

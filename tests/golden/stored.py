@@ -1,4 +1,4 @@
-"""Unpacks a stored run."""
+"""Stored runs of all schema versions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forces, their judgement and their statistics stay what they were."""
+"""Forces, their assessment and statistics do not change."""
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ def now():
 
 
 @pytest.mark.parametrize("name", THEN)
-def test_it_is_what_an_earlier_version_found(now, name):
+def test_a_column_equals_that_of_an_earlier_version(now, name):
     assert difference(now[name], THEN[name]) <= TOLERANCE
 
 
-def test_the_stored_run_says_something(now):
+def test_the_stored_run_covers_contacts_lost_rods_and_trust(now):
     assert set(now) == set(THEN)
     assert STORED.stat().st_size < 200_000
     for estimator in ("nlgs", "ensemble"):
@@ -27,12 +27,12 @@ def test_the_stored_run_says_something(now):
         assert fn.mean() > 1.0
         assert np.count_nonzero(np.abs(ft) > 0.01 * fn.mean()) > RODS
         assert THEN[f"{estimator}/age"].max() == 3
-        assert THEN[f"{estimator}/hidden_share"][2] > 0  # the lost rod was bridged
+        assert THEN[f"{estimator}/hidden_fraction"][2] > 0  # the lost rod was interpolated
         assert np.isnan(THEN[f"{estimator}/trust"][0])
         assert (THEN[f"{estimator}/trust"][1:] > 0.0).all()
 
 
-def test_a_difference_is_seen():
+def test_a_difference_is_measured():
     then = np.array([1.0, -2.0, np.nan])
     assert difference(then + np.array([0.0, 2e-6, 0.0]), then) == pytest.approx(1e-6)
     assert difference(then[:2], then) == np.inf

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.mutation.run import GREATEST_SURVIVAL, ROOT, format_table, judge_mutants, survival
+from tests.mutation.run import MAX_SURVIVAL, ROOT, format_table, judge_mutants, survival
 from tests.mutation.table import MUTANTS
 
 LAST_TABLE = Path(__file__).with_name("last_table.md")
@@ -15,15 +15,15 @@ LAST_TABLE = Path(__file__).with_name("last_table.md")
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
-    parser.add_argument("--last", action="store_true", help="print the table of the last complete run, and do nothing")
-    parser.add_argument("--check", action="store_true", help="only look whether every mutant's text is found once")
+    parser.add_argument("--last", action="store_true", help="only print the table of the last complete run")
+    parser.add_argument("--check", action="store_true", help="only check that every mutant's text is found once")
     parser.add_argument("--room", default="", help="only mutants of rooms that begin so, like solver/nlgs; not stored")
-    asked = parser.parse_args()
-    if asked.last:
+    options = parser.parse_args()
+    if options.last:
         print(LAST_TABLE.read_text(encoding="utf-8"), end="")
         return 0
-    mutants = [mutant for mutant in MUTANTS if mutant.room.startswith(asked.room)]
-    if asked.check:
+    mutants = [mutant for mutant in MUTANTS if mutant.room.startswith(options.room)]
+    if options.check:
         for mutant in mutants:
             mutant.locate(ROOT)
         print(f"{len(mutants)} mutants, each found once")
@@ -32,13 +32,13 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for verdict in judge_mutants(mutants, Path(folder)):
             verdicts.append(verdict)
-            told = f"killed by {verdict.by}" if verdict.killed else f"SURVIVED: {verdict.mutant.old!r}"
-            print(f"{len(verdicts)}/{len(mutants)} {verdict.file} {verdict.seconds:.0f} s {told}", flush=True)
+            outcome = f"killed by {verdict.by}" if verdict.killed else f"SURVIVED: {verdict.mutant.old!r}"
+            print(f"{len(verdicts)}/{len(mutants)} {verdict.file} {verdict.seconds:.0f} s {outcome}", flush=True)
     table = format_table(verdicts)
     print(table)
-    if not asked.room:
+    if not options.room:
         LAST_TABLE.write_text(table, encoding="utf-8")
-    return int(survival(verdicts) > GREATEST_SURVIVAL)
+    return int(survival(verdicts) > MAX_SURVIVAL)
 
 
 if __name__ == "__main__":

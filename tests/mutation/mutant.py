@@ -12,14 +12,14 @@ class StaleMutantError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    place: str  # a file, or a room in one of whose files the text stands
+    place: str  # a file, or a room in one of whose Python files the text stands
     old: str  # text that stands there exactly once
     new: str
     tests: tuple[str, ...]  # nearest tests: files or folders
 
     @property
     def room(self) -> str:
-        return self.place if not self.place.endswith(".py") else str(Path(self.place).parent)
+        return str(Path(self.place).parent) if Path(self.place).suffix else self.place
 
     def locate(self, root: Path) -> Path:
         """The file that the text stands in, relative to the root of a tree."""

@@ -1,8 +1,8 @@
-"""Apply every mutant to a copy of the tree, run the nearest tests there, and tell which of them nothing notices.
+"""Apply every mutant to a copy of the tree, run the nearest tests there, and report the mutants that survive.
 
-The copy keeps the files' times, so that compiled kernels that no mutant touches are found in their caches. A mutant of
-a kernel is run without compilation: its lines are the same, and its callers could not know of it otherwise. Every run
-is a fork of one process that has imported other people's libraries already, which takes longer than most tests.
+The copy keeps the files' times, so that kernels without a mutant are found in the caches of compiled code. A mutant of
+a kernel is run without compilation: the caches of its callers would hide it otherwise. Every run is a fork of one
+process that has imported the external libraries, which takes longer than most tests.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from tests.mutation.mutant import Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("app", "solver", "tests", "sample_data", ".editable", "pyproject.toml", "README.md")
-OWN = ("tests", "solver", "rodsight", "app")  # packages that every run must import from its copy
-# Not pytest's plugins: it wants to import those itself.
+OWN = ("tests", "rodsight")  # packages that every run must import from its copy
+# Without pytest's plugins: pytest must import those itself.
 PRELOADED = (
     "numpy", "numba", "scipy.spatial", "scipy.sparse.csgraph", "scipy.linalg", "scipy.stats", "scipy.ndimage",
     "h5py", "clarabel", "cv2", "pydantic", "pytest", "playwright.sync_api",
 )  # fmt: skip
-TIME_LIMIT = 300.0  # seconds; a mutant that never ends is noticed, too
-GREATEST_SURVIVAL = 0.10  # share of the mutants that may survive
+TIME_LIMIT = 300.0  # seconds; a mutant that exceeds it is killed
+MAX_SURVIVAL = 0.10  # fraction of the mutants that may survive
 
 
 class UnsoundTestsError(RuntimeError):
-    """The nearest tests fail without any mutant: they could tell nothing."""
+    """The nearest tests fail without any mutant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Verdict:
     mutant: Mutant
     file: Path
     killed: bool
-    by: str  # the test that noticed it, or how it ended
+    by: str  # the test that failed, or the end of the run
     seconds: float
 
 
@@ -50,9 +50,9 @@ def judge_mutants(mutants: Sequence[Mutant], folder: Path) -> Iterator[Verdict]:
     kernel = [in_kernel(ROOT / file, mutant.old) for mutant, file in zip(mutants, files, strict=True)]
     tree = copy_tree(folder)
     for tests, interpreted in sorted({(m.tests, k) for m, k in zip(mutants, kernel, strict=True)}):
-        code, told = run_tests(tree, tests, compile_kernels=not interpreted)
+        code, result = run_tests(tree, tests, compile_kernels=not interpreted)
         if code != 0:
-            raise UnsoundTestsError(f"without a mutant {' '.join(tests)} do not pass: {told}")
+            raise UnsoundTestsError(f"without a mutant {' '.join(tests)} do not pass: {result}")
     for mutant, file in zip(mutants, files, strict=True):
         yield judge(mutant, file, tree)
 
@@ -63,16 +63,16 @@ def judge(mutant: Mutant, file: Path, tree: Path) -> Verdict:
     text = (tree / file).read_text(encoding="utf-8")
     (tree / file).write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
     try:
-        code, told = run_tests(tree, mutant.tests, compile_kernels=not in_kernel(ROOT / file, mutant.old))
+        code, result = run_tests(tree, mutant.tests, compile_kernels=not in_kernel(ROOT / file, mutant.old))
     finally:
         shutil.copy2(ROOT / file, tree / file)
     if code > 1:  # neither passed nor failed: no test was run at all
-        told = f"pytest ended with {code}: {told}"
-    return Verdict(mutant, file, code != 0, told, perf_counter() - start)
+        result = f"pytest ended with {code}: {result}"
+    return Verdict(mutant, file, code != 0, result, perf_counter() - start)
 
 
 def copy_tree(folder: Path) -> Path:
-    """Copy what the tests need, caches of compiled kernels included."""
+    """Copy the files that the tests need, with the caches of compiled kernels."""
     for name in COPIED:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
@@ -82,7 +82,7 @@ def copy_tree(folder: Path) -> Path:
 
 
 def in_kernel(file: Path, text: str) -> bool:
-    """Whether a text stands in a compiled function, or at the top of a file that has some."""
+    """Whether a text is in a compiled function, or at the top level of a file with compiled functions."""
     code = file.read_text(encoding="utf-8")
     if "@njit" not in code:
         return False
@@ -94,7 +94,7 @@ def in_kernel(file: Path, text: str) -> bool:
 
 
 def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool) -> tuple[int, str]:
-    """pytest's exit code, and the test that failed; without compilation only tests that can do without."""
+    """Return pytest's exit code and the test that failed; without compilation, of unit tests alone."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(PRELOADED))
     report = tree / "report.txt"
@@ -112,7 +112,7 @@ def run_tests(tree: Path, tests: Sequence[str], *, compile_kernels: bool) -> tup
 
 
 def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, report: Path) -> None:
-    """Be a process that knows nothing but the copy of the tree."""
+    """Run the tests in a process that imports from the copy of the tree."""
     import numba
     import pytest
 
@@ -122,19 +122,19 @@ def _run_here(tree: Path, tests: Sequence[str], compile_kernels: bool, report: P
     for name in [name for name in sys.modules if name.split(".")[0] in OWN]:
         del sys.modules[name]
     sys.dont_write_bytecode = True
-    theirs = [path for path in sys.path if path and Path(path) not in (ROOT, ROOT / ".editable")]
-    sys.path[:] = [str(tree / ".editable"), str(tree), *theirs]
+    external = [path for path in sys.path if path and Path(path) not in (ROOT, ROOT / ".editable")]
+    sys.path[:] = [str(tree / ".editable"), str(tree), *external]
     os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:2])
     os.chdir(tree)
-    asked = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--hypothesis-profile=mutants", *tests]
+    options = ["-x", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--hypothesis-profile=mutants", *tests]
     if not compile_kernels:
         numba.config.DISABLE_JIT = True
-        asked += ["-m", "unit and not slow"]
-    sys.exit(pytest.main(asked))
+        options += ["-m", "unit and not slow"]
+    sys.exit(pytest.main(options))
 
 
 def format_table(verdicts: Sequence[Verdict]) -> str:
-    """Killed and survived by room, and every survivor, as Markdown."""
+    """Format killed and survived by folder, and every survivor, as Markdown."""
     lines = ["| room | mutants | killed | survived |", "|---|---:|---:|---:|"]
     for room in sorted({verdict.mutant.room for verdict in verdicts}):
         of = [verdict.killed for verdict in verdicts if verdict.mutant.room == room]
@@ -151,4 +151,5 @@ def format_table(verdicts: Sequence[Verdict]) -> str:
 
 
 def survival(verdicts: Sequence[Verdict]) -> float:
+    """Fraction of the mutants that survived."""
     return sum(not verdict.killed for verdict in verdicts) / max(len(verdicts), 1)

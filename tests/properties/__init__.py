@@ -1,1 +1,1 @@
-"""Laws that hold for any input, tried on many."""
+"""Laws that hold for any input, tested on generated inputs."""

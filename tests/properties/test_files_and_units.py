@@ -1,4 +1,4 @@
-"""What is written can be read, what is wrong is named, and units go there and back."""
+"""Files are read as written, errors are located, and conversions of units are invertible."""
 
 import csv
 import tempfile
@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rodsight.errors import InputError
 from rodsight.experiment.lens import BrownLens
 from rodsight.experiment.reading.tables import LARGEST, check_frames, check_unique, read_table, write_table
 from rodsight.experiment.units import Scale, pixel_size_between
+from rodsight.process.errors import InputError
 from rodsight.verdicts.log import Entry, Flag, Origin, Verdict, VerdictLog
 
 NUMBERS = st.floats(-LARGEST, LARGEST)
-# What a spreadsheet can hold: no control characters, and no blanks about it, which a reader takes off.
+# Cells of a spreadsheet: no control characters and no surrounding blanks, which a reader removes.
 WORDS = st.text(st.characters(exclude_categories=("Cc", "Cs", "Z")), min_size=1, max_size=8)
 LENGTHS = st.floats(1e-5, 1e-2)
 
 
 @given(st.lists(st.tuples(st.integers(0, 2**53), NUMBERS, WORDS), min_size=1, max_size=6))
-def test_a_table_gives_back_every_digit(rows):
+def test_table_preserves_every_digit(rows):
     frame, value, name = zip(*rows, strict=True)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "table.csv"
@@ -33,7 +33,7 @@ def test_a_table_gives_back_every_digit(rows):
 
 
 @given(st.integers(1, 8), st.data())
-def test_a_bad_cell_is_named_with_its_row(count, data):
+def test_bad_cell_is_named_with_its_row(count, data):
     bad = data.draw(st.integers(0, count - 1))
     text, problem = data.draw(
         st.sampled_from([("nan", "finite"), ("inf", "finite"), ("1,5", "cells"), ("x", "number")])
@@ -67,7 +67,7 @@ def test_frames_count_from_zero_without_gaps(frames):
 
 
 @given(LENGTHS, st.floats(0.8, 1.25), st.integers(10, 6000), st.floats(-50, 6000), st.floats(-50, 6000))
-def test_pixels_become_metres_and_pixels_again(size, ratio, height, column, row):
+def test_pixels_to_metres_and_back_is_exact(size, ratio, height, column, row):
     scale = Scale(size, height, ratio * size)
     point = scale.to_world(np.array([column, row]))
     assert scale.to_pixels(point) == pytest.approx([column, row], abs=1e-9 * height)
@@ -80,7 +80,7 @@ def test_pixels_become_metres_and_pixels_again(size, ratio, height, column, row)
 
 
 @given(st.floats(-4e-9, 4e-9), st.floats(0, 1800), st.floats(0, 1100))
-def test_a_lens_bends_there_and_back(bend, column, row):
+def test_lens_distortion_is_invertible(bend, column, row):
     lens = BrownLens(xc=900.0, yc=550.0, K1=bend, K2=0.0, K3=0.0, P1=0.0, P2=0.0)
     scale = Scale(2e-4, 1100, None, lens)
     there = scale.to_world(np.array([[column, row]]))
@@ -88,7 +88,7 @@ def test_a_lens_bends_there_and_back(bend, column, row):
 
 
 @given(LENGTHS, st.floats(0, 2 * np.pi), st.floats(10, 3000))
-def test_a_known_distance_tells_the_pixel_size(size, angle, pixels):
+def test_pixel_size_follows_from_a_known_distance(size, angle, pixels):
     start = np.array([100.0, 200.0])
     end = start + pixels * np.array([np.cos(angle), np.sin(angle)])
     assert pixel_size_between(start, end, size * pixels) == pytest.approx(size, rel=1e-9)
@@ -106,7 +106,7 @@ FLAGS = st.builds(
 
 
 @given(st.lists(st.one_of(VERDICTS, FLAGS), max_size=5))
-def test_the_log_gives_back_what_was_said(entries):
+def test_log_returns_the_written_entries(entries):
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "verdicts.jsonl"
         written = VerdictLog(file).append_all(entries)
@@ -117,7 +117,7 @@ def test_the_log_gives_back_what_was_said(entries):
 
 
 @given(st.lists(VERDICTS, min_size=1, max_size=4), st.binary(min_size=1, max_size=6))
-def test_a_line_torn_by_a_crash_costs_nothing_else(entries, rest):
+def test_incomplete_line_damages_no_other_entry(entries, rest):
     rest = b"{" + rest.replace(b"\n", b"")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "verdicts.jsonl"
@@ -127,10 +127,10 @@ def test_a_line_torn_by_a_crash_costs_nothing_else(entries, rest):
         later = VerdictLog(file).append_all(entries[1:]) if entries[1:] else []
         log = VerdictLog(file)
         assert log.entries() == first + later
-        assert log.torn == (1 if later else 0)  # without a later line it may still be under way
+        assert log.damaged_lines == (1 if later else 0)  # without a later line it may still be under way
 
 
-def test_what_the_tables_write_any_reader_of_csv_reads(tmp_path):
+def test_tables_are_valid_csv(tmp_path):
     file = tmp_path / "table.csv"
     write_table(file, {"name": ['a "quoted", one', "ä"], "x": [0.1, 1e-300]})
     with file.open(newline="", encoding="utf-8") as stream:

@@ -1,28 +1,28 @@
-"""What does not depend on the observer, and what scales."""
+"""Invariance under rotation of the axes, and scaling of forces."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from solver.bodies.grains import GrainMotion
-from solver.bodies.packing import Material
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
-from solver.contacts.kinematics import equilibrium_matrix, external_load, relative_motion
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, solve
-from solver.statistics.fabric import anisotropies, contact_fabric, fabric_anisotropy
-from solver.statistics.stress import (
+from rodsight.solver.bodies.grains import GrainMotion
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.contacts.kinematics import equilibrium_matrix, external_load, relative_motion
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, solve
+from rodsight.solver.statistics.fabric import anisotropies, contact_fabric, fabric_anisotropy
+from rodsight.solver.statistics.stress import (
     branch_vectors,
     contact_force_vectors,
     friction_angle,
     love_weber_stress,
     principal_stresses,
 )
+
 from tests.packings import squeezed_heap
 
-ROUNDING = 1e-9  # relative; sines and cosines of a turn and back
+ROUNDING = 1e-9  # relative, of a rotation and its inverse
 ANGLES = st.floats(-np.pi, np.pi)
 SPEEDS = st.floats(-1.0, 1.0)
 
@@ -34,13 +34,13 @@ def matrix(angle):
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
-def turned(angle, velocity=None, wall_velocity=None):
-    """Grains, walls and contacts as an observer sees them who is turned the other way."""
-    turn = matrix(angle)
+def rotated(angle, velocity=None, wall_velocity=None):
+    """Motion, walls and contacts rotated by an angle."""
+    rotation = matrix(angle)
     velocity = MOTION.velocity if velocity is None else velocity
     wall_velocity = WALLS.velocity if wall_velocity is None else wall_velocity
-    motion = GrainMotion(MOTION.position @ turn.T, velocity @ turn.T, MOTION.spin, MOTION.present)
-    walls = Walls(WALLS.endpoints @ turn.T, wall_velocity @ turn.T, WALLS.load)
+    motion = GrainMotion(MOTION.position @ rotation.T, velocity @ rotation.T, MOTION.spin, MOTION.present)
+    walls = Walls(WALLS.endpoints @ rotation.T, wall_velocity @ rotation.T, WALLS.load)
     return motion, walls, detect_contacts(GRAINS, motion.position, motion.present, walls, 4e-4)
 
 
@@ -50,16 +50,16 @@ def some_forces(seed):
 
 
 @given(SPEEDS, SPEEDS, SPEEDS)
-def test_a_rigid_motion_moves_no_contact(vx, vy, spin):
+def test_rigid_motion_has_no_relative_motion(vx, vy, spin):
     def velocity(point):
         return np.array([vx, vy]) + spin * np.stack([-point[..., 1], point[..., 0]], axis=-1)
 
     walls = Walls(WALLS.endpoints, velocity(WALLS.endpoints), WALLS.load)
     un, ut = relative_motion(CONTACTS, GRAINS.radius, velocity(MOTION.position), np.full(GRAINS.count, spin), walls)
-    # The contact point lies half a gap off either surface: that much of a turn is seen.
-    reach = ROUNDING + 0.5 * abs(spin) * np.abs(CONTACTS.gap).max() * 2.0
+    # The contact point is half a gap from either surface, which gives this relative motion.
+    tolerance = ROUNDING + 0.5 * abs(spin) * np.abs(CONTACTS.gap).max() * 2.0
     assert np.abs(un).max() <= ROUNDING
-    assert np.abs(ut).max() <= reach
+    assert np.abs(ut).max() <= tolerance
 
 
 @given(ANGLES, st.integers(0, 99))
@@ -68,37 +68,37 @@ def test_relative_motion_does_not_depend_on_the_observers_axes(angle, seed):
     velocity, wall_velocity = rng.normal(size=(GRAINS.count, 2)), rng.normal(size=(4, 2, 2))
     walls = Walls(WALLS.endpoints, wall_velocity, WALLS.load)
     expected = relative_motion(CONTACTS, GRAINS.radius, velocity, MOTION.spin, walls)
-    motion, walls, contacts = turned(angle, velocity, wall_velocity)
+    motion, walls, contacts = rotated(angle, velocity, wall_velocity)
     found = relative_motion(contacts, GRAINS.radius, motion.velocity, motion.spin, walls)
     assert np.array_equal(contacts.key, CONTACTS.key)
     assert np.stack(found) == pytest.approx(np.stack(expected), abs=ROUNDING)
 
 
 @given(ANGLES, st.integers(0, 99))
-def test_forces_and_stress_turn_with_the_packing(angle, seed):
+def test_forces_and_stress_rotate_with_the_packing(angle, seed):
     fn, ft = some_forces(seed)
-    turn = matrix(angle)
-    motion, _, contacts = turned(angle)
+    rotation = matrix(angle)
+    motion, _, contacts = rotated(angle)
     assert contact_force_vectors(contacts, fn, ft) == pytest.approx(
-        contact_force_vectors(CONTACTS, fn, ft) @ turn.T, abs=ROUNDING
+        contact_force_vectors(CONTACTS, fn, ft) @ rotation.T, abs=ROUNDING
     )
     stress = love_weber_stress(CONTACTS, fn, ft, MOTION.position, 0.02, 0.06)
-    seen = love_weber_stress(contacts, fn, ft, motion.position, 0.02, 0.06)
-    assert seen == pytest.approx(turn @ stress @ turn.T, abs=ROUNDING * np.abs(stress).max())
-    assert friction_angle(seen) == pytest.approx(friction_angle(stress), abs=ROUNDING)
-    (major, minor, direction), (own, least, before) = principal_stresses(seen), principal_stresses(stress)
+    found = love_weber_stress(contacts, fn, ft, motion.position, 0.02, 0.06)
+    assert found == pytest.approx(rotation @ stress @ rotation.T, abs=ROUNDING * np.abs(stress).max())
+    assert friction_angle(found) == pytest.approx(friction_angle(stress), abs=ROUNDING)
+    (major, minor, direction), (own, least, before) = principal_stresses(found), principal_stresses(stress)
     assert (major, minor) == pytest.approx((own, least), rel=ROUNDING)
     assert np.sin(2.0 * (direction - before - angle)) == pytest.approx(0.0, abs=1e-6)
 
 
 @given(ANGLES, st.integers(0, 99))
-def test_fabric_and_anisotropies_turn_with_the_packing(angle, seed):
+def test_fabric_and_anisotropies_rotate_with_the_packing(angle, seed):
     fn, ft = some_forces(seed)
-    turn = matrix(angle)
-    motion, _, contacts = turned(angle)
-    fabric, seen = contact_fabric(CONTACTS.normal), contact_fabric(contacts.normal)
-    assert seen == pytest.approx(turn @ fabric @ turn.T, abs=ROUNDING)
-    assert fabric_anisotropy(seen) == pytest.approx(fabric_anisotropy(fabric), abs=ROUNDING)
+    rotation = matrix(angle)
+    motion, _, contacts = rotated(angle)
+    fabric, found = contact_fabric(CONTACTS.normal), contact_fabric(contacts.normal)
+    assert found == pytest.approx(rotation @ fabric @ rotation.T, abs=ROUNDING)
+    assert fabric_anisotropy(found) == pytest.approx(fabric_anisotropy(fabric), abs=ROUNDING)
     before = anisotropies(CONTACTS.normal, branch_vectors(CONTACTS, MOTION.position), fn, ft)
     after = anisotropies(contacts.normal, branch_vectors(contacts, motion.position), fn, ft)
     for kind in ("contact", "branch", "normal", "tangential"):
@@ -109,7 +109,7 @@ def test_fabric_and_anisotropies_turn_with_the_packing(angle, seed):
 
 @given(st.integers(-8, 8))
 def test_forces_scale_with_load_and_motion_bit_for_bit(power):
-    """A power of two changes no digit: whatever is added without its share of the load would show."""
+    """A power of two changes no digit: a term that does not scale with the load would show."""
     scale, impedance = 2.0**power, GRAINS.mass * 1e3
     closing = np.where(np.arange(CONTACTS.count) % 3 == 0, 1e-6, 0.0)
 
@@ -124,7 +124,7 @@ def test_forces_scale_with_load_and_motion_bit_for_bit(power):
 
 
 @given(st.integers(0, 99))
-def test_forces_and_motions_do_the_same_work_on_either_side(seed):
+def test_relative_motion_is_the_transpose_of_equilibrium(seed):
     """f · Hᵀ v = v · H f: relative motion is the transpose of equilibrium."""
     rng = np.random.default_rng(seed)
     n, velocity, spin = GRAINS.count, rng.normal(size=(GRAINS.count, 2)), rng.normal(size=GRAINS.count)

@@ -1,1 +1,1 @@
-"""Slow, plain twins of the compiled kernels, written from the equations, and the comparison with them."""
+"""Plain twins of the compiled kernels, implemented from the equations, and the comparisons with them."""

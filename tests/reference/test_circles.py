@@ -1,4 +1,4 @@
-"""Circles measured together against plain ones."""
+"""Circles measured in one call against the plain twin."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from tests.reference.twins.circles import measured
 
 pytestmark = pytest.mark.unit
 
-NOWHERE = [np.nan, 0.0]  # standard deviation and quality where there is no circle
+NO_CIRCLE = [np.nan, 0.0]  # standard deviation and quality where there is no circle
 
 
 def two_discs():
@@ -48,7 +48,7 @@ def test_circles_are_measured_as_one_by_one(narrow):
         )
     assert found[:3, 4].min() > 0.5
     assert found[0, :3] == pytest.approx([40.3, 44.6, 20.2], abs=0.1)
-    assert found[6].tolist() == pytest.approx([-3.0, 200.0, 10.0, *NOWHERE], nan_ok=True)
+    assert found[6].tolist() == pytest.approx([-3.0, 200.0, 10.0, *NO_CIRCLE], nan_ok=True)
 
 
 @given(arrays(st.sampled_from([np.float32, np.float64]), st.integers(1, 40), elements=st.floats(-1e3, 1e3, width=32)))

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numba import njit
 from rodsight.tracking.correlation import kernels
-from rodsight.tracking.correlation.interpolation import interpolate, interpolate_finely, sample
+from rodsight.tracking.correlation.coarse_to_fine import select_distinct_places
+from rodsight.tracking.correlation.interpolation import interpolate_cubic, interpolate_quintic, sample
 from rodsight.tracking.correlation.noise import image_noise
-from rodsight.tracking.correlation.search import disc, search_patch, turns_to_try
+from rodsight.tracking.correlation.search import angles_to_try, disc_offsets, search_patch
 from rodsight.tracking.correlation.search_parts import search_parts
-from rodsight.tracking.correlation.sifting import take_most_similar
 from rodsight.tracking.correlation.spline_vectors import add_projections, read_cubic, read_quintic
-from rodsight.tracking.correlation.splines import fine_coefficients, spline_coefficients
+from rodsight.tracking.correlation.splines import quintic_coefficients, spline_coefficients
 from rodsight.tracking.detection.edges import sample_rays
 from scipy.ndimage import correlate, gaussian_filter
 
@@ -36,7 +36,7 @@ CENTRE, REACH = (30.3, 27.8), 9.2
 
 @njit
 def read_all(coefficients, at, finely):
-    """The spline at points (p, 2): what several taps at once read is read by compiled code alone."""
+    """The spline at points (p, 2); only compiled code reads several taps at once."""
     found = np.empty(len(at))
     for k in range(len(at)):
         ix, iy = int(at[k, 0]), int(at[k, 1])
@@ -64,36 +64,36 @@ def patch(picture):
 
 def fill(picture, coefficients=None):
     data = np.empty((kernels.count_pixels(*CENTRE, REACH), 6), np.float32)
-    inverse, facts = np.empty((3, 3)), np.empty(3)
+    inverse, statistics = np.empty((3, 3)), np.empty(3)
     coefficients = spline_coefficients(picture) if coefficients is None else coefficients
-    good = kernels.fill_patch(picture, coefficients, *CENTRE, REACH, data, inverse, facts)
-    return good, data, inverse, facts
+    good = kernels.fill_patch(picture, coefficients, *CENTRE, REACH, data, inverse, statistics)
+    return good, data, inverse, statistics
 
 
-def fit_rigidly(coefficients, data, inverse, leash, hopeless, tolerance, limit, pose, fit):
+def fit_rigidly(coefficients, data, inverse, max_shift, min_zncc, tolerance, limit, pose, fit):
     coarse = np.empty((5, 5))
     kernels.fill_coarse(data, coarse)
     kernels.fit_rigid(
-        coefficients, data, coarse, inverse, REACH, leash, hopeless, tolerance, limit, pose, fit, np.empty(4)
+        coefficients, data, coarse, inverse, REACH, max_shift, min_zncc, tolerance, limit, pose, fit, np.empty(4)
     )
 
 
-def moved(picture, shift, turn, gain=1.3, level=-20.0):
-    """The picture turned about the patch's centre and shifted, under another light; and the pose to be found."""
-    c, s = np.cos(turn), np.sin(turn)
-    fine = fine_coefficients(np.pad(picture, 12, mode="reflect"))
+def moved(picture, shift, angle, gain=1.3, level=-20.0):
+    """The picture rotated about the patch's centre, shifted, with other gain and offset; and the pose to be found."""
+    c, s = np.cos(angle), np.sin(angle)
+    fine = quintic_coefficients(np.pad(picture, 12, mode="reflect"))
     y, x = np.nonzero(np.ones(picture.shape, bool))
     dx, dy = x - CENTRE[0] - shift[0], y - CENTRE[1] - shift[1]
     result = values(fine, CENTRE[0] + c * dx + s * dy + 12, CENTRE[1] - s * dx + c * dy + 12, 5)
     result = (level + gain * result.reshape(picture.shape)).astype(np.float32)
-    return result, np.array([CENTRE[0] + shift[0], CENTRE[1] + shift[1], turn])
+    return result, np.array([CENTRE[0] + shift[0], CENTRE[1] + shift[1], angle])
 
 
-def test_between_the_pixels_lies_the_spline(picture):
+def test_the_spline_interpolates_between_pixels(picture):
     at = np.random.default_rng(1).uniform([4.0, 4.0], [58.0, 54.0], (40, 2))
     for coefficients, read, degree in (
-        (spline_coefficients(picture), interpolate, 3),
-        (fine_coefficients(picture), interpolate_finely, 5),
+        (spline_coefficients(picture), interpolate_cubic, 3),
+        (quintic_coefficients(picture), interpolate_quintic, 5),
     ):
         found = [read(coefficients, int(x), int(y), np.float32(x - int(x)), np.float32(y - int(y))) for x, y in at]
         expected = [value(coefficients, x, y, degree) for x, y in at]
@@ -102,12 +102,12 @@ def test_between_the_pixels_lies_the_spline(picture):
 
 def test_whole_rows_of_taps_read_the_same_spline(picture):
     at = np.random.default_rng(2).uniform([4.0, 4.0], [59.0, 55.0], (40, 2))
-    for coefficients, degree in ((spline_coefficients(picture), 3), (fine_coefficients(picture), 5)):
+    for coefficients, degree in ((spline_coefficients(picture), 3), (quintic_coefficients(picture), 5)):
         found = read_all(coefficients, at, degree == 5)
         assert found == pytest.approx([value(coefficients, x, y, degree) for x, y in at], rel=SINGLE)
 
 
-def test_projections_are_added_to_those_before():
+def test_projections_are_accumulated():
     rng = np.random.default_rng(3)
     data, sums = rng.normal(size=(7, 6)).astype(np.float32), rng.normal(size=4)
     expected = sums + 2.5 * data[3, 2:].astype(np.float64)
@@ -115,7 +115,7 @@ def test_projections_are_added_to_those_before():
     assert sums == pytest.approx(expected, rel=1e-15)
 
 
-def test_some_of_the_pixels_lead_as_all_of_them_would():
+def test_a_subset_of_pixels_gives_the_same_direction():
     rng = np.random.default_rng(4)
     data = rng.normal(size=(kernels.COARSE_PIXELS * 3 + 5, 6)).astype(np.float32)
     coarse = np.empty((5, 5))
@@ -126,7 +126,7 @@ def test_some_of_the_pixels_lead_as_all_of_them_would():
 
 
 @pytest.mark.parametrize("shape", [(64, 96), (70, 100), (20, 23)])
-def test_noise_is_the_mask_s_mean_answer_on_calm_tiles(shape):
+def test_noise_is_the_mean_mask_response_on_uniform_tiles(shape):
     image = np.random.default_rng(6).normal(100.0, 3.0, shape).astype(np.float32)
     tile = min(32, *shape)
     mask = np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0])
@@ -141,12 +141,12 @@ def test_the_most_similar_places_are_distinct():
     places = np.array([[5.0, 5.0, 0.1, 0.7], [6.0, 5.0, 0.2, 0.9], [5.5, 5.0, 2.0, 0.5], [30.0, 5.0, 0.1, 0.6],
                        [0.0, 0.0, 0.0, -1.0]])  # fmt: skip
     best = np.empty((4, 4))
-    take_most_similar(places, 3.0, best)
+    select_distinct_places(np.stack([places, places], 1)[:, 0], 3.0, best)  # a column, as in the search
     assert best[:3].tolist() == [places[1].tolist(), places[3].tolist(), places[2].tolist()]
     assert best[3, 3] == -1.0
 
 
-def test_points_and_rays_are_read_within_the_photograph_alone(picture):
+def test_points_and_rays_are_read_only_within_the_photograph(picture):
     coefficients = spline_coefficients(picture)
     x, y = np.array([0.99, 1.0, 30.5, 61.99, 62.0, 20.0]), np.array([5.0, 1.0, 20.25, 57.9, 5.0, 58.0])
     out = np.empty(6)
@@ -170,8 +170,8 @@ def test_points_and_rays_are_read_within_the_photograph_alone(picture):
     assert np.isnan(rays).any()
 
 
-def test_a_patch_is_what_its_pixels_say(picture, patch):
-    good, data, inverse, facts = fill(picture)
+def test_a_patch_has_the_statistics_of_its_pixels(picture, patch):
+    good, data, inverse, statistics = fill(picture)
     assert good
     assert len(data) == len(patch.f) == len(pixels_within(*CENTRE, REACH))
     assert data[:, 0] == pytest.approx(patch.dx, abs=1e-5)
@@ -179,18 +179,18 @@ def test_a_patch_is_what_its_pixels_say(picture, patch):
     assert data[:, 2] == pytest.approx(patch.f, abs=SINGLE)
     assert data[:, 3:] == pytest.approx(patch.descent, abs=SINGLE * np.abs(patch.descent).max())
     assert inverse == pytest.approx(np.linalg.inv(patch.descent.T @ patch.descent), rel=1e-3, abs=1e-6)
-    assert facts == pytest.approx([patch.norm, patch.mean, patch.correlation_length], rel=SINGLE)
+    assert statistics == pytest.approx([patch.norm, patch.mean, patch.correlation_length], rel=SINGLE)
 
 
 def test_a_patch_without_texture_is_none():
     assert not fill(np.full((60, 64), 90.0, np.float32))[0]
 
 
-@pytest.mark.parametrize(("shift", "turn"), [((0.37, -0.61), 0.05), ((-1.4, 1.1), -0.12)])
-def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
-    image, true = moved(picture, shift, turn)
+@pytest.mark.parametrize(("shift", "angle"), [((0.37, -0.61), 0.05), ((-1.4, 1.1), -0.12)])
+def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, angle):
+    image, true = moved(picture, shift, angle)
     image += np.random.default_rng(9).normal(0.0, 2.0, image.shape).astype(np.float32)
-    coefficients = fine_coefficients(image)
+    coefficients = quintic_coefficients(image)
     _, data, inverse, _ = fill(picture)
     pose, fit = np.array([*CENTRE, 0.0]), np.zeros(kernels.FIT_COLUMNS)
     fit_rigidly(coefficients, data, inverse, 4.0, 0.0, 1e-3, 40, pose, fit)
@@ -202,7 +202,7 @@ def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
     assert fit[kernels.ZNCC] == pytest.approx(zncc, abs=1e-5)
     assert fit[kernels.RESIDUAL] == pytest.approx(residual, rel=0.02)
     assert fit[[kernels.GAIN, kernels.OFFSET]] == pytest.approx([gain, offset], rel=1e-4)
-    # With no step allowed it only looks.
+    # With no step allowed it only evaluates.
     still, look = true.copy(), np.zeros(kernels.FIT_COLUMNS)
     fit_rigidly(coefficients, data, inverse, 4.0, 0.0, 1e-3, 0, still, look)
     assert np.array_equal(still, true)
@@ -210,27 +210,27 @@ def test_a_fit_ends_where_the_plain_one_does(picture, patch, shift, turn):
     assert look[kernels.ZNCC] > 0.99
 
 
-def test_a_fit_gives_up_where_it_should(picture):
+def test_a_fit_is_rejected_by_its_limits(picture):
     image, _ = moved(picture, (0.4, 0.2), 0.0)
-    coefficients = fine_coefficients(image)
+    coefficients = quintic_coefficients(image)
     _, data, inverse, _ = fill(picture)
 
-    def code(start, *, leash=4.0, hopeless=0.0, limit=40):
+    def code(start, *, max_shift=4.0, min_zncc=0.0, limit=40):
         fit = np.zeros(kernels.FIT_COLUMNS)
-        fit_rigidly(coefficients, data, inverse, leash, hopeless, 1e-3, limit, np.array([*start, 0.0]), fit)
+        fit_rigidly(coefficients, data, inverse, max_shift, min_zncc, 1e-3, limit, np.array([*start, 0.0]), fit)
         return fit[kernels.CODE]
 
     assert code((11.0, 28.0)) == kernels.LEFT_IMAGE
-    assert code(CENTRE, leash=0.2) == kernels.WANDERED
-    assert code((CENTRE[0] + 6.0, CENTRE[1] - 5.0), leash=50.0, hopeless=0.99) == kernels.WANDERED
+    assert code(CENTRE, max_shift=0.2) == kernels.DIVERGED
+    assert code((CENTRE[0] + 6.0, CENTRE[1] - 5.0), max_shift=50.0, min_zncc=0.99) == kernels.DIVERGED
     assert code(CENTRE, limit=1) == kernels.UNFINISHED
     assert code(CENTRE) == kernels.CONVERGED
 
 
-def test_a_robust_fit_ends_where_tukeys_weights_leave_it(picture, patch):
+def test_a_robust_fit_ends_at_the_fixed_point_of_tukeys_weights(picture, patch):
     image, true = moved(picture, (0.3, -0.2), 0.03)
-    image[:, 35:] = 240.0  # something bright covers a part
-    coefficients = fine_coefficients(image)
+    image[:, 35:] = 240.0  # a bright cover over a part
+    coefficients = quintic_coefficients(image)
     _, data, _, _ = fill(picture)
     pose, fit, covariance = true.copy(), np.zeros(kernels.FIT_COLUMNS), np.zeros((3, 3))
     noise, gain, offset = 1.0, 1.3 * patch.norm, 1.3 * patch.mean - 20.0
@@ -240,7 +240,7 @@ def test_a_robust_fit_ends_where_tukeys_weights_leave_it(picture, patch):
     step, spread, a, b, kept, residual = tukey_fixed_point(
         coefficients, patch, pose, fit[kernels.GAIN], fit[kernels.OFFSET], noise
     )
-    assert np.abs(step[:2]).sum() + REACH * abs(step[2]) < 0.005  # the fit's own measure of standing still
+    assert np.abs(step[:2]).sum() + REACH * abs(step[2]) < 0.005  # the convergence criterion of the fit
     assert (a, b) == pytest.approx((fit[kernels.GAIN], fit[kernels.OFFSET]), rel=0.01)
     assert fit[kernels.KEPT] == pytest.approx(kept, abs=0.01)
     assert kept < 0.9
@@ -248,25 +248,54 @@ def test_a_robust_fit_ends_where_tukeys_weights_leave_it(picture, patch):
     assert covariance == pytest.approx(spread, rel=0.06, abs=1e-3 * np.abs(spread).max())
 
 
-def test_a_robust_fit_gives_up_what_is_covered_altogether(picture, patch):
+def test_a_robust_fit_rejects_a_fully_covered_patch(picture, patch):
     image = picture.copy()
     image[:, 25:] = np.random.default_rng(3).uniform(0, 255, image[:, 25:].shape)
     _, data, _, _ = fill(picture)
     fit = np.zeros(kernels.FIT_COLUMNS)
     kernels.fit_robust(
-        fine_coefficients(image), data, REACH, 3.0, 1.0, patch.norm, patch.mean, 60, np.array([*CENTRE, 0.0]), fit,
+        quintic_coefficients(image), data, REACH, 3.0, 1.0, patch.norm, patch.mean, 60, np.array([*CENTRE, 0.0]), fit,
         np.zeros((3, 3)),
     )  # fmt: skip
-    assert fit[kernels.CODE] == kernels.WANDERED
+    assert fit[kernels.CODE] == kernels.DIVERGED
     kernels.fit_robust(
-        fine_coefficients(image), data, REACH, 3.0, 1.0, patch.norm, patch.mean, 60, np.array([9.0, 28.0, 0.0]), fit,
+        quintic_coefficients(image), data, REACH, 3.0, 1.0, patch.norm, patch.mean, 60, np.array([9.0, 28.0, 0.0]), fit,
         np.zeros((3, 3)),
     )  # fmt: skip
     assert fit[kernels.CODE] == kernels.LEFT_IMAGE
 
 
-def test_a_disc_has_its_quarters_one_after_the_other():
-    x, y, start = disc(6.3)
+def test_a_robust_fit_without_a_known_light_diverges(picture, patch):
+    _, data, _, _ = fill(picture)
+    for light in ((np.nan, patch.mean), (patch.norm, np.nan), (np.inf, patch.mean)):
+        fit = np.zeros(kernels.FIT_COLUMNS)
+        kernels.fit_robust(
+            quintic_coefficients(picture), data, REACH, 3.0, 1.0, *light, 60, np.array([*CENTRE, 0.0]), fit,
+            np.zeros((3, 3)),
+        )  # fmt: skip
+        assert fit[kernels.CODE] == kernels.DIVERGED
+        assert fit[kernels.ZNCC] == 0.0
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_stripes_are_no_texture(picture, along):
+    stripes = np.repeat(picture.mean(axis=along, keepdims=True), picture.shape[along], axis=along)
+    assert not fill(np.ascontiguousarray(stripes))[0]
+
+
+@pytest.mark.parametrize(
+    ("matrix", "definite"),
+    [
+        ([[2.0, 1.0], [1.0, 2.0]], True), ([[1.0, 1.0], [1.0, 1.0]], False), ([[1.0, 2.0], [2.0, 1.0]], False),
+        ([[np.nan, 0.0], [0.0, 1.0]], False), ([[1.0, 0.0], [0.0, np.inf]], False), ([[0.0, 0.0], [0.0, 1.0]], False),
+    ],
+)  # fmt: skip
+def test_a_matrix_without_an_inverse_is_recognised(matrix, definite):
+    assert kernels.is_positive_definite(np.array(matrix)) == definite
+
+
+def test_the_pixels_of_a_disc_are_ordered_by_quarters():
+    x, y, start = disc_offsets(6.3)
     assert sorted(zip(x.tolist(), y.tolist(), strict=True)) == sorted(pixels_within(0.0, 0.0, 6.3))
     quarters = [
         lambda a, b: a >= 0 and b >= 0,
@@ -281,19 +310,19 @@ def test_a_disc_has_its_quarters_one_after_the_other():
 
 
 @pytest.mark.parametrize(("search", "parts"), [(search_patch, False), (search_parts, True)])
-@pytest.mark.parametrize("sweep", [0.4, 1.0])
-def test_a_search_finds_what_trying_everything_finds(picture, search, parts, sweep):
+@pytest.mark.parametrize("angle_window", [0.4, 1.0])
+def test_a_search_finds_the_exhaustive_maximum(picture, search, parts, angle_window):
     reach, origin, spacing, window = 5.0, (22.3, 24.6), 3.0, 6.0
     image, _ = moved(picture, (2.0, -1.0), 0.2)
     image[:, 38:] = 250.0
     reference = spline_coefficients(picture)
-    turns, sectors = turns_to_try(0.1, reach, sweep)
-    assert np.abs(np.diff(turns)).max() * reach <= 1.2 + 1e-9
+    angles, sectors = angles_to_try(0.1, reach, angle_window)
+    assert np.abs(np.diff(angles)).max() * reach <= 1.2 + 1e-9
     places = [(x, y) for y in range(20, 33) for x in range(25, 38)]
-    scores = search_plainly(reference, image, origin, reach, places, turns, parts=parts)
-    expected = best_places(scores, places, turns, sectors, spacing, 4)
+    scores = search_plainly(reference, image, origin, reach, places, angles, parts=parts)
+    expected = best_places(scores, places, angles, sectors, spacing, 4)
     best = np.empty((4, 4))
-    search(reference, image, *origin, reach, 31.0, 26.0, 0.1, window, sweep, spacing, best)
+    search(reference, image, *origin, reach, 31.0, 26.0, 0.1, window, angle_window, spacing, best)
     assert best == pytest.approx(np.array(expected), abs=1e-4)
 
 

@@ -2,20 +2,20 @@
 
 import numpy as np
 import pytest
+from rodsight.solver.detection.touch_probability import ContactProbabilitySettings, smooth_gaps
 
-from solver.detection.touch_probability import ContactProbabilitySettings, smooth_gaps
 from tests.reference.twins.touch_probability import plain_smooth
 
 pytestmark = pytest.mark.unit
 
-ROUNDING = 1e-9  # absolute, of a probability; forward and backward pass are normalised at other places
+ROUNDING = 1e-9  # absolute, of a probability; the passes are normalised at different places
 SCALES = np.array([60e-6, 75e-6, 20e-6, 90e-6, 75e-6, 40e-6])  # [m] per interval
 OVERLAPS = (0.0, 6e-6)  # [m]
 
 
 @pytest.fixture(scope="module")
 def gaps():
-    """Gaps (f, c) [m] of pairs that touch, open, close, stay away, jump, are lost, and their deviation."""
+    """Gaps (f, c) [m] of pairs that touch, open, close, stay away, jump, are lost, and their standard deviation."""
     rng = np.random.default_rng(2)
     frames = len(SCALES) + 1
     opening = np.linspace(0.0, 200e-6, frames)
@@ -40,21 +40,21 @@ def test_the_smoother_is_the_plain_one(gaps, overlap):
     assert found.variance == pytest.approx(variance, abs=ROUNDING * variance.max())
 
 
-def test_the_gaps_take_every_branch(gaps):
+def test_the_gaps_reach_every_branch(gaps):
     measured, sigma = gaps
     touch, _, _ = plain_smooth(measured, sigma, SCALES, 0.0)
     widest = max(6.0 * SCALES.max(), 12.0 * np.median(sigma[np.isfinite(measured)]))
     known = np.isfinite(measured)
     assert (~known[0]).any()
     assert (~known[-1]).any()
-    assert (measured[known] < -5.0 * sigma[known]).any()  # deeper than any overlap counts
+    assert (measured[known] < -5.0 * sigma[known]).any()  # below any modelled overlap
     assert (measured[known] > widest).any()  # beyond the last state
     assert touch.max() > 0.95
     assert touch.min() < 1e-3
     assert ((touch > 0.05) & (touch < 0.95)).any()
 
 
-def test_one_photograph_alone_has_its_say(gaps):
+def test_a_single_photograph_is_smoothed(gaps):
     measured, sigma = gaps
     found = smooth_gaps(measured[:1], sigma[:1], SCALES[:0], ContactProbabilitySettings())
     touch, mean, _ = plain_smooth(measured[:1], sigma[:1], SCALES[:0], 0.0)

@@ -1,4 +1,4 @@
-"""The loops that draw a photograph against whole arrays."""
+"""The kernels that draw a photograph against array implementations."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def tiles():
     return np.full((2, *SHAPE), 7.0, np.float32)
 
 
-def test_the_constants_are_those_written_here():
+def test_the_constants_equal_those_of_the_twin():
     assert (
         drawing.FINE,
         pytest.approx(drawing.EDGE),
@@ -32,19 +32,19 @@ def test_an_edge_is_the_integral_of_its_kernel():
 
 
 @pytest.mark.parametrize("centre", [(30.2, 25.7), (4.0, 26.0)])  # within the tile, and over its side
-def test_a_rod_is_drawn_as_it_should_be(centre):
+def test_a_rod_is_drawn_as_by_the_twin(centre):
     glow, share = tiles()
-    turn, tilt = 0.7, np.array([0.6, -0.8])
-    given = (*centre, 21.4, np.cos(turn), np.sin(turn), DOTS, 210.0, 20.0, 0.6, tilt, 5.0)
+    angle, tilt = 0.7, np.array([0.6, -0.8])
+    given = (*centre, 21.4, np.cos(angle), np.sin(angle), DOTS, 210.0, 20.0, 0.6, tilt, 5.0)
     kernels.draw_rod(glow, share, *given)
-    expected, part = drawing.rod(SHAPE, *centre, 21.4, turn, DOTS, 210.0, 20.0, 0.6, tilt, 5.0)
+    expected, part = drawing.rod(SHAPE, *centre, 21.4, angle, DOTS, 210.0, 20.0, 0.6, tilt, 5.0)
     assert share == pytest.approx(part, abs=SINGLE)
     assert glow == pytest.approx(expected, abs=210.0 * SINGLE)
     assert ((part > 0) & (part < 1)).any()
     assert (part == 1).any()
 
 
-def test_a_bar_is_drawn_as_it_should_be():
+def test_a_bar_is_drawn_as_by_the_twin():
     glow, share = tiles()
     along = np.array([np.cos(0.4), np.sin(0.4)])
     kernels.draw_bar(glow, share, 12.0, 9.5, along, 33.0, 14.0, DOTS, 150.0, 20.0)
@@ -69,7 +69,7 @@ def test_sub_pixels_are_weighted_about_their_pixels_and_added():
         assert found == pytest.approx(expected, rel=SINGLE)
 
 
-def test_the_backing_fills_what_nothing_covers():
+def test_the_backing_fills_uncovered_pixels():
     rng = np.random.default_rng(6)
     scene, covered = rng.uniform(0, 200, SHAPE).astype(np.float32), rng.uniform(0.0, 1.3, SHAPE).astype(np.float32)
     covered[:4] = 1.0

@@ -11,12 +11,12 @@ from tests.reference.twins.edges import apart, circle_step, rim, rim_misfit, san
 
 pytestmark = pytest.mark.unit
 
-STILL = 2e-4  # [px] a fit ends at steps below a ten-thousandth
+CONVERGED = 2e-4  # [px] a fit ends at steps below a ten-thousandth
 SAME = 5e-3  # [px] Gauss-Newton ends at steps below a thousandth
 
 
 def edge_points(seed=3):
-    """Points of a circle with some noise, a tenth of them on a neighbour instead."""
+    """Points of a circle with noise, a tenth of them on a neighbour instead."""
     rng = np.random.default_rng(seed)
     angle = np.arange(0.0, 2.0 * np.pi, 1.0 / 24.0)
     ex, ey, radius = 0.6, -0.4, 24.5
@@ -28,30 +28,30 @@ def edge_points(seed=3):
 
 
 @pytest.mark.parametrize("scatter", [np.inf, 0.05])
-def test_a_circle_stands_still_under_the_plain_step(scatter):
+def test_a_fitted_circle_is_a_fixed_point_of_the_plain_step(scatter):
     angle, distance, weight, (ex, ey, radius) = edge_points()
-    found = fit_circle(0.0, 0.0, 24.3, angle, distance, weight, radius_scatter=scatter, scale_least=0.02)
+    found = fit_circle(0.0, 0.0, 24.3, angle, distance, weight, radius_sd=scatter, min_scale=0.02)
     shift = np.array([found.x, found.y, found.radius - 24.3])
     step, residual, weights = circle_step(angle, distance, weight, 24.3, shift, scatter, 0.02)
-    assert np.abs(step).max() < STILL
-    assert found.residual == pytest.approx(residual, abs=2 * STILL)
-    assert (weights[10:25] == 0.0).mean() > 0.8  # what is on the neighbour does not count
+    assert np.abs(step).max() < CONVERGED
+    assert found.residual == pytest.approx(residual, abs=2 * CONVERGED)
+    assert (weights[10:25] == 0.0).mean() > 0.8  # points on the neighbour have no weight
     assert [found.x, found.y] == pytest.approx([ex, ey], abs=0.05)
     if np.isinf(scatter):
         assert found.radius == pytest.approx(radius, abs=0.05)
     else:
-        assert 24.3 < found.radius < radius  # the prior holds it back
+        assert 24.3 < found.radius < radius  # the prior limits it
     assert 0.003 < found.sigma < 0.03
 
 
-def test_a_rim_is_where_the_plain_fit_finds_it():
+def test_a_rim_fit_is_the_plain_one():
     rng = np.random.default_rng(5)
     first, step, width, expected_dark = 14.0, 0.25, 0.8, 25.0
     r = first + step * np.arange(60)
     edges, slopes = rng.uniform(22.6, 23.4, 6), rng.uniform(-4.0, 4.0, 6)
     rays = np.stack([expected_dark + rim(r, e, 140.0, c, width) for e, c in zip(edges, slopes, strict=True)])
     rays = (rays + rng.normal(0, 0.5, rays.shape)).astype(np.float32)
-    rays[5] = expected_dark + 1.0  # no light at all
+    rays[5] = expected_dark + 1.0  # uniformly dark
     start = edges + rng.uniform(-0.3, 0.3, 6)
     start[4] = np.nan
     angle = np.linspace(0.0, 5.0, 6)
@@ -60,7 +60,7 @@ def test_a_rim_is_where_the_plain_fit_finds_it():
     for p in range(4):
         assert dark[p] == pytest.approx(rays[p][(r > start[p] + 1.0) & (r <= start[p] + 2.4)].min(), abs=1.0)
         end = r[np.argmin(np.where((r >= start[p] + 1.0) & (r <= start[p] + 2.4 + step / 2), rays[p], np.inf))]
-        # Fitted is from 1.2 px inside the rough edge to 3 px outside, or to where the dark is read.
+        # The fit extends from 1.2 px inside the rough edge to 3 px outside, or to the start of the dark level.
         chosen = (r >= start[p] - 1.2 - 1e-9) & (r <= min(start[p] + 3.0, end) + 1e-9)
         plain = least_squares(
             lambda v, p=p, c=chosen: rim_misfit(rays[p][c], r[c], v, dark[p], width, 0.0, 0.75, step, level[p]),
@@ -92,7 +92,7 @@ def test_the_steepest_descent_of_a_ray_is_the_plain_one(narrow):
     assert edges[3:, 1].tolist() == [0.0, 0.0]
 
 
-def test_circles_strike_out_the_later_ones_that_overlap_them():
+def test_circles_remove_later_ones_that_overlap_them():
     rng = np.random.default_rng(9)
     x, y, radius = rng.uniform(0.0, 60.0, 150), rng.uniform(5.0, 40.0, 150), rng.uniform(1.0, 7.0, 150)
     kept = without_overlap(x, y, radius, allowed=0.2)

@@ -1,27 +1,27 @@
-"""What is measured of forces, how contacts are ordered and what accelerates a solve, against the plain ones."""
+"""Residuals of forces, visiting order and acceleration against plain implementations."""
 
 import numpy as np
 import pytest
-
-from solver.nlgs.acceleration import extrapolate, inner_products
-from solver.nlgs.sweeping.contact_law import project_on_cone
-from solver.nlgs.sweeping.kernels import (
+from rodsight.solver.nlgs.acceleration import extrapolate, inner_products
+from rodsight.solver.nlgs.sweeping.contact_law import project_on_cone
+from rodsight.solver.nlgs.sweeping.kernels import (
     advance,
     apply_forces,
+    measure_force_residual,
     measure_forces,
     measure_natural_map,
     measure_state,
-    measure_unbalance,
 )
-from solver.nlgs.sweeping.measured_sweeps import advance_and_measure, find_rest, rest_shape
-from solver.nlgs.sweeping.ordering import GROUP, visiting_order
+from rodsight.solver.nlgs.sweeping.measured_sweeps import advance_and_measure, equilibrium_shape, find_equilibrium
+from rodsight.solver.nlgs.sweeping.ordering import GROUP, visiting_order
+
 from tests.reference.twins.ordering import plain_order
 from tests.reference.twins.packing import make_case, make_guess
 from tests.reference.twins.sweeps import PlainSolver, greatest_change, mean_normal
 
 pytestmark = pytest.mark.unit
 
-ROUNDING = 1e-9  # relative; what the forces add to a velocity is read off the velocity again, which costs some digits
+ROUNDING = 1e-9  # relative; differences of velocities cancel some digits
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +40,10 @@ def state_of(problem, force):
     return body, plate
 
 
-def test_forces_are_measured_as_the_paper_does(case):
+def test_force_measures_are_those_of_the_paper(case):
     force, before = make_guess(case, 3), make_guess(case, 4)
     before[5] = force[5] = 0.0
-    assert ((force == 0).all(axis=1) & (before != 0).any(axis=1)).any()  # contacts that have lost all
+    assert ((force == 0).all(axis=1) & (before != 0).any(axis=1)).any()  # contacts that lose their whole force
     change, norm, mean = measure_forces(force, before)
     assert change == pytest.approx(greatest_change(force, before), rel=ROUNDING)
     assert norm == pytest.approx(np.sqrt(sum(fn**2 + ft**2 for fn, ft in force)), rel=ROUNDING)
@@ -65,15 +65,15 @@ def test_residuals_are_those_of_the_forces(case, plain, sweeps):
     advance(problem, body, plate, force, sweeps, 1.0)
     ordered = np.empty_like(force)
     ordered[problem.rows] = force
-    natural_map, (worst, mean) = plain.natural_map(ordered), plain.unbalance(ordered)
+    natural_map, (worst, mean) = plain.natural_map(ordered), plain.force_residual(ordered)
     norm = float(np.linalg.norm(force))
     assert measure_natural_map(problem, body, plate, force, norm) == pytest.approx(natural_map, rel=ROUNDING)
-    assert measure_unbalance(problem, body) == pytest.approx((worst, mean), rel=ROUNDING)
+    assert measure_force_residual(problem, body) == pytest.approx((worst, mean), rel=ROUNDING)
     expected = natural_map, worst / mean_normal(ordered)
     assert measure_state(problem, body, plate, force) == pytest.approx(expected, rel=ROUNDING)
 
 
-def test_no_force_at_all_is_infinitely_far_from_a_load(case):
+def test_zero_forces_under_load_have_an_infinite_residual(case):
     problem = case.assemble()
     force = np.zeros((case.contacts.count, 2))
     body, plate = state_of(problem, force)
@@ -86,21 +86,21 @@ def swept(request):
     return make_case(with_boundary=request.param != "walls")
 
 
-def rest_of(problem):
-    rest = np.empty(rest_shape(len(problem.body)))
-    find_rest(problem, rest)
-    return rest
+def equilibrium_of(problem):
+    equilibrium = np.empty(equilibrium_shape(len(problem.body)))
+    find_equilibrium(problem, equilibrium)
+    return equilibrium
 
 
 @pytest.mark.parametrize("relaxation", [1.0, 1.4])
-def test_measured_sweeps_are_the_silent_ones(swept, relaxation):
+def test_measured_sweeps_are_the_plain_ones(swept, relaxation):
     problem = swept.assemble()
     force = make_guess(swept)[problem.rows].copy()
     body, plate = state_of(problem, force)
-    silent = [each.copy() for each in (body, plate, force)]
-    advance_and_measure(problem, body, plate, force, rest_of(problem), relaxation, np.empty((6, 3)))
-    advance(problem, *silent, 6, relaxation)
-    assert all(np.array_equal(one, other) for one, other in zip(silent, (body, plate, force), strict=True))
+    unmeasured = [each.copy() for each in (body, plate, force)]
+    advance_and_measure(problem, body, plate, force, equilibrium_of(problem), relaxation, np.empty((6, 3)))
+    advance(problem, *unmeasured, 6, relaxation)
+    assert all(np.array_equal(one, other) for one, other in zip(unmeasured, (body, plate, force), strict=True))
 
 
 @pytest.mark.parametrize("relaxation", [1.0, 1.4])
@@ -113,16 +113,16 @@ def test_every_sweep_holds_its_own_residuals(swept, relaxation):
     force = expected[problem.rows].copy()
     body, plate = state_of(problem, force)
     residuals = np.empty((count, 3))
-    advance_and_measure(problem, body, plate, force, rest_of(problem), relaxation, residuals)
-    world = plain.world(expected)
+    advance_and_measure(problem, body, plate, force, equilibrium_of(problem), relaxation, residuals)
+    bodies = plain.body_velocities(expected)
     for row in range(count):
         before = expected.copy()
-        plain.sweep(world, expected, problem.rows, relaxation)
+        plain.sweep(bodies, expected, problem.rows, relaxation)
         assert residuals[row] == pytest.approx(
             (
                 greatest_change(expected, before),
                 plain.natural_map(expected),
-                plain.unbalance(expected)[0] / mean_normal(expected),
+                plain.force_residual(expected)[0] / mean_normal(expected),
             ),
             rel=ROUNDING,
         )
@@ -133,11 +133,11 @@ def test_sweeps_have_the_same_residuals_however_many_are_done_at_once(case):
     force = make_guess(case)[problem.rows].copy()
     body, plate = state_of(problem, force)
     again = [each.copy() for each in (body, plate, force)]
-    together, alone = np.empty((7, 3)), np.empty((7, 3))
-    advance_and_measure(problem, body, plate, force, rest_of(problem), 1.0, together)
-    for row in range(len(alone)):
-        advance_and_measure(problem, *again, rest_of(problem), 1.0, alone[row : row + 1])
-    assert np.array_equal(together, alone)
+    at_once, one_by_one = np.empty((7, 3)), np.empty((7, 3))
+    advance_and_measure(problem, body, plate, force, equilibrium_of(problem), 1.0, at_once)
+    for row in range(len(one_by_one)):
+        advance_and_measure(problem, *again, equilibrium_of(problem), 1.0, one_by_one[row : row + 1])
+    assert np.array_equal(at_once, one_by_one)
 
 
 @pytest.mark.parametrize("size", [4, GROUP])
@@ -149,7 +149,7 @@ def test_contacts_are_visited_in_the_plain_order(case, size):
     assert 0 < grouped < len(order)
 
 
-def test_forces_are_extrapolated_and_put_back_on_their_cones():
+def test_forces_are_extrapolated_and_projected_onto_their_cones():
     rng = np.random.default_rng(0)
     rows, vector = rng.normal(size=(3, 70)), rng.normal(size=70)
     assert inner_products(rows, vector) == pytest.approx(

@@ -1,41 +1,46 @@
-"""A step of the simulation in a periodic cell against the same step written from the mechanics alone."""
+"""A step of the simulation in a periodic cell against a plain implementation from the mechanics."""
 
 import numpy as np
 import pytest
-
-from solver.dem.kernels import Law
-from solver.dem.periodic_kernels import PeriodicBodies, PeriodicPairs, Servo, advance_periodic
+from rodsight.solver.dem.boundaries import CELL, CELL_PRESSURE, Boundary
+from rodsight.solver.dem.contact_law import Law
+from rodsight.solver.dem.time_step import DemBodies, DemPairs, advance
 
 pytestmark = pytest.mark.unit
 
-LAW = Law(1e-4, 2e4, 1.4e4, 0.5, 0.25, 0.25, 0.0, 3.0, 0.0, 0.0)
-SERVO = Servo(5e3, 2e5, 10.0, 0.06)
+LAW = Law(1e-4, 2e4, 1.4e4, 0.5, 0.25, 0.25, 0.0, 0.0, 3.0, 0.0, 0.0)
+REQUIRED, VISCOSITY, LENGTH = 5e3, 2e5, 0.06  # [Pa], [Pa s], [m]
+NO_WALLS = DemPairs(*np.empty((2, 0), np.int32), np.empty((0, 2), np.int64), *np.empty((5, 0)))
 RATE = 0.8  # [1/s]
 
 
-def make_bodies() -> tuple[PeriodicBodies, PeriodicPairs]:
-    """Three rods in a row that closes across the leaning edge of their cell."""
+def make_bodies() -> tuple[DemBodies, DemPairs, Boundary]:
+    """Three rods in a row that closes across the inclined edge of their cell."""
     rng = np.random.default_rng(4)
     radius, mass = np.array([0.010, 0.011, 0.009]), np.array([0.05, 0.06, 0.04])
     cell = np.array([[0.02, 0.05], [0.0785, 0.051]])  # the row closes by a − b
     state = np.zeros((3, 6))
     state[:, :2] = np.array([[0.01, 0.01], [0.0305, 0.0105], [0.05, 0.0105]])
     state[:, 3:] = rng.normal(0, [1e-2, 1e-2, 1.0], (3, 3))
-    pairs = PeriodicPairs(
+    pairs = DemPairs(
         np.array([0, 1, 0], np.int32), np.array([1, 2, 2], np.int32), np.array([[0, 0], [0, 0], [1, -1]]),
-        rng.uniform(1, 2, 3), rng.normal(0, 1, 3), np.zeros(3), np.zeros(3),
+        rng.uniform(1, 2, 3), rng.normal(0, 1, 3), np.zeros(3), np.zeros(3), np.zeros(3),
     )  # fmt: skip
-    return PeriodicBodies(state, rng.normal(0, 1, (3, 3)), radius, mass, cell, np.array([4e3])), pairs
+    boundary = Boundary(
+        CELL, np.array([*cell.ravel(), 4e3, 0.0]), np.zeros((2, 3)), np.array([REQUIRED, VISCOSITY, 10.0, LENGTH])
+    )
+    bodies = DemBodies(state, rng.normal(0, 1, (3, 3)), radius, mass, np.zeros((3, 3)), np.zeros(3), np.ones(3))
+    return bodies, pairs, boundary
 
 
 def test_a_step_is_that_of_the_plain_mechanics() -> None:
-    bodies, pairs = make_bodies()
+    bodies, pairs, boundary = make_bodies()
     start, spring = bodies.state.copy(), pairs.spring.copy()
-    force, cell = bodies.force.copy(), bodies.cell.copy()
+    force, cell = bodies.force.copy(), boundary.state[:4].reshape(2, 2).copy()
     dt = LAW.time_step
-    assert advance_periodic(bodies, pairs, LAW, SERVO, np.array([RATE]), 1.0) == 1
+    assert advance(bodies, pairs, NO_WALLS, LAW, boundary, np.array([[RATE]]), 1.0) == 1
 
-    stretch = (4e3 - SERVO.wanted) / SERVO.viscosity
+    stretch = (4e3 - REQUIRED) / VISCOSITY
     gradient = np.array([[stretch, RATE], [0.0, stretch]])
     velocity = (1 - LAW.drag * dt) * start[:, 3:5] + dt * force[:, :2] / bodies.mass[:, None]
     spin = (1 - LAW.drag * dt) * start[:, 5] + dt * force[:, 2] / (0.5 * bodies.mass * bodies.radius**2)
@@ -63,15 +68,15 @@ def test_a_step_is_that_of_the_plain_mechanics() -> None:
         work += fn * distance
     assert bodies.state[:, :2] == pytest.approx(place, rel=1e-13)
     assert bodies.state[:, 3:5] == pytest.approx(velocity, rel=1e-12)
-    assert bodies.cell == pytest.approx(cell, rel=1e-13)
+    assert boundary.state[:4].reshape(2, 2) == pytest.approx(cell, rel=1e-13)
     assert bodies.force == pytest.approx(total, rel=1e-9, abs=1e-12)
-    assert bodies.pressure[0] == pytest.approx(work / (2 * abs(np.linalg.det(cell)) * SERVO.length), rel=1e-12)
+    assert boundary.state[CELL_PRESSURE] == pytest.approx(work / (2 * abs(np.linalg.det(cell)) * LENGTH), rel=1e-12)
 
 
-def test_pairs_that_part_lose_their_springs() -> None:
-    bodies, pairs = make_bodies()
+def test_pairs_that_separate_lose_their_springs() -> None:
+    bodies, pairs, boundary = make_bodies()
     bodies.state[:, :2] *= 1.2
-    bodies.cell[:] *= 1.2
-    advance_periodic(bodies, pairs, LAW, SERVO, np.zeros(1), 1.0)
+    boundary.state[:4] *= 1.2
+    advance(bodies, pairs, NO_WALLS, LAW, boundary, np.zeros((1, 1)), 1.0)
     assert not pairs.fn.any()
     assert not pairs.spring.any()

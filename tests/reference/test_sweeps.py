@@ -1,18 +1,18 @@
-"""The compiled sweeps against the plain ones, on a packing that takes every branch."""
+"""The compiled sweeps against the plain ones, on a packing that reaches every branch."""
 
 import numpy as np
 import pytest
+from rodsight.solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance
+from rodsight.solver.nlgs.sweeping.kernels import advance, apply_forces
+from rodsight.solver.nlgs.sweeping.ordering import GROUP
 
-from solver.nlgs.problem import PLATE_IMPEDANCE, inertial_impedance, kinematic_impedance
-from solver.nlgs.sweeping.kernels import advance, apply_forces
-from solver.nlgs.sweeping.ordering import GROUP
 from tests.reference.twins.packing import LOST, make_case, make_guess
 from tests.reference.twins.sweeps import PLATE, PlainSolver
 
 pytestmark = pytest.mark.unit
 
-# Relative to the greatest force or velocity. The sums are the same but in another order, and a sweep passes an error
-# of rounding on to the next contact; a dozen sweeps leave 1e-13.
+# Relative to the greatest force or velocity. Sums are in another order, and a sweep propagates rounding errors to the
+# next contact; a dozen sweeps leave 1e-13.
 ROUNDING = 1e-11
 
 
@@ -37,19 +37,22 @@ def state_of(problem, force):
     return body, plate
 
 
-def test_the_case_takes_every_branch(case, plain):
+def test_the_case_reaches_every_branch(case, plain):
     problem = case.assemble()
     pairs = len(problem.rows) - len(problem.wall)
     assert case.grains.count >= 144
     assert problem.grouped >= 2 * GROUP
     assert pairs - problem.grouped > 0  # pairs in no group
-    assert pairs % GROUP != 0  # a block that is filled up
+    assert pairs % GROUP != 0  # a padded block
     assert set(problem.wall_body[:, 1]) == {0, 1, 2, 3}
+    fixed = problem.wall[:, 7] != 0.0  # at the disc that is fixed to the plate
+    assert fixed.sum() >= 2
+    assert set(problem.wall_body[fixed, 1]) == {2}
     loaded = case.walls.loaded[problem.wall_body[:, 1]]
     assert loaded.any()
     assert not loaded.all()
-    assert np.count_nonzero(problem.wall[:, 5]) == len(problem.wall)  # walls move along themselves
-    assert np.count_nonzero(problem.wall[:, 4]) == len(problem.wall)  # and across
+    assert np.count_nonzero(problem.wall[:, 5]) == len(problem.wall)  # walls move tangentially
+    assert np.count_nonzero(problem.wall[:, 4]) == len(problem.wall)  # and normally
     assert not case.motion.present.all()
     with_wall = case.contacts.with_wall
     for of in (with_wall, ~with_wall):
@@ -59,9 +62,9 @@ def test_the_case_takes_every_branch(case, plain):
     ratio = case.grains.mass / case.grains.radius**2
     assert ratio.max() > 1.5 * ratio.min()
     force = make_guess(case)
-    world = plain.world(force)
+    bodies = plain.body_velocities(force)
     for _ in range(4):
-        plain.sweep(world, force, problem.rows)
+        plain.sweep(bodies, force, problem.rows)
     friction = np.array([plain.friction(c) for c in range(len(force))])
     for of in (with_wall, ~with_wall):
         fn, ft, limit = force[of, 0], force[of, 1], friction[of] * force[of, 0]
@@ -78,25 +81,25 @@ def test_compiled_sweeps_are_the_plain_ones(case, plain, relaxation, start):
     expected = make_guess(case) if start == "guess" else np.zeros((case.contacts.count, 2))
     force = expected[problem.rows].copy()
     body, plate = state_of(problem, force)
-    world = plain.world(expected)
+    bodies = plain.body_velocities(expected)
     for sweeps in (1, 5):
         advance(problem, body, plate, force, sweeps, relaxation)
         for _ in range(sweeps):
-            plain.sweep(world, expected, problem.rows, relaxation)
+            plain.sweep(bodies, expected, problem.rows, relaxation)
         assert force == close_to(expected[problem.rows])
-    there = case.motion.present
-    assert body[there, :2] == close_to(world.velocity[there])
-    assert body[there, 2] == close_to((world.spin * case.grains.radius)[there])
-    assert plate[:, 0] == close_to(world.plate)
+    present = case.motion.present
+    assert body[present, :2] == close_to(bodies.velocity[present])
+    assert body[present, 2] == close_to((bodies.spin * case.grains.radius)[present])
+    assert plate[:, 0] == close_to(bodies.plate)
 
 
-def test_forces_set_the_velocities_that_they_cause(case, plain):
+def test_forces_set_the_velocities_of_bodies(case, plain):
     problem, force = case.assemble(), make_guess(case)
     body, plate = state_of(problem, force[problem.rows])
-    world, there = plain.world(force), case.motion.present
-    assert body[there, :2] == close_to(world.velocity[there])
-    assert body[there, 2] == close_to((world.spin * case.grains.radius)[there])
-    assert plate[:, 0] == close_to(world.plate)
+    bodies, present = plain.body_velocities(force), case.motion.present
+    assert body[present, :2] == close_to(bodies.velocity[present])
+    assert body[present, 2] == close_to((bodies.spin * case.grains.radius)[present])
+    assert plate[:, 0] == close_to(bodies.plate)
     assert np.all(body[list(LOST)] == 0.0)
 
 
@@ -114,7 +117,7 @@ def test_the_records_hold_the_plain_operators(case, plain):
     assert PLATE_IMPEDANCE == PLATE
 
 
-def test_what_a_lost_grain_weighs_burdens_nobody(case):
+def test_the_weight_of_a_lost_grain_does_not_act(case):
     assert np.all(case.assemble().external[list(LOST)] == 0.0)
 
 

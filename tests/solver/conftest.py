@@ -1,4 +1,4 @@
-"""Which of the solver's tests are small enough to pass without compilation, too."""
+"""Marks the solver tests that are small enough to run without compilation."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-# Thousands of sweeps or time steps, or nothing that is compiled: interpreted they would take minutes, or
-# say nothing new. Their kernels are compared with plain twins in tests/reference, the posterior's with integrals.
+# Tests with thousands of sweeps or time steps take minutes without compilation; tests without compiled code would be
+# repeated. The kernels are compared with plain twins in tests/reference, those of the posterior with integrals.
 COMPILED_ALONE = (
     "calibration", "convex", "dem", "sequence", "test_acceleration.py", "test_refinement.py", "test_frame_posterior.py",
     "test_radii.py", "test_simulated_forces.py",

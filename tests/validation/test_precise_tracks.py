@@ -1,4 +1,4 @@
-"""Tracks so precise that the overlaps of hard rods show: stress and sliding are those that motion tells."""
+"""Tracks so precise that the overlaps of hard rods are visible: forces stay those of the motion estimate."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
-from rodsight.inference.inference import CorrectedSequence
-from rodsight.progress import silent
-from rodsight.study.worlds.world_score import solve_world, true_forces
+from rodsight.inference.corrected_sequence import CorrectedSequence
+from rodsight.process.progress import no_progress
+from rodsight.solver.statistics.agreement import compare_forces
+from rodsight.study.scenarios.scenario_score import solve_scenario, true_forces
 
-from solver.statistics.agreement import compare_forces
 from tests.program import RODSIGHT
 
 SYNTH = ("--preset", "small", "--seed", "3", "--frames", "8", "--no-photographs")  # 1 µm; rods overlap by 4 µm
@@ -28,20 +28,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def score(folder: Path, positions: str) -> tuple[CorrectedSequence, np.ndarray]:
-    """r of f_n and of f_t, and the scale, on average over the frames that a motion leads to."""
+    """Sequence, and means of r of f_n, of f_t and of the scale over all frames but the first."""
     experiment = load_experiment(folder, (f"solver.positions={positions}",))
-    sequence, solved = solve_world(experiment, silent)
+    solution = solve_scenario(experiment, no_progress)
+    sequence = solution.sequence
     true, seen = true_forces(experiment, sequence), []
-    for frame in [each.forces for each in solved][1:]:
+    for frame in solution.results.frames[1:]:
         found = compare_forces(frame.contacts.key, np.column_stack([frame.fn, frame.ft]), *true[frame.frame])
         seen.append((found.r_fn, found.r_ft, found.scale))
     return sequence, np.mean(seen, axis=0)
 
 
-def test_visible_overlaps_of_hard_rods_take_nothing_from_what_motion_tells(folder):
+def test_visible_overlaps_of_hard_rods_do_not_degrade_the_forces(folder):
     sequence, found = score(folder, "needed")
     _, motion = score(folder, "never")
-    assert sequence.settings.overlap_seen
+    assert sequence.settings.measured_overlap
     assert found[0] > motion[0] - 0.003
     assert found[1] > motion[1] - 0.02
     assert found[2] == pytest.approx(1.0, abs=0.04)

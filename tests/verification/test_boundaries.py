@@ -1,19 +1,19 @@
-"""Walls of any convex arrangement, several plates under load, weight: what statics demands of them."""
+"""Static equilibrium with convex arrangements of walls, several loaded plates, and weight."""
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.motion import Snapshot, no_motion
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.convex.program import assemble_balance, project_onto_equilibrium
+from rodsight.solver.detection.contact_networks import ThresholdNetwork
+from rodsight.solver.nlgs.chain import ChainSettings, advance_chain
+from rodsight.solver.nlgs.force_memory import ForceMemory
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, solve
+from rodsight.solver.statistics.stress import wall_forces
 
-from solver.bodies.motion import Snapshot, no_motion
-from solver.bodies.packing import Material, Packing
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
-from solver.convex.program import assemble_balance, polish
-from solver.detection.networks import NearPairs
-from solver.nlgs.chain import ChainSettings, advance_chain
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, solve
-from solver.nlgs.warm_start import ForceMemory
-from solver.statistics.stress import wall_forces
 from tests.packings import LENGTH, box, motion, rods
 
 CONVERGED = 1e-6  # relative, of an iteration run far beyond its need
@@ -35,7 +35,7 @@ def static_forces(grains, position, walls, *, friction=0.3, gravity=(0.0, 0.0)):
     return contacts, solution
 
 
-def test_a_grain_in_a_triangle_pushes_all_three_sides_alike():
+def test_grain_in_a_triangle_has_equal_forces_on_all_sides():
     contacts, solution = static_forces(rods(0.01), np.zeros((1, 2)), triangle(0.01, 7.0), friction=0.0)
     assert contacts.count == 3
     assert solution.fn == pytest.approx([7.0] * 3, rel=CONVERGED)
@@ -59,7 +59,7 @@ def test_two_plates_each_carry_their_own_load():
     assert total[3] == pytest.approx([-8.0, 0.0], rel=CONVERGED, abs=1e-6)
 
 
-def test_the_floor_carries_weight_and_load():
+def test_floor_carries_weight_and_load():
     position = square_lattice(2, 3)
     grains = rods(*[0.01] * 6)
     contacts, solution = static_forces(grains, position, box(0.04, 0.06, top_load=5.0), gravity=(0.0, -9.81))
@@ -68,7 +68,7 @@ def test_the_floor_carries_weight_and_load():
     assert -(floor + sides) == pytest.approx(5.0 + 9.81 * grains.mass.sum(), rel=CONVERGED)
 
 
-def test_weight_may_point_anywhere():
+def test_gravity_may_have_any_direction():
     grains = rods(*[0.01] * 6)
     contacts, solution = static_forces(grains, square_lattice(3, 2), box(0.06, 0.04), gravity=(9.81, 0.0))
     assert wall_forces(contacts, solution.fn, solution.ft).sum(axis=0) == pytest.approx(
@@ -76,7 +76,7 @@ def test_weight_may_point_anywhere():
     )
 
 
-def test_a_polished_field_balances_every_plate():
+def test_projected_forces_balance_every_plate():
     position = square_lattice(3, 2)
     walls = box(0.06, 0.04)
     walls = Walls(walls.endpoints, walls.velocity, np.array([np.nan, 8.0, 30.0, np.nan]))
@@ -86,20 +86,22 @@ def test_a_polished_field_balances_every_plate():
     balance = assemble_balance(
         contacts, grains, walls, present=present, friction=np.full(contacts.count, 0.3), force_unit=10.0
     )
-    rough = np.full(contacts.count, 9.0)
-    found = polish(balance, rough, np.zeros(contacts.count))
+    given = np.full(contacts.count, 9.0)
+    found = project_onto_equilibrium(balance, given, np.zeros(contacts.count))
     total = wall_forces(contacts, found.fn, found.ft)
-    # The balance is a strong spring, not a constraint: a thousandth of the pull towards the rough field is left.
+    # Equilibrium is a strong penalty, not a constraint: a thousandth of the difference to the given forces remains.
     assert total[1, 0] == pytest.approx(8.0, rel=2e-3)
     assert total[2, 1] == pytest.approx(30.0, rel=2e-3)
 
 
-def test_a_chain_takes_its_loads_from_the_pressures_of_its_walls():
+def test_loads_of_a_chain_follow_from_the_pressures():
     grains = rods(*[0.01] * 6)
     pressure = np.array([np.nan, 2e3, 5e3, np.nan])
     packing = Packing(grains, LENGTH, Material(0.0, 0.0), pressure)
-    still = Snapshot(0.0, square_lattice(3, 2), np.zeros(6), np.ones(6, bool), box(0.06, 0.04).endpoints, 1e-6)
-    step = advance_chain(packing, no_motion(still), ForceMemory.empty(), ChainSettings(sweeps=4000), NearPairs(1e-9))
+    at_rest = Snapshot(0.0, square_lattice(3, 2), np.zeros(6), np.ones(6, bool), box(0.06, 0.04).endpoints, 1e-6)
+    step = advance_chain(
+        packing, no_motion(at_rest), ForceMemory.empty(), ChainSettings(sweeps=4000), ThresholdNetwork(1e-9)
+    )
     total = wall_forces(step.contacts, step.solution.fn, step.solution.ft)
     assert total[1, 0] == pytest.approx(2e3 * 0.04 * LENGTH, rel=1e-4)
     assert total[2, 1] == pytest.approx(5e3 * 0.06 * LENGTH, rel=1e-4)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from rodsight.solver.nlgs.solve import NlgsSettings, Stop, solve
 
-from solver.nlgs.solve import NlgsSettings, Stop, solve
 from tests.packings import box, motion, problem_of, rods
 
 EXACT = 1e-12  # relative: a handful of floating-point operations
@@ -21,7 +21,7 @@ def test_two_approaching_grains_stop_each_other():
     assert solution.ft == pytest.approx([0.0], abs=EXACT)
 
 
-def test_two_parting_grains_bear_no_force():
+def test_two_separating_grains_bear_no_force():
     state = motion(np.array([[0.0, 0.0], [0.016, 0.0]]), np.array([[-1e-3, 0.0], [1e-3, 0.0]]))
     problem, _ = problem_of(rods(0.008, 0.008), state, box_far_away())
     solution = solve(problem, NlgsSettings(sweeps=3))
@@ -29,7 +29,7 @@ def test_two_parting_grains_bear_no_force():
 
 
 @pytest.mark.parametrize(("friction", "sliding"), [(10.0, False), (0.1, True)])
-def test_a_glancing_pair_sticks_or_slides_by_coulombs_law(friction, sliding):
+def test_glancing_pair_sticks_or_slides_by_coulombs_law(friction, sliding):
     state = motion(np.array([[0.0, 0.0], [0.016, 0.0]]), np.array([[1e-3, 0.0], [0.0, 1e-3]]))
     impedance = np.array([2.0, 2.0])
     problem, _ = problem_of(rods(0.008, 0.008), state, box_far_away(), friction=friction, impedance=impedance)
@@ -48,7 +48,7 @@ def test_spinning_grains_are_slowed_by_friction():
     assert solution.ft == pytest.approx([2 * 0.008 * 0.5 / 3.0], rel=EXACT)
 
 
-def test_a_grain_between_two_walls_carries_the_load():
+def test_grain_between_two_walls_carries_the_load():
     grains = rods(0.008)
     problem, contacts = problem_of(
         grains, motion(np.array([[0.03, 0.008]])), box(0.06, 0.016, top_load=12.0), friction=0.3
@@ -60,7 +60,7 @@ def test_a_grain_between_two_walls_carries_the_load():
     assert solution.ft == pytest.approx([0.0, 0.0], abs=CONVERGED)
 
 
-def test_a_stack_of_three_grains_carries_its_weight():
+def test_stack_of_three_grains_carries_its_weight():
     grains = rods(0.008, 0.010, 0.007)
     height = np.cumsum([0.008, 0.018, 0.017])
     problem, contacts = problem_of(
@@ -76,9 +76,9 @@ def test_a_stack_of_three_grains_carries_its_weight():
         assert fn == pytest.approx(expected[(int(i), int(j))], rel=CONVERGED)
 
 
-def test_a_pyramid_of_three_shares_the_upper_ones_weight():
+def test_pyramid_of_three_carries_the_weight_of_the_top_grain():
     # Two grains on the floor held by friction, a third on top: equilibrium of the top grain gives 2 f·cos30° = m g
-    # for the resultant along the branch, whatever the share of friction.
+    # for the resultant along the branch, whatever the friction.
     grains = rods(0.01, 0.01, 0.01)
     position = np.array([[0.02, 0.01], [0.04, 0.01], [0.03, 0.01 + 0.01 * np.sqrt(3)]])
     problem, contacts = problem_of(

@@ -1,14 +1,14 @@
-"""The forces do not depend on who looks: rotated, mirrored, scaled and renamed problems have the same answer."""
+"""Invariance of the forces: rotated, mirrored, scaled and renumbered problems have the same solution."""
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import GrainMotion, Grains
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, solve
 
-from solver.bodies.grains import GrainMotion, Grains
-from solver.bodies.packing import Material
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, solve
 from tests.packings import squeezed_heap
 
 # Without friction the normal forces of this heap are unique, so different visiting orders must meet; the iteration
@@ -31,11 +31,11 @@ def forces(grains, state, walls, material=MATERIAL, threshold=2e-4):
     return contacts, solution.fn
 
 
-def turned(heap, matrix):
+def transformed(heap, matrix):
     grains, state, walls = heap
     sign = np.linalg.det(matrix)
     endpoints, velocity = walls.endpoints @ matrix.T, walls.velocity @ matrix.T
-    if sign < 0:  # mirrored walls must be walked the other way to keep the packing on the left
+    if sign < 0:  # mirrored walls are reversed to keep the packing on their left
         endpoints, velocity = endpoints[:, ::-1], velocity[:, ::-1]
     return (
         grains,
@@ -45,16 +45,16 @@ def turned(heap, matrix):
 
 
 @pytest.mark.parametrize("degrees", [30.0, 90.0, 217.0])
-def test_forces_turn_with_the_packing(heap, degrees):
+def test_forces_rotate_with_the_packing(heap, degrees):
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     _, expected = forces(*heap)
-    _, found = forces(*turned(heap, np.array([[c, -s], [s, c]])))
+    _, found = forces(*transformed(heap, np.array([[c, -s], [s, c]])))
     assert found == pytest.approx(expected, abs=SAME * expected.max())
 
 
 def test_forces_are_mirrored_with_the_packing(heap):
     _, expected = forces(*heap)
-    _, found = forces(*turned(heap, np.array([[-1.0, 0.0], [0.0, 1.0]])))
+    _, found = forces(*transformed(heap, np.array([[-1.0, 0.0], [0.0, 1.0]])))
     assert found == pytest.approx(expected, abs=SAME * expected.max())
 
 
@@ -66,23 +66,23 @@ def test_forces_scale_with_load_and_motion(heap):
     assert found == pytest.approx(3 * expected, abs=3 * SAME * expected.max())
 
 
-def test_forces_do_not_depend_on_the_names_of_the_grains(heap):
+def test_forces_do_not_depend_on_the_numbering_of_the_grains(heap):
     grains, state, walls = heap
     contacts, expected = forces(*heap)
     order = np.random.default_rng(0).permutation(grains.count)
-    place = np.argsort(order)  # old name -> new row
-    renamed, found = forces(
+    new_row = np.argsort(order)  # old row → new row
+    renumbered, found = forces(
         Grains(grains.radius[order], grains.mass[order]),
         GrainMotion(state.position[order], state.velocity[order], state.spin[order], state.present[order]),
         walls,
     )
-    by_pair = {frozenset((int(i), int(j))): fn for i, j, fn in zip(renamed.i, renamed.j, found, strict=True)}
+    by_pair = {frozenset((int(i), int(j))): fn for i, j, fn in zip(renumbered.i, renumbered.j, found, strict=True)}
     for i, j, fn in zip(contacts.i, contacts.j, expected, strict=True):
-        new_j = int(place[j]) if j < grains.count else int(j)
-        assert by_pair[frozenset((int(place[i]), new_j))] == pytest.approx(fn, abs=SAME * expected.max())
+        new_j = int(new_row[j]) if j < grains.count else int(j)
+        assert by_pair[frozenset((int(new_row[i]), new_j))] == pytest.approx(fn, abs=SAME * expected.max())
 
 
-def test_a_mirrored_single_sweep_mirrors_friction_too():
+def test_mirrored_single_sweep_mirrors_friction_too():
     # One contact with friction: f_t changes its sign in the mirror, f_n does not.
     from tests.packings import motion, problem_of, rods
     from tests.verification.test_closed_forms import box_far_away

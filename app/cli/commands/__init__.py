@@ -1,1 +1,1 @@
-"""One file per family of commands, each a thin layer over the stages."""
+"""One file per group of commands, which call the stages."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from ...errors import InputError
-from ..arguments import Quiet
-from ..terminal import progress_of, table_console, tell
+from ..arguments import AsJson, Quiet, Scheduler, Workers, worker_count
+from ..terminal import print_line, progress_of, table_console
 
 if TYPE_CHECKING:
-    from ...campaign.collect import Row
+    from ...campaigns.collect import Row
 
 
 def campaign(
@@ -28,61 +28,46 @@ def campaign(
     out: Annotated[
         Path | None, tyro.conf.arg(metavar="DIR", help="folder of all runs; default: runs/ and the table's name")
     ] = None,
-    workers: Annotated[int | None, tyro.conf.arg(metavar="N", help="processes; default: one for every core")] = None,
-    scheduler: Annotated[
-        str | None, tyro.conf.arg(metavar="ADDRESS", help="run on the machines of this dask scheduler instead")
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     recordings: Annotated[bool, tyro.conf.arg(help="write a recording of every run")] = True,
-    dry: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="check the table, and list the runs that it asks for")
-    ] = False,
+    dry: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="check the table and list its runs")] = False,
+    as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
-    """Run many experiments with many settings, side by side, and tell of them as one.
+    """Run many experiments with many settings in parallel, with one report of all.
 
-    Columns of TABLE: experiment; name, frames (A:B) where wanted; all others are keys such as material.friction, an
-    empty cell leaving the experiment's own. The same command goes on where it stopped. A run that fails does not stop
+    Columns of TABLE: experiment; optionally name and frames (A:B); all others are keys such as material.friction, where
+    an empty cell keeps the experiment's value. The same command resumes where it stopped; a failed run does not stop
     the others. In DIR: a folder for each run, catalogue.csv, contacts.parquet, grains.parquet, frames.parquet and
     walls.parquet of all runs, report.html.
 
     Example: rodsight campaign sample_data/campaign.csv --workers 2
     """
-    from solver.together import available_cores
+    from ...campaigns.campaign import run_campaign
+    from ...campaigns.plan import read_plan
 
-    from ...campaign.collect import collect
-    from ...campaign.plan import read_plan
-    from ...campaign.report import write_report
-    from ...campaign.workers import run_cases
-    from ...sensitivity.execution import reach_scheduler
-
-    if workers is not None and workers < 1:
-        raise InputError("--workers", str(workers), "must be at least one")
-    console = table_console(quiet=quiet)
+    processes = worker_count(workers)
+    console = table_console(quiet=quiet or as_json)
     cases = [replace(case, record=recordings) for case in read_plan(table)]
     if dry:
+        if as_json:
+            print(json.dumps([case.as_plain() for case in cases], indent=1))
         for case in cases:
-            tell(console, f"{case.name}: {case.experiment} {' '.join(case.settings)}".rstrip())
+            print_line(console, f"{case.name}: {case.experiment} {' '.join(case.settings)}".rstrip())
         return 0
-    if scheduler is not None:
-        reach_scheduler(scheduler)
     folder = out if out is not None else Path("runs") / table.stem
-    folder.mkdir(parents=True, exist_ok=True)
-    outcomes = []
     with progress_of(quiet) as progress:
-        progress("runs", 0, len(cases))
-        crew = available_cores() if workers is None else workers
-        for outcome in run_cases(cases, folder, workers=crew, scheduler=scheduler):
-            outcomes.append(outcome)
-            progress("runs", len(outcomes), len(cases))
-    rows = collect(folder, cases, outcomes)
-    report = write_report(folder, rows)
-    _print(console, rows)
-    failed = [each for each in outcomes if each.error]
-    for each in failed:
-        tell(console, f"{each.name} failed: {each.error}")
-    kept = sum(each.kept for each in outcomes)
-    tell(console, f"{len(cases)} runs, {kept} of them there already, {len(failed)} failed. All of it: {report}")
-    return 1 if failed else 0
+        done = run_campaign(cases, folder, workers=processes, scheduler=scheduler, progress=progress)
+    if as_json:
+        print(json.dumps({"folder": str(folder), "report": str(done.report), "runs": done.rows}, indent=1))
+        return 1 if done.failed else 0
+    _print(console, done.rows)
+    for each in done.failed:
+        print_line(console, f"{each.name} failed: {each.error}")
+    counts = f"{len(cases)} runs, {done.reused} of them reused, {len(done.failed)} failed"
+    print_line(console, f"{counts}. Report: {done.report}")
+    return 1 if done.failed else 0
 
 
 def _print(console: object, rows: list[Row]) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from ...errors import InputError
+from ...process.errors import InputError
 
 
 def docs(
@@ -21,13 +21,13 @@ def docs(
         bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print the page here instead of opening it")
     ] = False,
     find: Annotated[
-        str | None, tyro.conf.arg(metavar="WORDS", help="list the sections that hold these words, and open none")
+        str | None, tyro.conf.arg(metavar="WORDS", help="list the sections that contain these words")
     ] = None,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="write the pages there, and open none")] = None,
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help="write the pages there")] = None,
 ) -> int:
-    """Open the documentation in the browser: the shipped pages, without a network.
+    """Open the documentation in the browser: the installed pages, without a network.
 
-    Words instead of a page: rodsight docs --find "plot P(f)"
+    To search: rodsight docs --find "plot P(f)"
 
     Example: rodsight docs troubleshooting --text
     """
@@ -37,7 +37,7 @@ def docs(
     from ...manual.contents import pages
     from ...manual.reading import page_text, reading_folder, write_pages
     from ...recording.viewing.viewer import has_display
-    from ..terminal import tell
+    from ..terminal import print_line
 
     if find is not None:
         return _find(find)
@@ -45,8 +45,8 @@ def docs(
     name = (page or "index").removesuffix(".md").replace("-", "_")
     if name not in names:
         near = get_close_matches(name, names, 1)
-        meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
-        raise InputError("docs", str(page), f"is no page: {meant}")
+        hint = f"did you mean {near[0]}?" if near else f"the pages are {', '.join(names)}"
+        raise InputError("docs", str(page), f"is not a page: {hint}")
     console = Console()
     if text:
         from rich.markdown import Markdown
@@ -57,19 +57,19 @@ def docs(
     shown = first.with_name(f"{name}.html")
     if out is None and has_display():
         webbrowser.open(shown.resolve().as_uri())
-    tell(console, f"{shown}; in this terminal: rodsight docs {name} --text")
+    print_line(console, f"{shown}; in this terminal: rodsight docs {name} --text")
     return 0
 
 
 def _find(words: str) -> int:
-    """List the sections that hold the words, with the line that shows one of them."""
+    """List the sections that contain the words, with the command that shows each."""
     from rich.console import Console
 
     from ...manual.finding import find_sections
 
     sections = find_sections(words)
     if not sections:
-        raise InputError("--find", repr(words), "stands in no section: try fewer words, or parts of them")
+        raise InputError("--find", repr(words), "occurs in no section: try fewer words, or parts of them")
     console = Console(highlight=False, markup=False)
     for section in sections:
         console.print(f"{section.title}: {section.heading}", style="bold")

@@ -1,116 +1,112 @@
-"""Commands that hand results on: share a recording, export forms that other tools and people read."""
+"""Commands that write results for others: `export` to other formats, `share` for a small recording."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import tyro
 from rich.console import Console
 
-from ...errors import InputError
-from ..arguments import Frames, Quiet, parse_frames
-from ..terminal import progress_of, tell
+from ...process.errors import InputError
+from ..arguments import Frames, Quiet, parse_frames, refuse_step
+from ..stored_results import recording_file, results_file
+from ..terminal import print_line, progress_of
 
-if TYPE_CHECKING:
-    from ...experiment.units import Scale
-    from ...figures.gallery import FileKind
-    from ...figures.page import Width
-    from ...progress import Progress
-    from ...results.results import Results
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """Which pictures of a recording are drawn, and how."""
-
-    recording: Path
-    timeline: str
-    times: str | None  # A:B on the timeline
-    step: int
-    tab: str | None
-    view: str | None
-    size: str  # WxH
-    rate: float  # [1/s] pictures of a film
+Kind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
+# Kinds to which each option applies; --out and --quiet apply to all.
+KINDS_OF_OPTION: dict[str, tuple[Kind, ...]] = {
+    "--kind": ("tables",),
+    **dict.fromkeys(
+        ("--frames", "--timeline", "--step", "--tab", "--view", "--size", "--figure"), ("pictures", "video")
+    ),
+    "--rate": ("video",),
+    "--pixel-size": ("dic",),
+    **dict.fromkeys(("--frame", "--formats", "--width"), ("figures",)),
+}
 
 
 def export(
-    what: Annotated[
-        Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"],
-        tyro.conf.Positional,
-        tyro.conf.arg(help="to write"),
-    ],
+    what: Annotated[Kind, tyro.conf.Positional, tyro.conf.arg(help="to write")],
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RESULTS", help="a run's folder or file")],
     /,
     out: Annotated[
         Path | None, tyro.conf.arg(metavar="PATH", help="folder, or file of a video; default: beside the results")
     ] = None,
-    kind: Annotated[Literal["csv", "parquet"], tyro.conf.arg(help="of tables")] = "csv",
+    kind: Annotated[Literal["csv", "parquet"] | None, tyro.conf.arg(help="tables: format; default csv")] = None,
     frames: Annotated[str | None, tyro.conf.arg(metavar="A:B", help="pictures, video: of the timeline")] = None,
     timeline: Annotated[
-        Literal["frame", "sweep"], tyro.conf.arg(help="pictures, video: what goes on from one to the next")
-    ] = "frame",
-    step: Annotated[int, tyro.conf.arg(help="pictures, video: every so many values")] = 1,
+        Literal["frame", "sweep"] | None, tyro.conf.arg(help="pictures, video: from picture to picture; default frame")
+    ] = None,
+    step: Annotated[int | None, tyro.conf.arg(help="pictures, video: every so many values; default 1")] = None,
     tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show")] = None,
     view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
-    size: Annotated[str, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window [px]")] = "1600x1000",
-    rate: Annotated[float, tyro.conf.arg(help="video: pictures a second [1/s]")] = 6.0,
+    figure: Annotated[
+        Literal["forces", "density", "rose", "stress", "time", "truth"] | None,
+        tyro.conf.arg(help="pictures, video: this figure of every frame, instead of the viewer"),
+    ] = None,
+    size: Annotated[
+        str | None, tyro.conf.arg(metavar="WxH", help="pictures, video: of the window [px]; default 1600x1000")
+    ] = None,
+    rate: Annotated[float | None, tyro.conf.arg(help="video: pictures a second [1/s]; default 6")] = None,
     pixel_size: Annotated[
         float | None, tyro.conf.arg(help="dic: side of a pixel [m]; default: the experiment's")
     ] = None,
     frame: Annotated[int | None, tyro.conf.arg(help="figures: of this frame; default: the last settled one")] = None,
-    formats: Annotated[tuple[Literal["pdf", "svg", "png"], ...], tyro.conf.arg(help="figures: kinds of files")] = (
-        "pdf",
-        "svg",
-    ),
-    width: Annotated[Literal["single", "double"], tyro.conf.arg(help="figures: columns of a page")] = "single",
+    formats: Annotated[
+        tuple[Literal["pdf", "svg", "png"], ...], tyro.conf.arg(help="figures: kinds of files; default pdf svg")
+    ] = (),
+    width: Annotated[
+        Literal["single", "double"] | None, tyro.conf.arg(help="figures: columns of a page; default single")
+    ] = None,
     quiet: Quiet = False,
 ) -> int:
     """Write pictures, a video, figures for a paper, tables, files for ParaView, OVITO and networkx, tracker files.
 
     Tables come with columns.csv, the dictionary of their columns, and datapackage.json for a data repository. ParaView
-    opens vtk/packing.pvd, OVITO ovito/frame_0000.vtm, and finds the others.
+    opens vtk/packing.pvd, OVITO ovito/frame_0000.vtm; they find the other files. An option that does not apply to the
+    chosen kind is refused.
 
-    Example: rodsight export video runs/shear --view "Force network"
+    Example: rodsight export video runs/shear --figure forces
     """
-    from ...exchange.contact_graph import write_graphs
-    from ...exchange.dic_files import write_sequence
-    from ...exchange.ovito_files import write_ovito
-    from ...exchange.tidy_tables import write_tables
-    from ...exchange.vtk_polydata import write_polydata
+    given = {
+        "--kind": kind, "--frames": frames, "--timeline": timeline, "--step": step, "--tab": tab, "--view": view,
+        "--size": size, "--rate": rate, "--pixel-size": pixel_size, "--frame": frame, "--formats": formats or None,
+        "--width": width, "--figure": figure,
+    }  # fmt: skip
+    from ...exported_files import Drawing, draw_figure_frames, draw_pictures, write_data, write_run_figures
     from ...results.hdf5.store import load_results
-    from ...run_folder import RECORDING, RESULTS
 
+    _refuse_other_options(what, given)
     console = Console(quiet=quiet)
     folder = source if source.is_dir() else source.parent
     if what in ("pictures", "video"):
-        recording = folder / RECORDING if source.suffix != ".rrd" else source
-        if not recording.is_file():
+        recording = source if source.suffix == ".rrd" else recording_file(folder)
+        if figure is None and not recording.is_file():
             raise InputError(recording, "", "there is no such recording")
-        drawing = Drawing(recording, timeline, frames, step, tab, view, size, rate)
+        times = None if frames is None else refuse_step(parse_frames(frames))
+        drawing = Drawing(
+            recording, timeline or "frame", times, 1 if step is None else step, tab, view,
+            _window(size or "1600x1000"), 6.0 if rate is None else rate,
+        )  # fmt: skip
         with progress_of(quiet) as progress:
-            told = _draw(drawing, out, progress, film=what == "video")
-        tell(console, told)
-        return 0
-    if what == "figures":
-        told = _write_figures(folder / RESULTS if source.is_dir() else source, out, formats, frame, width)
-        tell(console, told)
-        return 0
-    results = load_results(folder / RESULTS if source.is_dir() else source)
-    target = out if out is not None else folder / what
-    if what == "tables":
-        files = write_tables(results, target, kind)
-    elif what == "vtk":
-        files = write_polydata(results, target)
-    elif what == "ovito":
-        files = write_ovito(results, target)
-    elif what == "graph":
-        files = write_graphs(results, target)
+            if figure is None:
+                files = draw_pictures(drawing, out, progress, film=what == "video")
+            else:
+                files = draw_figure_frames(results_file(folder), out, figure, drawing, progress, film=what == "video")
+        if what == "video":
+            message = f"{files[0]}: {1e-6 * files[0].stat().st_size:.1f} MB."
+        else:
+            message = f"{files[0].parent}/: {len(files)} pictures, {files[0].name} … {files[-1].name}."
+    elif what == "figures":
+        file = results_file(source)
+        files = write_run_figures(file, out, formats or ("pdf", "svg"), frame, width or "single")
+        message = f"{files[0].parent}/: {', '.join(each.name for each in files)}."
     else:
-        files = write_sequence(results.tracks, _scale_of(results, pixel_size), target)
-    shown = ", ".join(file.name for file in files[:3]) + (f" … {files[-1].name}" if len(files) > 3 else "")
-    tell(console, f"{target}/: {shown}.")
+        target = folder / what if out is None else out
+        files = write_data(what, load_results(results_file(source)), target, form=kind or "csv", pixel_size=pixel_size)
+        message = _name_files(target, files)
+    print_line(console, message)
     return 0
 
 
@@ -124,86 +120,59 @@ def share(
     frames: Frames = None,
     scale: Annotated[float, tyro.conf.arg(help="of photographs, 0.5: half as wide and high")] = 1.0,
     html: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="one page with the viewer in it")] = False,
-    repair: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="mend a damaged recording instead")] = None,
+    although_out_of_date: Annotated[
+        bool,
+        tyro.conf.FlagCreatePairsOff,
+        tyro.conf.arg(help="share a run although its input has changed since it was computed"),
+    ] = False,
+    repair: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help="repair a damaged recording instead")] = None,
     out: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help="what to write; default: beside the recording")
+        Path | None, tyro.conf.arg(metavar="FILE", help="file to write; default: beside the recording")
     ] = None,
 ) -> int:
     """Make a small recording to send, or one HTML file that any browser opens.
 
     Example: rodsight share runs/shear --frames 0:12 --scale 0.5 --html
     """
-    from ...run_folder import RECORDING
-
     console = Console(soft_wrap=True)
     if (source is None) == (repair is None):
         raise InputError("share", "", "give either a run's folder or recording, or --repair FILE")
     if repair is not None:
         return _repair(repair, out, console)
     assert source is not None
-    recording = source / RECORDING if source.is_dir() else source
+    recording = recording_file(source)
     if source.is_dir() and not recording.is_file() and html:
-        return _share_several(source, parse_frames(frames), scale, out, console)
+        return _share_several(
+            source, refuse_step(parse_frames(frames)), scale, out, console, although=although_out_of_date
+        )
     if not recording.is_file():
         raise InputError(recording, "", "there is no such recording")
-    return _share(recording, parse_frames(frames), scale, html, out, console)
+    if not although_out_of_date:
+        refuse_out_of_date(recording)
+    return _share(recording, refuse_step(parse_frames(frames)), scale, html, out, console)
 
 
-def _draw(drawing: Drawing, out: Path | None, progress: Progress, *, film: bool) -> str:
-    """Write the film, or the pictures; returns what to tell."""
-    from ...recording.viewing.headless import NoPictureError
-    from ...recording.viewing.pictures import Shown, timeline_values, write_film, write_pictures
+def refuse_out_of_date(recording: Path) -> None:
+    """Raise InputError where the input of a recording's run has changed since it was computed."""
+    from ...out_of_date import out_of_date
+    from ...run_folder import RECORDING
 
-    recording, step = drawing.recording, drawing.step
-    if step < 1:
-        raise InputError("--step", str(step), "is not a positive number")
-    if not 0.0 < drawing.rate <= 120.0:
-        raise InputError("--rate", str(drawing.rate), "is not between 0 and 120 pictures a second")
-    try:
-        first, last = timeline_values(recording, drawing.timeline)
-        begin, end = parse_frames(drawing.times)
-        if drawing.times is not None and not first <= begin <= (last if end is None else end - 1) <= last:
-            raise InputError(
-                "--frames", drawing.times, f"is not a range of {first}:{last + 1} on the timeline {drawing.timeline}"
-            )
-        chosen = range(max(begin, first), last + 1 if end is None else end, step)
-        shown = Shown(drawing.timeline, drawing.tab, drawing.view, _window(drawing.size))
-
-        def told(done: int, total: int) -> None:
-            progress("drawing", done, total)
-
-        if film:
-            file = out if out is not None else recording.with_suffix(".mp4")
-            written = write_film(recording, file, chosen, shown, rate=drawing.rate, progress=told)
-            text = f"{file}: {len(chosen)} pictures, {1e-6 * written:.1f} MB."
-        else:
-            folder = out if out is not None else recording.parent / "pictures"
-            files = write_pictures(recording, folder, chosen, shown, progress=told)
-            text = f"{folder}/: {len(files)} pictures, {files[0].name} … {files[-1].name}."
-    except NoPictureError as error:
-        raise InputError("export", "", str(error)) from None
-    return text
+    reasons = out_of_date(recording.parent) if recording.name == RECORDING else []
+    if reasons:
+        raise InputError(
+            recording, "", f"is out of date: {'; '.join(reasons)}; run the experiment again, or --although-out-of-date"
+        )
 
 
-def _write_figures(
-    file: Path,
-    out: Path | None,
-    formats: tuple[FileKind, ...],
-    frame: int | None,
-    width: Width,
-) -> str:
-    """Write the figures of a run, that against the truth where its experiment names one; returns what to tell."""
-    from ...figures.gallery import write_figures
-    from ...results.hdf5.store import load_results
-    from ...run_truth import truth_of
+def _refuse_other_options(what: Kind, given: dict[str, object]) -> None:
+    for option, kinds in KINDS_OF_OPTION.items():
+        if given[option] is not None and what not in kinds:
+            raise InputError("export", f"{option} with {what}", f"applies to {' and '.join(kinds)} only")
 
-    folder = file.parent / "figures" if out is None else out
-    results, truth = load_results(file), truth_of(file)
-    try:
-        files = write_figures(results, folder, formats, frame=frame, width=width, truth=truth)
-    except (IndexError, ValueError) as error:
-        raise InputError("--frame", str(frame), str(error)) from None
-    return f"{folder}/: {', '.join(each.name for each in files)}."
+
+def _name_files(target: Path, files: list[Path]) -> str:
+    names = ", ".join(file.name for file in files[:3]) + (f" … {files[-1].name}" if len(files) > 3 else "")
+    return f"{target}/: {names}."
 
 
 def _window(text: str) -> tuple[int, int]:
@@ -213,31 +182,11 @@ def _window(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def _scale_of(results: Results, pixel_size: float | None) -> Scale:
-    """The scale of the photographs; their height, where it is not known, puts the packing just inside."""
-    import tomllib
-
-    from ...experiment.config.experiment_file import ExperimentFile
-    from ...experiment.units import Scale
-
-    if pixel_size is None:
-        section = ExperimentFile.model_validate(tomllib.loads(results.configuration)).photographs
-        given = section.pixel_size if section is not None else None
-        pixel_size = given[0] if isinstance(given, tuple) else given
-    if pixel_size is None:
-        raise InputError("--pixel-size", "", "is missing: these grains were not tracked in photographs")
-    if not pixel_size > 0.0:
-        raise InputError("--pixel-size", str(pixel_size), "is not positive")
-    tracks = results.tracks
-    top = tracks.position[tracks.present][:, 1].max() + tracks.radius.max()
-    return Scale(pixel_size, int(top / pixel_size) + 2)
-
-
 def _share(
     recording: Path, frames: tuple[int, int | None], scale: float, page: bool, out: Path | None, console: Console
 ) -> int:
-    from ...recording.files.cards import make_card
-    from ...recording.files.share import share_recording
+    from ...recording.archive.cards import make_card
+    from ...recording.archive.share import share_recording
     from ...recording.viewing.single_page import write_single_page
     from ...run_folder import RECORDING
 
@@ -250,32 +199,34 @@ def _share(
         report = share_recording(recording, target, first=first, stop=stop, scale=scale)
     except ValueError as error:
         raise InputError(recording, "", str(error)) from None
-    told = f"{target}: {_size(report.size)} of {_size(report.former_size)}, {report.frames} frames."
-    tell(console, f"{told} To look at it: rodsight view {target}")
+    sizes = f"{target}: {_size(report.size)} of {_size(report.former_size)}, {report.frames} frames."
+    print_line(console, f"{sizes} To view it: rodsight view {target}")
     if page:
         file = out if out is not None else target.with_suffix(".html")
         size = write_single_page([target], file, title=name or "Rodsight", cards=[make_card(target)])
-        tell(
+        print_line(
             console,
-            f"{file}: {_size(size)}, viewer included; any browser opens it, also without network or server.",
+            f"{file}: {_size(size)}, viewer included; any browser opens it, without network or server.",
         )
     return 0
 
 
 def _share_several(
-    folder: Path, frames: tuple[int, int | None], scale: float, out: Path | None, console: Console
+    folder: Path, frames: tuple[int, int | None], scale: float, out: Path | None, console: Console, *, although: bool
 ) -> int:
     """Write one page of all runs in a folder: a card for each, and one viewer for all."""
     from tempfile import TemporaryDirectory
 
-    from ...recording.files.cards import make_card
-    from ...recording.files.catalogue import RECORDING, find_recordings, read_entries
-    from ...recording.files.share import share_recording
+    from ...recording.archive.cards import make_card
+    from ...recording.archive.catalogue import RECORDING, find_recordings, read_catalogue
+    from ...recording.archive.share import share_recording
     from ...recording.viewing.single_page import write_single_page
 
-    recordings = [entry.file for entry in read_entries(find_recordings(folder)) if entry.properties is not None]
+    recordings = [entry.file for entry in read_catalogue(find_recordings(folder)) if entry.properties is not None]
     if not recordings:
-        raise InputError(folder, "", "holds no recording that can be read: neither recording.rrd nor runs with one")
+        raise InputError(folder, "", "holds no readable recording: neither recording.rrd nor runs with one")
+    for recording in () if although else recordings:
+        refuse_out_of_date(recording)
     name = folder.resolve().name
     file = out if out is not None else folder / f"{name}-share.html"
     with TemporaryDirectory(prefix="rodsight-") as place:
@@ -290,12 +241,12 @@ def _share_several(
             for recording, part in zip(recordings, parts, strict=True)
         ]
         size = write_single_page(parts, file, title=name, cards=cards)
-    tell(console, f"{file}: {_size(size)}, {len(parts)} runs and one viewer; any browser opens it.")
+    print_line(console, f"{file}: {_size(size)}, {len(parts)} runs and one viewer; any browser opens it.")
     return 0
 
 
 def _repair(damaged: Path, out: Path | None, console: Console) -> int:
-    from ...recording.files.repair import repair_recording
+    from ...recording.archive.repair import repair_recording
 
     if not damaged.is_file():
         raise InputError(damaged, "", "there is no such recording")
@@ -305,10 +256,10 @@ def _repair(damaged: Path, out: Path | None, console: Console) -> int:
         report = repair_recording(damaged, target)
     except OSError as error:
         raise InputError(damaged, "", str(error)) from None
-    tell(
+    print_line(
         console,
         f"{target}: the forces of {report.frames} frames saved, {_size(report.size)} of {_size(report.former_size)}. "
-        f"To look at it: rodsight view {target}",
+        f"To view it: rodsight view {target}",
     )
     return 0
 

@@ -1,4 +1,4 @@
-"""Commands that make an experiment's results: run, check, track, solve, record."""
+"""Commands that compute an experiment's results: run, check, track, solve, record."""
 
 from __future__ import annotations
 
@@ -15,30 +15,33 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from rich.console import Console
 
-from ...errors import InputError
+from ...process.errors import InputError
 from ..arguments import (
+    AsJson,
     Ensemble,
     ExperimentPath,
     Frames,
     FullFrames,
+    KeepOld,
     MaxSize,
     Out,
     ProgressForm,
     Quiet,
     Settings,
     Sweeps,
+    Threads,
     parse_frames,
+    worker_count,
 )
-from ..terminal import Form, progress_of, tell
+from ..terminal import Form, print_line, progress_of
 
 if TYPE_CHECKING:
     from ...run_folder import Run
-    from ...tracks import Tracks, WallTracks
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """The arguments that commands on an experiment share, as the user gave them."""
+    """The arguments that commands on an experiment share, as given by the user."""
 
     experiment: Path
     settings: tuple[str, ...] = ()
@@ -48,13 +51,15 @@ class Request:
     max_size: float | None = None  # [MB] of the recording
     full_frames: tuple[int, ...] = ()
     progress: Form = "bars"
+    keep_old: bool = False
+    print_table: bool = True  # False: standard output is kept for JSON
 
     @property
     def console(self) -> Console:
-        return Console(quiet=self.quiet)
+        return Console(quiet=self.quiet or not self.print_table)
 
-    def laid_over(self, key: str, value: str | int | None) -> Request:
-        """The same with one more setting, where a value was given."""
+    def with_setting(self, key: str, value: str | int | None) -> Request:
+        """Return the request with one more setting, if a value is given."""
         return self if value is None else replace(self, settings=(*self.settings, f"{key}={json.dumps(value)}"))
 
 
@@ -71,30 +76,38 @@ def run(
     ensemble: Ensemble = None,
     frames: Frames = None,
     settings: Settings = (),
+    workers: Threads = None,
     progress: ProgressForm = "bars",
     follow: Annotated[
         bool,
         tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="wait for further photographs and solve them as they come, then run as ever"),
+        tyro.conf.arg(help="wait for further photographs and solve them as they arrive, then run as usual"),
     ] = False,
     idle: Annotated[
         float | None,
-        tyro.conf.arg(metavar="SECONDS", help="end when no photograph has come for so long [s]; with --follow"),
+        tyro.conf.arg(metavar="SECONDS", help="end after this time without a photograph [s]; for --follow"),
     ] = None,
+    keep_old: KeepOld = False,
+    as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
-    """Photographs to contact forces and a recording: the main job.
+    """Compute contact forces and a recording from photographs: the main command.
 
     Example: rodsight run sample_data/shear --view web
     """
     from ... import pipeline
+    from ...run_folder import SUMMARY
     from ...run_truth import load_truth
     from ..summary_table import print_summary
     from ..watching import watching
-    from .look import show
+    from .view_commands import show
 
-    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames, progress)
-    request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)
+    request = Request(
+        experiment, settings, quiet, out, frames, max_size, full_frames, progress, keep_old, print_table=not as_json
+    )
+    request = request.with_setting("solver.ensemble_size", ensemble).with_setting("recording.sweeps", sweeps)
+    threads = None if workers is None else worker_count(workers)
+    request = request.with_setting("solver.workers", threads).with_setting("tracking.workers", threads)
     console = request.console
     began = time.perf_counter()
     if follow:
@@ -104,10 +117,14 @@ def run(
         truth = load_truth(run, results)
         recording = pipeline.record(run, results, truth)
         summary = pipeline.conclude(run, results, truth, began)
+    if as_json:
+        stored = json.loads(run.file(SUMMARY).read_text(encoding="utf-8"))  # with null for unknown numbers
+        print(json.dumps({"folder": str(run.folder), "notes": run.notes, **stored}, indent=1))
+        return 0
     print_summary(console, summary)
     console.print(f"Results in {run.folder}/ after {summary['timings']['total']:.1f} s.", highlight=False)
-    _tell_notes(run, console)
-    watched = watch is not None and watch.started  # the viewer is open already
+    _print_notes(run, console)
+    watched = watch is not None and watch.started  # the viewer is already open
     return show(recording, "none" if watched else view, console)
 
 
@@ -115,51 +132,29 @@ def check(
     experiment: ExperimentPath,
     /,
     budget: Annotated[
-        bool, tyro.conf.arg(help="say what the first photographs, or their tracks, promise of the forces")
+        bool, tyro.conf.arg(help="predict the accuracy of the forces from the first photographs or their tracks")
     ] = True,
     settings: Settings = (),
+    as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
-    """Validate an experiment, and say from its first three photographs or their tracks what to expect of the forces.
+    """Validate an experiment, and predict the accuracy of its forces from three photographs or their tracks.
 
     Example: rodsight check sample_data/shear
     """
-    from ... import pipeline
-    from ...promise import describe_photographs, describe_promise, glimpse
+    from ...input_check import check_input
 
     request = Request(experiment, settings, quiet)
     with open_run(request, writes=False) as run:
-        tracks, walls = pipeline.check(run)
-        seen, sentences = None, []
-        if budget and not quiet:  # nobody would read it
-            seen = (tracks, walls) if tracks is not None else glimpse(run.experiment, run.progress, run.notes.append)
-            sentences = [] if tracks is not None else describe_photographs(run.experiment)
-            sentences += describe_promise(*seen)[0]
-    config = run.experiment.config
-    if tracks is not None:
-        what = f"{tracks.grain_count} grains tracked over {tracks.frame_count} frames"
-    else:
-        what = f"{len(run.experiment.photographs())} photographs"
-        what += f", {seen[0].grain_count} grains in the first" if seen is not None else ""
-    what += f", {_bounds(tracks, walls)}"
+        report = check_input(run, predict=budget and (as_json or not quiet))
+    if as_json:
+        print(json.dumps(report.as_plain(), indent=1))
+        return 0
     console = request.console
-    console.print(f"{config.name}: the input is good: {what}.", highlight=False)
-    _tell_notes(run, console)
-    for sentence in sentences:
-        tell(console, sentence)
+    console.print(f"{report.name}: the input is valid: {report.content()}.", highlight=False)
+    for sentence in (*report.notes, *report.unused, *report.prediction):
+        print_line(console, sentence)
     return 0
-
-
-def _bounds(tracks: Tracks | None, walls: WallTracks | None) -> str:
-    """What bounds the packing, in a phrase."""
-    if walls is None:
-        return "no walls: it can be tracked but not solved"
-    told = [f"{walls.count} walls"] if walls.count else []
-    if walls.cell is not None:
-        told.append("in a periodic cell")
-    if tracks is not None and tracks.boundary is not None:
-        told.append(f"{int(tracks.boundary.sum())} of them the boundary")
-    return ", ".join(told) or "bounded by grains"
 
 
 def track(
@@ -168,22 +163,25 @@ def track(
     out: Out = None,
     frames: Frames = None,
     report: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write DIR/tracking_report.html: how well it went")
+        bool,
+        tyro.conf.FlagCreatePairsOff,
+        tyro.conf.arg(help="write DIR/tracking_report.html on the quality of tracking"),
     ] = False,
     settings: Settings = (),
+    keep_old: KeepOld = False,
     quiet: Quiet = False,
 ) -> int:
-    """Follow the grains through the photographs, no more.
+    """Track the grains through the photographs only.
 
     Example: rodsight track sample_data/shear --report
     """
     from ... import pipeline
     from ...run_folder import TRACKS
 
-    request = Request(experiment, settings, quiet, out, frames)
+    request = Request(experiment, settings, quiet, out, frames, keep_old=keep_old)
     with open_run(request) as run:
         if report and run.experiment.config.photographs is None:
-            raise InputError(run.experiment.file, "--report", "shows photographs, and these tracks come from a table")
+            raise InputError(run.experiment.file, "--report", "needs photographs, but these tracks come from a table")
         tracks, walls = pipeline.track(run)
         page = pipeline.report_tracking(run, tracks, walls) if report else None
     console = request.console
@@ -194,9 +192,9 @@ def track(
         f"tracks in {where}.",
         highlight=False,
     )
-    _tell_notes(run, console)
+    _print_notes(run, console)
     if page is not None:
-        console.print(f"How well it went: {page}", highlight=False)
+        console.print(f"Report: {page}", highlight=False)
     return 0
 
 
@@ -208,9 +206,10 @@ def solve(
     ensemble: Ensemble = None,
     frames: Frames = None,
     settings: Settings = (),
+    keep_old: KeepOld = False,
     quiet: Quiet = False,
 ) -> int:
-    """Find contacts and forces, tracking first where that has not been done.
+    """Find contacts and forces, tracking first if needed.
 
     Example: rodsight solve sample_data/shear --set material.friction=0.3
     """
@@ -218,8 +217,8 @@ def solve(
     from ...run_truth import load_truth
     from ..summary_table import print_summary
 
-    request = Request(experiment, settings, quiet, out, frames)
-    request = request.laid_over("solver.ensemble_size", ensemble).laid_over("recording.sweeps", sweeps)
+    request = Request(experiment, settings, quiet, out, frames, keep_old=keep_old)
+    request = request.with_setting("solver.ensemble_size", ensemble).with_setting("recording.sweeps", sweeps)
     began = time.perf_counter()
     with open_run(request) as run:
         results = pipeline.solve(run)
@@ -227,7 +226,7 @@ def solve(
         summary = pipeline.conclude(run, results, truth, began)
     console = request.console
     print_summary(console, summary)
-    _tell_notes(run, console)
+    _print_notes(run, console)
     return 0
 
 
@@ -240,32 +239,72 @@ def record(
     full_frames: FullFrames = (),
     frames: Frames = None,
     settings: Settings = (),
+    keep_old: KeepOld = False,
     quiet: Quiet = False,
 ) -> int:
-    """Write the recording, solving first where that has not been done.
+    """Write the recording, solving first if needed; of results.h5 alone one without photographs.
 
     Example: rodsight record sample_data/shear --sweeps all
     """
     from ... import pipeline
     from ...run_truth import load_truth
-    from .look import show
+    from .view_commands import show
 
-    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames)
-    request = request.laid_over("recording.sweeps", sweeps)
+    request = Request(experiment, settings, quiet, out, frames, max_size, full_frames, keep_old=keep_old)
+    if _is_results(experiment):
+        return _record_alone(request, sweeps)
+    request = request.with_setting("recording.sweeps", sweeps)
     with open_run(request) as run:
         results = pipeline.solve(run)
         recording = pipeline.record(run, results, load_truth(run, results))
     console = request.console
-    _tell_notes(run, console)
+    _print_notes(run, console)
     return show(recording, "none", console)
+
+
+def _is_results(path: Path) -> bool:
+    """Whether a path is results.h5, or a folder with it and without an experiment."""
+    from ...experiment.experiment import CONFIG_NAME
+    from ...run_folder import RESULTS
+
+    return path.suffix == ".h5" or ((path / RESULTS).is_file() and not (path / CONFIG_NAME).is_file())
+
+
+def _record_alone(request: Request, sweeps: str | None) -> int:
+    """Write the recording of results without their experiment, and so without photographs. Exit status 0."""
+    from ...process.lock import hold_folder
+    from ...recording.files.finished_run import RecordingOptions, write_recording
+    from ...results.hdf5.store import load_results
+    from ...run_folder import RECORDING
+    from ..stored_results import results_file
+    from .view_commands import show
+
+    given = {"--set": request.settings, "--frames": request.frames, "--full-frames": request.full_frames}
+    for option, value in given.items():
+        if value:
+            raise InputError("record", option, "needs the experiment, not its results alone")
+    file = results_file(request.experiment)
+    results = load_results(file)
+    target = (file.parent if request.out is None else request.out) / RECORDING
+    if request.out is None and target.exists():
+        raise InputError(target, "", "is there already, perhaps with photographs: choose another folder with --out")
+    notes: list[str] = []
+    with progress_of(request.quiet) as progress, hold_folder(target.parent, notes.append):
+        written = write_recording(
+            results, target, progress=lambda done, total: progress("recording", done, total),
+            options=RecordingOptions(sweeps or "log", _bytes(request.max_size)),
+        )  # fmt: skip
+    for note in (*notes, *written.notes):
+        print_line(request.console, note)
+    return show(target, "none", request.console)
 
 
 @contextmanager
 def open_run(request: Request, *, writes: bool = True) -> Iterator[Run]:
-    """The run that was asked for, with progress shown while it is open; its folder is its own if it writes there."""
+    """Open the requested run with a progress display; a run that writes locks its folder."""
     from ...experiment.config.unused_keys import refuse_unused_keys
     from ...experiment.experiment import load_experiment
-    from ...run_folder import Run, owned
+    from ...run_folder import Run, hold_run
 
     experiment = load_experiment(request.experiment, request.settings)
     refuse_unused_keys(experiment.config, experiment.file)
@@ -273,21 +312,21 @@ def open_run(request: Request, *, writes: bool = True) -> Iterator[Run]:
     with progress_of(request.quiet, request.progress) as progress:
         run = Run(
             experiment, folder, parse_frames(request.frames), progress, max_size=_bytes(request.max_size),
-            full_frames=request.full_frames,
+            full_frames=request.full_frames, keep_old=request.keep_old,
         )  # fmt: skip
         if not writes:
             yield run
             return
-        with owned(run):
+        with hold_run(run):
             yield run
 
 
 def _follow(request: Request, idle: float | None) -> None:
-    """Solve photographs as they come, telling what a person should know at once."""
+    """Solve photographs as they arrive, reporting alarms at once."""
     from ...following.follow import follow
 
     if request.frames is not None:
-        raise InputError("--frames", request.frames, "does not go with --follow, which takes every photograph")
+        raise InputError("--frames", request.frames, "cannot be used with --follow, which solves every photograph")
     if idle is not None and not (math.isfinite(idle) and idle > 0.0):
         raise InputError("--idle", str(idle), "is not a positive number of seconds")
 
@@ -295,10 +334,13 @@ def _follow(request: Request, idle: float | None) -> None:
         if request.progress == "lines":
             print(json.dumps({"alarm": text, "frame": frame}), file=sys.stderr, flush=True)
         else:
-            tell(request.console, f"\a{f'Frame {frame}: {text}'}")
+            print_line(request.console, f"\a{f'Frame {frame}: {text}'}")
 
     with open_run(request) as run:
-        follow(run, request.settings, idle=idle, alarm=alarm, say=lambda text: tell(request.console, text))
+        for _ in follow(
+            run, request.settings, idle=idle, alarm=alarm, report=lambda text: print_line(request.console, text)
+        ):
+            pass
 
 
 def _bytes(megabytes: float | None) -> int | None:
@@ -309,6 +351,6 @@ def _bytes(megabytes: float | None) -> int | None:
     return int(1e6 * megabytes)
 
 
-def _tell_notes(run: Run, console: Console) -> None:
+def _print_notes(run: Run, console: Console) -> None:
     for note in run.notes:
-        tell(console, note)
+        print_line(console, note)

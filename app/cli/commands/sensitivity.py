@@ -1,4 +1,4 @@
-"""The command that varies what nobody knows exactly: sensitivity."""
+"""The command that varies uncertain inputs: sensitivity."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ...errors import InputError
-from ..arguments import ExperimentPath, Frames, Out, Quiet, Settings
+from ..arguments import AsJson, ExperimentPath, Frames, Out, Quiet, Scheduler, Settings, Workers, worker_count
 from ..terminal import table_console
 from .run import Request, open_run
 
@@ -24,23 +23,21 @@ def sensitivity(
     ] = "oat",
     factors: Annotated[
         tuple[str, ...],
-        tyro.conf.arg(metavar="NAME[=LOW:HIGH]", help="what is varied, and over what range; default: everything"),
+        tyro.conf.arg(metavar="NAME[=LOW:HIGH]", help="factors to vary, with their ranges; default: all"),
     ] = (),
     samples: Annotated[int | None, tyro.conf.arg(metavar="N", help="runs of --design sobol; default 64")] = None,
     seed: Annotated[int, tyro.conf.arg(help="of the noise and of the design")] = 0,
-    workers: Annotated[int | None, tyro.conf.arg(metavar="N", help="processes; default: one for every core")] = None,
-    scheduler: Annotated[
-        str | None, tyro.conf.arg(metavar="ADDRESS", help="run on the machines of this dask scheduler instead")
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     budget: Annotated[
         bool,
         tyro.conf.FlagCreatePairsOff,
-        tyro.conf.arg(help="instead divide each frame's error among its causes, and store that with the results"),
+        tyro.conf.arg(help="instead attribute each frame's error to its causes, and store that with the results"),
     ] = False,
-    as_json: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="print JSON")] = False,
+    as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
-    """Vary what nobody knows exactly, and see how much the forces depend on it.
+    """Vary uncertain inputs and measure how much the forces depend on them.
 
     Factors and their ranges: friction, wall_friction (× 0.8 to 1.2); precision, overlap, kappa, sweeps, and threshold
     of a single chain (× 0.5 to 2); position_noise, rotation_noise (1 to 2 standard deviations more); radius_scatter
@@ -49,41 +46,38 @@ def sensitivity(
 
     Example: rodsight sensitivity sample_data/shear --factors friction=0.7:1.3 kappa
     """
-    from solver.together import available_cores
-
     from ... import pipeline
-    from ...sensitivity import design as designs
-    from ...sensitivity import report
-    from ...sensitivity import study as runs
-    from ...sensitivity.execution import reach_scheduler
+    from ...robustness import design as designs
+    from ...robustness import report
+    from ...robustness import study as runs
+    from ...robustness.execution import reach_scheduler
 
-    if workers is not None and workers < 1:
-        raise InputError("--workers", str(workers), "must be at least one")
+    processes = worker_count(workers)
     console = table_console(report.WIDTH, quiet=quiet)
     request = Request(experiment, settings, quiet, out, frames)
     if budget:
-        return _divide_error(request, workers or available_cores(), as_json=as_json)
+        return _attribute_error(request, processes, as_json=as_json)
     with open_run(request) as run:
         varied, cases = designs.plan(run.experiment, design, factors, samples, seed)
         if scheduler is not None:
             reach_scheduler(scheduler)
         nominal, fingerprint = pipeline.nominal_run(run)
         effects = runs.run_study(
-            nominal, cases, runs.Diary(run.file(runs.DIARY), fingerprint),
-            workers=available_cores() if workers is None else workers, scheduler=scheduler, progress=run.progress,
+            nominal, cases, runs.EffectLog(run.file(runs.EFFECT_LOG), fingerprint),
+            workers=processes, scheduler=scheduler, progress=run.progress,
         )  # fmt: skip
         own = runs.compare(nominal.networks, nominal)
-        findings = report.Findings(run.experiment.name, design, varied, cases, effects, own)
-        report.save_findings(findings, run.folder)
+        results = report.SensitivityResults(run.experiment.name, design, varied, cases, effects, own)
+        report.save_sensitivity(results, run.folder)
     if as_json:
-        print(json.dumps(report.as_json(findings), indent=1))
+        print(json.dumps(report.as_json(results), indent=1))
         return 0
-    report.print_findings(console, findings)
+    report.print_sensitivity(console, results)
     console.print(f"Tables in {run.folder}/: {', '.join(report.FILES)}.", highlight=False)
     return 0
 
 
-def _divide_error(request: Request, workers: int, *, as_json: bool) -> int:
+def _attribute_error(request: Request, workers: int, *, as_json: bool) -> int:
     from ... import pipeline
     from ...results.summary import summarize
     from ..summary_table import budget_lines
@@ -97,7 +91,7 @@ def _divide_error(request: Request, workers: int, *, as_json: bool) -> int:
     for line in budget_lines(summary):
         console.print(line, highlight=False, soft_wrap=True)
     console.print(
-        f"Shares by frame: frames/error_budget in {run.folder}/results.h5; rodsight record draws them.",
+        f"Fractions by frame: frames/error_budget in {run.folder}/results.h5; rodsight record draws them.",
         highlight=False,
         soft_wrap=True,
     )

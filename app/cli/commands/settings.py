@@ -1,12 +1,14 @@
-"""The command that explains the experiment file: settings."""
+"""The command that describes the experiment file: settings."""
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from ...errors import InputError
+from ...process.errors import InputError
+from ..arguments import AsJson
 from ..terminal import table_console
 
 if TYPE_CHECKING:
@@ -21,10 +23,11 @@ def settings(
     ] = None,
     /,
     markdown: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print all of them as a page of documentation")
+        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="print all as a page of documentation")
     ] = False,
+    as_json: AsJson = False,
 ) -> int:
-    """List what may stand in experiment.toml, and what --set takes: default, unit, meaning.
+    """List the keys of experiment.toml and --set: default, unit, meaning.
 
     Example: rodsight settings solver
     """
@@ -40,17 +43,31 @@ def settings(
     if which is not None:
         name = which.strip("[]")
         found = find_key(ExperimentFile, name)
+        if found is not None and as_json:
+            print(json.dumps([_plain(found)], indent=1))
+            return 0
         if found is not None:
             _print_key(console, found)
             return 0
         sections = tuple(each for each in sections if each.name == name or each.name.startswith(f"{name}."))
         if not sections:
             other = nearest_key(ExperimentFile, name)
-            meant = f": did you mean {other}?" if other else ": rodsight settings lists all"
-            raise InputError("settings", which, f"is neither a section nor a key of experiment.toml{meant}")
+            hint = f": did you mean {other}?" if other else ": rodsight settings lists all"
+            raise InputError("settings", which, f"is neither a section nor a key of experiment.toml{hint}")
+    if as_json:
+        print(json.dumps([_plain(key) for section in sections for key in section.keys], indent=1))
+        return 0
     for section in sections:
         _print_section(console, section)
     return 0
+
+
+def _plain(key: Key) -> dict[str, str | bool]:
+    """Return a key of the experiment file for JSON; its default as TOML, empty where there is none."""
+    return {
+        "key": key.name, "kind": key.kind, "unit": key.unit, "default": key.default, "required": key.required,
+        "meaning": key.meaning,
+    }  # fmt: skip
 
 
 def _print_key(console: Console, key: Key) -> None:

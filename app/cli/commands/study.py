@@ -9,22 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import tyro
 
-from ...errors import InputError
-from ...synthetic.worlds.names import WorldName
-from ..arguments import Quiet, Settings
-from ..terminal import progress_of, table_console
+from ...process.errors import InputError
+from ...synthetic.scenarios.preset_names import ScenarioName
+from ..arguments import AsJson, Quiet, Settings
+from ..stored_results import load_run
+from ..terminal import print_line, progress_of, table_console
 from .run import Request, open_run
 
 if TYPE_CHECKING:
-    from ...study.worlds.world_score import WorldPlan
+    from ...study.scenarios.scenario_score import StudyPlan
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
-    """What studies of worlds are asked for."""
+class _StudyRequest:
+    """The arguments that studies of scenarios share."""
 
-    plan: WorldPlan
-    worlds: tuple[WorldName, ...]  # none: those that the study chooses
+    plan: StudyPlan
+    scenarios: tuple[ScenarioName, ...]  # empty: the default of the study
     seeds: tuple[int, ...]
     out: Path
     quiet: bool
@@ -38,6 +39,7 @@ def study(
             "status",
             "uncertainty",
             "worlds",
+            "trust",
             "numbers",
             "intervals",
             "report",
@@ -47,11 +49,12 @@ def study(
         ],
         tyro.conf.Positional,
         tyro.conf.arg(
-            help="the paper's claims; r against noise; trust and status refitted; coverage of error bars; what "
-            "laboratories bring, as simulated worlds; every statistic against the truth's; what stated "
-            "intervals of forces cover, by groups of contacts, and their constants fitted anew; all of that as one "
-            "page, and what does not hold; what `check` promises from the first photographs beside what comes out; a "
-            "run against forces that were measured; how far forces move when next to nothing is changed"
+            help="the paper's claims; r against noise; fit of trust and status; coverage of error bars; simulated "
+            "scenarios of laboratory data; trust against r by kind of input, and its fit; every statistic against the "
+            "truth; coverage of the intervals of forces by groups of contacts, and a fit of their constants; all of "
+            "that as one page, with what is outside its limits; the accuracy that `check` predicts from the first "
+            "photographs beside the result; a run against measured forces; the change of forces by small changes of "
+            "input"
         ),
     ],
     folder: Annotated[
@@ -72,20 +75,22 @@ def study(
         int | None,
         tyro.conf.arg(
             metavar="K",
-            help="uncertainty: sequences solved again, default 8; intervals: what they add to the deviations",
+            help="solutions with resampled input; uncertainty: default 8; intervals: adds their standard deviation",
         ),
     ] = None,
-    worlds: Annotated[tuple[WorldName, ...], tyro.conf.arg(help="of them only these")] = (),
-    jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds: processes")] = 1,
+    scenarios: Annotated[
+        tuple[ScenarioName, ...], tyro.conf.arg(name="worlds", help="only these scenarios; default: all")
+    ] = (),
+    jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds, trust: processes")] = 1,
     fit: Annotated[
         tuple[int, ...],
-        tyro.conf.arg(metavar="SEED", help="intervals, numbers, budget: fit constants on these, too"),
+        tyro.conf.arg(metavar="SEED", help="trust, intervals, numbers, budget: also fit the constants on these seeds"),
     ] = (),
     settings: Settings = (),
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="where simulated truths are kept")] = Path("runs/study"),
-    as_json: Annotated[
-        bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="json", help="worlds, real: print JSON")
-    ] = False,
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="cache of simulated truths and scores")] = Path(
+        "runs/study"
+    ),
+    as_json: AsJson = False,
     page: Annotated[
         Path | None,
         tyro.conf.arg(
@@ -96,11 +101,11 @@ def study(
     frame: Annotated[int | None, tyro.conf.arg(help="real: the frame of the pictures; default: the middle one")] = None,
     quiet: Quiet = False,
 ) -> int:
-    """Measure the method on simulated truth: minutes for each packing, kept for the next time.
+    """Measure the method on simulated truth: minutes for each packing, stored for the next time.
 
-    Worlds that are finished are kept; --worlds, --jobs, --set and --json are for worlds.
+    Finished scores are stored; --worlds, --jobs, --set and --json apply to worlds, --json also to real and report.
 
-    Some of them: rodsight study worlds --seeds 1 --worlds shear gravity; of one's own: rodsight study perturbation
+    Some scenarios: rodsight study worlds --seeds 1 --worlds shear gravity; an experiment: rodsight study perturbation
     sample_data/shear
 
     Photoelastic forces: rodsight import pegs, rodsight run, then rodsight study real runs/my_test --page real.html
@@ -109,32 +114,34 @@ def study(
     """
     if subject == "real":
         return _study_real(folder, page, frame, as_json=as_json)
-    from ...study.worlds.world_score import WorldPlan
-    from ...synthetic.worlds.making import GRAINS
+    from ...study.scenarios.scenario_score import StudyPlan
+    from ...synthetic.scenarios.scenario_folder import GRAINS
 
     chosen = (*settings, "solver.estimator=nlgs") if subject == "worlds" and estimator == "nlgs" else settings
-    plan = WorldPlan(GRAINS if grains is None else grains, out / "worlds", chosen)
-    asked = _Asked(plan, worlds, seeds, out, quiet)
+    plan = StudyPlan(GRAINS if grains is None else grains, out / "worlds", chosen)
+    request = _StudyRequest(plan, scenarios, seeds, out, quiet)
     if subject == "report" and frame is None:
-        return _study_report(asked, page, as_json=as_json)
+        return _study_report(request, page, as_json=as_json)
     for option, value in (("--page", page), ("--frame", frame)):
         if value is not None:
-            raise InputError("study", f"{option} with {subject}", "is for real only")
+            raise InputError("study", f"{option} with {subject}", "applies to real only")
     if subject == "perturbation":
-        return _study_perturbation(folder, asked)
+        return _study_perturbation(folder, request)
     if folder is not None:
-        raise InputError("study", f"{folder} with {subject}", "a path is for real and perturbation only")
+        raise InputError("study", f"{folder} with {subject}", "a path applies to real and perturbation only")
     if subject == "worlds":
-        return _study_worlds(asked, jobs=jobs, as_json=as_json)
+        return _study_worlds(request, jobs=jobs, as_json=as_json)
+    if subject == "trust":
+        return _study_trust(request, jobs=jobs, fit=fit)
     if subject == "numbers":
-        return _study_numbers(asked, fit=fit)
+        return _study_numbers(request, fit=fit)
     if subject == "intervals":
-        return _study_intervals(asked, fit=fit, members=ensemble or 0)
+        return _study_intervals(request, fit=fit, members=ensemble or 0)
     if subject == "budget":
-        return _study_budget(asked, fit=fit)
-    for option, given in (("--worlds", worlds), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
+        return _study_budget(request, fit=fit)
+    for option, given in (("--worlds", scenarios), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
         if given:
-            raise InputError("study", f"{option} with {subject}", "is for worlds only")
+            raise InputError("study", f"{option} with {subject}", "applies to worlds only")
     grains = 1172 if grains is None else grains
     from ...study.accuracy import study_accuracy
     from ...study.claims import study_claims
@@ -143,7 +150,7 @@ def study(
 
     console = table_console()
     if subject in ("status", "uncertainty") and len(seeds) < 2:
-        raise InputError("--seeds", " ".join(map(str, seeds)), "must be two or more: to fit on, and to judge on")
+        raise InputError("--seeds", " ".join(map(str, seeds)), "must be two or more: one half to fit, one to judge")
     half = (len(seeds) + 1) // 2
     with progress_of(quiet) as progress:
         if subject == "accuracy":
@@ -151,8 +158,7 @@ def study(
         elif subject == "uncertainty":
             study_uncertainty(
                 seeds[:half], seeds[half:], members=8 if ensemble is None else ensemble, grains=grains,
-                estimator=estimator, folder=out,
-                console=console, progress=progress,
+                estimator=estimator, folder=out, console=console, progress=progress,
             )  # fmt: skip
         elif subject == "status":
             refit_status(seeds[:half], seeds[half:], grains=(grains,), folder=out, console=console, progress=progress)
@@ -162,22 +168,17 @@ def study(
 
 
 def _study_real(folder: Path | None, page: Path | None, frame: int | None, *, as_json: bool) -> int:
-    from ...experiment.experiment import load_experiment
-    from ...results.hdf5.store import load_results, origin_of
-    from ...run_folder import RESULTS, Run, find_experiment
     from ...run_truth import load_truth
     from ...study.real import real_forces, real_page
 
     if folder is None:
-        raise InputError("study real", "RUN", "is missing: the folder of a run, such as runs/my_test")
-    file = folder / RESULTS if folder.is_dir() else folder
-    results, origin = load_results(file), origin_of(file)
-    run = Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames)
+        raise InputError("study real", "RUN", "is missing: give the folder of a run, such as runs/my_test")
+    run, results = load_run(folder)
     truth = load_truth(run, results)
     if truth is None or run.experiment.config.truth is None:
         raise InputError(run.experiment.file, "key truth", "is missing: there are no measured forces to compare with")
     sides = real_forces.correlate_sides(
-        run.experiment.folder / run.experiment.config.truth, origin.frames[0], len(results.frames)
+        run.experiment.folder / run.experiment.config.truth, run.frames, len(results.frames)
     )
     found = real_forces.study_real(results, truth, sides, frame)
     if page is not None:
@@ -187,137 +188,158 @@ def _study_real(folder: Path | None, page: Path | None, frame: int | None, *, as
         return 0
     real_page.print_real(table_console(real_page.WIDTH), found)
     if page is not None:
-        table_console().print(f"Pictures of frame {found.shown}: {page}", highlight=False)
+        print_line(table_console(), f"Pictures of frame {found.shown}: {page}")
     return 0
 
 
-def _study_perturbation(experiment: Path | None, asked: _Asked) -> int:
+def _study_perturbation(experiment: Path | None, request: _StudyRequest) -> int:
     from ... import pipeline
-    from ...study.worlds.perturbation import on_told_grains, perturb_world, print_perturbations, study_perturbations
+    from ...study.scenarios.perturbation import (
+        on_given_grains,
+        perturb_scenario,
+        print_perturbations,
+        study_perturbations,
+    )
 
-    console = table_console()
+    console, plan = table_console(), request.plan
     if experiment is not None:
-        with open_run(Request(experiment, asked.plan.settings, asked.quiet)) as run:
+        with open_run(Request(experiment, plan.settings, request.quiet)) as run:
             inputs, results, truth = pipeline.solved_inputs(run)
             bodies, walls = results.grains.count + results.walls.count, results.walls.count
             true = None if truth is None else truth.by_frame(bodies, len(results.frames))
-            told = inputs.tracks.grain_count
-            known = None if true is None else [on_told_grains(*each, bodies, walls, told) for each in true]
+            given = inputs.tracks.grain_count
+            known = None if true is None else [on_given_grains(*each, bodies, walls, given) for each in true]
             effects = study_perturbations(inputs, known, progress=run.progress)
         print_perturbations(console, run.experiment.name, effects)
         return 0
-    for world in asked.worlds or get_args(WorldName):
-        for seed in asked.seeds:
-            with progress_of(asked.quiet) as progress:
-                effects = perturb_world(
-                    world,
-                    seed,
-                    grains=asked.plan.grains,
-                    folder=asked.plan.folder,
-                    settings=asked.plan.settings,
-                    progress=progress,
+    for scenario in request.scenarios or get_args(ScenarioName):
+        for seed in request.seeds:
+            with progress_of(request.quiet) as progress:
+                effects = perturb_scenario(
+                    scenario, seed, grains=plan.grains, folder=plan.folder, settings=plan.settings, progress=progress
                 )
-            print_perturbations(console, f"{world}, seed {seed}", effects)
+            print_perturbations(console, f"{scenario}, seed {seed}", effects)
     return 0
 
 
-def _study_worlds(asked: _Asked, *, jobs: int, as_json: bool) -> int:
-    from ...study.worlds.world_table import WIDTH, print_worlds, study_worlds
-    from ...study.worlds.world_table import as_json as worlds_as_json
+def _study_worlds(request: _StudyRequest, *, jobs: int, as_json: bool) -> int:
+    from ...study.scenarios import score_table
 
     if jobs < 1:
         raise InputError("--jobs", str(jobs), "must be at least one")
-    worlds = asked.worlds or get_args(WorldName)
-    with progress_of(asked.quiet) as progress:
-        scores = study_worlds(asked.plan, worlds, asked.seeds, jobs=jobs, progress=progress)
+    scenarios = request.scenarios or get_args(ScenarioName)
+    with progress_of(request.quiet) as progress:
+        scores = score_table.score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
     if as_json:
-        print(json.dumps(worlds_as_json(scores), indent=1))
+        print(json.dumps(score_table.as_json(scores), indent=1))
     else:
-        print_worlds(table_console(WIDTH), scores)
+        score_table.print_scores(table_console(score_table.WIDTH), scores)
     return 0
 
 
-def _study_numbers(asked: _Asked, *, fit: tuple[int, ...]) -> int:
-    from ...study.worlds.numbers import (
-        FIT_WORLDS,
-        WORLDS,
-        compare_numbers,
-        fit_deviations,
-        print_by_world,
-        print_numbers,
-    )
-    from ...study.worlds.solved_world import solve_worlds
-    from ...study.worlds.world_table import WIDTH
+def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> int:
+    import numpy as np
+
+    from ...study.scenarios import trust_study
+    from ...study.scenarios.score_table import WIDTH, score_scenarios
+    from ...study.scenarios.trust_study import TrustSample
 
     console = table_console(WIDTH)
-    with progress_of(asked.quiet) as progress:
+    scenarios: tuple[ScenarioName, ...] = request.scenarios or get_args(ScenarioName)
+    with progress_of(request.quiet) as progress:
         if fit:
-            known = [
-                each for one in solve_worlds(asked.plan, FIT_WORLDS, fit, progress) for each in compare_numbers(one)
-            ]  # fmt: skip
-            for name, told in fit_deviations(known).items():
-                console.print(f"{name}: {', '.join(f'{each:.2g}' for each in told)}", highlight=False)
-        solved = solve_worlds(asked.plan, asked.worlds or WORLDS, asked.seeds, progress)
-        found = [each for one in solved for each in compare_numbers(one)]
-    print_numbers(console, found)
-    print_by_world(console, found, "sliding_fraction")
+            read: list[ScenarioName] = [name for name in scenarios if name not in trust_study.LEFT_OUT]
+            known = TrustSample.of(score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress))
+            for title, names in (("both", tuple(trust_study.MEASURES)), ("motion", trust_study.MOTION_ONLY)):
+                found, margin, _ = trust_study.fit_expected(known, names)
+                console.print(
+                    trust_study.describe_fit(title, found, margin), highlight=False, markup=False, soft_wrap=True
+                )
+        scores = score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
+    sample = TrustSample.of(scores)
+    new = np.isin(sample.kind, list(trust_study.LEFT_OUT))
+    trust_study.print_trust(console, "Kinds that the fit has read", sample.select(~new))
+    trust_study.print_trust(console, "Kinds left out of the fit", sample.select(new))
     return 0
 
 
-def _study_intervals(asked: _Asked, *, fit: tuple[int, ...], members: int) -> int:
-    from ...study.worlds import interval_fit, intervals
-    from ...study.worlds.contact_errors import ContactErrors, measure_errors
-    from ...study.worlds.solved_world import solve_worlds
-    from ...study.worlds.world_table import WIDTH
+def _study_numbers(request: _StudyRequest, *, fit: tuple[int, ...]) -> int:
+    from ...study.scenarios import statistic_errors
+    from ...study.scenarios.score_table import WIDTH
+    from ...study.scenarios.solved_scenario import solve_scenarios
 
     console = table_console(WIDTH)
-    with progress_of(asked.quiet) as progress:
+
+    def measure(scenarios: tuple[ScenarioName, ...], seeds: tuple[int, ...]) -> list[statistic_errors.StatisticErrors]:
+        solved = solve_scenarios(request.plan, scenarios, seeds, progress)
+        return [each for one in solved for each in statistic_errors.measure_statistic_errors(one)]
+
+    with progress_of(request.quiet) as progress:
         if fit:
-            known = interval_fit.errors_of_fit(asked.plan, fit, progress)
+            constants = statistic_errors.fit_sd_constants(measure(statistic_errors.FIT_SCENARIOS, fit))
+            for name, values in constants.items():
+                console.print(f"{name}: {', '.join(f'{each:.2g}' for each in values)}", highlight=False)
+        found = measure(request.scenarios or statistic_errors.SCENARIOS, request.seeds)
+    statistic_errors.print_statistic_errors(console, found)
+    statistic_errors.print_by_scenario(console, found, "sliding_fraction")
+    return 0
+
+
+def _study_intervals(request: _StudyRequest, *, fit: tuple[int, ...], members: int) -> int:
+    from ...study.scenarios import interval_coverage, interval_fit
+    from ...study.scenarios.contact_errors import ContactErrors, measure_errors
+    from ...study.scenarios.score_table import WIDTH
+    from ...study.scenarios.solved_scenario import solve_scenarios
+
+    console = table_console(WIDTH)
+    with progress_of(request.quiet) as progress:
+        if fit:
+            known = interval_fit.errors_of_fit(request.plan, fit, progress)
             interval_fit.print_fit(console, interval_fit.fit_intervals(known))
-            intervals.print_intervals(console, "On the worlds and seeds of the fit, constants in use", known)
-        worlds = asked.worlds or intervals.JUDGE_WORLDS
+            title = "On the scenarios and seeds of the fit, with the constants in use"
+            interval_coverage.print_intervals(console, title, known)
+        scenarios = request.scenarios or interval_coverage.JUDGE_SCENARIOS
         judged, widened = [], []
-        for each in solve_worlds(asked.plan, worlds, asked.seeds, progress, members=members):
+        for each in solve_scenarios(request.plan, scenarios, request.seeds, progress, members=members):
             judged.append(measure_errors(each))
             widened += [measure_errors(each, widened=True)] if members else []
-    title = "Share of contacts within one and two stated deviations, %"
-    intervals.print_intervals(console, title, ContactErrors.joined(judged))
+    title = "Percentage of contacts within one and two stated standard deviations"
+    interval_coverage.print_intervals(console, title, ContactErrors.joined(judged))
     if members:
-        told = f"The same with the spread of {members} sequences solved again"
-        intervals.print_intervals(console, told, ContactErrors.joined(widened))
+        title = f"The same with the standard deviation of {members} solutions with resampled input"
+        interval_coverage.print_intervals(console, title, ContactErrors.joined(widened))
     return 0
 
 
-def _study_budget(asked: _Asked, *, fit: tuple[int, ...]) -> int:
-    from ...study.worlds import promises
+def _study_budget(request: _StudyRequest, *, fit: tuple[int, ...]) -> int:
+    from ...study.scenarios import predictions
 
     console = table_console()
-    worlds = asked.worlds or promises.WORLDS
-    with progress_of(asked.quiet) as progress:
+    scenarios = request.scenarios or predictions.COMPARED_SCENARIOS
+    with progress_of(request.quiet) as progress:
         if fit:
-            found = promises.fit_promise(promises.study_promises(asked.plan, worlds, fit, progress))
+            found = predictions.fit_prediction(predictions.study_predictions(request.plan, scenarios, fit, progress))
             console.print(f"Fitted on seeds {' '.join(map(str, fit))}: {found}", highlight=False)
-        kept = promises.study_promises(asked.plan, worlds, asked.seeds, progress)
-    promises.print_promises(console, kept)
+        outcomes = predictions.study_predictions(request.plan, scenarios, request.seeds, progress)
+    predictions.print_predictions(console, outcomes)
     return 0
 
 
-def _study_report(asked: _Asked, page: Path | None, *, as_json: bool) -> int:
-    """Write the calibration report. Exit status 1 where something that is stated does not hold."""
+def _study_report(request: _StudyRequest, page: Path | None, *, as_json: bool) -> int:
+    """Write the calibration report. Exit status 1 if a quantity is outside its limits."""
     from ...study.report.calibration_report import study_calibration
     from ...study.report.report_page import report_page
-    from ...study.worlds.numbers import WORLDS
+    from ...study.scenarios.statistic_errors import SCENARIOS
 
-    with progress_of(asked.quiet) as progress:
-        found = study_calibration(asked.plan, asked.worlds or WORLDS, asked.seeds, progress)
+    with progress_of(request.quiet) as progress:
+        found = study_calibration(request.plan, request.scenarios or SCENARIOS, request.seeds, progress)
     facts = found.facts()
-    file = asked.out / "report.html" if page is None else page
+    file = request.out / "report.html" if page is None else page
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(report_page(found), encoding="utf-8")
     if as_json:
         print(json.dumps(facts, indent=1))
     else:
-        told = facts["broken"] or ["all that is stated holds within its limits"]
-        table_console().print(f"{file}: {'; '.join(told)}.", highlight=False, soft_wrap=True)
+        verdict = facts["broken"] or ["all stated quantities are within their limits"]
+        print_line(table_console(), f"{file}: {'; '.join(verdict)}.")
     return 1 if facts["broken"] else 0

@@ -1,13 +1,13 @@
-"""Commands that set an experiment up: open, on a page; init, from flags."""
+"""Commands that set up an experiment: open, on a page; init, from flags."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
-from ..arguments import Quiet
+from ..arguments import Browser, Port, Quiet
 
 
 def open_(
@@ -17,10 +17,10 @@ def open_(
         tyro.conf.arg(metavar="FOLDER", help="of photographs, of an experiment or of several"),
     ] = Path(),
     /,
-    port: Annotated[int, tyro.conf.arg(help="of the page on 127.0.0.1; 0 takes a free one")] = 0,
-    browser: Annotated[bool, tyro.conf.arg(help="open the page")] = True,
+    port: Port = 0,
+    browser: Browser = True,
 ) -> int:
-    """Open the workbench: a local page to set up, mend, run, inspect and review experiments of a folder.
+    """Open the workbench: a local page to set up, correct, run, inspect and review experiments of a folder.
 
     Example: rodsight open sample_data
     """
@@ -31,7 +31,7 @@ def open_(
 
 def init(
     folder: Annotated[
-        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the experiment, where the photographs are")
+        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the experiment, with the photographs")
     ],
     /,
     photographs: Annotated[str, tyro.conf.arg(metavar="PATTERN", help="of the photographs, relative to FOLDER")],
@@ -44,7 +44,7 @@ def init(
     pressure: Annotated[
         tuple[str, ...],
         tyro.conf.UseAppendAction,
-        tyro.conf.arg(metavar="WALL=PASCAL", help="that loads a wall [Pa]; repeatable"),
+        tyro.conf.arg(metavar="WALL=PASCAL", help="pressure on a wall [Pa]; repeatable"),
     ] = (),
     density: Annotated[float | None, tyro.conf.arg(metavar="KG/M3", help="of the rods [kg/m³]")] = None,
     length: Annotated[float | None, tyro.conf.arg(metavar="METRES", help="of the rods [m]")] = None,
@@ -54,26 +54,47 @@ def init(
             metavar="MU|measured", help="coefficient of friction between rods; measured: found from the motion"
         ),
     ] = None,
+    channel: Annotated[
+        Literal["grey", "red", "green", "blue"] | None,
+        tyro.conf.arg(help="of the photographs in which rods stand out best; default grey"),
+    ] = None,
+    region: Annotated[
+        str | None, tyro.conf.arg(metavar="X0,Y0,X1,Y1", help="columns and rows [px] outside of which nothing is seen")
+    ] = None,
+    follow: Annotated[
+        Literal["texture", "outline"] | None,
+        tyro.conf.arg(help="by the texture of the rods, or by their outline where they are plain; default texture"),
+    ] = None,
+    radius_range: Annotated[
+        str | None, tyro.conf.arg(metavar="A:B", help="of the radii to look for [px], where --radii are unknown")
+    ] = None,
     name: Annotated[str | None, tyro.conf.arg(help="of the experiment; default: of the folder")] = None,
     quiet: Quiet = False,
 ) -> int:
-    """Set an experiment up from flags: experiment.toml, walls, rods, and understood.png, a picture to check them by.
+    """Set up an experiment from flags: experiment.toml, walls, rods, and understood.png, a picture of them.
 
     Example: rodsight init my_test --photographs '../sample_data/shear/photos/*.jpg' --pixel-size 2.5e-4 --interval 52
     --radii 0.007,0.008,0.011 --pressure top=50e3 --friction 0.25
     """
     from ...workbench import command
-    from ...workbench.setup.initialise import Told, parse_pressures, parse_radii
+    from ...workbench.setup.initialise import (
+        SetupFlags,
+        parse_pressures,
+        parse_radii,
+        parse_radius_range,
+        parse_region,
+    )
 
-    told = Told(
+    flags = SetupFlags(
         photographs, name, pixel_size, interval, parse_radii(radii), walls, parse_pressures(pressure),
         {"density": density, "length": length, "friction": _number_or_word(friction)},
+        channel, parse_region(region), follow, parse_radius_range(radius_range),
     )  # fmt: skip
-    return command.initialise_experiment(folder, told, quiet=quiet)
+    return command.initialise_experiment(folder, flags, quiet=quiet)
 
 
 def _number_or_word(text: str | None) -> float | str | None:
     try:
         return None if text is None else float(text)
     except ValueError:
-        return text  # refused, where it is no word that means something, by the experiment's own check
+        return text  # validated with the experiment

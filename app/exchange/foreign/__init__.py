@@ -1,4 +1,1 @@
-"""Other programs' tables, dumps and spots, read as observations and made experiment folders.
-
-Stands on experiment (tables, errors) and tracks; knows no solver but its shapes.
-"""
+"""Tables, dumps and spots of other programs, read as observations and written as experiment folders."""

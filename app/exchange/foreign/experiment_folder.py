@@ -1,4 +1,4 @@
-"""An experiment folder of what another program saw: tables, and an experiment.toml that says where they came from."""
+"""Writer of an experiment folder from imported data: tables, and an experiment.toml that names their source."""
 
 from __future__ import annotations
 
@@ -9,43 +9,48 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.bodies.grains import Array
-
-from ...errors import InputError
 from ...experiment.experiment import CELL_COLUMNS, CONFIG_NAME
+from ...experiment.reading.corners import FrameCorners, bars_of_corners
 from ...experiment.reading.tables import write_table
-from .observations import Arranged
+from ...process.errors import InputError
+from ...solver.bodies.grains import Array
+from .imported_corners import CornerDiscs
+from .observations import ImportedTracks
 from .proposed_walls import Walls
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What the packing is kept by, and what is known beside its tracks."""
+class FolderContents:
+    """Inputs of an experiment besides its tracks: boundaries, loads, other settings and true forces."""
 
     walls: Walls | None = None
+    corners: CornerDiscs | None = None  # of the frame; without walls, bars run through their centres
     pressure: Mapping[str, float] = field(default_factory=dict)  # [Pa] of walls by their names
     outer_grains: bool = False  # the outermost grains are the boundary
+    edge: tuple[str, ...] = ()  # names of these grains, where the other program gives them; empty: they are found
     cell: Array | None = None  # (f, 2, 2) [m], vectors of a periodic cell, instead of either
     known: Mapping[str, str] = field(default_factory=dict)  # lines of sections by their names
     truth: Mapping[str, Sequence[object]] | None = None  # columns of truth_contacts.csv
 
 
 def refuse_existing(folder: Path) -> None:
-    """Raise InputError where an experiment is already."""
+    """Raise InputError if the folder contains an experiment."""
     if (folder / CONFIG_NAME).exists():
-        raise InputError(folder / CONFIG_NAME, "", "is there already: choose another folder")
+        raise InputError(folder / CONFIG_NAME, "", "already exists: choose another folder")
 
 
-def write_folder(folder: Path, arranged: Arranged, around: Surroundings, source: str) -> None:
-    """Write the folder, experiment.toml last; source: what it was made from, in words. Raises InputError."""
+def write_folder(folder: Path, imported: ImportedTracks, contents: FolderContents, source: str) -> None:
+    """Write the folder, experiment.toml last; source: a sentence on its origin. Raises InputError."""
     refuse_existing(folder)
-    names = () if around.walls is None else around.walls.name
-    for wall in around.pressure:
+    names = () if contents.walls is None else contents.walls.name
+    if contents.walls is None and contents.corners is not None:
+        names = bar_names(contents.corners)
+    for wall in contents.pressure:
         if wall not in names:
-            there = f"there are {', '.join(names)}" if names else "there are no walls: give --walls"
-            raise InputError("--pressure", wall, f"is no wall ({there})")
+            existing = f"the walls are {', '.join(names)}" if names else "there are no walls: give --walls"
+            raise InputError("--pressure", wall, f"is not a wall ({existing})")
     folder.mkdir(parents=True, exist_ok=True)
-    tracks = arranged.tracks
+    tracks = imported.tracks
     frame, grain = np.nonzero(tracks.present)
     poses: dict[str, Iterable[object]] = {
         "frame": frame.tolist(),
@@ -58,18 +63,23 @@ def write_folder(folder: Path, arranged: Arranged, around: Surroundings, source:
         poses["theta"] = ["" if np.isnan(value) else value for value in angle.tolist()]
     write_table(folder / "tracks.csv", poses)
     write_table(folder / "grains.csv", {"id": tracks.id.tolist(), "radius": tracks.radius.tolist()})
-    number = arranged.number.tolist()
+    number = imported.number.tolist()
     write_table(folder / "times.csv", {"frame": range(len(number)), "time": tracks.time.tolist(), "number": number})
-    if arranged.renamed:
-        write_table(folder / "ids.csv", {"id": tracks.id.tolist(), "name": arranged.name})
-    if around.walls is not None:
-        _write_walls(folder / "walls.csv", around.walls)
-    if around.cell is not None:
-        vectors = around.cell.reshape(-1, 4).T.tolist()
-        write_table(folder / "cell.csv", dict(zip(CELL_COLUMNS, (range(len(around.cell)), *vectors), strict=True)))
-    if around.truth is not None:
-        write_table(folder / "truth_contacts.csv", around.truth)
-    (folder / CONFIG_NAME).write_text(_describe(folder, arranged, around, source), encoding="utf-8")
+    if imported.renamed:
+        write_table(folder / "ids.csv", {"id": tracks.id.tolist(), "name": imported.name})
+    if contents.walls is not None:
+        _write_walls(folder / "walls.csv", contents.walls)
+    if contents.outer_grains and contents.edge:
+        named = tracks.id[np.isin(imported.name, contents.edge)]
+        write_table(folder / "boundary.csv", {"id": named.tolist()})
+    if contents.corners is not None:
+        _write_corners(folder / "corners.csv", contents.corners)
+    if contents.cell is not None:
+        vectors = contents.cell.reshape(-1, 4).T.tolist()
+        write_table(folder / "cell.csv", dict(zip(CELL_COLUMNS, (range(len(contents.cell)), *vectors), strict=True)))
+    if contents.truth is not None:
+        write_table(folder / "truth_contacts.csv", contents.truth)
+    (folder / CONFIG_NAME).write_text(_describe(folder, imported, contents, source), encoding="utf-8")
 
 
 def _write_walls(file: Path, walls: Walls) -> None:
@@ -85,35 +95,62 @@ def _write_walls(file: Path, walls: Walls) -> None:
     )
 
 
-def _describe(folder: Path, arranged: Arranged, around: Surroundings, source: str) -> str:
-    sigma = arranged.tracks.sigma
-    lines = [f"# {source}", *(f"# {remark}" for remark in arranged.remarks)]
+def bar_names(corners: CornerDiscs) -> tuple[str, ...]:
+    """Return the names of the bars between corners."""
+    c = len(corners.name)
+    discs = FrameCorners(corners.name, corners.centre, np.full(c, corners.radius), corners.angle)
+    return bars_of_corners(Path("corners.csv"), discs)[0]
+
+
+def _write_corners(file: Path, corners: CornerDiscs) -> None:
+    f, c = corners.centre.shape[:2]
+    columns: dict[str, Iterable[object]] = {
+        "frame": np.repeat(np.arange(f), c).tolist(),
+        "corner": corners.name * f,
+        "x": corners.centre[..., 0].ravel().tolist(),
+        "y": corners.centre[..., 1].ravel().tolist(),
+        "radius": [corners.radius] * (f * c),
+    }
+    if np.isfinite(corners.angle).any():
+        columns["theta"] = ["" if np.isnan(angle) else angle for angle in corners.angle.ravel().tolist()]
+    write_table(file, columns)
+
+
+def _describe(folder: Path, imported: ImportedTracks, contents: FolderContents, source: str) -> str:
+    sigma = imported.tracks.sigma
+    lines = [f"# {source}", *(f"# {remark}" for remark in imported.remarks)]
     lines.append(f"name = {json.dumps(_name(folder), ensure_ascii=False)}")
-    if around.truth is not None:
+    if contents.truth is not None:
         lines.append('truth = "truth_contacts.csv"')
     lines += [
         "", "[tracks]", 'positions = "tracks.csv"', 'grains = "grains.csv"', 'times = "times.csv"',
         f"precision = {float(np.nanmax(sigma)):.6g}",
     ]  # fmt: skip
-    if around.walls is not None:
-        lines += ["", f"# {around.walls.remark}", "[walls]", 'file = "walls.csv"']
-        for wall, pressure in around.pressure.items():
+    if contents.walls is not None or contents.corners is not None:
+        lines.append("")
+        if contents.walls is not None:
+            lines.append(f"# {contents.walls.remark}")
+        if contents.corners is not None:
+            lines.append(f"# Discs at the corners of the frame. {contents.corners.remark}")
+        lines.append("[walls]")
+        if contents.walls is not None:
+            lines.append('file = "walls.csv"')
+        if contents.corners is not None:
+            lines.append('corners = "corners.csv"')
+        for wall, pressure in contents.pressure.items():
             lines += [f"[walls.{json.dumps(wall, ensure_ascii=False)}]", f"pressure = {pressure!r}"]
-    elif around.cell is not None:
+    elif contents.cell is not None:
         lines += ["", "# The simulation's box is periodic both ways.", "[boundary]", 'periodic = "cell.csv"']
-    elif around.outer_grains:
-        lines += [
-            "",
-            "# Nothing is told of walls: the outermost grains are the boundary.",
-            "[boundary]",
-            'grains = "outer"',
-        ]
+    elif contents.outer_grains:
+        which = "those that the file puts at the edge" if contents.edge else "the outermost grains"
+        grains = "boundary.csv" if contents.edge else "outer"
+        lines += ["", f"# No walls are given: {which} are the boundary.", "[boundary]", f'grains = "{grains}"']
     else:
         lines += ["", "# Add [walls] with the table frame,wall,x1,y1,x2,y2 [m] to solve for forces."]
-    for section, text in around.known.items():
+    for section, text in contents.known.items():
         lines += ["", f"[{section}]", text]
-    if "material" not in around.known:
-        lines += ["", "# [material] density, length, friction, gravity: what is not told here has its default."]
+    if "material" not in contents.known:
+        lines += ["", "# [material] density, length, friction, gravity: keys that are not given have their defaults."]
     return "\n".join(lines) + "\n"
 
 

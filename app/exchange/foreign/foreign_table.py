@@ -1,4 +1,4 @@
-"""Any program's table: commas, semicolons, tabs or blanks between its cells, or Parquet; read as text, row by row."""
+"""Reader of tables of other programs: cells separated by commas, semicolons, tabs or blanks, or Parquet."""
 
 from __future__ import annotations
 
@@ -8,56 +8,72 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ...errors import InputError
-from ...experiment.reading.input_files import ordinary
+from ...experiment.reading.input_files import regular
 from ...experiment.reading.tables import Table
+from ...process.errors import InputError
 
 PARQUET = b"PAR1"
 COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
-NOTHING = frozenset({"", "nan", "NaN", "NA", "null", "None", "-"})  # written where there is no value
-SHOWN = 12  # column names that a complaint lists
+MISSING = frozenset({"", "nan", "NaN", "NA", "null", "None", "-"})  # cells without a value
+MAX_LISTED = 12  # column names in a message
 
 
 def read_foreign(file: Path, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
     """Read the named columns of a table; a file without a header has columns 1, 2, 3, …
 
-    Blank values are empty text; decimal commas become points. Raises InputError naming file, row and value.
+    Parameters
+    ----------
+    file : Path
+    columns : sequence of str
+        Required columns.
+    optional : sequence of str
+        Columns that are read if they exist.
+
+    Returns
+    -------
+    Table
+        Missing values are empty text; decimal commas are converted to points.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and value.
     """
     header, rows = _open(file)
     wanted = [*columns, *(name for name in optional if name in header)]
     for name in wanted:
         if header.count(name) != 1:
-            listed = ", ".join(header[:SHOWN]) + (" …" if len(header) > SHOWN else "")
-            problem = "there is no such column" if name not in header else "stands twice in the header"
-            raise InputError(file, f"column {name}", f"{problem} (there are: {listed})")
-    place = [header.index(name) for name in wanted]
+            listed = ", ".join(header[:MAX_LISTED]) + (" …" if len(header) > MAX_LISTED else "")
+            problem = "there is no such column" if name not in header else "is twice in the header"
+            raise InputError(file, f"column {name}", f"{problem} (columns: {listed})")
+    position = [header.index(name) for name in wanted]
     values: dict[str, list[str]] = {name: [] for name in wanted}
     line = []
     for number, cells in rows:
         if len(cells) != len(header):
             raise InputError(file, f"row {number}", f"has {len(cells)} cells, the header has {len(header)}")
         line.append(number)
-        for name, at in zip(wanted, place, strict=True):
+        for name, at in zip(wanted, position, strict=True):
             cell = cells[at].strip()
-            values[name].append("" if cell in NOTHING else cell)
+            values[name].append("" if cell in MISSING else cell)
     if not line:
         raise InputError(file, "", "has no rows")
     table = Table(file, values, line)
     for name in wanted:
-        _mend_commas(table, name, values)
+        _convert_decimal_commas(table, name, values)
     return table
 
 
 def column_names(file: Path) -> list[str]:
-    """The names in a table's header. Raises InputError."""
+    """Return the names in a table's header. Raises InputError."""
     return _open(file)[0]
 
 
 def read_text(file: Path) -> str:
-    """A text file, whatever wrote it: UTF-8 or UTF-16 with their marks, or Latin-1. Raises InputError."""
+    """Read a text file in UTF-8, UTF-16 with byte order mark, or Latin-1. Raises InputError."""
     try:
-        content = ordinary(file).read_bytes()
+        content = regular(file).read_bytes()
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except OSError as error:
@@ -67,19 +83,19 @@ def read_text(file: Path) -> str:
     else:
         encodings = ("utf-8-sig", "latin-1")
     if encodings[0] != "utf-16" and b"\0" in content:
-        raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL: it is not text")
+        raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "contains a NUL: it is not text")
     for encoding in encodings:
         try:
             return content.decode(encoding)
         except UnicodeDecodeError:
             continue
-    raise InputError(file, "", f"is not {encodings[0]} text, which it claims to be")
+    raise InputError(file, "", f"is not valid {encodings[0]} text")
 
 
 def _open(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
-    """The header, and the rows with their lines."""
+    """Return the header, and the rows with their line numbers."""
     try:
-        with ordinary(file).open("rb") as stream:
+        with regular(file).open("rb") as stream:
             start = stream.read(4)
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
@@ -111,7 +127,7 @@ def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     delimiter = _delimiter(kept[0][1])
     cells = [(number, _split(text, delimiter)) for number, text in kept]
     first = [cell.strip() for cell in cells[0][1]]
-    if not all(NUMBER.fullmatch(cell) or cell in NOTHING for cell in first):
+    if not all(NUMBER.fullmatch(cell) or cell in MISSING for cell in first):
         return first, iter(cells[1:])
     named = [cell.strip() for cell in _split(remarks[-1], delimiter)] if remarks else []
     if len(named) == len(first):
@@ -120,7 +136,7 @@ def _open_text(file: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
 
 
 def _delimiter(line: str) -> str | None:
-    """What stands between the cells of a line; None: blanks."""
+    """Return the delimiter of a line; None: blanks."""
     for mark in ("\t", ";"):
         if mark in line:
             return mark
@@ -139,11 +155,13 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return next(csv.reader(io.StringIO(line), delimiter=delimiter, skipinitialspace=True), [])
 
 
-def _mend_commas(table: Table, name: str, values: dict[str, list[str]]) -> None:
+def _convert_decimal_commas(table: Table, name: str, values: dict[str, list[str]]) -> None:
     """Decimal commas become points; a column that has both is not guessed at."""
     commas = [row for row, cell in enumerate(values[name]) if COMMA_DECIMAL.fullmatch(cell)]
     if not commas:
         return
     if any("." in cell for cell in values[name]):
-        raise table.error(commas[0], name, "has a comma where other rows have a point: thousands are not told apart")
+        raise table.error(
+            commas[0], name, "has a comma where other rows have a point: the decimal separator is ambiguous"
+        )
     values[name][:] = [cell.replace(",", ".") if COMMA_DECIMAL.fullmatch(cell) else cell for cell in values[name]]

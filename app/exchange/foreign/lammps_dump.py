@@ -1,44 +1,47 @@
-"""Text dumps of LAMMPS and LIGGGHTS: ITEM: TIMESTEP, NUMBER OF ATOMS, BOX BOUNDS, ATOMS, again and again.
+"""Text dumps of LAMMPS and LIGGGHTS: repeated ITEM: TIMESTEP, NUMBER OF ATOMS, BOX BOUNDS, ATOMS.
 
-Rotations come from quaternions where they are dumped, or else from angular velocities, summed up in time. Where the box
-is periodic the cell's vectors are kept, where it is fixed its faces are walls.
+Rotations are read from quaternions, or else integrated from angular velocities. A periodic box gives the vectors of a
+cell, a fixed box gives walls at its faces.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from solver.bodies.grains import Array
-
-from ...errors import InputError
 from ...experiment.reading.tables import Table
-from .foreign_table import read_text
-from .observations import Observations
+from ...process.errors import InputError
+from ...solver.bodies.grains import Array
+from .foreign_table import column_names, read_foreign, read_text
+from .observations import Observations, layer_remarks
 
-PLACES = {  # names of a coordinate, the best first; the last are shares of the box
+COORDINATES = {  # names of a coordinate, the best first; the last two are fractions of the box
     "x": ("x", "xu", "xs", "xsu"), "y": ("y", "yu", "ys", "ysu"), "z": ("z", "zu", "zs", "zsu"),
 }  # fmt: skip
 SCALED = ("s", "su")
 QUATERNIONS = (("c_q[1]", "c_q[2]", "c_q[3]", "c_q[4]"), ("quatw", "quati", "quatj", "quatk"))
-FLAT = 0.5  # of a mean diameter: centres within it are a layer
-SPINS = {"z": "omegaz", "y": "omegay", "x": "omegax"}
+# Usual names of the columns of pairs, the best first.
+PAIR_COLUMNS = {
+    "i": ("id1", "patom1", "itag", "id_i"), "j": ("id2", "patom2", "jtag", "id_j"),
+    "frame": ("step", "timestep", "iter"),
+}  # fmt: skip
+ANGULAR_VELOCITIES = {"z": "omegaz", "y": "omegay", "x": "omegax"}
 
 
 @dataclass(frozen=True, slots=True)
-class Dump:
-    """What the dumps tell beside their particles."""
+class DumpData:
+    """The particles and the box of dumps."""
 
-    seen: Observations
+    observed: Observations
     low: Float[Array, "f 2"]  # of the box, in the dump's unit
-    cell: Float[Array, "f 2 2"]  # its edges, along the first axis and along the second, if it is not tilted
+    cell: Float[Array, "f 2 2"]  # edges of the box, along the first and the second axis if it is not tilted
     periodic: tuple[bool, bool]  # across x, across y
-    shrinking: bool = False  # some faces follow the outermost grains (s, m): nothing stands there
+    shrinking: bool = False  # some faces follow the outermost grains (s, m) and are no walls
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,84 +51,102 @@ class _Step:
     number: int
     low: Array  # (3,) corner of the box
     edges: Array  # (3, 3) from there, a row each
-    ends: tuple[str, ...]  # (3,) what the faces are: pp, ff, …
+    ends: tuple[str, ...]  # (3,) boundary conditions of the faces: pp, ff, …
     columns: list[str]
     rows: list[list[str]]
 
 
-def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Dump:
-    """Read one file of many steps, or a folder of dumps; interval [s] of one step, for angular velocities.
+def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> DumpData:
+    """Read one file of many steps, or a folder of dumps.
 
-    columns: `x` and `y` may name other axes, such as y=z. Raises InputError naming file, row and value.
+    Parameters
+    ----------
+    source : Path
+    columns : mapping of str to str
+        `x` and `y` may name other axes, such as y=z.
+    interval : float
+        Duration of one step [s], for angular velocities.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and value.
     """
     files = _files(source)
     steps = {step.number: step for file in files for step in _steps(file)}
     if not steps:
-        raise InputError(source, "", "holds no ITEM: TIMESTEP")
+        raise InputError(source, "", "contains no ITEM: TIMESTEP")
     ordered = [steps[number] for number in sorted(steps)]
     axes = tuple(columns.get(role, role) for role in "xy")
     for axis in axes:
-        if axis not in PLACES:
+        if axis not in COORDINATES:
             raise InputError("--columns", axis, "is not an axis of a dump: x, y or z")
     third = next(axis for axis in "xyz" if axis not in axes)
-    frames, names, lines, place, radius, angle, spin, depth = [], [], [], [], [], [], [], []
+    velocity = ANGULAR_VELOCITIES[third]
+    frames, names, lines, position, radius, angle, spin, depth = [], [], [], [], [], [], [], []
     for step in ordered:
-        find = _Finder(step)
+        step_columns = _StepColumns(step)
         frames.append(np.full(len(step.rows), step.number, np.int64))
-        names += find.text("id")
+        names += step_columns.text("id")
         lines += range(step.line, step.line + len(step.rows))
-        place.append(np.column_stack([find.place(axis) for axis in axes]))
-        depth.append(find.place(third) if find.has_place(third) else np.zeros(len(step.rows)))
-        radius.append(find.radius())
-        turn = find.angle(third)
-        angle.append(turn)
-        spin.append(find.numbers(SPINS[third]) if SPINS[third] in step.columns else np.full(len(step.rows), np.nan))
+        position.append(np.column_stack([step_columns.position(axis) for axis in axes]))
+        depth.append(step_columns.position(third) if step_columns.has_position(third) else np.zeros(len(step.rows)))
+        radius.append(step_columns.radius())
+        angle.append(step_columns.angle(third))
+        unknown = np.full(len(step.rows), np.nan)
+        spin.append(step_columns.numbers(velocity) if velocity in step.columns else unknown)
     joined = np.concatenate
-    turned, how = joined(angle), []
-    summed = bool(np.isnan(turned).all() and np.isfinite(joined(spin)).any())
-    if summed:
-        turned = _sum_up(
-            [step.number for step in ordered], [_Finder(step).text("id") for step in ordered], spin, interval
+    rotation, remarks = joined(angle), []
+    integrated = bool(np.isnan(rotation).all() and np.isfinite(joined(spin)).any())
+    if integrated:
+        rotation = _integrate_spin(
+            [step.number for step in ordered], [_StepColumns(step).text("id") for step in ordered], spin, interval
         )
-        how.append(
-            f"Rotations are {SPINS[third]} summed up over the steps dumped: coarse, if grains turned in between."
+        remarks.append(
+            f"Rotations are {velocity} integrated over the dumped steps, which is coarse if grains rotated in between."
         )
     if (axes[0], axes[1]) in (("x", "z"), ("y", "x"), ("z", "y")):
-        turned = -turned  # the third axis points away from the eye
+        rotation = -rotation  # the third axis points away from the observer
     known = joined(radius)
-    spread = float(np.ptp(joined(depth)))
-    if np.isfinite(known).any() and spread > FLAT * 2.0 * float(np.nanmean(known)):
-        how.append(f"{third} goes over {spread:g}: this is no layer of rods, and {third} is left out.")
+    remarks += layer_remarks(third, joined(depth), known)
     k = ["xyz".index(axis) for axis in axes]
     periodic = (ordered[0].ends[k[0]] == "pp", ordered[0].ends[k[1]] == "pp")
     if periodic[0] != periodic[1]:
-        how.append(
-            f"The box is periodic across {axes[0] if periodic[0] else axes[1]} alone, which no experiment can be: "
-            "contacts through these edges are lost, and grains that went through them jump."
+        remarks.append(
+            f"The box is periodic across {axes[0] if periodic[0] else axes[1]} only, which is not supported: contacts "
+            "through these edges are lost, and grains that crossed them jump."
         )
     left = sorted(set(ordered[0].columns) & {"fx", "fy", "fz", "vx", "vy", "vz"})
     if left:
-        how.append(f"Left out: {', '.join(left)}.")
+        remarks.append(f"Left out: {', '.join(left)}.")
     table = Table(ordered[0].file, {"id": names}, lines)
-    seen = Observations(
-        table, "id", joined(frames), tuple(names), joined(place), turned, known, remarks=tuple(how), counted=summed
+    observed = Observations(
+        table,
+        "id",
+        joined(frames),
+        tuple(names),
+        joined(position),
+        rotation,
+        known,
+        remarks=tuple(remarks),
+        unwrapped=integrated,
     )
     low = np.array([step.low[k] for step in ordered])
     cell = np.array([step.edges[np.ix_(k, k)] for step in ordered])
     shrinking = any(set(ordered[0].ends[each]) & {"s", "m"} for each in k)
-    return Dump(seen, low, cell, periodic, shrinking)
+    return DumpData(observed, low, cell, periodic, shrinking)
 
 
-class _Finder:
-    """Columns of one step by what they mean."""
+class _StepColumns:
+    """Columns of one step by their meaning."""
 
     def __init__(self, step: _Step) -> None:
         self._step = step
 
     def text(self, name: str) -> list[str]:
         if name not in self._step.columns:
-            there = " ".join(self._step.columns)
-            raise InputError(self._step.file, f"step {self._step.number}", f"has no column {name} (there are: {there})")
+            names = " ".join(self._step.columns)
+            raise InputError(self._step.file, f"step {self._step.number}", f"has no column {name} (columns: {names})")
         at = self._step.columns.index(name)
         return [row[at] for row in self._step.rows]
 
@@ -141,17 +162,17 @@ class _Finder:
             values.append(value)
         return np.array(values)
 
-    def has_place(self, axis: str) -> bool:
-        return any(name in self._step.columns for name in PLACES[axis])
+    def has_position(self, axis: str) -> bool:
+        return any(name in self._step.columns for name in COORDINATES[axis])
 
-    def place(self, axis: str) -> Array:
-        name = next((each for each in PLACES[axis] if each in self._step.columns), axis)
+    def position(self, axis: str) -> Array:
+        name = next((each for each in COORDINATES[axis] if each in self._step.columns), axis)
         values = self.numbers(name)
         if not name.endswith(SCALED):
             return values
         if np.any(self._step.edges != np.diag(np.diag(self._step.edges))):
             where = f"step {self._step.number}"
-            raise InputError(self._step.file, where, f"{name} is a share of a tilted box: dump x y z, or xu yu zu")
+            raise InputError(self._step.file, where, f"{name} is a fraction of a tilted box: dump x y z, or xu yu zu")
         k = "xyz".index(axis)
         return self._step.low[k] + values * self._step.edges[k, k]
 
@@ -163,11 +184,77 @@ class _Finder:
         return np.full(len(self._step.rows), np.nan)
 
     def angle(self, axis: str) -> Array:
-        """About an axis [rad], of quaternions; NaN without any."""
+        """Return rotations about an axis [rad] from quaternions; NaN without any."""
         for names in QUATERNIONS:
             if all(name in self._step.columns for name in names):
                 return 2.0 * np.arctan2(self.numbers(names[1 + "xyz".index(axis)]), self.numbers(names[0]))
         return np.full(len(self._step.rows), np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class PairForces:
+    """Forces between pairs of grains in a simulation, in newtons."""
+
+    step: list[int]  # (m,)
+    i: list[str]  # (m,) names
+    j: list[str]
+    force: Array  # (m, 2) [N] that j exerts on i, along the first and the second axis
+
+
+def read_pair_forces(source: Path, columns: Mapping[str, str]) -> PairForces:
+    """Read pair forces: `dump local` of LAMMPS and LIGGGHTS (ITEM: ENTRIES), or a table with one row per pair.
+
+    Parameters
+    ----------
+    source : Path
+        A file, or a folder of dumps.
+    columns : mapping of str to str
+        Columns of the roles i, j, fx, fy (frame, in a table); `x` and `y` may name other axes, such as y=z. Defaults
+        are the names in PAIR_COLUMNS, the first that exists.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and value.
+    """
+    axes = tuple(columns.get(role, role) for role in "xy")
+    wanted = {"i": "i", "j": "j", **{f"f{role}": f"f{axis}" for role, axis in zip("xy", axes, strict=True)}}
+    if not source.is_dir() and not _is_dump(source):
+        return _pair_table(source, columns, wanted)
+    found = PairForces([], [], [], np.empty((0, 2)))
+    parts: list[Array] = []
+    for file in _files(source):
+        for step in _steps(file, "ENTRIES"):
+            cells = _StepColumns(step)
+            name = {role: columns.get(role) or _known_name(role, default, step.columns)
+                    for role, default in wanted.items()}  # fmt: skip
+            found.step.extend([step.number] * len(step.rows))
+            found.i.extend(_as_names(cells.text(name["i"])))
+            found.j.extend(_as_names(cells.text(name["j"])))
+            parts.append(np.column_stack([cells.numbers(name["fx"]), cells.numbers(name["fy"])]))
+    if not parts:
+        raise InputError(source, "", "contains no ITEM: ENTRIES, as dump local writes them")
+    return PairForces(found.step, found.i, found.j, np.concatenate(parts))
+
+
+def _pair_table(file: Path, columns: Mapping[str, str], wanted: Mapping[str, str]) -> PairForces:
+    header = column_names(file)
+    name = {role: columns.get(role) or _known_name(role, default, header)
+            for role, default in {"frame": "frame", **wanted}.items()}  # fmt: skip
+    table = read_foreign(file, list(name.values()))
+    force = np.column_stack([table.numbers(name["fx"]), table.numbers(name["fy"])])
+    step = table.integers(name["frame"]).tolist()
+    return PairForces(step, _as_names(table.text(name["i"])), _as_names(table.text(name["j"])), force)
+
+
+def _known_name(role: str, default: str, present: Sequence[str]) -> str:
+    """Return the first existing one of the usual names of a role; else its default, which the reader names missing."""
+    return next((each for each in (default, *PAIR_COLUMNS.get(role, ())) if each in present), default)
+
+
+def _as_names(texts: Sequence[str]) -> list[str]:
+    """Return names of grains without the decimals that computed columns have: 12.0 is 12."""
+    return [re.sub(r"\.0*$", "", each.strip()) for each in texts]
 
 
 def _files(source: Path) -> list[Path]:
@@ -175,7 +262,7 @@ def _files(source: Path) -> list[Path]:
         return [source]
     found = [file for file in source.iterdir() if file.is_file() and _is_dump(file)]
     if not found:
-        raise InputError(source, "", "holds no file that begins with ITEM: TIMESTEP")
+        raise InputError(source, "", "contains no file that begins with ITEM: TIMESTEP")
     return sorted(found, key=lambda file: [int(part) for part in re.findall(r"\d+", file.name)])
 
 
@@ -184,7 +271,8 @@ def _is_dump(file: Path) -> bool:
         return stream.read(5) == b"ITEM:"
 
 
-def _steps(file: Path) -> Iterator[_Step]:
+def _steps(file: Path, of: str = "ATOMS") -> Iterator[_Step]:
+    """Yield the steps of a dump with their rows of atoms, or of other entries."""
     lines = read_text(file).splitlines()
     at, number, count = 0, None, None
     low, edges, ends = np.zeros(3), np.zeros((3, 3)), ("ff", "ff", "ff")
@@ -194,43 +282,45 @@ def _steps(file: Path) -> Iterator[_Step]:
             at += 1
             continue
         if head[0] != "ITEM:":
-            raise InputError(file, f"row {at + 1}", f"{lines[at][:60]!r} stands where ITEM: is expected")
+            raise InputError(file, f"row {at + 1}", f"{lines[at][:60]!r} is in the place of ITEM:")
         item = " ".join(head[1:])
         try:
             if item == "TIMESTEP":
                 number, at = int(lines[at + 1]), at + 2
-            elif item == "NUMBER OF ATOMS":
+            elif item == f"NUMBER OF {of}":
                 count, at = int(lines[at + 1]), at + 2
             elif item.startswith("BOX BOUNDS"):
                 low, edges = _box([lines[at + k].split() for k in (1, 2, 3)], general="abc" in head)
                 ends = tuple(each for each in head[3:] if len(each) == 2 and set(each) <= set("pfsm")) or ends
                 at += 4
-            elif item.startswith("ATOMS"):
+            elif item.startswith(of):
                 if number is None or count is None:
-                    raise InputError(file, f"row {at + 1}", "comes before ITEM: TIMESTEP or ITEM: NUMBER OF ATOMS")
+                    raise InputError(file, f"row {at + 1}", f"comes before ITEM: TIMESTEP or ITEM: NUMBER OF {of}")
                 columns, first = head[2:], at + 1
                 rows = [line.split() for line in lines[first : first + count]]
                 short = [k for k, row in enumerate(rows) if len(row) != len(columns)]
                 if short or len(rows) < count:
                     row = short[0] if short else len(rows)
-                    raise InputError(file, f"row {first + row + 1}", f"is not the {len(columns)} cells of a particle")
+                    raise InputError(file, f"row {first + row + 1}", f"does not have {len(columns)} cells")
                 yield _Step(file, first + 1, number, low, edges, ends, columns, rows)
                 at = first + count
+            elif item.split()[0] in ("ATOMS", "ENTRIES"):
+                raise InputError(file, f"row {at + 1}", f"holds {item.split()[0]}, where ITEM: {of} is expected")
             else:  # UNITS, TIME, …
                 at += 2
         except (ValueError, IndexError):
-            raise InputError(file, f"row {at + 2}", f"does not follow from ITEM: {item}") from None
+            raise InputError(file, f"row {at + 2}", f"is not valid after ITEM: {item}") from None
 
 
 def _box(rows: list[list[str]], *, general: bool) -> tuple[Array, Array]:
-    """Corner (3,) and edges (3, 3); of a tilted box LAMMPS tells the bounds of what surrounds it.
+    """Return corner (3,) and edges (3, 3) of a box; for a tilted one LAMMPS writes the bounds of its bounding box.
 
-    general: every row is an edge and a coordinate of the corner, as OVITO and later versions of LAMMPS write.
+    general: every row is an edge and a coordinate of the corner, as in OVITO and later versions of LAMMPS.
     """
     values = [[float(cell) for cell in row] for row in rows]
     if general:
-        told = np.array([row[:4] for row in values])
-        return told[:, 3], told[:, :3]
+        table = np.array([row[:4] for row in values])
+        return table[:, 3], table[:, :3]
     bounds = np.array([row[:2] for row in values])
     xy, xz, yz = ((row[2] if len(row) > 2 else 0.0) for row in values)
     bounds[0] -= min(0.0, xy, xz, xy + xz), max(0.0, xy, xz, xy + xz)
@@ -240,16 +330,16 @@ def _box(rows: list[list[str]], *, general: bool) -> tuple[Array, Array]:
     return bounds[:, 0], edges
 
 
-def _sum_up(number: list[int], names: list[list[str]], spin: list[Array], interval: float) -> Array:
-    """Rotations of all rows [rad] from angular velocities [rad/s], by the mean of a grain's two ends of an interval."""
+def _integrate_spin(number: list[int], names: list[list[str]], spin: list[Array], interval: float) -> Array:
+    """Integrate angular velocities [rad/s] to rotations of all rows [rad] by the trapezoidal rule for each grain."""
     last: dict[str, tuple[int, float, float]] = {}
     found = []
     for step, ids, rates in zip(number, names, spin, strict=True):
-        turned = np.zeros(len(ids))
+        rotation = np.zeros(len(ids))
         for row, (name, rate) in enumerate(zip(ids, rates, strict=True)):
             if name in last:
-                before, former, angle = last[name]
-                turned[row] = angle + 0.5 * (former + rate) * (step - before) * interval
-            last[name] = (step, float(rate), float(turned[row]))
-        found.append(turned)
+                previous_step, previous_rate, angle = last[name]
+                rotation[row] = angle + 0.5 * (previous_rate + rate) * (step - previous_step) * interval
+            last[name] = (step, float(rate), float(rotation[row]))
+        found.append(rotation)
     return np.concatenate(found)

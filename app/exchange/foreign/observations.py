@@ -1,4 +1,4 @@
-"""What another program saw, one row per grain and photograph, and what becomes of it: tracks in metres, y up."""
+"""Observations of another program, one row per grain and photograph, and their conversion to tracks in metres, y up."""
 
 from __future__ import annotations
 
@@ -8,73 +8,93 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
-from ...errors import InputError
 from ...experiment.reading.tables import Table
+from ...process.errors import InputError
+from ...solver.bodies.grains import Array
 from ...tracks import Tracks, TrackStatus
 
-GREATEST_ID = 2**53
-VARIES = 0.02  # of a grain's radius, from frame to frame, beyond which it is said
+MAX_ID = 2**53
+MAX_DEPTH = 0.5  # [mean diameter] of the centres of a layer
+RADIUS_VARIATION = 0.02  # relative, of a grain's radius over the frames, above which a remark is made
 
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """Rows as the other program counts: in its unit of length, its axes and its names."""
+    """Rows in the units, axes and names of the other program."""
 
-    rows: Table  # where they stand, for complaints; the column `id`
+    rows: Table  # source rows, for messages; the column `id`
     id_column: str
     frame: Int[np.ndarray, " m"]
-    name: tuple[str, ...]  # (m,) of the grain, as it is written
-    place: Float[Array, "m 2"]  # in its unit of length
+    name: tuple[str, ...]  # (m,) of the grain, as written
+    position: Float[Array, "m 2"]  # in its unit of length
     angle: Float[Array, " m"]  # [rad] in its axes; NaN where unknown
     radius: Float[Array, " m"]  # in its unit of length; NaN where unknown
     time: Float[Array, " m"] | None = None  # [s]; None: unknown
-    remarks: tuple[str, ...] = ()  # what could not be carried over, a sentence each
-    counted: bool = False  # whole turns are in the angles already: they do not jump
+    remarks: tuple[str, ...] = ()  # on data that could not be converted, one sentence each
+    unwrapped: bool = False  # angles are continuous already
 
     def with_remark(self, remark: str) -> Observations:
         return replace(self, remarks=(*self.remarks, remark))
 
 
+def layer_remarks(axis: str, depth: Array, radius: Array) -> list[str]:
+    """Return a remark if coordinates `depth` (m,) along the omitted axis exceed half a mean diameter, else nothing."""
+    extent = float(np.ptp(depth))
+    if np.isfinite(radius).any() and extent > MAX_DEPTH * 2.0 * float(np.nanmean(radius)):
+        return [f"{axis} extends over {extent:g}: this is not a layer of rods, and {axis} is left out."]
+    return []
+
+
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """How another program counts."""
+    """Units and axes of another program."""
 
     unit: float = 1.0  # [m] of its unit of length
     y_down: bool = False
-    height: float | None = None  # the y that becomes 0, in its unit, where y points down; None: the highest
-    interval: float = 1.0  # [s] between frames whose numbers differ by one, where no time is told
-    radius: float | None = None  # of all grains, in its unit, where none is told
+    height: float | None = None  # y that becomes 0 if y points down, in its unit; None: the highest
+    interval: float = 1.0  # [s] between frames whose numbers differ by one, if no time is given
+    radius: float | None = None  # of all grains, in its unit, if none is given
 
 
 @dataclass(frozen=True, slots=True)
-class Arranged:
-    """Tracks, and how to find in them what the other program named otherwise."""
+class ImportedTracks:
+    """Tracks, with the frame numbers and grain names of the other program."""
 
     tracks: Tracks
-    number: Int[np.ndarray, " f"]  # of the frames, as the other program counts
-    name: tuple[str, ...]  # (n,) of the grains, as the other program writes them
-    floor: float  # the other program's y that is 0 here, in its unit
+    number: Int[np.ndarray, " f"]  # of the frames in the other program
+    name: tuple[str, ...]  # (n,) of the grains in the other program
+    floor: float  # y of the other program that is 0 here, in its unit
     remarks: tuple[str, ...] = field(default=())
 
     @property
     def renamed(self) -> bool:
-        """Whether grains have other names here than there."""
+        """Whether grains have other names than in the other program."""
         return any(str(new) != old for new, old in zip(self.tracks.id, self.name, strict=True))
 
 
-def arrange(seen: Observations, convention: Convention, precision: float) -> Arranged:
-    """Make tracks of observations; precision [m] of a position. Raises InputError naming row and value.
+def make_tracks(observed: Observations, convention: Convention, precision: float) -> ImportedTracks:
+    """Make tracks of observations.
 
-    Frames are numbered from 0 in their order; ids that are no whole numbers become numbers; angles that jump by a
-    turn are unwrapped; a grain's radius is its median.
+    Frames are numbered from 0 in their order; ids that are not integers are replaced by integers; jumps of angles by 2π
+    are removed; a grain's radius is its median.
+
+    Parameters
+    ----------
+    observed : Observations
+    convention : Convention
+    precision : float
+        Standard deviation of a position [m].
+
+    Raises
+    ------
+    InputError
+        Naming row and value.
     """
-    remarks = list(seen.remarks)
-    number, frame = np.unique(seen.frame, return_inverse=True)
-    ids, names, row = _name_grains(seen.name)
+    remarks = list(observed.remarks)
+    number, frame = np.unique(observed.frame, return_inverse=True)
+    ids, names, row = _name_grains(observed.name)
     f, n = len(number), len(ids)
-    _refuse_twice(seen, frame, row)
+    _refuse_duplicates(observed, frame, row)
     if not np.array_equal(number, np.arange(f)):
         even = f < 2 or len(set(np.diff(number).tolist())) == 1
         remarks.append(
@@ -84,26 +104,26 @@ def arrange(seen: Observations, convention: Convention, precision: float) -> Arr
         )
     position, rotation = np.full((f, n, 2), np.nan), np.full((f, n), np.nan)
     radius = np.full((f, n), np.nan)
-    place, angle, floor = seen.place, seen.angle, 0.0
+    points, angle, floor = observed.position, observed.angle, 0.0
     if convention.y_down:
-        floor = float(place[:, 1].max()) if convention.height is None else convention.height
-        place = np.column_stack([place[:, 0], floor - place[:, 1]])
+        floor = float(points[:, 1].max()) if convention.height is None else convention.height
+        points = np.column_stack([points[:, 0], floor - points[:, 1]])
         angle = -angle
-    position[frame, row] = convention.unit * place
+    position[frame, row] = convention.unit * points
     rotation[frame, row] = angle
-    radius[frame, row] = convention.unit * seen.radius
-    rotation, turned = (rotation, 0) if seen.counted else _unwrap(rotation)
-    if turned:
-        remarks.append(f"Angles of {turned} grains jumped by turns, and go on without.")
-    told = np.isfinite(rotation).any(axis=0) if n else np.zeros(0, np.bool_)
-    if not told.all():
-        which = "is" if not told.any() else f"of {int((~told).sum())} grains is"
+    radius[frame, row] = convention.unit * observed.radius
+    rotation, jumped = (rotation, 0) if observed.unwrapped else _unwrap(rotation)
+    if jumped:
+        remarks.append(f"Jumps by 2π were removed from the angles of {jumped} grains.")
+    known = np.isfinite(rotation).any(axis=0) if n else np.zeros(0, np.bool_)
+    if not known.all():
+        which = "is" if not known.any() else f"of {int((~known).sum())} grains is"
         remarks.append(f"The rotation {which} unknown.")
     present = np.isfinite(position).all(axis=2)
     tracks = Tracks(
         id=ids,
-        radius=_one_radius(seen, radius, names, convention, remarks),
-        time=_times(seen, frame, number, convention),
+        radius=_one_radius(observed, radius, names, convention, remarks),
+        time=_times(observed, frame, number, convention),
         position=position,
         rotation=rotation,
         sigma=np.where(present, precision, np.nan),
@@ -112,15 +132,15 @@ def arrange(seen: Observations, convention: Convention, precision: float) -> Arr
     )
     if missing := int((~present).sum()):
         remarks.append(f"{missing} poses lost: these grains are missing from some frames.")
-    arranged = Arranged(tracks, number, names, floor, tuple(remarks))
-    if arranged.renamed:
-        also = f"Ids that are no whole numbers have become 0 … {n - 1}: ids.csv says which."
-        return Arranged(tracks, number, names, floor, (*remarks, also))
-    return arranged
+    imported = ImportedTracks(tracks, number, names, floor, tuple(remarks))
+    if imported.renamed:
+        renamed = f"Ids that are not integers are replaced by 0 … {n - 1}: see ids.csv."
+        return replace(imported, remarks=(*remarks, renamed))
+    return imported
 
 
 def _name_grains(written: tuple[str, ...]) -> tuple[NDArray[np.int64], tuple[str, ...], NDArray[np.intp]]:
-    """Ids (n,), names (n,), and the grain (m,) of every row: whole numbers keep their value, others are counted."""
+    """Return ids (n,), names (n,), and the grain (m,) of every row: integers keep their value, others are numbered."""
     names = list(dict.fromkeys(written))
     whole = [_whole(each) for each in names]
     if all(value is not None for value in whole):
@@ -129,15 +149,15 @@ def _name_grains(written: tuple[str, ...]) -> tuple[NDArray[np.int64], tuple[str
             by_value.setdefault(value, name)  # type: ignore[arg-type]
         values = sorted(by_value)
         at = {value: k for k, value in enumerate(values)}
-        place = {name: at[value] for name, value in zip(names, whole, strict=True)}  # type: ignore[index]
+        grain = {name: at[value] for name, value in zip(names, whole, strict=True)}  # type: ignore[index]
         ids = np.array(values, np.int64)
-        return ids, tuple(str(value) for value in values), np.array([place[each] for each in written], np.intp)
+        return ids, tuple(str(value) for value in values), np.array([grain[each] for each in written], np.intp)
     at = {name: k for k, name in enumerate(names)}
     return np.arange(len(names), dtype=np.int64), tuple(names), np.array([at[each] for each in written], np.intp)
 
 
 def _whole(text: str) -> int | None:
-    """A whole number, also one written as 3.0; None for anything else."""
+    """Parse an integer, also one written as 3.0; None for anything else."""
     try:
         value = int(text)
     except ValueError:
@@ -148,60 +168,64 @@ def _whole(text: str) -> int | None:
         if not (np.isfinite(number) and number == int(number)):
             return None
         value = int(number)
-    return value if abs(value) <= GREATEST_ID else None
+    return value if abs(value) <= MAX_ID else None
 
 
-def _refuse_twice(seen: Observations, frame: NDArray[np.intp], row: NDArray[np.intp]) -> None:
+def _refuse_duplicates(observed: Observations, frame: NDArray[np.intp], row: NDArray[np.intp]) -> None:
     pair = np.stack([frame, row], axis=1)
     _, first = np.unique(pair, axis=0, return_index=True)
     if len(first) < len(pair):
         again = int(np.setdiff1d(np.arange(len(pair)), first)[0])
-        raise seen.rows.error(again, seen.id_column, f"stands twice in frame {seen.frame[again]}")
+        raise observed.rows.error(again, observed.id_column, f"occurs twice in frame {observed.frame[again]}")
 
 
 def _unwrap(rotation: Array) -> tuple[Array, int]:
-    """Rotations (f, n) [rad] without jumps of whole turns between the frames that show a grain; how many had such."""
-    turned = 0
+    """Remove jumps by 2π from rotations (f, n) [rad]; also return the number of grains that had jumps."""
+    jumped = 0
     rotation = rotation.copy()
     for column in rotation.T:
-        told = np.flatnonzero(np.isfinite(column))
-        if len(told) < 2:
+        known = np.flatnonzero(np.isfinite(column))
+        if len(known) < 2:
             continue
-        smooth = np.unwrap(column[told])
-        turned += bool(np.any(np.abs(smooth - column[told]) > 1.0))
-        column[told] = smooth
-    return rotation, turned
+        smooth = np.unwrap(column[known])
+        jumped += bool(np.any(np.abs(smooth - column[known]) > 1.0))
+        column[known] = smooth
+    return rotation, jumped
 
 
 def _one_radius(
-    seen: Observations, radius: Array, names: tuple[str, ...], convention: Convention, remarks: list[str]
+    observed: Observations, radius: Array, names: tuple[str, ...], convention: Convention, remarks: list[str]
 ) -> Array:
-    """A radius (n,) [m] for every grain, of those (f, n) [m] that its frames tell."""
-    told = np.isfinite(radius).any(axis=0)
+    """Return one radius (n,) [m] for every grain from those of its frames (f, n) [m]."""
+    known = np.isfinite(radius).any(axis=0)
     if convention.radius is not None:
-        radius = np.where(told, radius, convention.unit * convention.radius)
-    elif not told.all():
-        lacking = names[int(np.flatnonzero(~told)[0])]
+        radius = np.where(known, radius, convention.unit * convention.radius)
+    elif not known.all():
+        missing = names[int(np.flatnonzero(~known)[0])]
         raise InputError(
-            seen.rows.file, "", f"tells no radius of {int((~told).sum())} grains (the first: {lacking}): name its "
+            observed.rows.file, "", f"gives no radius of {int((~known).sum())} grains (the first: {missing}): name its "
             "column, radius=… or diameter=…, or give --radius"
         )  # fmt: skip
-    one = np.nanmedian(radius, axis=0)
-    if len(one) and not one.min() > 0.0:
-        bad = int(np.argmin(one))
-        raise InputError(seen.rows.file, f"id {names[bad]}", f"has radius {one[bad] / convention.unit:g}")
-    spread = np.nanmax(radius, axis=0) - np.nanmin(radius, axis=0)
-    if varying := int((spread > VARIES * one).sum()):
-        remarks.append(f"The radius of {varying} grains varies from frame to frame by over {VARIES:.0%}: its median.")
-    return one
+    median = np.nanmedian(radius, axis=0)
+    if len(median) and not median.min() > 0.0:
+        bad = int(np.argmin(median))
+        raise InputError(observed.rows.file, f"id {names[bad]}", f"has radius {median[bad] / convention.unit:g}")
+    variation = np.nanmax(radius, axis=0) - np.nanmin(radius, axis=0)
+    if varying := int((variation > RADIUS_VARIATION * median).sum()):
+        remarks.append(
+            f"The radius of {varying} grains varies by more than {RADIUS_VARIATION:.0%}: the median is used."
+        )
+    return median
 
 
-def _times(seen: Observations, frame: NDArray[np.intp], number: NDArray[np.int64], convention: Convention) -> Array:
-    if seen.time is None:
+def _times(observed: Observations, frame: NDArray[np.intp], number: NDArray[np.int64], convention: Convention) -> Array:
+    if observed.time is None:
         return (number - number[0]) * convention.interval
-    time = np.array([np.median(seen.time[frame == k]) for k in range(len(number))])
+    time = np.array([np.median(observed.time[frame == k]) for k in range(len(number))])
     late = np.flatnonzero(np.diff(time) <= 0)
     if len(late):
         where = f"frame {number[late[0] + 1]}"
-        raise InputError(seen.rows.file, where, f"time {time[late[0] + 1]:g} is not after that of the frame before it")
+        raise InputError(
+            observed.rows.file, where, f"time {time[late[0] + 1]:g} is not after that of the previous frame"
+        )
     return time - time[0]

@@ -1,15 +1,14 @@
-"""Photoelastic tests solved by PeGS: where its discs are, and the forces that their fringes tell, from either side.
+"""Photoelastic tests solved by PeGS: positions of discs, and contact forces read from the fringes of either disc.
 
-Two ways of writing. By photograph, as the rigidity library reads it: NAME_ParticleData.dlm (id, x, y, radius, more)
-with NAME_NormWeightedAdjacencyMatrix.dlm and NAME_TanWeighted…, whose row i, column j is the force on their contact as
-disc i's fringes tell it, or NAME_bonds.txt (rows of i and j from 0, sliding, f_t, f_n). All at once, as PeGS 2 writes
-it: particle_positions.txt (frame, id, x, y, radius, edge) with Adjacency_list.txt (frame, i, j, f_t, f_n), where a
-contact stands once for either disc and j is −1 at a wall. Pixels, y down; f_n > 0 presses. No rotations.
+There are two formats. By photograph, for the rigidity library: NAME_ParticleData.dlm (id, x, y, radius, more) with
+NAME_NormWeightedAdjacencyMatrix.dlm and NAME_TanWeighted…, whose row i, column j is the force on their contact read
+from the fringes of disc i, or NAME_bonds.txt (rows of i and j from 0, sliding, f_t, f_n). All photographs together, by
+PeGS 2: particle_positions.txt (frame, id, x, y, radius, edge) with Adjacency_list.txt (frame, i, j, f_t, f_n), where a
+contact has one row for either disc and j is −1 at a wall. Pixels, y down; f_n > 0 is compression. No rotations.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -17,62 +16,102 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
-from ...errors import InputError
+from ...experiment.photographs import natural_key
 from ...experiment.reading.tables import Table
+from ...process.errors import InputError
+from ...solver.bodies.grains import Array
 from .foreign_table import read_text
-from .observations import Arranged, Observations
+from .observations import ImportedTracks, Observations
 
 DISCS, BONDS = "_ParticleData.dlm", "_bonds.txt"
-APART, ALIKE = 0.1, 0.12  # of the mean: between sizes of discs, and within one
-MOST_SIZES, FEWEST_DISCS = 4, 10
+MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes of discs, and within one
+MAX_SIZES, MIN_DISCS = 4, 10
+COPY_DIGITS = 1e-6  # relative difference of copies: that of their rounding
+LEAST_COPIES = 4  # rows
 NORMAL, TANGENTIAL = "_NormWeightedAdjacencyMatrix.dlm", "_TanWeightedAdjacencyMatrix.dlm"
 POSITIONS, CONTACTS = "particle_positions.txt", "Adjacency_list.txt"
 
 
-Bonds = tuple[NDArray[np.integer], NDArray[np.integer], Array, Array]  # (b,) teller, other, f_n, f_t
+Bonds = tuple[NDArray[np.integer], NDArray[np.integer], Array, Array]  # (b,) disc that was read, other disc, f_n, f_t
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
-    """Forces of contacts as one of their two discs tells them; one row per contact and telling disc."""
+class ForceReadings:
+    """Forces read from one of the two discs of a contact; one row per contact and disc."""
 
     frame: Int[np.ndarray, " s"]
-    teller: Int[np.ndarray, " s"]  # id of the disc whose fringes were read
+    disc: Int[np.ndarray, " s"]  # id of the disc whose fringes were read
     other: Int[np.ndarray, " s"]
     fn: Float[Array, " s"]  # [N]
-    ft: Float[Array, " s"]  # [N], of a sign that only the program knows
+    ft: Float[Array, " s"]  # [N], in the sign convention of the program
 
 
-def read_pegs(folder: Path) -> tuple[Observations, Side]:
-    """Read a folder in either way of writing. Raises InputError naming file, row and value."""
+def read_pegs(folder: Path) -> tuple[Observations, ForceReadings]:
+    """Read a folder in either format. Raises InputError naming file, row and value."""
     if not folder.is_dir():
-        raise InputError(folder, "", "is no folder")
-    discs = sorted(folder.glob(f"*{DISCS}"), key=_natural)
+        raise InputError(folder, "", "is not a folder")
+    discs = sorted(folder.glob(f"*{DISCS}"), key=natural_key)
     if discs:
         return _read_by_photograph(discs)
     if (folder / POSITIONS).exists():
         return _read_all(folder)
-    raise InputError(folder, "", f"holds neither *{DISCS} nor {POSITIONS}")
+    raise InputError(folder, "", f"contains neither *{DISCS} nor {POSITIONS}")
 
 
-def true_contacts(told: Side, arranged: Arranged) -> dict[str, list[object]]:
-    """Columns of a table of true forces: both sides' f_n beside their mean, or the only side there is.
+def read_edge(folder: Path) -> tuple[str, ...]:
+    """Return the names of discs whose flag puts them at the edge in most photographs; empty: no flags, or all discs."""
+    file = folder / POSITIONS
+    if not file.exists() or sorted(folder.glob(f"*{DISCS}")):
+        return ()
+    table = _numbers(file, 5)
+    names, row = np.unique(table[:, -5], return_inverse=True)
+    fraction = np.bincount(row, table[:, -1] != 0.0) / np.bincount(row)
+    at_edge = names[fraction > 0.5]
+    return tuple(f"{each:.17g}" for each in at_edge) if len(at_edge) < len(names) else ()
 
-    A tangential force changes its sign where y does.
+
+def without_copies(readings: ForceReadings) -> tuple[ForceReadings, str]:
+    """Keep one of two readings of a contact where they are copies of each other; also return a remark, or "".
+
+    Two discs are read independently, so that their forces differ. Files that hold every force twice, from i to j and
+    from j to i, have one reading, whose error they do not show.
     """
-    row = {int(number): k for k, number in enumerate(arranged.number)}
-    sides: dict[tuple[int, int, int], list[tuple[float, float] | None]] = {}
-    for frame, teller, other, fn, ft in zip(told.frame, told.teller, told.other, told.fn, told.ft, strict=True):
+    low, high = np.minimum(readings.disc, readings.other), np.maximum(readings.disc, readings.other)
+    _, contact, count = np.unique(
+        np.stack([readings.frame, low, high]), axis=1, return_inverse=True, return_counts=True
+    )
+    contact = np.ravel(contact)
+    total = np.bincount(contact, readings.fn)
+    twice = count[contact] == 2
+    differs = np.abs(readings.fn - 0.5 * total[contact]) > COPY_DIGITS * np.abs(readings.fn)
+    if twice.sum() < LEAST_COPIES or differs[twice].any():
+        return readings, ""
+    kept = ~twice | (readings.disc < readings.other)
+    one = ForceReadings(*(getattr(readings, each.name)[kept] for each in fields(ForceReadings)))
+    return one, (
+        f"The forces of {int(twice.sum()) // 2} contacts are given twice and are equal: copies, not two readings. "
+        "Their error is unknown."
+    )
+
+
+def true_contacts(readings: ForceReadings, imported: ImportedTracks) -> dict[str, list[object]]:
+    """Return columns of a table of true forces: both readings of f_n and their mean, or the only reading.
+
+    Tangential forces change their sign, since y is reversed.
+    """
+    row = {int(number): k for k, number in enumerate(imported.number)}
+    readings_by_contact: dict[tuple[int, int, int], list[tuple[float, float] | None]] = {}
+    for frame, disc, other, fn, ft in zip(
+        *(getattr(readings, each.name) for each in fields(ForceReadings)), strict=True
+    ):
         if int(frame) not in row:
             continue
-        low, high = sorted((int(teller), int(other)))
-        both = sides.setdefault((row[int(frame)], low, high), [None, None])
-        both[int(teller != low)] = (float(fn), float(ft))
+        low, high = sorted((int(disc), int(other)))
+        both = readings_by_contact.setdefault((row[int(frame)], low, high), [None, None])
+        both[int(disc != low)] = (float(fn), float(ft))
     columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")}
-    for (frame, low, high), both in sorted(sides.items()):
-        known = [side for side in both if side is not None]
+    for (frame, low, high), both in sorted(readings_by_contact.items()):
+        known = [reading for reading in both if reading is not None]
         mean = np.mean(known, axis=0)
         values = (frame, low, high, float(mean[0]), -float(mean[1]), *("" if s is None else s[0] for s in both))
         for name, value in zip(columns, values, strict=True):
@@ -80,9 +119,9 @@ def true_contacts(told: Side, arranged: Arranged) -> dict[str, list[object]]:
     return columns
 
 
-def _read_by_photograph(files: list[Path]) -> tuple[Observations, Side]:
+def _read_by_photograph(files: list[Path]) -> tuple[Observations, ForceReadings]:
     frames, parts, lines = [], [], []
-    sides: list[Side] = []
+    parts_of_readings: list[ForceReadings] = []
     for frame, file in enumerate(files):
         discs = _numbers(file, 4)
         stem = file.name.removesuffix(DISCS)
@@ -94,33 +133,37 @@ def _read_by_photograph(files: list[Path]) -> tuple[Observations, Side]:
         if found is None:
             found = _read_bonds(file.parent / f"{stem}{BONDS}", len(ids))
         if found is not None:
-            teller, other, fn, ft = found
-            sides.append(Side(np.full(len(fn), frame, np.int64), ids[teller], ids[other], fn, ft))
-    remarks = () if sides else (f"No forces are there: neither *{NORMAL} nor *{BONDS}.",)
+            disc, other, fn, ft = found
+            parts_of_readings.append(ForceReadings(np.full(len(fn), frame, np.int64), ids[disc], ids[other], fn, ft))
+    remarks = [] if parts_of_readings else [f"There are no forces: neither *{NORMAL} nor *{BONDS}."]
+    readings, remark = without_copies(_join_readings(parts_of_readings))
     table = np.concatenate(parts)
-    return _observe(files[0].parent, np.concatenate(frames), table, lines, remarks), _side(sides)
+    remarks += [remark] if remark else []
+    return _observe(files[0].parent, np.concatenate(frames), table, lines, tuple(remarks)), readings
 
 
-def _read_all(folder: Path) -> tuple[Observations, Side]:
+def _read_all(folder: Path) -> tuple[Observations, ForceReadings]:
     file = folder / POSITIONS
     table = _numbers(file, 5)
     contacts = _numbers(folder / CONTACTS, 5) if (folder / CONTACTS).exists() else np.empty((0, 5))
     if table.shape[1] == 5:  # of one photograph: id, x, y, radius, edge
         number = np.unique(contacts[:, 0])
         if len(number) > 1:
-            raise InputError(file, "", f"does not say which of {len(number)} frames it is of: six columns are expected")
+            raise InputError(file, "", f"does not name its frame of {len(number)}: six columns are expected")
         table = np.column_stack([np.full(len(table), number[0] if len(number) else 1.0), table])
     frame = _whole_numbers(file, table[:, 0], "frame")
     remarks = []
     at_wall = contacts[:, 2] < 0
     if at_wall.any():
-        remarks.append(f"{int(at_wall.sum())} forces on walls are left out: the file does not say which wall.")
+        remarks.append(f"{int(at_wall.sum())} forces on walls are left out: the file does not name the wall.")
     contacts = contacts[~at_wall]
     known = np.isin(contacts[:, 1], table[:, 1]) & np.isin(contacts[:, 2], table[:, 1])
     if not known.all():
-        remarks.append(f"{int((~known).sum())} forces are left out: they are of discs that have no position.")
+        remarks.append(f"{int((~known).sum())} forces of discs without a position are left out.")
     whole = _whole_numbers(folder / CONTACTS, contacts[known, :3].ravel(), "frame, i or j").reshape(-1, 3)
-    side = Side(whole[:, 0], whole[:, 1], whole[:, 2], contacts[known, 4], contacts[known, 3])
+    side = ForceReadings(whole[:, 0], whole[:, 1], whole[:, 2], contacts[known, 4], contacts[known, 3])
+    side, remark = without_copies(side)
+    remarks += [remark] if remark else []
     return _observe(file, frame, table[:, 1:5], list(range(1, len(table) + 1)), tuple(remarks)), side
 
 
@@ -128,28 +171,28 @@ def _observe(
     file: Path, frame: NDArray[np.int64], discs: Array, line: list[int], remarks: tuple[str, ...]
 ) -> Observations:
     name = tuple(f"{value:.17g}" for value in discs[:, 0])
-    radius, classes = _cut_sizes(discs[:, 0], discs[:, 3])
+    radius, classes = _group_radii(discs[:, 0], discs[:, 3])
     if classes:
         sizes = " and ".join(f"{each:.4g}" for each in classes)
-        remarks = (*remarks, f"Discs are cut in sizes: radii are the means of {sizes} px, not what each was read as.")
+        remarks = (*remarks, f"Discs have nominal sizes: radii are the means {sizes} px, not the single readings.")
     return Observations(
         Table(file, {"id": list(name)}, line), "id", frame, name, discs[:, 1:3].copy(),
         np.full(len(discs), np.nan), radius, remarks=remarks,
     )  # fmt: skip
 
 
-def _cut_sizes(ids: Array, radius: Array) -> tuple[Array, list[float]]:
-    """Radii (m,) [px] as their sizes have them, and the sizes; as they were read where no sizes stand apart.
+def _group_radii(ids: Array, radius: Array) -> tuple[Array, list[float]]:
+    """Replace radii (m,) [px] by the mean of their size class; also return the sizes, empty without distinct classes.
 
-    Found circles are whole or half pixels, and wrong by what light a disc has: a size is known better than a disc.
+    Detected radii are whole or half pixels and depend on the light; the mean of a class is more precise.
     """
     which, row = np.unique(ids, return_inverse=True)
     mean = np.bincount(row, radius) / np.bincount(row)
     order = np.argsort(mean)
-    parted = np.flatnonzero(np.diff(mean[order]) > APART * mean.mean())
-    groups = np.split(order, parted + 1)
-    wide = any(np.ptp(mean[group]) > ALIKE * mean[group].mean() for group in groups)
-    if len(groups) > MOST_SIZES or wide or len(which) < FEWEST_DISCS:
+    boundaries = np.flatnonzero(np.diff(mean[order]) > MIN_GAP * mean.mean())
+    groups = np.split(order, boundaries + 1)
+    wide = any(np.ptp(mean[group]) > MAX_RANGE * mean[group].mean() for group in groups)
+    if len(groups) > MAX_SIZES or wide or len(which) < MIN_DISCS:
         return radius.copy(), []
     size = np.empty(len(which))
     for group in groups:
@@ -158,7 +201,7 @@ def _cut_sizes(ids: Array, radius: Array) -> tuple[Array, list[float]]:
 
 
 def _read_matrices(folder: Path, stem: str, count: int) -> Bonds | None:
-    """Rows of the discs that tell, of the others, f_n and f_t; None where there are no matrices."""
+    """Return rows of the discs that were read, of the others, f_n and f_t; None without matrices."""
     files = folder / f"{stem}{NORMAL}", folder / f"{stem}{TANGENTIAL}"
     if not files[0].exists():
         return None
@@ -167,8 +210,8 @@ def _read_matrices(folder: Path, stem: str, count: int) -> Bonds | None:
     for file, matrix in zip(files, (normal, tangential), strict=True):
         if matrix.shape != (count, count):
             raise InputError(file, "", f"is {matrix.shape[0]} by {matrix.shape[1]}, but there are {count} discs")
-    teller, other = np.nonzero(normal)
-    return teller, other, normal[teller, other], tangential[teller, other]
+    disc, other = np.nonzero(normal)
+    return disc, other, normal[disc, other], tangential[disc, other]
 
 
 def _read_bonds(file: Path, count: int) -> Bonds | None:
@@ -182,18 +225,18 @@ def _read_bonds(file: Path, count: int) -> Bonds | None:
     return pair[:, 0], pair[:, 1], bonds[:, 4], bonds[:, 3]
 
 
-def _side(parts: list[Side]) -> Side:
+def _join_readings(parts: list[ForceReadings]) -> ForceReadings:
     if not parts:
         none = np.empty(0, np.int64)
-        return Side(none, none, none, np.empty(0), np.empty(0))
-    frame, teller, other, fn, ft = (
-        np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Side)
+        return ForceReadings(none, none, none, np.empty(0), np.empty(0))
+    frame, disc, other, fn, ft = (
+        np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(ForceReadings)
     )
-    return Side(frame, teller, other, fn, ft)
+    return ForceReadings(frame, disc, other, fn, ft)
 
 
 def _numbers(file: Path, least: int) -> Array:
-    """All numbers of a file without header (m, at least `least`), with commas or blanks between."""
+    """Read the numbers of a file without header (m, at least `least`), separated by commas or blanks."""
     rows = []
     for number, text in enumerate(read_text(file).splitlines(), start=1):
         if not text.strip():
@@ -219,11 +262,7 @@ def _ids(file: Path, values: Array) -> NDArray[np.int64]:
 
 
 def _whole_numbers(file: Path, values: Array, what: str) -> NDArray[np.int64]:
-    broken = np.flatnonzero(values != np.rint(values))
-    if len(broken):
-        raise InputError(file, f"{what} = {values[broken[0]]:g}", "is not a whole number")
+    violations = np.flatnonzero(values != np.rint(values))
+    if len(violations):
+        raise InputError(file, f"{what} = {values[violations[0]]:g}", "is not a whole number")
     return values.astype(np.int64)
-
-
-def _natural(file: Path) -> list[tuple[int, str]]:
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)]

@@ -1,6 +1,6 @@
-"""TrackMate's spots: its CSV table, whose header has four rows, its file of a whole session, and its simple tracks.
+"""Spots of TrackMate: its CSV table with four header rows, its session file, and its simple tracks.
 
-Lengths are in the picture's calibrated unit, y down. A spot without a track is no grain that was followed.
+Lengths are in the picture's calibrated unit, y down. A spot without a track is not a tracked grain.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import InputError
 from ...experiment.reading.tables import Table
-from .columns import observe_table
+from ...process.errors import InputError
 from .foreign_table import read_foreign, read_text
 from .observations import Observations
+from .tracker_tables import observe_table
 
 COLUMNS = {"frame": "FRAME", "id": "TRACK_ID", "x": "POSITION_X", "y": "POSITION_Y", "radius": "RADIUS"}
 METRES = {
@@ -25,14 +25,14 @@ METRES = {
 
 @dataclass(frozen=True, slots=True)
 class Spots:
-    """Spots, and what one of their units of length is."""
+    """Spots and their unit of length."""
 
-    seen: Observations
-    unit: float | None  # [m]; None: a pixel, or not known
+    observed: Observations
+    unit: float | None  # [m]; None: a pixel, or unknown
 
 
 def read_trackmate(file: Path, columns: Mapping[str, str]) -> Spots:
-    """Read any of the three. Raises InputError naming file, row and value."""
+    """Read any of the three formats. Raises InputError naming file, row and value."""
     chosen = {**COLUMNS, **columns}
     text = read_text(file)
     if text.lstrip()[:1] == "<":
@@ -53,7 +53,7 @@ def read_trackmate(file: Path, columns: Mapping[str, str]) -> Spots:
 
 def _read_xml(file: Path, text: str, chosen: dict[str, str]) -> Spots:
     if "<!ENTITY" in text:
-        raise InputError(file, "", "declares entities, which TrackMate does not: it is not read")
+        raise InputError(file, "", "declares entities, which TrackMate does not: it is refused")
     try:
         root = ElementTree.fromstring(text.encode("utf-8"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last: of an encoding
@@ -78,7 +78,7 @@ def _read_xml(file: Path, text: str, chosen: dict[str, str]) -> Spots:
 
 
 def _simple_tracks(file: Path, root: ElementTree.Element) -> Spots:
-    """Tracks without spots' features: particles are counted, and have no radius."""
+    """Read tracks without features of spots: particles are numbered and have no radius."""
     rows = [
         {
             "FRAME": each.get("t", ""),
@@ -99,23 +99,23 @@ def _observe(file: Path, rows: Iterable[Mapping[str, str]], chosen: dict[str, st
     if not any(chosen["radius"] in row for row in rows):
         del chosen["radius"]
     for number, row in enumerate(rows, start=1):
-        lacking = [name for name in (chosen["frame"], chosen["x"], chosen["y"]) if not row.get(name)]
-        if lacking:
-            raise InputError(file, f"spot {number}", f"has no {lacking[0]}")
+        missing = [name for name in (chosen["frame"], chosen["x"], chosen["y"]) if not row.get(name)]
+        if missing:
+            raise InputError(file, f"spot {number}", f"has no {missing[0]}")
     columns = {name: [row.get(name, "") for row in rows] for name in chosen.values()}
     table = Table(file, columns, list(range(1, len(rows) + 1)), of="spot")
     return _unbranched(file, observe_table(table, chosen))
 
 
-def _unbranched(file: Path, seen: Observations) -> Observations:
-    """The same; raises InputError where a track has two spots in a frame, as those of cells that divide have."""
+def _unbranched(file: Path, observed: Observations) -> Observations:
+    """Return the observations; raises InputError for a track with two spots in a frame, such as dividing cells."""
     known: set[tuple[int, str]] = set()
-    for frame, name in zip(seen.frame.tolist(), seen.name, strict=True):
+    for frame, name in zip(observed.frame.tolist(), observed.name, strict=True):
         if (frame, name) in known:
             raise InputError(
                 file, f"track {name}",
-                f"has two spots in frame {frame}: it splits or merges, which rods do not. Track again without, or "
-                "unlink them in TrackScheme",
+                f"has two spots in frame {frame}: it splits or merges, which rods do not. Track without splitting, "
+                "or unlink them in TrackScheme",
             )  # fmt: skip
         known.add((frame, name))
-    return seen
+    return observed

@@ -1,1 +1,1 @@
-"""The experiment file: its sections, what every key means, and what of it is refused."""
+"""The experiment file: its sections, the meaning of every key, and the validation of their values."""

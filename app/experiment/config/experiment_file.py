@@ -1,9 +1,9 @@
-"""The experiment file: one frozen section per stage, every key with a default that works or a reason to be given."""
+"""The experiment file: one frozen section per stage; every key has a working default or is required."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -11,58 +11,39 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from ...errors import InputError
+from ...process.errors import InputError
 from ..reading.input_files import InputFiles
 from .input_sections import BoundarySection, GivenTracks, PhotographsSection, WallsSection
-from .keys import find_key, nearest_key
+from .keys import Key, find_key, nearest_key
 from .section import Section, key
-from .tuning_sections import (
-    CalibrationSection,
-    ContactsSection,
-    MaterialSection,
-    RecordingSection,
-    SensitivitySection,
-    SolverSection,
-    TrackingSection,
-)
+from .tuning_sections import InferenceSections, SensitivitySection, TrackingSection
 from .unused_keys import unused_keys
 
-LONGEST = 60  # characters of a value that is quoted
-S = TypeVar("S", bound="InferenceSections")
-
-
-class InferenceSections(Section):
-    """The sections that say how tracks become forces, wherever the tracks come from."""
-
-    material: MaterialSection = key("What all rods have in common.", default=MaterialSection())
-    calibration: CalibrationSection = key("Self-calibration from persistent contacts.", default=CalibrationSection())
-    contacts: ContactsSection = key("Tuning of contact detection.", default=ContactsSection())
-    solver: SolverSection = key("Tuning of the force solver.", default=SolverSection())
-    recording: RecordingSection = key("Tuning of the recording.", default=RecordingSection())
+MAX_QUOTED = 60  # characters of a quoted value
+LENGTHS = ("too_long", "too_short")  # errors of lists
+S = TypeVar("S", bound=InferenceSections)
 
 
 class InputSections(Section):
-    """The sections that say what was measured, and how photographs become tracks."""
+    """The sections that describe the measurement, and how photographs become tracks."""
 
-    name: Annotated[str, Field(pattern=r"^[\w][\w .+-]*$")] = key(
-        "Name of the experiment: of its results' folder, too."
-    )
+    name: Annotated[str, Field(pattern=r"^[\w][\w .+-]*$")] = key("Name of the experiment and of its results' folder.")
     photographs: PhotographsSection | None = key("Photographs to be tracked. Give these or tracks.", default=None)
-    tracks: GivenTracks | None = key("Grains that any other tool has tracked. Give these or photographs.", default=None)
+    tracks: GivenTracks | None = key("Grains tracked by any other tool. Give these or photographs.", default=None)
     walls: WallsSection | None = key(
         "The walls; without them and without a boundary grains are tracked but not solved.", default=None
     )
-    boundary: BoundarySection | None = key("What bounds the packing where it is no wall.", default=None)
+    boundary: BoundarySection | None = key("Boundary of the packing where it has no wall.", default=None)
     tracking: TrackingSection = key("Tuning of the tracker.", default=TrackingSection())
 
 
 class ExperimentFile(InferenceSections, InputSections):
-    """All of an experiment."""
+    """All sections of an experiment."""
 
     sensitivity: SensitivitySection = key("Ranges of the robustness study.", default=SensitivitySection())
-    truth: str | None = key("Table frame,i,j,fn,ft of true contact forces, to be compared with.", default=None)
+    truth: str | None = key("Table frame,i,j,fn,ft of true contact forces, for comparison.", default=None)
     truth_tracks: str | None = key(
-        "Table frame,id,x,y,theta that names detected grains as the truth does.", default=None
+        "Table frame,id,x,y,theta of true poses, by which detected grains get the ids of the truth.", default=None
     )
 
     @model_validator(mode="after")
@@ -76,42 +57,46 @@ class ExperimentFile(InferenceSections, InputSections):
         if self.boundary is None or self.boundary.periodic is None:
             return self
         if self.walls is not None:
-            raise ValueError("boundary.periodic stands instead of [walls]: give one of them")
+            raise ValueError("boundary.periodic is given instead of [walls]: give one of them")
         if any(self.material.gravity):
-            raise ValueError("material.gravity: nothing carries the weight in a periodic cell")
+            raise ValueError("material.gravity: no boundary carries the weight in a periodic cell")
         return self
 
 
 def load_config(file: Path, settings: Sequence[str] = (), inputs: InputFiles | None = None) -> ExperimentFile:
-    """Read an experiment file and lay KEY=VALUE settings over it; raises InputError naming file, key and value."""
+    """Read an experiment file and override it by KEY=VALUE settings. Raises InputError with file, key and value."""
     try:
         data = tomllib.loads((InputFiles() if inputs is None else inputs).read(file).decode("utf-8"))
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(file, "", f"cannot be read ({error})") from None
-    except (ValueError, RecursionError) as error:  # also a number of thousands of digits
+    except (ValueError, RecursionError) as error:  # ValueError also for a number of thousands of digits
         raise InputError(file, "", f"is not TOML: {error}") from None
     return _validated(ExperimentFile, file, data, settings)
 
 
 def load_sections(settings: Sequence[str]) -> InferenceSections:
-    """Defaults with KEY=VALUE settings laid over; raises InputError naming key and value."""
+    """Return the defaults overridden by KEY=VALUE settings. Raises InputError with key and value."""
     return _validated(InferenceSections, "settings", {}, settings)
 
 
-def find_complaints(file: Path, data: dict[str, Any]) -> list[tuple[str, InputError]]:
-    """Everything that is wrong with the values of an experiment file, each with the key that it is about."""
+def find_config_errors(file: Path, data: dict[str, Any]) -> list[tuple[str, InputError]]:
+    """Return all errors in the values of an experiment file, each with its key."""
     try:
         ExperimentFile.model_validate(data)
     except ValidationError as error:
-        return [_explain_one(file, each) for each in error.errors()]
+        found = {}
+        for each in error.errors():  # one for each key, where several kinds of value were tried
+            name, explained = _explain_one(file, each)
+            found.setdefault((name, "" if name else explained.problem), (name, explained))
+        return list(found.values())
     return []
 
 
 def _validated(kind: type[S], file: Path | str, data: dict[str, Any], settings: Sequence[str]) -> S:
     for setting in settings:
-        _lay_over(data, setting)
+        _override(data, setting)
     _refuse_nul(file, data, "")
     try:
         return kind.model_validate(data)
@@ -120,7 +105,7 @@ def _validated(kind: type[S], file: Path | str, data: dict[str, Any], settings: 
 
 
 def _refuse_nul(file: Path | str, value: Any, name: str) -> None:
-    """No file and no library takes a text with a NUL in it."""
+    """Raise InputError for a text with a NUL character, which no file name and no library accepts."""
     if isinstance(value, dict):
         for key, part in value.items():
             _refuse_nul(file, str(key), f"{name}.{key}".strip("."))
@@ -132,7 +117,7 @@ def _refuse_nul(file: Path | str, value: Any, name: str) -> None:
         raise InputError(file, f"key {name!r} = {value!r}", "holds a NUL character")
 
 
-def _lay_over(data: dict[str, Any], setting: str) -> None:
+def _override(data: dict[str, Any], setting: str) -> None:
     name, equals, text = setting.partition("=")
     if not equals or not name.strip():
         raise InputError("--set", setting, "is not KEY=VALUE, such as solver.kappa=0.05")
@@ -148,47 +133,90 @@ def _lay_over(data: dict[str, Any], setting: str) -> None:
     data[last] = value
 
 
+# Parts of a place that pydantic adds: the kind of value that was tried, the free names of walls.
+_INNER = ("plates", "constrained-float", "constrained-int", "float", "int", "str", "bool")
+
+
+def find_wrong_values(file: Path, data: dict[str, Any], keys: Collection[str]) -> list[str]:
+    """Return the errors of given values, each in words; keys: those that are judged, with all below them.
+
+    A key that is missing is no wrong value.
+    """
+    try:
+        ExperimentFile.model_validate(data)
+    except ValidationError as error:
+        found: dict[str, str] = {}
+        for each in error.errors():
+            name, explained = _explain_one(file, each)
+            concerned = any(
+                name == key or name.startswith(f"{key}.") or f"{name}.{_first_word(explained)}" == key for key in keys
+            )
+            if concerned and each["type"] != "missing":
+                problem = explained.problem.partition(";")[0] if each["type"] != "value_error" else explained.problem
+                found.setdefault(name, f"{name}: {problem}{_meaning(name)}")
+        return list(found.values())
+    return []
+
+
+def _first_word(error: InputError) -> str:
+    return error.problem.partition(" ")[0]
+
+
 def _explain(file: Path | str, error: ValidationError) -> InputError:
     return _explain_one(file, error.errors()[0])[1]
 
 
 def _explain_one(file: Path | str, first: ErrorDetails) -> tuple[str, InputError]:
-    """The key that a complaint is about, and the complaint."""
-    name = ".".join(str(part) for part in first["loc"] if part not in ("plates",))
+    """Return the key of a validation error, and the error for the user."""
+    name = ".".join(str(part) for part in first["loc"] if str(part) not in _INNER and "[" not in str(part))
     where = f"key {name}" if name else ""
     if first["type"] == "extra_forbidden":
         other = nearest_key(ExperimentFile, name)
-        meant = f": did you mean {other}?" if other else ""
-        return name, InputError(file, where, f"is not known (value {first['input']!r}){meant}")
-    if first["type"] == "missing":
+        hint = f": did you mean {other}?" if other else ""
+        return name, InputError(file, where, f"is not known (value {first['input']!r}){hint}")
+    if first["type"] == "missing" and not isinstance(first["loc"][-1], int):
         return name, InputError(file, where, f"is missing{_meaning(name)}")
     if first["type"] == "value_error":
         return name, InputError(file, where, first["msg"].removeprefix("Value error, "))
-    said = first["msg"].replace("Input should be", "must be")
-    return name, InputError(file, where, f"value {_shortened(first['input'])}: {said}{_range(name)}{_meaning(name)}")
+    value = f"value {_shortened(first['input'])}"
+    if first["type"] == "model_type":
+        return name, InputError(file, where, f"{value}: is a section: write [{name}] and its keys below it")
+    known = _key_of(name)
+    if known is not None and (name != known.name or first["type"].endswith("_type") or first["type"] in LENGTHS):
+        return name, InputError(file, f"key {known.name}", f"{value}{_range(known.name)}{_meaning(known.name)}")
+    if first["type"] == "string_pattern_mismatch":
+        words = "must begin with a letter or a digit, and hold letters, digits, spaces and . + - _ only"
+        return name, InputError(file, where, f"{value}: {words}{_range(name)}{_meaning(name)}")
+    expected = first["msg"].replace("Input should be", "must be").replace("a valid dictionary", "a section of keys")
+    return name, InputError(file, where, f"{value}: {expected}{_range(name)}{_meaning(name)}")
+
+
+def _key_of(name: str) -> Key | None:
+    """Return the key that a name denotes, perhaps followed by an index, or by one of its kinds of values."""
+    return find_key(ExperimentFile, name) or find_key(ExperimentFile, name.rpartition(".")[0])
 
 
 def _shortened(value: Any) -> str:
     text = f"about 10^{value.bit_length() * 3 // 10}" if isinstance(value, int) and abs(value) > 10**30 else repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]} …"
+    return text if len(text) <= MAX_QUOTED else f"{text[:MAX_QUOTED]} …"
 
 
 def _range(name: str) -> str:
-    """What may stand at a key, to be appended to a complaint."""
+    """Return the allowed values of a key, to append to an error."""
     found = find_key(ExperimentFile, name)
     return "" if found is None else f"; {found.name} is a {found.kind}"
 
 
 def _meaning(name: str) -> str:
-    """The first sentence of what a key says of itself, to be appended to a complaint."""
+    """Return the first sentence of a key's description, to append to an error."""
     found = find_key(ExperimentFile, name)
     return "" if found is None else f" ({found.summary})"
 
 
 def as_toml(config: InferenceSections) -> str:
-    """The resolved configuration, defaults included, as TOML that reads back to the same.
+    """Return the resolved configuration with its defaults as TOML, which loads to the same configuration.
 
-    Defaults that the chosen estimator does not use are left out: the text is an experiment file that is accepted.
+    Defaults that the chosen estimator does not use are left out, so that the text is a valid experiment file.
     """
     data = config.model_dump(exclude_none=True)
     for name in unused_keys(config):
@@ -197,5 +225,5 @@ def as_toml(config: InferenceSections) -> str:
             data[section].pop(last, None)
     walls = data.get("walls")
     if walls is not None and not walls["plates"].keys() & WallsSection.model_fields.keys():
-        walls.update(walls.pop("plates"))  # as a person writes it: [walls.NAME]
+        walls.update(walls.pop("plates"))  # in the form of an experiment file: [walls.NAME]
     return tomli_w.dumps(data)

@@ -1,4 +1,4 @@
-"""Sections of the experiment file that say what was photographed or tracked, and where it is."""
+"""Sections of the experiment file for its inputs: photographs, tracks, walls and boundaries."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pydantic import BeforeValidator, model_validator
 
 from .section import Finite, Length, Pixels, Section, Switch, above, between, key, whole
 
-OUTER = "outer"  # in place of a table: the outermost grains
+OUTER = "outer"  # instead of a table: the outermost grains
 
 
 def _pixel_size(value: Any) -> Any:
-    """One side or both, in one line of complaint: a union's own would name its branches."""
+    """Validate one or both sides of a pixel with a one-line error (pydantic would list all branches of a union)."""
     sides = value if isinstance(value, list | tuple) else [value]
     numbers = all(isinstance(side, int | float) and not isinstance(side, bool) for side in sides)
     if len(sides) not in (1, 2) or not numbers or not all(0 < side <= 1 for side in sides):
@@ -21,7 +21,7 @@ def _pixel_size(value: Any) -> Any:
 
 
 class LensSection(Section):
-    """How the lens bends the picture: OpenCV's model, or Brown's with capital letters as p-tracker writes it."""
+    """Distortion by the lens: OpenCV's model, or Brown's with capital letters as in p-tracker."""
 
     fx: Pixels | None = key("Focal length along the rows, OpenCV's model.", unit="px", default=None)
     fy: Pixels | None = key("Focal length along the columns; absent: as fx.", unit="px", default=None)
@@ -59,7 +59,7 @@ class KnownDistance(Section):
 
     start: tuple[Finite, Finite] = key("Column and row of one point.", unit="px")
     end: tuple[Finite, Finite] = key("Column and row of the other point.", unit="px")
-    metres: Length = key("Distance of the two points; the farther apart they are, the better.", unit="m")
+    metres: Length = key("Distance of the two points; a longer distance is more precise.", unit="m")
 
     @model_validator(mode="after")
     def _apart(self) -> KnownDistance:
@@ -69,12 +69,15 @@ class KnownDistance(Section):
 
 
 Column = Annotated[int, whole(0, 10**6)]
+Pixel = Annotated[float, between(-1e6, 1e6)]  # a place, beyond the photograph as well
 
 
 class PhotographsSection(Section):
-    """Where the photographs are and what a pixel is."""
+    """The photographs, their scale and their times."""
 
-    files: str = key("Pattern of the photographs, relative to the experiment; taken in natural order of their names.")
+    files: str = key(
+        "Pattern of the photographs, relative to the experiment; they are sorted by name in natural order."
+    )
     pixel_size: Annotated[float | tuple[float, float] | None, BeforeValidator(_pixel_size)] = key(
         "Side of a pixel in the plane of the rods' ends. Two numbers where pixels are not square: along rows, along "
         "columns. Give this or distance.",
@@ -82,41 +85,46 @@ class PhotographsSection(Section):
         default=None,
     )
     distance: KnownDistance | None = key(
-        "A distance measured in the first photograph, in place of pixel_size.", default=None
+        "A distance measured in the first photograph, instead of pixel_size.", default=None
     )
-    lens: LensSection | None = key("Distortion by the lens; absent: the picture is straight.", default=None)
+    lens: LensSection | None = key("Distortion by the lens; absent: none.", default=None)
     interval: Annotated[float, above(0, 1e9)] | None = key(
         "Time between photographs. Give this or times.", unit="s", default=None
     )
-    times: str | None = key("Table frame,time of photographs at uneven times, in place of interval.", default=None)
+    times: str | None = key("Table frame,time of photographs at uneven times, instead of interval.", default=None)
     grains: str | None = key(
         "Table id,x,y,radius in pixels of the rods on the first photograph; absent: they are detected. The "
-        "detections.csv of a run, mended by hand, can be given here.",
+        "detections.csv of a run, corrected by hand, can be given here.",
         default=None,
     )
     radii: tuple[Length, ...] = key(
-        "Known radius classes of the rods. They make detection sure and tell an error of pixel_size.",
+        "Known radius classes of the rods. They make detection reliable and reveal an error of pixel_size.",
         unit="m",
         default=(),
     )
     channel: Literal["grey", "red", "green", "blue"] = key(
-        "What of colour photographs is looked at: where the rods stand out best.", default="grey"
+        "Channel of colour photographs to use: the one with the best contrast of the rods.", default="grey"
     )
     region: tuple[Column, Column, Column, Column] | None = key(
-        "First column and row, last column and row of what is looked at; nothing outside is.", unit="px", default=None
+        "First column and row, last column and row of the used part of the photographs.", unit="px", default=None
     )
+    mask: tuple[tuple[tuple[Pixel, Pixel], ...], ...] = key(
+        "Polygons of the photographs in which nothing is looked at, each a list of [column, row]: bolts, cables, "
+        "reflections.",
+        unit="px", default=(),
+    )  # fmt: skip
     follow: Literal["texture", "outline"] = key(
-        "What of the rods is followed. texture: what is painted on them, with their rotation; outline: their rims, for "
-        "discs that are plain, or that change inside as photoelastic ones do; their rotation stays unknown.",
+        "Feature of the rods that is tracked. texture: the paint on them, with their rotation; outline: their rims, "
+        "for plain discs or for discs that change inside, such as photoelastic ones; their rotation stays unknown.",
         default="texture",
     )
     max_pixels: Annotated[int, whole(1, 10**10)] = key(
-        "Pixels that a photograph may claim to have: a file of a few bytes can claim any number.",
+        "Largest number of pixels in the header of a photograph, because a file of a few bytes can state any number.",
         unit="px",
         default=200_000_000,
     )
     corrections: str | None = key(
-        "Table frame,id,x,y,theta of poses told by hand in pixels and radians, or the word lost.", default=None
+        "Table frame,id,x,y,theta of poses entered by hand in pixels and radians, or the word lost.", default=None
     )
 
     @model_validator(mode="after")
@@ -134,6 +142,15 @@ class PhotographsSection(Section):
         return self
 
     @model_validator(mode="after")
+    def _mask_has_corners(self) -> PhotographsSection:
+        for polygon in self.mask:
+            if len(polygon) < 3:
+                raise ValueError(
+                    f"mask value {[list(point) for point in polygon]!r}: a polygon has three corners or more"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _one_clock(self) -> PhotographsSection:
         if (self.interval is None) == (self.times is None):
             raise ValueError("give either interval or times")
@@ -147,20 +164,20 @@ class GivenTracks(Section):
     grains: str = key("Table id,radius of the grains in metres.")
     times: str = key("Table frame,time of the photographs in seconds.")
     radius_offset: Literal["estimate"] | Finite = key(
-        "An error that all radii share, to be added to each, or estimate: found from the gaps of touching grains.",
+        "Offset common to all radii, added to each, or estimate: found from the gaps of touching grains.",
         unit="m",
         default="estimate",
     )
     precision: Annotated[float, above(0, 1)] = key(
-        "Standard deviation of a position component. Change it to what your tracker reaches: pairs are judged by it, "
-        "unless the gaps of touching rods contradict it.",
+        "Standard deviation of a position component. Set it to the precision of your tracker: contacts are detected by "
+        "it, unless the gaps of touching rods contradict it.",
         unit="m",
         default=1.0e-5,
     )
 
 
 class Plate(Section):
-    """What is known of one wall beside its position."""
+    """Load and end points of one wall."""
 
     pressure: Annotated[float, between(1e-3, 1e11)] | None = key(
         "Pressure that loads this wall; absent: its measured velocity is imposed. One loaded wall sets the scale of "
@@ -170,14 +187,14 @@ class Plate(Section):
     )
 
     ends: Literal["auto", "bar", "corner"] = key(
-        "What the two points of this wall are. bar: points of the bar itself; corner: where bars meet, which slides "
-        "along the bar; auto: corners where their distance changes.",
+        "Meaning of the two points of this wall. bar: points of the bar itself; corner: points where bars meet, which "
+        "slide along the bar; auto: corners where their distance changes.",
         default="auto",
     )
 
 
 class WallsSection(Section):
-    """The walls: tables of straight and of circular ones, and a table [walls.NAME] of what else is known of one."""
+    """The walls: tables of straight and of circular ones, and a table [walls.NAME] with further keys of one wall."""
 
     file: str | None = key(
         "Table frame,wall,x1,y1,x2,y2 of straight walls' ends in metres; the packing lies to the left of 1 → 2.",
@@ -185,39 +202,48 @@ class WallsSection(Section):
     )
     arcs: str | None = key(
         "Table frame,wall,x,y,radius,side of circular walls in metres; side: in where the packing is inside the "
-        "circle, out where it is outside. Told in frame 0 alone, a circle stays. A column theta in radians says how it "
-        "turns.",
+        "circle, out where it is outside. A circle given in frame 0 alone does not move. A column theta in radians "
+        "gives its rotation.",
+        default=None,
+    )
+    corners: str | None = key(
+        "Table frame,corner,x,y,radius of discs in metres that are fixed to the frame where two bars meet; rods touch "
+        "them. Without `file`, the bars run through the centres of neighbouring corners. A disc turns with its bar, "
+        "unless a column theta in radians gives its rotation, and shares the load of a loaded bar.",
         default=None,
     )
     load: str | None = key(
-        "Table frame,wall,force of the normal force in newtons that was measured on walls, in every photograph: it "
-        "loads them instead of a pressure.",
+        "Table frame,wall,force of the normal force in newtons measured on walls in every photograph, which loads them "
+        "instead of a pressure.",
         default=None,
     )
     track: Switch | None = key(
-        "Follow walls in the photographs where the table has no row; absent: where it has frame 0 alone.", default=None
+        "Track walls in the photographs where the table has no row; absent: where it has frame 0 alone.", default=None
     )
     thickness: Length | None = key(
-        "Thickness of the bars seen beside the walls' inner faces; absent: measured on the picture.",
+        "Thickness of the bars seen beside the walls' inner faces; absent: measured on the photograph.",
         unit="m",
         default=None,
     )
     forces: str | None = key(
-        "Table frame,wall,fx,fy of the packing's force on walls in newtons, from sensors: to compare with, never used.",
+        "Table frame,wall,fx,fy of the packing's force on walls in newtons, from sensors; for comparison only.",
         default=None,
     )
-    plates: dict[str, Plate] = key("What is known of walls by their names: the tables [walls.NAME].", default={})
+    plates: dict[str, Plate] = key("Further keys of walls by their names: the tables [walls.NAME].", default={})
 
     @model_validator(mode="after")
     def _some_walls(self) -> WallsSection:
-        if self.file is None and self.arcs is None:
-            raise ValueError("file is missing: give a table of straight walls, or arcs, a table of circular ones")
+        if self.file is None and self.arcs is None and self.corners is None:
+            raise ValueError(
+                "file is missing: give a table of straight walls, arcs, a table of circular ones, or corners, a table "
+                "of the discs where bars meet"
+            )
         return self
 
     @model_validator(mode="before")
     @classmethod
     def _gather_plates(cls, data: Any) -> Any:
-        """[walls.NAME] tables stand beside `file` in the experiment file."""
+        """Gather the tables [walls.NAME], which stand beside `file` in the experiment file."""
         if not isinstance(data, dict) or "plates" in data:
             return data
         return {
@@ -227,11 +253,11 @@ class WallsSection(Section):
 
 
 class BoundarySection(Section):
-    """What bounds the packing where it is no wall: some of its grains, or the edges of a periodic cell."""
+    """Boundary of the packing other than walls: some of its grains, or the edges of a periodic cell."""
 
     grains: str | None = key(
-        "Table id of the grains that are the boundary, or outer: the outermost ones, found on the first photograph. "
-        "They move as they were seen and carry forces, and no balance is asked of them.",
+        "Table id of the boundary grains, or outer: the outermost ones, found on the first photograph. Their measured "
+        "motion is imposed; they carry forces and need not be in equilibrium.",
         default=None,
     )
     periodic: str | None = key(
@@ -240,7 +266,7 @@ class BoundarySection(Section):
 
     @property
     def found(self) -> bool:
-        """Whether the boundary's grains are to be found."""
+        """Whether the boundary grains are to be detected."""
         return self.grains == OUTER
 
     @model_validator(mode="after")

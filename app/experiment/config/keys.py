@@ -1,4 +1,4 @@
-"""The keys of the experiment file as a person looks them up: name, kind, unit, default, meaning."""
+"""The keys of the experiment file for documentation and errors: name, kind, unit, default, meaning."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from .section import Section
 
-ANY = "NAME"  # stands for a name that the user chooses, such as that of a wall
-LIKE = 0.7  # similarity from which on a key may have been meant
+ANY = "NAME"  # placeholder of a name chosen by the user, such as that of a wall
+MIN_SIMILARITY = 0.7  # of a key that the user may have meant
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Key:
     """One key of the experiment file."""
 
     name: str  # with its sections: solver.kappa
-    kind: str  # what may stand there, in words
+    kind: str  # its allowed values, in words
     unit: str  # empty: none
     default: str  # as TOML; empty: none, or it must be given
     required: bool
@@ -31,14 +31,14 @@ class Key:
 
     @property
     def summary(self) -> str:
-        """The first sentence of its meaning, without the full stop, with its unit."""
+        """First sentence of the meaning without the full stop, with the unit."""
         first = self.meaning.partition(". ")[0].rstrip(".")
         return f"{first} [{self.unit}]" if self.unit else first
 
 
 @dataclass(frozen=True, slots=True)
 class KeySection:
-    """A table of the experiment file with the keys that stand in it."""
+    """A table of the experiment file with its keys."""
 
     name: str  # empty: the file itself
     meaning: str
@@ -47,18 +47,18 @@ class KeySection:
 
 @cache
 def list_sections(file: type[Section]) -> tuple[KeySection, ...]:
-    """Every section of the model, the file itself first."""
+    """Return all sections of the model, the file itself first."""
     schema = file.model_json_schema()
     return tuple(_walk(schema, schema, ""))
 
 
 def list_keys(file: type[Section]) -> list[Key]:
-    """Every key of the model."""
+    """Return all keys of the model."""
     return [key for section in list_sections(file) for key in section.keys]
 
 
 def find_key(file: type[Section], name: str) -> Key | None:
-    """The key of this name, a wall's own name or a place in a list included; None: there is none."""
+    """Return the key of this name, which may include the name of a wall or an index of a list; None: no such key."""
     keys = {key.name: key for key in list_keys(file)}
     parts = name.split(".")
     while parts:
@@ -70,20 +70,20 @@ def find_key(file: type[Section], name: str) -> Key | None:
 
 
 def nearest_key(file: type[Section], name: str) -> str | None:
-    """The key, or the section, that was probably meant."""
+    """Return the key or section with the most similar name, None where no name is similar."""
     names = [key.name for key in list_keys(file)]
     names += [section.name for section in list_sections(file) if section.name]
     parts = name.split(".")
-    if len(parts) == 3:  # a wall's own name is nobody's mistake
+    if len(parts) == 3:  # the name of a wall is free
         names = [each.replace(ANY, parts[1]) for each in names]
     last = {each.rpartition(".")[2]: each for each in reversed(names)}
-    if parts[-1] in last:  # of another section
+    if parts[-1] in last:  # the key of another section
         return last[parts[-1]]
-    near = get_close_matches(name, names, n=1, cutoff=LIKE)
-    if near:
-        return near[0]
-    near = get_close_matches(parts[-1], last, n=1, cutoff=LIKE)
-    return last[near[0]] if near else None
+    similar = get_close_matches(name, names, n=1, cutoff=MIN_SIMILARITY)
+    if similar:
+        return similar[0]
+    similar = get_close_matches(parts[-1], last, n=1, cutoff=MIN_SIMILARITY)
+    return last[similar[0]] if similar else None
 
 
 def _with_any_name(parts: list[str]) -> str:
@@ -92,23 +92,23 @@ def _with_any_name(parts: list[str]) -> str:
 
 def _walk(schema: dict[str, Any], part: dict[str, Any], prefix: str) -> Iterator[KeySection]:
     keys, inner = [], []
-    for name, told in part["properties"].items():
+    for name, entry in part["properties"].items():
         path = f"{prefix}{name}"
-        table, repeated = _table(schema, told)
+        table, repeated = _table(schema, entry)
         if table is not None:
             inner.append((f"{prefix}{ANY}." if repeated else f"{path}.", table))
         else:
-            default = _toml(told["default"]) if told.get("default") is not None else ""
+            default = _toml(entry["default"]) if entry.get("default") is not None else ""
             required = name in part.get("required", ())
-            keys.append(Key(path, _kind(told), told.get("unit", ""), default, required, told["description"]))
+            keys.append(Key(path, _kind(entry), entry.get("unit", ""), default, required, entry["description"]))
     yield KeySection(prefix.rstrip("."), part.get("description", ""), tuple(keys))
     for path, table in inner:
         yield from _walk(schema, table, path)
 
 
-def _table(schema: dict[str, Any], told: dict[str, Any]) -> tuple[dict[str, Any] | None, bool]:
-    """The schema of the table that a key stands for, and whether there are many of it by name."""
-    for choice in told.get("anyOf", [told]):
+def _table(schema: dict[str, Any], entry: dict[str, Any]) -> tuple[dict[str, Any] | None, bool]:
+    """Return the schema of the table at a key, and whether the table is repeated under names."""
+    for choice in entry.get("anyOf", [entry]):
         repeated = isinstance(choice.get("additionalProperties"), dict)
         reference = (choice["additionalProperties"] if repeated else choice).get("$ref")
         if reference is not None:
@@ -116,24 +116,26 @@ def _table(schema: dict[str, Any], told: dict[str, Any]) -> tuple[dict[str, Any]
     return None, False
 
 
-def _kind(told: dict[str, Any]) -> str:
-    """What may stand there, in words."""
-    if "anyOf" in told:
-        return " or ".join(_kind(choice) for choice in told["anyOf"] if choice.get("type") != "null")
-    if "enum" in told:
-        return " or ".join(f'"{each}"' for each in told["enum"])
-    what = told.get("type")
-    if what == "array":
-        if "prefixItems" in told:
-            return f"[{', '.join(_kind(item) for item in told['prefixItems'])}]"
-        return f"list of {_kind(told['items'])}"
-    if what == "object":
-        return f"table of {_kind(told['additionalProperties'])}"
-    if what in ("number", "integer"):
-        word = "number" if what == "number" else "whole number"
-        bounds = [f"{sign} {told[name]:g}" for name, sign in _BOUNDS if name in told]
+def _kind(entry: dict[str, Any]) -> str:
+    """Return the allowed values in words."""
+    if "anyOf" in entry:
+        return " or ".join(_kind(choice) for choice in entry["anyOf"] if choice.get("type") != "null")
+    if "const" in entry:
+        return f'"{entry["const"]}"'
+    if "enum" in entry:
+        return " or ".join(f'"{each}"' for each in entry["enum"])
+    kind = entry.get("type")
+    if kind == "array":
+        if "prefixItems" in entry:
+            return f"[{', '.join(_kind(item) for item in entry['prefixItems'])}]"
+        return f"list of {_kind(entry['items'])}"
+    if kind == "object":
+        return f"table of {_kind(entry['additionalProperties'])}"
+    if kind in ("number", "integer"):
+        word = "number" if kind == "number" else "whole number"
+        bounds = [f"{sign} {entry[name]:g}" for name, sign in _BOUNDS if name in entry]
         return " ".join([word, ", ".join(bounds)]).strip()
-    return {"boolean": "true or false", "string": "text"}[str(what)]
+    return {"boolean": "true or false", "string": "text"}[str(kind)]
 
 
 _BOUNDS = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<"))

@@ -1,4 +1,4 @@
-"""What every section of the experiment file is made of: frozen models, and keys that say what they mean."""
+"""Base of every section of the experiment file: a frozen model, and keys with descriptions."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ GREATEST = 2**53  # whole numbers up to it are exact wherever they are stored
 
 
 def _number(**bounds: Any) -> Any:
-    """A number within bounds: neither true nor quoted, finite."""
+    """Return the field of a finite number within bounds; booleans and quoted numbers are refused."""
     return Field(strict=True, allow_inf_nan=False, **bounds)
 
 
 def above(low: float, high: float) -> Any:
-    """low < value ≤ high."""
+    """Return the field of a number with low < value ≤ high."""
     return _number(gt=low, le=high)
 
 
 def between(low: float, high: float) -> Any:
-    """low ≤ value ≤ high."""
+    """Return the field of a number with low ≤ value ≤ high."""
     return _number(ge=low, le=high)
 
 
 def whole(low: int, high: int) -> Any:
-    """A whole number, low ≤ value ≤ high."""
+    """Return the field of a whole number with low ≤ value ≤ high."""
     return Field(strict=True, ge=low, le=high)
 
 
@@ -38,11 +38,11 @@ Switch = Annotated[bool, Field(strict=True)]
 
 
 class Section(BaseModel):
-    """A table of the experiment file. A key that it does not know is refused."""
+    """A table of the experiment file. Unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
 
 
 def key(description: str, *, unit: str = "", default: Any = PydanticUndefined) -> Any:
-    """A key of the experiment file; without a default it must be given. The first sentence is quoted in complaints."""
+    """Return a key of the experiment file, required without a default. Errors quote the first sentence."""
     return Field(default, description=description, json_schema_extra={"unit": unit} if unit else None)

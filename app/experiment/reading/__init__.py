@@ -1,1 +1,1 @@
-"""Tables and other input files as they are read."""
+"""Read tables and other input files."""

@@ -1,52 +1,57 @@
-"""Input files as they were read: one content for a whole run, whatever happens to the files meanwhile."""
+"""Read input files with one content for a whole run: a file that changes during the run is refused."""
 
 from __future__ import annotations
 
 import hashlib
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ...errors import InputError, RunError
+from ...process.errors import InputError, RunError
 
 
-def ordinary(file: Path) -> Path:
-    """The file, if it is none that never ends or answers, such as a device or a pipe. Raises InputError, OSError."""
+def regular(file: Path) -> Path:
+    """Return the file if it is neither a device nor a pipe, which may never end. Raises InputError, OSError."""
     kind = file.stat().st_mode
-    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):  # a folder is refused by whoever opens it
+    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):  # opening a folder raises its own error
         raise InputError(file, "", "is a device or a pipe, not a file")
     return file
 
 
 class InputFiles:
-    """Reads input files and keeps the hash of the very bytes that it handed out.
+    """Reader of input files that keeps the hash of the bytes it returned.
 
-    A file that is read again must still be what it was: nothing is ever made from one content and filed under the hash
-    of another.
+    A file that is read again must be unchanged, so that no result is stored under the hash of another content.
     """
 
     def __init__(self) -> None:
         self._sums: dict[Path, str] = {}  # SHA-256 by file
+        self.unused_columns: dict[Path, tuple[str, ...]] = {}  # of tables: names that nothing has read
         self._listed: dict[str, tuple[Path, ...]] = {}
 
     def read(self, file: Path) -> bytes:
-        """The bytes of a file. Raises OSError, and RunError where it has changed since it was first read."""
-        content = ordinary(file).read_bytes()
+        """Return the bytes of a file. Raises OSError, and RunError where it has changed since it was first read."""
+        content = regular(file).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
         if self._sums.setdefault(file, digest) != digest:
             raise RunError(
-                f"{file}: has changed while it was in use; the same command starts again with what it is now"
+                f"{file}: has changed while it was in use; run the same command again, which uses the new content"
             )
         return content
 
+    def note_columns(self, file: Path, unused: Sequence[str]) -> None:
+        """Note the columns of a table that its reader does not use; another reader of the file may use them."""
+        former = self.unused_columns.get(file)
+        self.unused_columns[file] = tuple(name for name in unused if former is None or name in former)
+
     def checksum(self, file: Path) -> str:
-        """SHA-256 of a file, as it was first read. Raises OSError."""
+        """Return the SHA-256 of a file as it was first read. Raises OSError."""
         if file not in self._sums:
             self.read(file)
         return self._sums[file]
 
     def listed(self, pattern: str, find: Callable[[], tuple[Path, ...]]) -> tuple[Path, ...]:
-        """The files that match a pattern, as they were first found."""
+        """Return the files that match a pattern, as they were first found."""
         if pattern not in self._listed:
             self._listed[pattern] = find()
         return self._listed[pattern]

@@ -1,4 +1,4 @@
-"""Tables without quotes, taken apart at once: a sequence has hundreds of thousands of cells."""
+"""Fast parser of tables without quotes: a sequence has hundreds of thousands of cells."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LONGEST = 1 << 17  # bytes of a line: the reader of CSV refuses longer cells
+MAX_LINE = 1 << 17  # bytes: the csv module refuses longer cells
 COMMA, NEWLINE = b",\n"
 
 
 @dataclass(frozen=True, slots=True)
 class PlainRows:
-    """Columns of a table, the same as the reader of CSV finds."""
+    """Columns of a table, equal to those that the csv module reads."""
 
     values: dict[str, list[str]]  # by name of the column, without blanks around
     line: Sequence[int]  # of each row, from 1
 
 
 def split_plain(content: bytes, columns: Sequence[str], optional: Sequence[str]) -> PlainRows | None:
-    """The named columns of a table in UTF-8; None where it is not so plain, or anything is wrong with it.
+    """Return the named columns of a table in UTF-8; None where the table is not plain, or is wrong in any way.
 
-    Plain is what has no quotes, no blank rows, and as many cells in every row.
+    A plain table has no quotes, no blank rows, and as many cells in every row.
     """
     content = content.replace(b"\r\n", b"\n").removesuffix(b"\n")
     if not columns or b'"' in content or b"\r" in content or b"\0" in content:
@@ -30,7 +30,7 @@ def split_plain(content: bytes, columns: Sequence[str], optional: Sequence[str])
     raw = np.frombuffer(content, np.uint8)
     end = np.append(np.flatnonzero(raw == NEWLINE), len(raw))
     commas = np.diff(np.searchsorted(np.flatnonzero(raw == COMMA), end), prepend=0)
-    if len(end) < 2 or np.any(commas != commas[0]) or np.diff(end, prepend=0).max() > LONGEST:
+    if len(end) < 2 or np.any(commas != commas[0]) or np.diff(end, prepend=0).max() > MAX_LINE:
         return None
     try:
         text = content.decode("utf-8-sig")
@@ -43,6 +43,6 @@ def split_plain(content: bytes, columns: Sequence[str], optional: Sequence[str])
     if any(header.count(name) != 1 for name in columns):
         return None
     values = {name: list(map(str.strip, cells[width + header.index(name) :: width])) for name in columns}
-    if "" in values[columns[0]]:  # perhaps the row is blank
+    if "" in values[columns[0]]:  # the row may be blank
         return None
     return PlainRows(values, range(2, len(end) + 1))

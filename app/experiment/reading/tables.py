@@ -1,4 +1,4 @@
-"""Tables as comma-separated text with a header, read so that every complaint names its row."""
+"""Tables as comma-separated text with a header; every error names its row."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...process.errors import InputError
+from .column_names import refuse_likely_names
 from .input_files import InputFiles
 from .plain_rows import split_plain
 
 LARGEST = 1e50  # in SI units no length, time or force is larger; its square and its cube are still numbers
-GREATEST = 2**53  # beyond it a number with a point no longer tells two whole ones apart
+GREATEST = 2**53  # float64 represents all whole numbers up to it
 
 
 class Table:
@@ -25,7 +26,7 @@ class Table:
         self.file = file
         self._columns = columns
         self._line = line
-        self._of = of  # what `line` counts
+        self._of = of  # the unit of `line`
 
     def __len__(self) -> int:
         return len(self._line)
@@ -35,54 +36,59 @@ class Table:
         return tuple(self._columns)
 
     def select(self, kept: Sequence[bool] | NDArray[np.bool_]) -> Table:
-        """The rows that are marked (m,)."""
+        """Return a table of the rows marked in `kept` (m,)."""
         columns = {name: [v for v, k in zip(values, kept, strict=True) if k] for name, values in self._columns.items()}
         line = [number for number, k in zip(self._line, kept, strict=True) if k]
         return Table(self.file, columns, line, of=self._of)
 
     def where(self, row: int) -> str:
+        """Return the line of a row in the file, in words."""
         return f"{self._of} {self._line[row]}"
 
     def text(self, column: str) -> list[str]:
+        """Return a column as texts."""
         return self._columns[column]
 
     def integers(self, column: str) -> NDArray[np.int64]:
+        """Return a column of whole numbers (m,). Raises InputError with row and value."""
         try:
             values = list(map(int, self._columns[column]))
         except ValueError:
             values = []
-        if not values or min(values) < -GREATEST or max(values) > GREATEST:  # one by one, to name what is wrong
+        if not values or min(values) < -GREATEST or max(values) > GREATEST:  # one by one, to name the wrong value
             values = [self._number(int, column, row) for row in range(len(self))]
         return np.array(values, np.int64)
 
     def numbers(self, column: str) -> NDArray[np.float64]:
+        """Return a column of finite numbers (m,). Raises InputError with row and value."""
         try:
             values = np.array(list(map(float, self._columns[column])), np.float64)
-        except ValueError:  # one by one, to name it
+        except ValueError:  # one by one, to name the wrong value
             values = np.array([self._number(float, column, row) for row in range(len(self))], np.float64)
         self._refuse_large(values, np.arange(len(self)), column)
         return values
 
-    def numbers_if_told(self, column: str) -> NDArray[np.float64]:
-        """Numbers of a column that may be absent, or empty in any row: NaN there."""
+    def optional_numbers(self, column: str) -> NDArray[np.float64]:
+        """Return the numbers of a column that may be absent or have empty cells (m,), NaN there."""
         if column not in self._columns:
             return np.full(len(self), np.nan)
-        told = np.flatnonzero([text != "" for text in self._columns[column]])
+        filled = np.flatnonzero([text != "" for text in self._columns[column]])
         values = np.full(len(self), np.nan)
-        values[told] = [self._number(float, column, int(row)) for row in told]
-        self._refuse_large(values[told], told, column)
+        values[filled] = [self._number(float, column, int(row)) for row in filled]
+        self._refuse_large(values[filled], filled, column)
         return values
 
     def error(self, row: int, column: str, problem: str) -> InputError:
+        """Return the error of a value, with file, row, column and value."""
         return InputError(self.file, f"{self.where(row)}, {column} = {self._columns[column][row]!r}", problem)
 
     def _refuse_large(self, values: NDArray[np.float64], row: NDArray[np.integer], column: str) -> None:
-        """Raise where one of the values, of these rows, is not a number that anything here can have."""
+        """Raise InputError where a value is not finite or larger than any physical quantity."""
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
             finite = np.isfinite(values[bad[0]])
-            what = "is larger than any length, time or force" if finite else "is not a finite number"
-            raise self.error(int(row[bad[0]]), column, what)
+            problem = "is larger than any length, time or force" if finite else "is not a finite number"
+            raise self.error(int(row[bad[0]]), column, problem)
 
     def _number(self, kind: type[int] | type[float], column: str, row: int) -> int | float:
         text = self._columns[column][row]
@@ -92,27 +98,45 @@ class Table:
             name = "a whole number" if kind is int else "a number"
             raise self.error(row, column, f"is not {name}") from None
         if kind is int and abs(value) > GREATEST:
-            raise self.error(row, column, f"is beyond the whole numbers that are exact, ± {GREATEST}")
+            raise self.error(row, column, f"is beyond the range of exact whole numbers, ± {GREATEST}")
         return value
 
 
 def read_table(
     file: Path, columns: Sequence[str], inputs: InputFiles | None = None, optional: Sequence[str] = ()
 ) -> Table:
-    """Read the named columns of a table; others are passed over. Raises InputError naming file, row and value.
+    """Read the named columns of a table; other columns are ignored.
 
-    inputs: what the file is read by, where it has to stay what it is; optional: columns that may be absent.
+    Parameters
+    ----------
+    file
+        The table.
+    columns
+        Names of the columns to read.
+    inputs
+        Reads the file and refuses it if it has changed since it was first read.
+    optional
+        Names of columns that may be absent.
+
+    Raises
+    ------
+    InputError
+        The table is wrong; the message names file, row and value.
     """
+    inputs = InputFiles() if inputs is None else inputs
     try:
-        content = (InputFiles() if inputs is None else inputs).read(file)
+        content = inputs.read(file)
         if b"\0" in content:
             raise InputError(file, f"row {content[: content.index(0)].count(10) + 1}", "holds a NUL character")
+        header = _header(content)
+        refuse_likely_names(file, header, columns, optional)
+        inputs.note_columns(file, [name for name in header if name not in (*columns, *optional)])
         plain = split_plain(content, columns, optional)
         if plain is not None:
             return Table(file, plain.values, plain.line)
         with io.StringIO(content.decode("utf-8-sig"), newline="") as stream:
             reader = csv.reader(stream)
-            header = [name.strip() for name in next(reader, [])]
+            next(reader, [])
             columns = [*columns, *(name for name in optional if name in header)]
             for name in columns:
                 if header.count(name) != 1:
@@ -138,8 +162,14 @@ def read_table(
     return Table(file, values, line)
 
 
+def _header(content: bytes) -> list[str]:
+    """Return the names in the first line of a table."""
+    with io.StringIO(content.decode("utf-8-sig"), newline="") as stream:
+        return [name.strip() for name in next(csv.reader(stream), [])]
+
+
 def write_table(file: Path, columns: Mapping[str, Iterable[object]]) -> None:
-    """Write columns of equal length; floats with all their digits."""
+    """Write columns of equal length, floats with all their digits."""
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
@@ -147,7 +177,7 @@ def write_table(file: Path, columns: Mapping[str, Iterable[object]]) -> None:
 
 
 def check_frames(table: Table, frame: NDArray[np.int64]) -> int:
-    """The number of frames; they must start at 0 and have no gaps."""
+    """Return the number of frames, which must start at 0 and have no gaps. Raises InputError otherwise."""
     if frame.min() < 0:
         raise table.error(int(frame.argmin()), "frame", "is negative: frames count from 0")
     present = np.unique(frame)
@@ -159,7 +189,7 @@ def check_frames(table: Table, frame: NDArray[np.int64]) -> int:
 
 
 def check_unique(table: Table, column: str, *keys: NDArray[np.int64]) -> None:
-    """No two rows may share all keys; the complaint names the later row."""
+    """Raise InputError with the later row where two rows have the same keys."""
     stacked = np.stack(keys, axis=1)
     _, first = np.unique(stacked, axis=0, return_index=True)
     if len(first) < len(stacked):

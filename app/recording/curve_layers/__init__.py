@@ -1,1 +1,1 @@
-"""What is drawn as curves and plots, a file for each."""
+"""The curves and plots, one file each."""

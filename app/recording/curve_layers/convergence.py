@@ -1,19 +1,18 @@
-"""Writes the residuals of every sweep, as powers of ten: the viewer has no logarithmic axis."""
+"""Writes log10 of the residuals of every sweep, as the viewer has no logarithmic axis."""
 
 from __future__ import annotations
 
 import numpy as np
 import rerun as rr
 
-from solver.bodies.grains import Array
-from solver.nlgs.sweep_record import SweepHistory
-
+from ...solver.bodies.grains import Array
+from ...solver.nlgs.sweep_record import SweepHistory
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba
 from ..look.values import log_scalar, send_scalars
 
-SMALLEST = 1e-16  # residuals below are drawn here: rounding level
+SMALLEST = 1e-16  # smaller residuals are drawn here: rounding level
 
 
 def log_residual_styles(stream: rr.RecordingStream) -> None:
@@ -24,7 +23,7 @@ def log_residual_styles(stream: rr.RecordingStream) -> None:
 
 
 def log_tolerance(clock: Clock, tolerance: float) -> None:
-    """Log the stopping level, once a frame."""
+    """Log the stopping level, once per frame."""
     clock.start()
     log_scalar(clock, entities.TOLERANCE, float(power_of_ten(np.array(tolerance))))
 
@@ -35,14 +34,14 @@ def log_tolerance_style(stream: rr.RecordingStream) -> None:
 
 
 def log_residuals(clock: Clock, history: SweepHistory) -> None:
-    """Log one frame's residuals of every sweep measured (at least one sweep); on `frame`, those of the last."""
+    """Log the residuals of every measured sweep of one frame (at least one), on `frame` those of the last."""
     for path, residual in (
         (entities.SWEEP_NATURAL_MAP, history.natural_map),
         (entities.SWEEP_UNBALANCE, history.unbalance),
         (entities.SWEEP_FORCE_CHANGE, history.force_change),
     ):
         powers = power_of_ten(residual)
-        known = np.flatnonzero(np.isfinite(powers))  # no gaps between, which would break the curve
+        known = np.flatnonzero(np.isfinite(powers))  # unmeasured sweeps are left out: gaps would interrupt the curve
         if len(known):
             when = rr.TimeColumn(entities.SWEEP, sequence=clock.first + known)
             send_scalars(clock.stream, path, when, powers[known])
@@ -51,7 +50,7 @@ def log_residuals(clock: Clock, history: SweepHistory) -> None:
 
 
 def power_of_ten(residual: Array) -> Array:
-    """log10 of residuals, not below that of SMALLEST; NaN stays NaN, infinity becomes NaN."""
+    """Return log10 of residuals, at least that of SMALLEST; NaN stays NaN, infinity becomes NaN."""
     residual = np.where(np.isinf(residual), np.nan, residual)
     return np.log10(np.maximum(residual, SMALLEST))
 

@@ -6,9 +6,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.statistics.force_statistics import mean_normal_force
-
+from ...solver.bodies.grains import Array
+from ...solver.statistics.force_statistics import mean_normal_force
 from ..look import entities
 from ..look.axes import Axes, log_texts
 from ..look.clock import Clock
@@ -23,11 +22,11 @@ EDGES = np.linspace(0.0, LARGEST, BINS + 1)
 
 
 class ForceDensity:
-    """Counts forces frame by frame."""
+    """Histogram of forces, of each frame and pooled over the frames so far."""
 
     def __init__(self) -> None:
         self._pooled = np.zeros(BINS)  # counts
-        self._total = 0  # forces counted, those beyond the axis too
+        self._total = 0  # forces counted, including those beyond the axis
 
     def log_axes(self, stream: rr.RecordingStream) -> None:
         """Log axes with the exponential e^(−f/⟨f⟩) for comparison."""
@@ -55,7 +54,7 @@ class ForceDensity:
         clock.stream.log(
             entities.FORCE_DENSITY,
             rr.Points2D(
-                density_points(*merged(counts, 1), len(loaded)),
+                density_points(*merge_bins(counts, 1), len(loaded)),
                 radii=np.float32(4.0),
                 colors=packed_one(SERIES[0]),
                 draw_order=20.0,
@@ -64,7 +63,7 @@ class ForceDensity:
         clock.stream.log(
             entities.FORCE_DENSITY_POOLED,
             rr.LineStrips2D(
-                [density_points(*merged(self._pooled), self._total)],
+                [density_points(*merge_bins(self._pooled), self._total)],
                 radii=np.float32(1.6),
                 colors=packed_one(SERIES[1]),
                 draw_order=10.0,
@@ -72,10 +71,10 @@ class ForceDensity:
         )
         self._log_tail(clock, loaded / mean_normal_force(fn) if len(loaded) else loaded, tail_exponent)
 
-    def _log_tail(self, clock: Clock, share: Array, exponent: float) -> None:
-        """Log the density S β exp(−β (x − 1)) above the mean, S the share of the forces (c,) that is there."""
+    def _log_tail(self, clock: Clock, ratio: Array, exponent: float) -> None:
+        """Log the density S β exp(−β (x − 1)) above the mean; S is the fraction of the forces (c,) above it."""
         strips, texts = [], []
-        above = float(np.mean(share > 1.0)) if len(share) else 0.0
+        above = float(np.mean(ratio > 1.0)) if len(ratio) else 0.0
         if np.isfinite(exponent) and exponent > 0.0 and above > 0.0:
             x = np.linspace(1.0, LARGEST, 29)
             power = np.log10(above * exponent) - exponent * (x - 1.0) * np.log10(np.e)
@@ -89,21 +88,34 @@ class ForceDensity:
         log_texts(clock.stream, entities.FORCE_DENSITY_TAIL_VALUE, texts, static=False)
 
 
-def merged(counts: Array, least: int = 4) -> tuple[Array, Array, Array]:
-    """Centres, counts and widths of bins (k,), neighbours above the mean thrown together until they hold `least`."""
+def merge_bins(counts: Array, least: int = 4) -> tuple[Array, Array, Array]:
+    """Merge neighbouring bins above the mean until each contains `least` forces.
+
+    Parameters
+    ----------
+    counts : array (BINS,)
+        Forces per bin.
+    least : int
+        Least number of forces of a merged bin.
+
+    Returns
+    -------
+    centre, count, width : array (k,)
+        The merged bins.
+    """
     centre, count, width, start = [], [], [], 0
     for stop in range(1, BINS + 1):
-        held = counts[start:stop].sum()
-        if held >= least or EDGES[stop] <= 1.0:
+        total = counts[start:stop].sum()
+        if total >= least or EDGES[stop] <= 1.0:
             centre.append(0.5 * (EDGES[start] + EDGES[stop]))
-            count.append(held)
+            count.append(total)
             width.append(EDGES[stop] - EDGES[start])
             start = stop
     return np.array(centre), np.array(count), np.array(width)
 
 
 def density_points(centre: Array, count: Array, width: Array, total: int) -> NDArray[np.float32]:
-    """Densities of `total` forces as points of the view (k, 2); empty bins and those below the axis have none."""
+    """Return densities of `total` forces as points of the view (k, 2), without empty bins and those below the axis."""
     with np.errstate(divide="ignore"):
         power = np.log10(count / (max(total, 1) * width))
     shown = power >= DECADES[0]

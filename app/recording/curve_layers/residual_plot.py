@@ -1,7 +1,7 @@
-"""Draws a frame's residuals over its sweeps on two logarithmic axes, which the viewer itself does not have.
+"""Draws the residuals of a frame over its sweeps on two logarithmic axes, which the viewer lacks.
 
-The curves are those of the chain, the stopping level and a start from zero forces beside them; on the timeline `sweep`
-points move along the curves.
+The curves are those of the chain, with the stopping level and the residuals of a start from zero forces; on the
+timeline `sweep` points move along the curves.
 """
 
 from __future__ import annotations
@@ -12,42 +12,49 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.nlgs.starts import COLD_SWEEPS
-from solver.nlgs.sweep_record import SweepHistory
-from solver.statistics.force_statistics import mean_normal_force
-
+from ...solver.bodies.grains import Array
+from ...solver.nlgs.start_residuals import COLD_SWEEPS
+from ...solver.nlgs.sweep_record import SweepHistory
+from ...solver.statistics.force_statistics import mean_normal_force
 from ..look import entities
 from ..look.axes import Axes
 from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba, packed
-from ..packing_layers.unconverged import changes_per_sweep
+from ..packing_layers.residual_maps import changes_per_sweep
 
 DECADES = (-6.0, 2.0)  # log10 of a residual, bottom and top
-MOST_POINTS = 220  # of a curve
-LEAST_SWEEPS = 1000  # that the axis has room for
+MAX_POINTS = 220  # of a curve
+MIN_SWEEPS = 1000  # least range of the axis
 COLOURS: tuple[Rgba, ...] = (SERIES[0], SERIES[1], SERIES[3])  # natural map, unbalance, mean change
 COLD: Rgba = (176, 222, 128, 150)
 _POWERS = "⁰¹²³⁴⁵⁶"
 
 
 class ResidualPlot:
-    """Draws the residuals of frames; the axis of sweeps has room for what the first frame took."""
+    """Draws the residuals of frames; the axis of sweeps covers the sweeps of the first frame."""
 
     def __init__(self, tolerance: float | None) -> None:
         self._tolerance = tolerance
         self._axes: Axes | None = None
 
-    def go_on(self, stream: rr.RecordingStream) -> None:
-        """Log the axes into another stream, too."""
+    def continue_in(self, stream: rr.RecordingStream) -> None:
+        """Log the axes into another stream."""
         if self._axes is not None:
             self._log_axes(stream, self._axes)
 
     def log(self, clock: Clock, history: SweepHistory, cold: Array | None, marked: NDArray[np.int64]) -> None:
-        """Draw one frame (at least one sweep).
+        """Draw one frame.
 
-        cold (s,): residuals after COLD_SWEEPS sweeps from zero forces, None: not known; marked (r,): sweeps, ascending,
-        at which points stand on the curves.
+        Parameters
+        ----------
+        clock : Clock
+            The frame on the timelines.
+        history : SweepHistory
+            Residuals of at least one sweep.
+        cold : array (s,), optional
+            Residuals after COLD_SWEEPS sweeps from zero forces; None: not known.
+        marked : array (r,)
+            Sweeps, ascending, at which points are drawn on the curves.
         """
         cold = np.full(len(COLD_SWEEPS), np.nan) if cold is None else cold
         axes = self._axes or self._begin(clock.stream, history.count)
@@ -69,7 +76,7 @@ class ResidualPlot:
         self._mark(clock, axes, residuals, np.unique(np.clip(marked, 0, history.count - 1)))
 
     def _mark(self, clock: Clock, axes: Axes, residuals: Array, at: NDArray[np.int64]) -> None:
-        """Points on the curves (3, s) at sweeps; the first row carries how they look."""
+        """Log points on the curves (3, s) at sweeps; the first row contains their style."""
         rows = at if len(at) and at[0] == 0 else np.concatenate([[0], at])
         places = [axes_points(axes, np.full(3, 1.0 + row), residuals[:, row], keep=True) for row in rows.tolist()]
         clock.start()
@@ -84,7 +91,7 @@ class ResidualPlot:
             )
 
     def _begin(self, stream: rr.RecordingStream, count: int) -> Axes:
-        decades = float(np.ceil(np.log10(max(count, LEAST_SWEEPS)) - 1e-9))
+        decades = float(np.ceil(np.log10(max(count, MIN_SWEEPS)) - 1e-9))
         self._axes = Axes((0.0, decades), DECADES)
         self._log_axes(stream, self._axes)
         return self._axes
@@ -97,7 +104,7 @@ class ResidualPlot:
             level = [axes.points(np.array([0.0, decades]), np.full(2, height))]
         notes = [
             (0.24, 0.98, "natural map", COLOURS[0]),
-            (0.24, 0.91, "… of a cold start", (*COLD[:3], 255)),
+            (0.24, 0.91, "of a cold start", (*COLD[:3], 255)),
             (0.68, 0.98, "worst unbalance / mean f_n", COLOURS[1]),
             (0.68, 0.91, "change per sweep / mean f_n", COLOURS[2]),
         ]  # fmt: skip
@@ -115,9 +122,19 @@ class ResidualPlot:
 
 
 def mean_changes(history: SweepHistory) -> Array:
-    """Mean |Δf| of a sweep over the mean f_n that the chain ends with (s,), between the sweeps whose forces are kept.
+    """Return the mean |Δf| per sweep over the mean f_n at the end of the chain.
 
-    NaN where they are not. The greatest |Δf| / |f| of a contact, in contrast, tells of the weakest contacts alone.
+    The greatest |Δf| / |f| of a contact, in contrast, depends on the weakest contacts only.
+
+    Parameters
+    ----------
+    history : SweepHistory
+        Sweeps of one frame.
+
+    Returns
+    -------
+    array (s,)
+        The mean since the kept sweep before; NaN at sweeps whose forces were not kept.
     """
     mean = np.full(history.count, np.nan)
     if len(history.recorded) > 1 and history.fn.shape[1]:
@@ -129,8 +146,19 @@ def mean_changes(history: SweepHistory) -> Array:
 
 
 def envelope(residual: Array) -> tuple[Array, Array]:
-    """A curve thinned to steps that grow: the sweep (k,), counted from 1, of the greatest residual of each step."""
-    edges = np.unique(np.round(np.geomspace(1.0, len(residual) + 1.0, MOST_POINTS)).astype(np.int64)) - 1
+    """Thin a curve to logarithmic steps.
+
+    Parameters
+    ----------
+    residual : array (s,)
+        Residual of every sweep.
+
+    Returns
+    -------
+    sweep, residual : array (k,)
+        Sweep, counted from 1, and value of the greatest residual of each step.
+    """
+    edges = np.unique(np.round(np.geomspace(1.0, len(residual) + 1.0, MAX_POINTS)).astype(np.int64)) - 1
     known = np.where(np.isfinite(residual), residual, -1.0)
     at = [a + int(np.argmax(known[a:b])) for a, b in pairwise(edges.tolist())]
     at = np.array(at, np.int64)
@@ -139,9 +167,21 @@ def envelope(residual: Array) -> tuple[Array, Array]:
 
 
 def axes_points(axes: Axes, sweep: Array, residual: Array, *, keep: bool = False) -> NDArray[np.float32]:
-    """Points of the plot (k, 2) at sweeps counted from 1; what lies outside is drawn at the rim.
+    """Return points of the plot.
 
-    With `keep` a residual that is not known, or zero, is drawn at the bottom; otherwise it is left out.
+    Parameters
+    ----------
+    axes : Axes
+        Axes of log10 of sweep and residual; points outside are drawn at their ends.
+    sweep, residual : array (k,)
+        Sweep, counted from 1, and residual.
+    keep : bool
+        Draw unknown and zero residuals at the bottom; otherwise they are left out.
+
+    Returns
+    -------
+    array (k, 2)
+        View coordinates.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         x, y = np.log10(sweep), np.log10(residual)

@@ -1,23 +1,22 @@
-"""Writes how far a frame is to be trusted: status lanes, trust, settling, flags."""
+"""Writes the reliability of a frame: status lanes, trust, settling and flags."""
 
 from __future__ import annotations
 
 import numpy as np
 import rerun as rr
 
-from solver.bodies.grains import Array
-from solver.sequence.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
-
+from ...solver.bodies.grains import Array
+from ...solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ...tracks import Tracks, TrackStatus
 from ..look import entities
 from ..look.clock import Clock
-from ..look.colours import BOUNDARY, GAINED, INFERRED, INK, LOST, SERIES, Rgba
+from ..look.colours import BOUNDARY, INFERRED, INK, LOST, NEW_CONTACT, SERIES, Rgba
+from ..look.printable_text import printable
 from ..look.scene import Scene
-from ..look.texts import printable
 from ..look.values import log_scalar, log_scalars
 from .convergence import power_of_ten
 
-# Apart in every vision; in grey what is settled is dark, and what asks for a look is bright.
+# Distinguishable in every kind of colour vision; in grey settled frames are dark, frames that need attention bright.
 STATUS_COLOURS: dict[FrameStatus, Rgba] = {
     FrameStatus.RESET: (188, 180, 244, 255),
     FrameStatus.SUSPECT: (229, 109, 122, 255),
@@ -26,9 +25,9 @@ STATUS_COLOURS: dict[FrameStatus, Rgba] = {
     FrameStatus.SETTLED: (15, 106, 49, 255),
     FrameStatus.FAILED: (82, 16, 44, 255),
 }
-DOUBTED = 0.9  # T below which its reasons are told
-# The lane of tracking: the first of them that holds of a frame is shown.
-SOME_LOST, SOME_CUT, SOME_INFERRED = "grains lost", "grains beyond the border", "seen ones tracked, some inferred"
+LOW_TRUST = 0.9  # T below which its reasons are flagged
+# States of the tracking lane; of those that apply to a frame the first is shown.
+SOME_LOST, SOME_CUT, SOME_INFERRED = "grains lost", "grains beyond the border", "visible ones tracked, some inferred"
 ALL_TRACKED = "all tracked"
 TRACKING_COLOURS: dict[str, Rgba] = {
     ALL_TRACKED: (58, 84, 108, 255),
@@ -70,14 +69,14 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         (entities.SIMILARITY, "similarity with the frame before", SERIES[1]),
         (entities.CORRECTION, "correction ε", SERIES[0]),
         (entities.OLD_UNBALANCE, "old unbalance ū", SERIES[3]),
-        (entities.START_DIFFERENCE, "two starts differ by H", SERIES[1]),
+        (entities.START_DIFFERENCE, "difference H of two starts", SERIES[1]),
         (entities.FRAMES_SINCE_RESET, "frames since reset", SERIES[1]),
         (entities.SAVED_SWEEPS, "sweeps saved", SERIES[1]),
         (entities.SWEEP_COUNT, "sweeps", SERIES[1]),
         (entities.FINAL_NATURAL_MAP, "natural map reached", SERIES[2]),
         (entities.FINAL_UNBALANCE, "worst unbalance of the reported field", SERIES[3]),
-        (entities.GAINED_COUNT, "gained", GAINED),
-        (entities.PARTED_COUNT, "lost", LOST),
+        (entities.NEW_CONTACT_COUNT, "new", NEW_CONTACT),
+        (entities.LOST_CONTACT_COUNT, "lost", LOST),
     ):
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
 
@@ -99,24 +98,24 @@ def log_settling(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         (entities.SWEEP_COUNT, forces.sweeps),
         (entities.FINAL_NATURAL_MAP, power_of_ten(np.array(forces.natural_map))),
         (entities.FINAL_UNBALANCE, power_of_ten(np.array(forces.unbalance))),
-        (entities.GAINED_COUNT, forces.gained_count),
-        (entities.PARTED_COUNT, forces.parted_count),
+        (entities.NEW_CONTACT_COUNT, forces.new_contact_count),
+        (entities.LOST_CONTACT_COUNT, forces.lost_contact_count),
     ):
         log_scalar(clock, path, float(value))
     if forces.error_budget is not None:
         _log_error_budget(clock, forces.error_budget)
 
 
-def _log_error_budget(clock: Clock, share: Array) -> None:
-    """Log the shares (p,) of the causes, and how they look: a recording without any has no such curves."""
-    log_scalars(clock, entities.ERROR_BUDGET, share)
+def _log_error_budget(clock: Clock, fraction: Array) -> None:
+    """Log the fractions (p,) of the causes and the styles of their curves, which other recordings lack."""
+    log_scalars(clock, entities.ERROR_BUDGET, fraction)
     colours = [(*SERIES, BOUNDARY, INK)[part] for part in range(len(ERROR_PARTS))]
     style = rr.SeriesLines(colors=colours, names=list(ERROR_PARTS), widths=[2.0] * len(ERROR_PARTS))
     clock.stream.log(entities.ERROR_BUDGET, style, static=True)
 
 
 def tracking_state(tracks: Tracks, frame: int) -> str:
-    """What the lane of tracking says of a frame."""
+    """Return the state of a frame in the tracking lane."""
     if tracks.lost[frame].any():
         return SOME_LOST
     if tracks.out_of_frame[frame].any():
@@ -130,15 +129,15 @@ def _log_flags(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     now = present[clock.frame]
     if forces.status in _LEVELS:
         _log_flag(clock, f"{forces.status.name.lower()}: {forces.reason}", _LEVELS[forces.status])
-    if forces.doubt and forces.trust < DOUBTED:
-        _log_flag(clock, f"T = {forces.trust:.2f}: {forces.doubt}", "INFO")
+    if forces.trust_penalties and forces.trust < LOW_TRUST:
+        _log_flag(clock, f"T = {forces.trust:.2f}: {forces.trust_penalties}", "INFO")
     cut = scene.tracks.out_of_frame[clock.frame]
     if (before & ~now & ~cut).any():
         ids = _listed(scene, before & ~now & ~cut)
-        _log_flag(clock, f"lost grain {ids}: takes no part from here", "WARN")
+        _log_flag(clock, f"grain {ids} is lost and left out from this frame on", "WARN")
     if (before & cut).any():
         ids = _listed(scene, before & cut)
-        _log_flag(clock, f"grain {ids} is cut by the picture's border: takes no part from here", "INFO")
+        _log_flag(clock, f"grain {ids} is cut by the border of the picture and left out from this frame on", "INFO")
     if clock.frame and (now & ~before).any():
         _log_flag(clock, f"grain {_listed(scene, now & ~before)} found again", "INFO")
 
@@ -148,7 +147,7 @@ def _log_flag(clock: Clock, text: str, level: str) -> None:
 
 
 def _listed(scene: Scene, rows: np.ndarray) -> str:
-    """Grain ids, at most eight of them."""
+    """Return the ids of grains, at most eight."""
     ids = scene.tracks.id[rows].tolist()
     shown = ", ".join(str(i) for i in ids[:8])
     return f"{shown} and {len(ids) - 8} more" if len(ids) > 8 else shown

@@ -8,16 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import rerun as rr
 
-from solver.bodies.grains import Array
-from solver.bodies.walls import Walls
-from solver.statistics.frame_statistics import FrameStatistics
-
 from ...results.schema import unit_of
+from ...solver.bodies.grains import Array
+from ...solver.bodies.walls import Walls
+from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import SERIES, Rgba
+from ..look.printable_text import printable
 from ..look.scene import Scene
-from ..look.texts import printable
 from ..look.values import log_scalar, log_scalars
 
 BAND_NAME = "95 %"
@@ -25,15 +24,16 @@ KILO, DEGREES = 1e-3, math.degrees(1.0)
 
 
 class Curve(NamedTuple):
-    """One quantity over time; its entity ends with the name of its field."""
+    """One quantity over time; its entity ends with the name of the field."""
 
     path: str
     name: str  # in the legend
     colour: Rgba
-    unit: float = 1.0  # by which it is multiplied to be shown
+    unit: float = 1.0  # factor from the stored to the displayed value
 
     @property
     def field(self) -> str:
+        """Field of FrameStatistics."""
         return self.path.rpartition("/")[2]
 
 
@@ -60,11 +60,11 @@ CURVES = (
     Curve(entities.MOBILISATION, "mobilisation |f_t| / μ f_n", SERIES[0]),
     Curve(entities.TAIL_EXPONENT, "tail exponent β", SERIES[0]),
     Curve(entities.PLATEAU_RATIO, "plateau ratio", SERIES[1]),
-    Curve(entities.STRONG_SHARE, "strong contacts", SERIES[1]),
-    Curve(entities.STRONG_PRESSURE_SHARE, "their share of the pressure", SERIES[0]),
-    Curve(entities.STRONG_DEVIATOR_SHARE, "their share of the deviator", SERIES[3]),
+    Curve(entities.STRONG_FRACTION, "strong contacts", SERIES[1]),
+    Curve(entities.STRONG_PRESSURE_FRACTION, "their fraction of the pressure", SERIES[0]),
+    Curve(entities.STRONG_DEVIATOR_FRACTION, "their fraction of the deviator", SERIES[3]),
     Curve(entities.CHAIN_COUNT, "force chains", SERIES[2]),
-    Curve(entities.CHAIN_GRAIN_SHARE, "grains in chains", SERIES[2]),
+    Curve(entities.CHAIN_GRAIN_FRACTION, "grains in chains", SERIES[2]),
 )
 
 
@@ -81,13 +81,13 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
         stream.log(path, rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls)), static=True)
     if scene.walls.force is not None:
         pale = [(*hue[:3], 150) for hue in hues]
-        told = [f"{name}, recorded" for name in walls]
+        names = [f"{name}, recorded" for name in walls]
         for path in (entities.WALL_NORMAL_RECORDED, entities.WALL_TANGENTIAL_RECORDED):
-            stream.log(path, rr.SeriesLines(colors=pale, names=told, widths=[5.0] * len(walls)), static=True)
+            stream.log(path, rr.SeriesLines(colors=pale, names=names, widths=[5.0] * len(walls)), static=True)
 
 
 def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> None:
-    """Log one frame's macroscopic quantities."""
+    """Log the macroscopic quantities of one frame."""
     clock.end()
     for path, value in statistic_values(statistics):
         log_scalar(clock, path, float(value))
@@ -102,24 +102,32 @@ def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> N
 
 
 def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ...]:
-    """Entity and value of every curve of one frame."""
+    """Return entity and value of every curve of one frame."""
     return tuple((curve.path, curve.unit * getattr(statistics, curve.field)) for curve in CURVES)
 
 
 def band_values(statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
-    """Entity of every band, and its ends (2,): two standard deviations to either side, NaN where none is known."""
-    two = 2.0 * np.array([-1.0, 1.0])
+    """Return entity and ends (2,) of every band: value ∓ two standard deviations, NaN where these are not known."""
+    factors = 2.0 * np.array([-1.0, 1.0])
     return tuple(
         (
             curve.path + entities.BAND,
-            curve.unit * (getattr(statistics, curve.field) + two * getattr(statistics, f"{curve.field}_sd")),
+            curve.unit * (getattr(statistics, curve.field) + factors * getattr(statistics, f"{curve.field}_sd")),
         )
         for curve in CURVES
     )
 
 
 def recorded_values(walls: Walls, force: Array) -> tuple[tuple[str, Array], ...]:
-    """Entity and values (w,) [N] of what sensors recorded of straight walls: force (w, 2) [N], NaN: none."""
+    """Return entity and values (w,) [N] of the forces recorded by sensors.
+
+    Parameters
+    ----------
+    walls : Walls
+        The walls, straight ones with a sensor.
+    force : array (w, 2)
+        Recorded force on every wall [N]; NaN: none.
+    """
     return (
         (entities.WALL_NORMAL_RECORDED, np.einsum("wk,wk->w", force, walls.outward)),
         (entities.WALL_TANGENTIAL_RECORDED, np.einsum("wk,wk->w", force, walls.direction)),
@@ -127,9 +135,9 @@ def recorded_values(walls: Walls, force: Array) -> tuple[tuple[str, Array], ...]
 
 
 def wall_values(walls: Walls, statistics: FrameStatistics) -> tuple[tuple[str, Array], ...]:
-    """Entity and values (w,) [N] of the curves of the walls of the frame.
+    """Return entity and values (w,) [N] of the curves of the wall forces of a frame.
 
-    Files of earlier versions have no sums over a wall's contacts; those of straight walls follow from its force.
+    Files of earlier versions have no sums over the contacts of a wall; for straight walls they follow from its force.
     """
     force = np.broadcast_to(statistics.wall_force, (walls.count, 2))
     normal, tangential = statistics.wall_normal_force, statistics.wall_tangential_force

@@ -1,14 +1,13 @@
-"""Writes the stress cross and the rose of contact directions: polar drawings about a unit circle."""
+"""Writes the stress cross and the rose of contact directions: polar plots about a unit circle."""
 
 from __future__ import annotations
 
 import numpy as np
 import rerun as rr
 
-from solver.bodies.grains import Array
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
-
+from ...solver.bodies.grains import Array
+from ...solver.frame_forces import FrameForces
+from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.axes import log_cross_hairs, log_texts, polar
 from ..look.clock import Clock
@@ -34,7 +33,7 @@ def log_polar_axes(stream: rr.RecordingStream) -> None:
 
 
 def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
-    """Log the principal stresses, and the normal stress in every direction, over the pressure."""
+    """Log the principal stresses and the normal stress in every direction, divided by the pressure."""
     clock.end()
     if not (np.all(np.isfinite(statistics.stress)) and statistics.pressure > 0.0):
         clock.stream.log(entities.STRESS_CROSS, rr.LineStrips2D([]))
@@ -44,8 +43,8 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
     stress = 0.5 * (statistics.stress + statistics.stress.T)
     value, axis = np.linalg.eigh(stress)
     value, axis = value[::-1], axis[:, ::-1]  # greatest first
-    share = value / statistics.pressure
-    tips = np.stack([axis[0], -axis[1]], axis=1) * (100.0 * share)[:, None]
+    ratio = value / statistics.pressure
+    tips = np.stack([axis[0], -axis[1]], axis=1) * (100.0 * ratio)[:, None]
     clock.stream.log(
         entities.STRESS_CROSS,
         rr.LineStrips2D(
@@ -71,19 +70,20 @@ def log_stress(clock: Clock, statistics: FrameStatistics) -> None:
 
 
 def log_rose(clock: Clock, forces: FrameForces) -> None:
-    """Log how many contacts between grains, and how much force, point in every direction, over the isotropic value.
+    """Log the angular densities of contacts between grains and of their forces, over the isotropic density.
 
-    Contacts count as they are likely to bear force; those with walls point where the walls face, and are left out.
+    A contact counts with its probability of bearing force. Contacts with walls are left out, as they have the
+    direction of the wall normal.
     """
     clock.end()
     loaded = np.isfinite(forces.fn) & (forces.fn > 0.0) & ~forces.contacts.with_wall
     normal, fn = forces.contacts.normal[loaded], forces.fn[loaded]
-    bears = np.ones(len(fn)) if forces.bearing_probability is None else forces.bearing_probability[loaded]
+    bearing = np.ones(len(fn)) if forces.bearing_probability is None else forces.bearing_probability[loaded]
     for path, weight, colour, order in (
-        (entities.ROSE, bears, SERIES[1], 10.0),
-        (entities.ROSE_OF_FORCES, bears * fn, SERIES[0], 20.0),
+        (entities.ROSE, bearing, SERIES[1], 10.0),
+        (entities.ROSE_OF_FORCES, bearing * fn, SERIES[0], 20.0),
     ):
-        strips = [rose_outline(direction_shares(normal, weight))] if len(fn) else []
+        strips = [rose_outline(direction_densities(normal, weight))] if len(fn) else []
         clock.stream.log(
             path,
             rr.LineStrips2D(
@@ -92,22 +92,35 @@ def log_rose(clock: Clock, forces: FrameForces) -> None:
         )
 
 
-def direction_shares(normal: Array, weight: Array) -> Array:
-    """Weight of the directions of normals (c, 2) and their opposites, over the isotropic share (BINS,)."""
+def direction_densities(normal: Array, weight: Array) -> Array:
+    """Return the angular density of normals and their opposites, over the isotropic density.
+
+    Parameters
+    ----------
+    normal : array (c, 2)
+        Contact normals.
+    weight : array (c,)
+        Weights of the contacts.
+
+    Returns
+    -------
+    array (BINS,)
+        Density per bin of direction; 1: isotropic.
+    """
     angle = np.arctan2(normal[:, 1], normal[:, 0])
     both = np.mod(np.concatenate([angle, angle + np.pi]), 2.0 * np.pi)
     counts = np.bincount((both * BINS / (2.0 * np.pi)).astype(np.int64) % BINS, np.tile(weight, 2), BINS)
     return counts * BINS / counts.sum()
 
 
-def rose_outline(shares: Array) -> np.ndarray:
-    """A closed outline of sectors (2 BINS + 1, 2) in view units."""
+def rose_outline(densities: Array) -> np.ndarray:
+    """Return a closed outline of sectors (2 BINS + 1, 2) in view coordinates."""
     edges = np.arange(BINS + 1) * 2.0 * np.pi / BINS
     angle = np.stack([edges[:-1], edges[1:]], axis=1).ravel()
-    outline = polar(angle, np.minimum(np.repeat(shares, 2), ROSE_REACH))  # what is greater ends at the view's edge
+    outline = polar(angle, np.minimum(np.repeat(densities, 2), ROSE_REACH))  # clipped at the edge of the view
     return np.concatenate([outline, outline[:1]])
 
 
 def _corner(reach: float, line: int) -> Array:
-    """Where a line of text stands in the upper left corner of a polar view."""
+    """Return the position of a line of text in the upper left corner of a polar view."""
     return 100.0 * reach * np.array([-0.62, -0.95 + 0.105 * line])

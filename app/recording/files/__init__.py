@@ -1,1 +1,1 @@
-"""Recordings as files: written, live, read back, mended, shared, catalogued."""
+"""Writes recordings: of a finished run, of a run while it is solved, and side files."""

@@ -1,8 +1,8 @@
-"""A live recording in a process of its own: the solve does not wait for its pictures.
+"""A live recording in a process of its own, for which the solve does not wait.
 
-What is solved goes there through a pipe. The process ends when the pipe does, be it that the run is over, interrupted
-or killed: it closes the recording and ends its servers. Frames that wait for their turn do so in a file without a name,
-so that waiting takes no memory; over there is one frame at a time.
+Solved frames are sent through a pipe. The process ends with the pipe, whether the run is complete, interrupted or
+killed: it closes the recording and ends its servers. Frames that are not yet sent wait in an unnamed file, not in
+memory; the process holds one frame at a time.
 """
 
 from __future__ import annotations
@@ -20,90 +20,100 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
-
 from ...results.results import Results
+from ...solver.frame_forces import FrameForces
+from ...solver.statistics.frame_statistics import FrameStatistics
 from .live import LiveRecording
 
-NICENESS = 10  # added to that of the run; a system that weighs whole sessions (autogroup) pays no heed to it
+NICENESS = 10  # added to that of the run; without effect where the system schedules whole sessions (autogroup)
 CUT_SHORT = "The run ended before its last frame."
 COMMAND = f"from {__name__} import serve; serve()"
 
 
 class LiveProcess:
-    """Hands a run to a LiveRecording elsewhere. Call start, frame for every frame in order, then close in any case.
+    """Sends a run to a LiveRecording in another process.
 
-    tell: is given sentences for the user as they come, from another thread: how to watch, what went wrong.
-    options: of LiveRecording; they go through the pipe, as do the run and its frames.
+    Call `start`, then `frame` for every frame in order, and `close` in any case.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    report : callable
+        Called from another thread with sentences for the user: how to watch the run, and errors of the live view.
+    **options
+        Options of LiveRecording; they are sent through the pipe, as are the run and its frames.
     """
 
-    def __init__(self, path: Path, tell: Callable[[str], None], **options: Any) -> None:
+    def __init__(self, path: Path, report: Callable[[str], None], **options: Any) -> None:
         self.path = path
         self.started = False
-        self._tell, self._options = tell, options
-        self._waiting = _Waiting()
-        # It takes a second to get ready, which is over when there is something to solve.
+        self._report, self._options = report, options
+        self._queue = _MessageQueue()
+        # Started now, as it needs a second, which has passed when the first frame is solved.
         self._process = subprocess.Popen(
             [sys.executable, "-c", COMMAND],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            start_new_session=True,  # an interrupt is meant for the run
+            start_new_session=True,  # an interrupt must reach the run only
         )
-        self._threads = tuple(threading.Thread(target=work, daemon=True) for work in (self._feed, self._listen))
+        self._threads = tuple(threading.Thread(target=task, daemon=True) for task in (self._send, self._receive))
 
     def start(self, run: Results) -> None:
-        """Open server, file and viewer; `run` has bodies and motion, its frames are still to come."""
+        """Open server, file and viewer; `run` has bodies and motion, but no solved frames yet."""
         self.started = True
-        self.path.unlink(missing_ok=True)  # of a former run
+        self.path.unlink(missing_ok=True)  # of an earlier run
         for thread in self._threads:
             thread.start()
-        self._waiting.put(("start", (self.path, self._options, run)))
+        self._queue.put(("start", (self.path, self._options, run)))
 
     def frame(self, forces: FrameForces, statistics: FrameStatistics) -> None:
-        """Have one finished frame recorded, and do not wait for it; where there is no room for it, the view ends."""
+        """Send one finished frame without waiting for it; if the disk is full, the live view ends."""
         try:
-            self._waiting.put(("frame", (forces, statistics)))
+            self._queue.put(("frame", (forces, statistics)))
         except OSError as error:
-            self._tell(f"The live view ends here, without harm to the run: {error.strerror}.")
-            self._waiting.end()
+            self._report(f"The live view ends here, without harm to the run: {error.strerror}.")
+            self._queue.end()
 
-    def close(self, *, whole: bool) -> None:
-        """Wait for what is still to be recorded, and for the end of file, servers and page.
+    def close(self, *, complete: bool) -> None:
+        """Wait until all frames are recorded and file, servers and page are closed.
 
-        whole: whether the run came to its end, which the summary says.
+        Parameters
+        ----------
+        complete : bool
+            The run came to its end; the summary of the recording reports it otherwise.
         """
-        if not self.started:  # it has opened nothing yet
-            self._waiting.close()
+        if not self.started:  # nothing was opened
+            self._queue.close()
             self._process.kill()
             self._process.communicate()
             return
-        if whole:
-            self._waiting.put(("finish", ()))
-        self._waiting.end()
+        if complete:
+            self._queue.put(("finish", ()))
+        self._queue.end()
         for thread in self._threads:
             thread.join()
-        self._waiting.close()
+        self._queue.close()
         if self._process.wait():
-            self._tell("The live view broke off, without harm to the run.")
+            self._report("The live view broke off, without harm to the run.")
 
-    def _feed(self) -> None:
+    def _send(self) -> None:
         assert self._process.stdin is not None
-        with suppress(BrokenPipeError), self._process.stdin as pipe:  # who hears no more says so by how it ended
-            while (message := self._waiting.get()) is not None:
+        with suppress(BrokenPipeError), self._process.stdin as pipe:  # the exit status reports a process that has ended
+            while (message := self._queue.get()) is not None:
                 pipe.write(message)
                 pipe.flush()
 
-    def _listen(self) -> None:
+    def _receive(self) -> None:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
-                self._tell(line.decode().rstrip())
+                self._report(line.decode().rstrip())
 
 
-class _Waiting:
-    """Messages on their way, in order; those that wait are in a file."""
+class _MessageQueue:
+    """A queue of messages; those not yet sent are stored in a file."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 - until close
@@ -112,7 +122,7 @@ class _Waiting:
         self._ended = False
 
     def put(self, message: tuple[str, Any]) -> None:
-        """Raises OSError where the disk has no room."""
+        """Append a message; raise OSError if the disk is full."""
         if self._ended:
             return
         content = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
@@ -124,16 +134,17 @@ class _Waiting:
             self._end += len(content)
 
     def end(self) -> None:
-        """Nothing comes any more."""
+        """End the queue after the messages so far."""
         if not self._ended:
             self._ended = True
             self._places.put(None)
 
     def close(self) -> None:
+        """Delete the file."""
         self._file.close()
 
     def get(self) -> bytes | None:
-        """The next message, which is waited for; None: there is none any more."""
+        """Wait for the next message and return it; None after the last."""
         place = self._places.get()
         if place is None:
             return None
@@ -144,33 +155,33 @@ class _Waiting:
 
 
 def serve() -> None:
-    """What the process does: record what comes through standard input until it ends."""
+    """Record the messages of standard input until it ends: the main function of the process."""
     for number in (signal.SIGINT, signal.SIGTERM):
-        # The pipe alone says when to end. Not SIG_IGN, which the page's server would inherit.
+        # Only the end of the pipe ends the process. Not SIG_IGN, which the server of the page would inherit.
         signal.signal(number, lambda *_: None)
     if hasattr(os, "nice"):
         os.nice(NICENESS)
-    live, whole = None, False
+    live, complete = None, False
     try:
-        while not whole:
-            name, given = pickle.load(sys.stdin.buffer)
+        while not complete:
+            name, content = pickle.load(sys.stdin.buffer)
             if name == "start":
-                path, options, run = given
+                path, options, run = content
                 live = LiveRecording(path, **options)
                 live.start(run)
                 if live.hint:
                     print(live.hint, flush=True)
             elif live is not None and name == "frame":
-                live.frame(*given)
-            whole = name == "finish"
-    except (EOFError, pickle.UnpicklingError):  # between two messages, or amidst one: the run is no more
+                live.frame(*content)
+            complete = name == "finish"
+    except (EOFError, pickle.UnpicklingError):  # the run has ended, between two messages or within one
         pass
     finally:
         if live is not None:
             try:
-                live.finish(() if whole else (CUT_SHORT,))
+                live.finish(() if complete else (CUT_SHORT,))
             finally:
                 live.close()
-            # Nobody listens any more where the run was killed.
+            # The pipe has no reader if the run was killed.
             with suppress(BrokenPipeError):
                 print(*live.notes, sep="\n", end="\n" if live.notes else "", flush=True)

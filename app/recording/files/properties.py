@@ -1,4 +1,4 @@
-"""Sends the properties of a recording: one column each in a catalogue of recordings."""
+"""Sends the properties of a recording, each a column in a catalogue of recordings."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from solver.sequence.frame_forces import FrameStatus
-
+from ...solver.frame_forces import FrameStatus
+from ..look.printable_text import printable
 from ..look.scene import Scene
-from ..look.texts import printable
-from ..tabs.summary_tab import FrameFacts
+from ..tabs.summary_tab import FrameSummary
 
 EXPERIMENT, OUTCOME, SETTINGS = "experiment", "outcome", "settings"
 
 
 def send_experiment(stream: rr.RecordingStream, scene: Scene) -> None:
-    """Send what the run was given."""
+    """Send the input of the run."""
     pressure = scene.walls.usual_pressure(scene.rod_length)[scene.walls.loaded]
     stream.send_property(
         EXPERIMENT,
@@ -33,13 +32,13 @@ def send_experiment(stream: rr.RecordingStream, scene: Scene) -> None:
             mean_diameter_mm=2e3 * float(np.mean(scene.tracks.radius)),
         ),
     )
-    # On its own: a catalogue shows the columns by the names of the properties, and this one is wide.
+    # A property of its own: a catalogue groups columns by property, and this column is wide.
     if scene.configuration:
         stream.send_property(SETTINGS, rr.AnyValues(configuration=printable(scene.configuration)))
 
 
-def send_outcome(stream: rr.RecordingStream, facts: Sequence[FrameFacts]) -> None:
-    """Send what came of it; what is not known is absent."""
+def send_outcome(stream: rr.RecordingStream, facts: Sequence[FrameSummary]) -> None:
+    """Send the results of the run; unknown values are absent."""
     if not facts:
         return
     count = Counter(fact.status for fact in facts)

@@ -1,4 +1,4 @@
-"""A side file with every kept sweep of chosen frames. Opened beside its recording, the viewer shows both as one."""
+"""Writes a side file with every kept sweep of selected frames; the viewer shows it and its recording as one."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from ...errors import InputError
+from ...process.errors import InputError
 from ...results.results import Results
-from ..look.clock import Clock, strain_ways
+from ..look.clock import Clock, accumulated_strains
 from ..look.force_style import ForceRange, ForceStyle
 from ..packing_layers.forces.network import SweepChoice, send_sweeps, visible_sweeps
 from ..tabs.layout_property import read_layout
@@ -20,7 +20,7 @@ from .writing import writing
 
 
 def write_side_file(results: Results, recording: Path, target: Path, frames: Sequence[int]) -> str:
-    """Do what record_side_file does and say so in a sentence; raises InputError for a frame that does not exist."""
+    """Write a side file and return a sentence that reports it; raise InputError for a frame that does not exist."""
     try:
         size = record_side_file(results, recording, target, frames)
     except ValueError as error:
@@ -30,10 +30,32 @@ def write_side_file(results: Results, recording: Path, target: Path, frames: Seq
 
 
 def record_side_file(results: Results, recording: Path | str, target: Path | str, frames: Sequence[int]) -> int:
-    """Write all kept sweeps of some frames beside a recording of the same results; returns the size [bytes].
+    """Write all kept sweeps of selected frames beside a recording of the same results.
 
-    The file carries the recording's own identity: `rodsight view RECORDING SIDE` shows one recording. Raises
-    FileNotFoundError where there is no recording, ValueError for a frame that does not exist.
+    The file has the identity of the recording: `rodsight view RECORDING SIDE` shows one recording.
+
+    Parameters
+    ----------
+    results : Results
+        The results of the run.
+    recording : Path or str
+        The recording of these results.
+    target : Path or str
+        The side file.
+    frames : sequence of int
+        The frames.
+
+    Returns
+    -------
+    int
+        Size of the file [bytes].
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no recording.
+    ValueError
+        If a frame does not exist.
     """
     recording, target = Path(recording), Path(target)
     if not recording.is_file():
@@ -52,14 +74,15 @@ def record_side_file(results: Results, recording: Path | str, target: Path | str
         with writing(stream, part):
             stream.set_log_time_enabled(False)
             first = 0
-            ways = strain_ways([forces.strain for forces in results.frames])
-            for forces, way in zip(results.frames, ways, strict=True):
+            strains = accumulated_strains([forces.strain for forces in results.frames])
+            for forces, strain in zip(results.frames, strains, strict=True):
                 span = forces.history.count + 1
                 if forces.frame in frames and forces.contacts.count:
                     time = float(results.tracks.time[forces.frame])
-                    clock = Clock(stream, forces.frame, first, first + span - 1, time, way)
+                    clock = Clock(stream, forces.frame, first, first + span - 1, time, strain)
                     rows, fn, _ = visible_sweeps(forces, span - 1, SweepChoice.ALL, 0)
-                    send_sweeps(clock, style, rows[1:], fn[1:], thin=True)  # the first has the geometry: not again
+                    # The first row, with the geometry, is in the recording.
+                    send_sweeps(clock, style, rows[1:], fn[1:], thin=True)
                 first += span
         os.replace(part, target)
     finally:

@@ -1,8 +1,8 @@
-"""A stream's bytes on their way to a file, which are written here: a disk that refuses them is an error like any other.
+"""Writes the bytes of a stream to a file, so that an error of the disk is raised in the calling thread.
 
-The SDK writes in a thread of its own, which a full disk ends; whoever flushes the stream afterwards may wait for ever.
-It is given a pipe instead, which is read to its end whatever becomes of the file. A disk that neither takes bytes nor
-refuses them has until a deadline.
+The SDK writes in a thread of its own, which a full disk ends; a later flush of the stream may then wait for ever. The
+stream writes to a pipe instead, which is read to its end even if the file fails. If the disk neither accepts nor
+refuses bytes, an error is raised at a deadline.
 """
 
 from __future__ import annotations
@@ -20,30 +20,48 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-DEADLINE = 60.0  # [s] in which some byte must reach the disk
-PIECE = 1 << 20  # [bytes] that are read at once
+DEADLINE = 60.0  # [s] without a byte written after which the disk has failed
+PIECE_SIZE = 1 << 20  # [bytes] of one read
 
 
 @contextmanager
 def writing(
     stream: rr.RecordingStream, file: Path, blueprint: rrb.Blueprint | None = None, *, indexed: bool = True
 ) -> Iterator[WrittenFile]:
-    """Have a stream written to a file, which is whole when the block has ended; the stream is ended with it.
+    """Write a stream to a file, which is complete at the end of the block; the stream is disconnected then.
 
-    indexed: with an index at its end, by which viewers read parts of it, and which grows in memory until then.
-    Raises OSError where the disk refuses, or does nothing for DEADLINE seconds.
+    Parameters
+    ----------
+    stream : RecordingStream
+        The stream.
+    file : Path
+        The file.
+    blueprint : Blueprint, optional
+        The blueprint stored in the file.
+    indexed : bool
+        End the file with an index, by which viewers read parts of it and which is kept in memory until then.
+
+    Yields
+    ------
+    WrittenFile
+        The file, to be flushed and checked.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses a write, or nothing is written for DEADLINE seconds.
     """
-    file.open("wb").close()  # refused here, if at all
+    file.open("wb").close()  # a folder that cannot be written to raises here
     written = WrittenFile(file)
     if hasattr(os, "mkfifo"):
         with tempfile.TemporaryDirectory(prefix="rodsight-") as folder:
             pipe = Path(folder) / "recording.rrd"
             os.mkfifo(pipe)
-            end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # there is nobody yet to wait for
+            end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # non-blocking, as there is no writer yet
             os.set_blocking(end, True)
-            held = os.open(pipe, os.O_WRONLY)  # until the stream has it: it writes before it is there
+            held = os.open(pipe, os.O_WRONLY)  # keeps the pipe open until the stream has opened it
             try:
-                written.fill_from(end)
+                written.read_pipe(end)
                 stream.save(pipe, default_blueprint=blueprint, write_footer=indexed)
             finally:
                 os.close(held)
@@ -57,71 +75,71 @@ def writing(
 
 
 class WrittenFile:
-    """A file that is being written."""
+    """A file that is written by a thread."""
 
     def __init__(self, file: Path) -> None:
         self.file = file
         self._error: OSError | None = None
-        self._waiting: queue.SimpleQueue[bytes] = queue.SimpleQueue()  # an empty piece is the last one
-        self._taken = self._written = 0  # bytes
-        self._moved = time.monotonic()  # when bytes last reached the file, or none were waiting
+        self._queue: queue.SimpleQueue[bytes] = queue.SimpleQueue()  # ends with an empty piece
+        self._received = self._written = 0  # [bytes]
+        self._progress_time = time.monotonic()  # when bytes were last written, or the queue was empty
         self._threads: tuple[threading.Thread, ...] = ()
 
     @property
     def size(self) -> int:
-        """Bytes that have reached the file."""
+        """Bytes written to the file."""
         return self._written if self._threads else self.file.stat().st_size
 
     def check(self) -> None:
-        """Raise what the disk has said so far, or that it says nothing."""
+        """Raise OSError if a write has failed, or if nothing has been written for DEADLINE seconds."""
         if self._error is not None:
             raise self._error
-        if self._taken > self._written and time.monotonic() - self._moved > DEADLINE:
+        if self._received > self._written and time.monotonic() - self._progress_time > DEADLINE:
             raise OSError(errno.ETIMEDOUT, f"nothing could be written for {DEADLINE:g} s", str(self.file))
 
     def flush(self, stream: rr.RecordingStream) -> None:
-        """Have all that was logged on its way to the disk."""
+        """Send all logged data to the file and check it."""
         stream.flush()
         self.check()
 
-    def fill_from(self, end: int) -> None:
-        """Write what comes out of a pipe until it ends; it is closed then."""
-        works = ((self._take, (end,)), (self._put, ()))
-        self._threads = tuple(threading.Thread(target=work, args=given, daemon=True) for work, given in works)
+    def read_pipe(self, end: int) -> None:
+        """Start to write the content of a pipe, up to its end; the pipe is closed then."""
+        tasks = ((self._receive, (end,)), (self._write, ()))
+        self._threads = tuple(threading.Thread(target=task, args=args, daemon=True) for task, args in tasks)
         for thread in self._threads:
             thread.start()
 
     def end(self) -> None:
-        """Wait until all is in the file; raises OSError at the deadline."""
+        """Wait until all bytes are written; raise OSError at the deadline."""
         for thread in self._threads:
             while thread.is_alive():
                 thread.join(0.05 * DEADLINE)
                 self.check()
         self.check()
 
-    def _take(self, end: int) -> None:
-        """Read a pipe to its end: the stream must not wait for a disk."""
+    def _receive(self, end: int) -> None:
+        """Read a pipe to its end: the stream must not wait for the disk."""
         with open(end, "rb", buffering=0) as pipe:
-            while piece := pipe.read(PIECE):
-                if self._taken == self._written:
-                    self._moved = time.monotonic()
-                self._taken += len(piece)
-                self._waiting.put(piece)
-        self._waiting.put(b"")
+            while piece := pipe.read(PIECE_SIZE):
+                if self._received == self._written:
+                    self._progress_time = time.monotonic()
+                self._received += len(piece)
+                self._queue.put(piece)
+        self._queue.put(b"")
 
-    def _put(self) -> None:
+    def _write(self) -> None:
         try:
             with self.file.open("wb", buffering=0) as target:
-                while piece := self._waiting.get():
-                    put(target.fileno(), piece)
+                while piece := self._queue.get():
+                    write_all(target.fileno(), piece)
                     self._written += len(piece)
-                    self._moved = time.monotonic()
+                    self._progress_time = time.monotonic()
         except OSError as error:
             self._error = OSError(error.errno, error.strerror, str(self.file))
 
 
-def put(file: int, content: bytes) -> None:
-    """Write all of it; a disk may take less at once."""
+def write_all(file: int, content: bytes) -> None:
+    """Write bytes to a file descriptor, in several writes where the system accepts fewer at once."""
     rest = memoryview(content)
     while rest:
         rest = rest[os.write(file, rest) :]

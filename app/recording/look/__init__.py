@@ -1,1 +1,1 @@
-"""What every drawing shares: entity paths, scene, canvas, colours, widths, texts, axes, legends."""
+"""Common parts of all drawings: entity paths, scene, canvas, colours, widths, texts and axes."""

@@ -1,4 +1,4 @@
-"""Axes drawn as lines, for the plots that the viewer does not have: logarithmic axes, scatter, roses."""
+"""Axes drawn as lines, for plots that the viewer lacks: logarithmic axes, scatter plots, roses."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from .colours import FAINT, INK, Rgba, packed, packed_one
 
-WIDTH, HEIGHT = 600.0, 380.0  # of a plot, in the units of its view
+WIDTH, HEIGHT = 600.0, 380.0  # of a plot, in units of its view
 PLOT_BOUNDS = ((-60.0, WIDTH + 25.0), (-15.0, HEIGHT + 45.0))  # of a view with its labels
 CIRCLE = 100.0  # radius of the unit circle of a polar plot
 
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """A rectangle of data drawn into WIDTH × HEIGHT, y up."""
+    """Data ranges of a plot, drawn in a rectangle of width × height view units, y up."""
 
     x_range: tuple[float, float]
     y_range: tuple[float, float]
@@ -28,7 +27,7 @@ class Axes:
     height: float = HEIGHT
 
     def points(self, x: Array, y: Array) -> NDArray[np.float32]:
-        """Data to the units of the view (…, 2)."""
+        """Convert data coordinates to view coordinates (…, 2)."""
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         across = (np.asarray(x) - x0) / (x1 - x0) * self.width
         down = (y1 - np.asarray(y)) / (y1 - y0) * self.height
@@ -45,7 +44,21 @@ class Axes:
         notes: Sequence[tuple[float, float, str, Rgba]] = (),
         guides: Sequence[NDArray[np.float32]] = (),
     ) -> None:
-        """Log grid lines and labels, static; notes: coloured texts at points; guides: further lines."""
+        """Log grid lines and labels, static.
+
+        Parameters
+        ----------
+        stream : RecordingStream
+            The stream.
+        lines, ticks : str
+            Entities of the lines and of the texts.
+        x_ticks, y_ticks : sequence of (float, str)
+            Value and label of every grid line.
+        notes : sequence of (float, float, str, Rgba)
+            Coloured texts at data coordinates x, y.
+        guides : sequence of arrays (k, 2)
+            Further lines, in view coordinates.
+        """
         x0, x1, y0, y1 = *self.x_range, *self.y_range
         grid = [self.points(np.array([x, x]), np.array([y0, y1])) for x, _ in x_ticks]
         grid += [self.points(np.array([x0, x1]), np.array([y, y])) for y, _ in y_ticks]
@@ -55,7 +68,8 @@ class Axes:
         stream.log(
             lines, rr.LineStrips2D(strips, radii=np.float32(0.6), colors=packed(shades), draw_order=0.0), static=True
         )
-        raised, left = 16.0 * (y1 - y0) / self.height, 22.0 * (x1 - x0) / self.width  # the viewer writes below a point
+        # The viewer places a text below its point.
+        raised, left = 16.0 * (y1 - y0) / self.height, 22.0 * (x1 - x0) / self.width
         texts = [(x, y0, text, INK) for x, text in x_ticks]
         texts += [(x0 - left, y + raised, text, INK) for y, text in y_ticks]
         placed = [(self.points(np.array(x), np.array(y)), text, colour) for x, y, text, colour in [*texts, *notes]]
@@ -65,7 +79,7 @@ class Axes:
 def log_texts(
     stream: rr.RecordingStream, path: str, texts: Sequence[tuple[NDArray, str, Rgba]], *, static: bool = True
 ) -> None:
-    """Log coloured texts at points of a view."""
+    """Log coloured texts at points (2,) in view coordinates."""
     stream.log(
         path,
         rr.Points2D(
@@ -80,18 +94,18 @@ def log_texts(
 
 
 def circle(radius: float = CIRCLE) -> NDArray[np.float32]:
-    """A closed circle about the origin (97, 2)."""
+    """Return a closed circle about the origin (97, 2)."""
     angle = np.linspace(0.0, 2.0 * np.pi, 97)
     return polar(angle, np.full(97, radius / CIRCLE))
 
 
 def polar(angle: Array, radius: Array) -> NDArray[np.float32]:
-    """Points at angles [rad], counter-clockwise as seen, and radii in units of the circle (k, 2)."""
+    """Return points (k, 2) at angles [rad], counter-clockwise on the screen, and radii in units of the circle."""
     return (CIRCLE * np.stack([radius * np.cos(angle), -radius * np.sin(angle)], axis=-1)).astype(np.float32)
 
 
 def log_cross_hairs(stream: rr.RecordingStream, path: str, reach: float) -> None:
-    """Log the unit circle and the axes of a polar plot, static; reach in units of the circle."""
+    """Log the unit circle and the axes of a polar plot, static, up to `reach` in units of the circle."""
     arm = reach * CIRCLE
     strips = [circle(), np.array([[-arm, 0], [arm, 0]]), np.array([[0, -arm], [0, arm]])]
     stream.log(
@@ -100,6 +114,6 @@ def log_cross_hairs(stream: rr.RecordingStream, path: str, reach: float) -> None
 
 
 def round_step(size: float) -> float:
-    """The next of 1, 2, 5 × 10^k below a size."""
+    """Return the greatest of 1, 2, 5 × 10^k that is not above a size."""
     decade = 10.0 ** np.floor(np.log10(size))
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= size))

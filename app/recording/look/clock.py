@@ -1,4 +1,4 @@
-"""Where rows stand on the timelines: of photographs by number, time and strain, and of sweeps."""
+"""Positions of rows on the timelines: frame number, time, strain and sweep."""
 
 from __future__ import annotations
 
@@ -9,33 +9,32 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.strain import way_of
-
+from ...solver.bodies.grains import Array
+from ...solver.bodies.strain import strain_magnitude
 from . import entities
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Puts rows at the right place of all timelines. Where time or strain are not known, rows are not on theirs."""
+    """Places the rows of one frame on all timelines; on those of time and strain only where these are known."""
 
     stream: rr.RecordingStream
     frame: int
     first: int  # value on `sweep` of the frame's first row
-    last: int  # … of its last row, first where the frame has one row only
+    last: int  # value on `sweep` of the last row; equals first if the frame has one row
     time: float = np.nan  # [s]
-    strain: float = np.nan  # way of the strain since frame 0
+    strain: float = np.nan  # accumulated strain since frame 0
 
     def start(self) -> None:
-        """What is logged next belongs to the frame's first row."""
+        """Set the time of the next data to the first row of the frame."""
         self._set(self.first)
 
     def end(self) -> None:
-        """What is logged next belongs to the frame's last row."""
+        """Set the time of the next data to the last row of the frame."""
         self._set(self.last)
 
     def frame_only(self) -> None:
-        """What is logged next belongs to the frame on its own timelines, and to nothing on `sweep`."""
+        """Set the time of the next data to the frame, without a value on `sweep`."""
         self.stream.reset_time()
         self.stream.set_time(entities.FRAME, sequence=self.frame)
         if np.isfinite(self.time):
@@ -48,7 +47,7 @@ class Clock:
         self.stream.set_time(entities.SWEEP, sequence=sweep)
 
     def columns(self, rows: NDArray[np.int64]) -> list[rr.TimeColumn]:
-        """All timelines for rows of this frame, counted from its first (k,)."""
+        """Return the columns of all timelines for rows (k,) of this frame, counted from its first."""
         columns = [
             rr.TimeColumn(entities.FRAME, sequence=np.full(len(rows), self.frame, np.int64)),
             rr.TimeColumn(entities.SWEEP, sequence=self.first + rows),
@@ -61,29 +60,39 @@ class Clock:
         return columns
 
 
-class StrainWay:
-    """How far the strain of a packing has gone since frame 0, frame by frame."""
+class AccumulatedStrain:
+    """The strain of a packing accumulated over its steps since frame 0."""
 
     def __init__(self) -> None:
-        self._gone = np.nan
-        self._former: Array | None = None
+        self._accumulated = np.nan
+        self._previous: Array | None = None
 
-    def go(self, strain: Array | None) -> float:
-        """The way up to a frame of this strain (2, 2) since frame 0; where it is not known, that of the frame before.
+    def add(self, strain: Array | None) -> float:
+        """Add a frame.
 
-        NaN until one is known.
+        Parameters
+        ----------
+        strain : array (2, 2), optional
+            Strain of the frame since frame 0; None or NaN: not known.
+
+        Returns
+        -------
+        float
+            Strain accumulated up to this frame. Where the strain is not known, the value of the frame before; NaN
+            until one is known.
         """
         if strain is None or not np.isfinite(strain).all():
-            return self._gone
-        self._gone = 0.0 if self._former is None else self._gone + way_of(strain - self._former)
-        self._former = strain
-        return self._gone
+            return self._accumulated
+        previous = self._previous
+        self._accumulated = 0.0 if previous is None else self._accumulated + strain_magnitude(strain - previous)
+        self._previous = strain
+        return self._accumulated
 
 
-def strain_ways(strains: Sequence[Array | None]) -> list[float]:
-    """The ways of all frames of a run, from their strains (2, 2) since frame 0."""
-    way = StrainWay()
-    return [way.go(strain) for strain in strains]
+def accumulated_strains(strains: Sequence[Array | None]) -> list[float]:
+    """Return the accumulated strains of all frames of a run, from their strains (2, 2) since frame 0."""
+    accumulated = AccumulatedStrain()
+    return [accumulated.add(strain) for strain in strains]
 
 
 def _nanoseconds(seconds: float) -> np.timedelta64:

@@ -1,7 +1,7 @@
-"""Colours: perceptually even ramps built in OKLab, and the few fixed colours of the views.
+"""Colours: perceptually uniform ramps built in OKLab, and the fixed colours of the views.
 
-A ramp is a path through OKLab cut into steps of equal length, so that equal differences of force
-look equally different. OKLab: B. Ottosson, "A perceptual color space for image processing" (2020).
+A ramp is a path through OKLab divided into steps of equal length, so that equal differences of force look equally
+different. OKLab: B. Ottosson, "A perceptual color space for image processing" (2020).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from ...solver.bodies.grains import Array
 
 # Cone responses (cubed) from OKLab, and linear sRGB from cone responses: Ottosson (2020).
 _CONES_FROM_LAB = np.array(
@@ -32,55 +32,57 @@ OUTLINE: Rgba = (150, 158, 172, 120)  # grains
 WEAK: Rgba = (150, 152, 158, 200)  # contacts below the weak level
 OPEN: Rgba = (120, 122, 130, 90)  # contacts without force
 WALL: Rgba = (120, 128, 142, 255)
-BOUNDARY: Rgba = (226, 205, 162, 255)  # grains that move as they were seen
+BOUNDARY: Rgba = (226, 205, 162, 255)  # grains with prescribed motion
 LOADED_WALL: Rgba = (222, 227, 236, 255)
-SLIDING: Rgba = (64, 214, 222, 255)  # the second colour, used for the tangential state only
+SLIDING: Rgba = (64, 214, 222, 255)  # for the tangential state only
 SUSPECT: Rgba = (255, 186, 73, 255)
 LOST: Rgba = (255, 82, 130, 255)
 INFERRED: Rgba = (96, 168, 255, 255)  # a rod that no photograph shows
-GAINED: Rgba = (112, 250, 147, 255)
+NEW_CONTACT: Rgba = (112, 250, 147, 255)
 ADDED: Rgba = (196, 130, 255, 255)  # by a reviewer
 FORBIDDEN: Rgba = (255, 214, 80, 255)  # by a reviewer
-# Curves: apart by a CIE76 of 25 under deuteranopia and protanopia, the first two and the last two in grey as well.
+# Curves: CIE76 differences of 25 and more under deuteranopia and protanopia, of the first and the last two in grey.
 SERIES: tuple[Rgba, ...] = ((255, 202, 87, 255), (90, 133, 250, 255), (174, 252, 163, 255), (215, 131, 209, 255))
 
-# Lightness, chroma, hue [°] along the way: deep red, vermilion, orange, yellow, cream.
-_FORCE_WAY = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.87, 0.155, 92.0), (0.97, 0.06, 106.0))
-# What has a sign grows brighter all the way, so that less and more are told apart without any hue.
-# Overlap cream, touching orange, open a quiet blue.
-_GAP_WAY = ((0.97, 0.04, 106.0), (0.87, 0.12, 85.0), (0.72, 0.14, 55.0), (0.56, 0.09, 330.0), (0.42, 0.12, 265.0))
-# Quiet slate, violet, magenta, rose, pale: what is far from converged glows.
-_DOUBT_WAY = ((0.36, 0.045, 260.0), (0.46, 0.10, 285.0), (0.58, 0.19, 330.0), (0.74, 0.15, 5.0), (0.95, 0.03, 60.0))
-# Doubtful yellow to a quiet blue where two bodies surely touch, darker all the way: it holds in grey, too.
-_PROBABILITY_WAY = ((0.93, 0.13, 103.0), (0.81, 0.12, 70.0), (0.67, 0.05, 10.0), (0.47, 0.075, 240.0))
-# Less, in deep blue, over nothing, in grey, to more, in bright yellow.
-_DIFFERENCE_WAY = (
+# Lightness, chroma, hue [°] along the path: deep red, vermilion, orange, yellow, cream.
+_FORCE_PATH = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.87, 0.155, 92.0), (0.97, 0.06, 106.0))
+# Signed quantities: lightness is monotonic, so that less and more differ without hue.
+# Overlap cream, touching orange, open blue.
+_GAP_PATH = ((0.97, 0.04, 106.0), (0.87, 0.12, 85.0), (0.72, 0.14, 55.0), (0.56, 0.09, 330.0), (0.42, 0.12, 265.0))
+# Slate, violet, magenta, rose, pale: large residuals and uncertainties are bright.
+_UNCERTAINTY_PATH = (
+    (0.36, 0.045, 260.0), (0.46, 0.10, 285.0), (0.58, 0.19, 330.0), (0.74, 0.15, 5.0), (0.95, 0.03, 60.0),
+)  # fmt: skip
+# Ambiguous yellow to blue where two bodies certainly touch; lightness is monotonic, so that it is readable in grey.
+_PROBABILITY_PATH = ((0.93, 0.13, 103.0), (0.81, 0.12, 70.0), (0.67, 0.05, 10.0), (0.47, 0.075, 240.0))
+# Less, deep blue; equal, grey; more, bright yellow.
+_DIFFERENCE_PATH = (
     (0.41, 0.235, 264.0), (0.52, 0.12, 260.0), (0.62, 0.0, 0.0), (0.75, 0.08, 60.0), (0.905, 0.10, 88.0),
 )  # fmt: skip
 RAMP_LEVELS = 64
 
 
-def lab_from_lch(way: tuple[tuple[float, float, float], ...]) -> Array:
-    """Lightness, chroma and hue [°] (k, 3) to OKLab (k, 3)."""
-    lightness, chroma, hue = np.array(way).T
+def lab_from_lch(path: tuple[tuple[float, float, float], ...]) -> Array:
+    """Convert lightness, chroma and hue [°] (k, 3) to OKLab (k, 3)."""
+    lightness, chroma, hue = np.array(path).T
     return np.stack([lightness, chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue))], axis=1)
 
 
 def linear_srgb(lab: Array) -> Array:
-    """OKLab (k, 3) to linear sRGB (k, 3), not clipped: outside 0 … 1 a screen cannot show it."""
+    """Convert OKLab (k, 3) to linear sRGB (k, 3), not clipped: outside 0 … 1 a screen cannot show it."""
     return (lab @ _CONES_FROM_LAB.T) ** 3 @ _RGB_FROM_CONES.T
 
 
-def even_way(corners: Array, count: int) -> Array:
-    """Points (count, 3) at equal distances along the polyline through OKLab corners (k, 3)."""
+def even_path(corners: Array, count: int) -> Array:
+    """Return points (count, 3) at equal distances along the polyline through OKLab corners (k, 3)."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     at = np.linspace(0.0, length[-1], count)
     return np.stack([np.interp(at, length, corners[:, axis]) for axis in range(3)], axis=1)
 
 
-def make_ramp(way: tuple[tuple[float, float, float], ...], count: int = RAMP_LEVELS) -> NDArray[np.uint8]:
-    """A ramp (count, 4) of opaque sRGB colours along a way through OKLab."""
-    linear = np.clip(linear_srgb(even_way(lab_from_lch(way), count)), 0.0, 1.0)
+def make_ramp(path: tuple[tuple[float, float, float], ...], count: int = RAMP_LEVELS) -> NDArray[np.uint8]:
+    """Return a ramp (count, 4) of opaque sRGB colours along a path through OKLab."""
+    linear = np.clip(linear_srgb(even_path(lab_from_lch(path), count)), 0.0, 1.0)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     ramp = np.full((count, 4), 255, np.uint8)
     ramp[:, :3] = np.round(255.0 * srgb)
@@ -88,17 +90,18 @@ def make_ramp(way: tuple[tuple[float, float, float], ...], count: int = RAMP_LEV
 
 
 def packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """Colours (k, 4) as 0xRRGGBBAA (k,), the form the recording keeps."""
+    """Convert colours (k, 4) to 0xRRGGBBAA (k,), the form stored in the recording."""
     red, green, blue, alpha = np.asarray(colours, np.uint32).T
     return red << 24 | green << 16 | blue << 8 | alpha
 
 
 def packed_one(colour: Rgba) -> np.uint32:
+    """Convert one colour to 0xRRGGBBAA."""
     return packed(np.array([colour], np.uint8))[0]
 
 
-FORCE_RAMP = make_ramp(_FORCE_WAY)
-GAP_RAMP = make_ramp(_GAP_WAY)
-DOUBT_RAMP = make_ramp(_DOUBT_WAY)
-PROBABILITY_RAMP = make_ramp(_PROBABILITY_WAY)
-DIFFERENCE_RAMP = make_ramp(_DIFFERENCE_WAY)
+FORCE_RAMP = make_ramp(_FORCE_PATH)
+GAP_RAMP = make_ramp(_GAP_PATH)
+UNCERTAINTY_RAMP = make_ramp(_UNCERTAINTY_PATH)
+PROBABILITY_RAMP = make_ramp(_PROBABILITY_PATH)
+DIFFERENCE_RAMP = make_ramp(_DIFFERENCE_PATH)

@@ -1,4 +1,4 @@
-"""Names of the timelines and entities of a recording; what each holds is written in `written_schema`."""
+"""Names of the timelines and entities of a recording; `written_schema` states the content of each."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ GRAINS_LOST = "/grains/lost"
 FORCES = "/contacts/force"
 FORCES_ACROSS = "/contacts/force/across"
 SLIDING = "/contacts/sliding"
-FORCE_DOUBT = "/contacts/doubt"
+FORCE_UNCERTAINTY = "/contacts/uncertainty"
 GAPS = "/contacts/gap"
-GAINED = "/contacts/gained"
-PARTED = "/contacts/parted"
+NEW_CONTACTS = "/contacts/new"
+LOST_CONTACTS = "/contacts/lost"
 VERDICTS = "/contacts/verdict"
 FORCE_LEGEND = "/legend/force"
 SCALE_BAR = "/legend/scale"
@@ -30,7 +30,7 @@ FORCE_LEGEND_TICKS = "/legend/force/ticks"
 FORCE_LEGEND_NOTES = "/legend/force/notes"
 GAP_LEGEND = "/legend/gap"
 GAP_LEGEND_TICKS = "/legend/gap/ticks"
-COLOUR_LEGENDS = "/legend/by"  # and the quantity
+COLOUR_LEGENDS = "/legend/by"  # followed by the quantity
 MAP_LEGEND = "/legend/unconverged"
 MAP_LEGEND_TICKS = "/legend/unconverged/ticks"
 
@@ -60,10 +60,10 @@ SAVED_SWEEPS = "/frames/sweeps_saved"
 SWEEP_COUNT = "/frames/sweeps"
 FINAL_NATURAL_MAP = "/frames/natural_map"
 FINAL_UNBALANCE = "/frames/unbalance"
-GAINED_COUNT = "/frames/contacts_gained"
-PARTED_COUNT = "/frames/contacts_parted"
+NEW_CONTACT_COUNT = "/frames/contacts_new"
+LOST_CONTACT_COUNT = "/frames/contacts_lost"
 EXPECTED_COUNT = "/frames/contacts_expected"
-DOUBTFUL_COUNT = "/frames/contacts_doubtful"
+AMBIGUOUS_COUNT = "/frames/contacts_ambiguous"
 FLAGS = "/flags"
 
 FRICTION_ANGLE = "/statistics/friction_angle"
@@ -88,16 +88,16 @@ TANGENTIAL_FORCE_ANISOTROPY = "/statistics/tangential_force_anisotropy"
 MOBILISATION = "/statistics/mobilisation"
 TAIL_EXPONENT = "/statistics/tail_exponent"
 PLATEAU_RATIO = "/statistics/plateau_ratio"
-STRONG_SHARE = "/statistics/strong_share"
-STRONG_PRESSURE_SHARE = "/statistics/strong_pressure_share"
-STRONG_DEVIATOR_SHARE = "/statistics/strong_deviator_share"
+STRONG_FRACTION = "/statistics/strong_fraction"
+STRONG_PRESSURE_FRACTION = "/statistics/strong_pressure_fraction"
+STRONG_DEVIATOR_FRACTION = "/statistics/strong_deviator_fraction"
 CHAIN_COUNT = "/statistics/chain_count"
-CHAIN_GRAIN_SHARE = "/statistics/chain_grain_share"
+CHAIN_GRAIN_FRACTION = "/statistics/chain_grain_fraction"
 WALL_NORMAL_FORCE = "/statistics/wall_normal_force"
 WALL_TANGENTIAL_FORCE = "/statistics/wall_tangential_force"
 WALL_NORMAL_RECORDED = "/statistics/wall_normal_force/recorded"
 WALL_TANGENTIAL_RECORDED = "/statistics/wall_tangential_force/recorded"
-BAND = "/band"  # below a curve: two standard deviations to either side
+BAND = "/band"  # child of a curve: two standard deviations to either side
 FORCE_DENSITY = "/statistics/force_density/frame"
 FORCE_DENSITY_TAIL = "/statistics/force_density/tail"
 FORCE_DENSITY_TAIL_VALUE = "/statistics/force_density/tail/value"
@@ -119,7 +119,7 @@ RADIUS_TICKS = "/statistics/radius_curve/axes/ticks"
 
 RODS = "/rods/bodies"
 ROD_CHAINS = "/rods/chains"
-FILM_FRAMES = "/film/frames/picture"  # and the number of the frame below it
+FILM_FRAMES = "/film/frames/picture"  # followed by the number of the frame
 FILM_PLACE = "/film/frames/place"
 FILM_SWEEPS = "/film/sweeps/pictures"
 
@@ -133,22 +133,22 @@ TRUTH_ERROR = "/truth/relative_l2"
 
 SUMMARY = "/summary"
 
-# What contacts may be coloured by, beside f_n: each is a component of FORCES.
-COLOURED_BY = TANGENTIAL, SLIDES, BEARS, TOUCHES, AGE, CHANGE, ERROR = (
+# Quantities by which contacts may be coloured, beside f_n; the colours by each are a component of FORCES.
+COLOURED_BY = TANGENTIAL, SLIDING_PROBABILITY, BEARING_PROBABILITY, TOUCHING_PROBABILITY, AGE, CHANGE, ERROR = (
     "ft", "sliding", "bearing", "touching", "age", "change", "error",
 )  # fmt: skip
 
 
 def coloured_by(name: str) -> str:
-    """Archetype of the colours by a quantity of COLOURED_BY; their component is its `colors`."""
+    """Return the archetype of the colours by a quantity of COLOURED_BY; its component is `colors`."""
     return f"by_{name}"
 
 
-# Curves of statistics, each with its band.
+# Curves of statistics, each with a band.
 BANDED = (
     FRICTION_ANGLE, WALL_RATIO_ANGLE, PRINCIPAL_DIRECTION, PRESSURE, COORDINATION_NUMBER,
     COORDINATION_NUMBER_WITHOUT_RATTLERS, RATTLER_COUNT, CONTACT_COUNT, SLIDING_FRACTION, MEAN_FN, MAX_FN,
     FABRIC_ANISOTROPY, SIGMA_1, SIGMA_2, ANISOTROPY_ANGLE, CONTACT_ANISOTROPY, BRANCH_ANISOTROPY,
-    NORMAL_FORCE_ANISOTROPY, TANGENTIAL_FORCE_ANISOTROPY, MOBILISATION, TAIL_EXPONENT, PLATEAU_RATIO, STRONG_SHARE,
-    STRONG_PRESSURE_SHARE, STRONG_DEVIATOR_SHARE, CHAIN_COUNT, CHAIN_GRAIN_SHARE,
+    NORMAL_FORCE_ANISOTROPY, TANGENTIAL_FORCE_ANISOTROPY, MOBILISATION, TAIL_EXPONENT, PLATEAU_RATIO, STRONG_FRACTION,
+    STRONG_PRESSURE_FRACTION, STRONG_DEVIATOR_FRACTION, CHAIN_COUNT, CHAIN_GRAIN_FRACTION,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The scene: what the writers must know of the whole run before its first frame."""
+"""The scene: the data of the whole run that the writers need before its first frame."""
 
 from __future__ import annotations
 
@@ -8,24 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.cell import Cell
-from solver.bodies.grains import Array, Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts
-from solver.contacts.radius_tuning import RadiusTuning
-
 from ...results.results import TruthContacts
+from ...solver.bodies.cell import Cell
+from ...solver.bodies.grains import Array, Grains
+from ...solver.bodies.walls import Walls
+from ...solver.contacts.contacts import Contacts
+from ...solver.contacts.radius_tuning import RadiusTuning
 from ...tracks import Tracks, WallTracks
 from .canvas import Canvas
 from .force_style import ForceStyle
-from .texts import printable
+from .printable_text import printable
 
-USUAL_ROD_LENGTH = 0.06  # [m] drawn where the configuration does not say
+USUAL_ROD_LENGTH = 0.06  # [m] drawn if the configuration gives no length
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """One run before its frames: bodies, canvas, the look of forces."""
+    """Bodies, canvas and style of forces of one run."""
 
     name: str
     tracks: Tracks
@@ -36,39 +35,39 @@ class Scene:
     canvas: Canvas
     style: ForceStyle
     truth: TruthContacts | None = None
-    tolerance: float | None = None  # stopping level of the residual that the solver watches
+    tolerance: float | None = None  # stopping level of the residual
     radius_tuning: RadiusTuning | None = None
 
     @property
     def rod_length(self) -> float:
-        """Length of the rods [m]: material.length of the configuration."""
+        """Length of the rods [m]: `material.length` of the configuration."""
         length = setting(self.configuration, "material", "length")
         return float(length) if isinstance(length, (int, float)) and length > 0 else USUAL_ROD_LENGTH
 
     @property
     def weight(self) -> Array:
-        """Weight of every grain (n, 2) [N]: material.gravity of the configuration, none where it does not say."""
+        """Weight of every grain (n, 2) [N], from `material.gravity` of the configuration; zero if that is not set."""
         gravity = setting(self.configuration, "material", "gravity")
         x, y = gravity if isinstance(gravity, list) else (0.0, 0.0)
         return self.grains.weight((float(x), float(y)))
 
     def body_names(self, bodies: NDArray[np.integer]) -> list[str]:
-        """Names of bodies by row: a grain's id, a wall's name."""
+        """Return the names of bodies by row: the id of a grain, the name of a wall."""
         n = self.grains.count
         return [printable(self.walls.name[b - n]) if b >= n else str(self.tracks.id[b]) for b in bodies.tolist()]
 
     def walls_at(self, frame: int) -> Walls:
-        """The walls of one frame, or its cell, at rest: for measuring, not for solving."""
+        """Return the walls, or the cell, of one frame at rest: for measurements, not for a solve."""
         walls = self.walls
         cell = None if walls.cell is None else walls.cell[frame]
         return Walls.at_rest(walls.endpoints[frame], side=walls.side, cell=cell)
 
     def branches(self, frame: int, contacts: Contacts) -> NDArray[np.float32]:
-        """Lines to draw for contacts (c, 2, 2) [px], of `lines`."""
+        """Return the lines of contacts (c, 2, 2) in [px]."""
         return self.canvas.points(self.lines(frame, contacts)).astype(np.float32)
 
     def lines(self, frame: int, contacts: Contacts) -> Array:
-        """From centre to centre (c, 2, 2) [m]; for a wall, and across the edge of a cell, to the contact point."""
+        """Return lines (c, 2, 2) [m] from centre to centre; at a wall or the edge of a cell, to the contact point."""
         position = self.tracks.position[frame]
         wall = contacts.with_wall
         ends = np.empty((contacts.count, 2, 2))
@@ -80,28 +79,28 @@ class Scene:
         return ends
 
     def far_halves(self, frame: int, contacts: Contacts) -> tuple[NDArray[np.intp], Array]:
-        """The contacts across the edge of a cell (a,), and lines (a, 2, 2) [m] from j to where they are."""
+        """Return the contacts across the edge of a cell (a,), and lines (a, 2, 2) [m] from j to the contact point."""
         rows = np.flatnonzero(self.across(frame, contacts))
         start = self.tracks.position[frame][contacts.j[rows]]
         reach = self.grains.radius[contacts.j[rows]] + 0.5 * contacts.gap[rows]
         return rows, np.stack([start, start - reach[:, None] * contacts.normal[rows]], axis=1)
 
     def across(self, frame: int, contacts: Contacts) -> NDArray[np.bool_]:
-        """Which contacts reach across the edge of the cell as it is drawn (c,)."""
+        """Return which contacts cross the edge of the cell as it is drawn (c,)."""
         if self.walls.cell is None:
             return np.zeros(contacts.count, np.bool_)
         apart = self.tracks.position[frame][contacts.j] - self.tracks.position[frame][contacts.i]
         return np.linalg.norm(apart, axis=1) > 2.0 * self.grains.radius.max() + np.abs(contacts.gap)
 
     def contact_points(self, frame: int, contacts: Contacts) -> Array:
-        """Where contacts are drawn (c, 2) [m]: in a cell at the rim of i, wherever that was wrapped to."""
+        """Return the points at which contacts are drawn (c, 2) [m]: in a cell at the rim of i as wrapped."""
         if self.walls.cell is None:
             return contacts.point
         reach = self.grains.radius[contacts.i] + 0.5 * contacts.gap
         return self.tracks.position[frame][contacts.i] + reach[:, None] * contacts.normal
 
     def outline(self, frame: int) -> Array:
-        """Corners (k, 2) [m] of what bounds the packing in a frame: walls, the cell, or a box around all grains."""
+        """Return corners (k, 2) [m] of the boundary in a frame: walls, the cell, or a box around all grains."""
         if self.walls.cell is not None:
             return cell_corners(self.walls.cell[frame])
         if self.walls.count:
@@ -112,13 +111,13 @@ class Scene:
 
 
 def cell_corners(vectors: Array) -> Array:
-    """Corners (4, 2) [m] of a cell of vectors (2, 2) [m]."""
+    """Return the corners (4, 2) [m] of a cell of vectors (2, 2) [m]."""
     a, b = vectors
     return np.array([np.zeros(2), a, a + b, b])
 
 
 def tracks_in_cell(tracks: Tracks, walls: WallTracks) -> Tracks:
-    """The tracks as they are drawn: wrapped into the cell where there is one."""
+    """Return the tracks as they are drawn: wrapped into the cell if there is one."""
     if walls.cell is None:
         return tracks
     inside = np.stack([
@@ -128,7 +127,7 @@ def tracks_in_cell(tracks: Tracks, walls: WallTracks) -> Tracks:
 
 
 def setting(configuration: str, section: str, key: str) -> object | None:
-    """One value of a configuration in TOML, None where it is not set or the text is not TOML."""
+    """Return one value of a configuration in TOML; None if it is not set or the text is not TOML."""
     try:
         part = tomllib.loads(configuration).get(section)
     except tomllib.TOMLDecodeError:

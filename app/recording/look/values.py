@@ -1,7 +1,7 @@
-"""Numbers as the recording keeps them: what is not known is absent, never NaN.
+"""Numbers in the recording: unknown values are null, never NaN.
 
-The viewer shows an absent value as such, curves have a gap there, and two recordings of one run compare equal
-(NaN differs from itself).
+The viewer shows a null as absent, curves have a gap there, and two recordings of one run compare equal (NaN differs
+from itself).
 """
 
 from __future__ import annotations
@@ -11,30 +11,29 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from .clock import Clock
 
 
-def known(values: NDArray[np.floating]) -> pa.Array:
-    """Values (k,), null where they are not finite."""
+def nullable(values: NDArray[np.floating]) -> pa.Array:
+    """Return values (k,) as an array with nulls where they are not finite."""
     finite = np.isfinite(values)
-    # What lies behind a null is not shown, but is compared: it must not be NaN either.
+    # The value below a null is not shown but is compared, so that it must not be NaN either.
     return pa.array(np.where(finite, values, 0.0).astype(values.dtype), mask=~finite)
 
 
 def log_scalar(clock: Clock, path: str, value: float) -> None:
-    """Log one point of a curve; a gap where the value is not finite."""
+    """Log one point of a curve, a gap if the value is not finite."""
     clock.stream.log(path, rr.Scalars([value] if np.isfinite(value) else []))
 
 
 def log_scalars(clock: Clock, path: str, values: Array) -> None:
-    """Log one point of several curves that share a path; a gap where any is not finite."""
+    """Log one point of several curves of one path, a gap if any value is not finite."""
     clock.stream.log(path, rr.Scalars(values if np.all(np.isfinite(values)) else []))
 
 
 def send_scalars(stream: rr.RecordingStream, path: str, when: rr.TimeColumn, values: Array) -> None:
-    """Send many points (k,) of a curve; gaps where values are not finite."""
+    """Send many points (k,) of a curve, with gaps where values are not finite."""
     finite = np.isfinite(values)
     columns = rr.Scalars.columns(scalars=values[finite])
     stream.send_columns(path, [when], columns.partition(finite.astype(np.int64)))

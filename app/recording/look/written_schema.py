@@ -1,25 +1,25 @@
-"""The written schema of a recording: every timeline, every entity, every component, in one place.
+"""The schema of a recording: every timeline, entity and component.
 
-Four timelines. `frame` counts photographs from 0; `time` [s] and `microstrain` say when and how far into the test
-they were taken. `sweep` counts Gauss-Seidel sweeps over the whole run: frame k occupies the values first_sweep[k] …
-first_sweep[k+1] − 1, one value per sweep and a last one for the reported field (that one alone where a frame was not
-swept at all). Rows that belong to a frame carry all timelines; on those of photographs the last row of a frame wins, so
-`frame` shows the reported forces while `sweep` shows the solve on its way to them.
+There are four timelines. `frame` counts photographs from 0; `time` [s] and `microstrain` are the time and the
+accumulated strain at which they were taken. `sweep` counts Gauss-Seidel sweeps over the whole run: frame k occupies the
+values first_sweep[k] … first_sweep[k+1] − 1, one value per sweep and a last one for the reported field (only that
+one if a frame was not swept). Rows of a frame are on all timelines; on those of photographs the viewer shows the last
+row of a frame, so that `frame` shows the reported forces and `sweep` the convergence of the solve.
 
-`microstrain` is the way of the packing's strain, in millionths, so that it never turns back: of every step between
-photographs its shear, or its greatest principal strain where that is greater. A shear test that goes one way only is
-thus drawn over its shear, an oedometer over its axial strain. Files without `frames/strain` have no such timeline.
+`microstrain` is the accumulated strain of the packing, in millionths, which never decreases: the sum over the steps
+between photographs of their shear, or of their greatest principal strain where that is greater. A monotonic shear test
+is thus drawn over its shear, an oedometer test over its axial strain. Files without `frames/strain` lack this timeline.
 
-The first row of a frame carries the geometry, the later ones only widths and colours. The sweeps are those of the
-Gauss-Seidel chain, its own last one included; the row after it shows the reported field, which the estimator
-`ensemble` makes of several chains and convex members: the forces may step there. Values to be clicked (`fn`,
+The first row of a frame contains the geometry, the later ones only widths and colours. The sweeps are those of the
+Gauss-Seidel chain, including its last; the row after it shows the reported field, which the estimator `ensemble`
+computes from several chains and convex programmes: the forces may jump there. The values shown by a click (`fn`,
 `ft`, …) are those of the reported field.
 
 Lengths in the 2D views are pixels of the photograph as recorded (y down; a photograph above 4 megapixels
 is recorded at half size), or nominal pixels of 1/30 mean radius without photographs. The 3D view is in metres.
 
-The recording's property `experiment` holds what a run was given (name, frames, grains, friction, pressure, …), its
-property `outcome` what came of it, `settings` the configuration as TOML: in a catalogue each is a column.
+The property `experiment` of a recording holds the input of the run (name, frames, grains, friction, pressure, …), the
+property `outcome` its results, and `settings` the configuration as TOML: in a catalogue each is a column.
 """
 
 from __future__ import annotations
@@ -31,25 +31,26 @@ from . import entities
 
 
 class When(Enum):
-    """On which rows an entity has data."""
+    """The rows in which an entity has data."""
 
     START = "first sweep of every frame, on all timelines"
     START_AND_SWEEPS = "first sweep of every frame, then width and colour at recorded sweeps, on all timelines"
     START_AND_END = "cleared at the first sweep of every frame, set at its last row, on all timelines"
     END = "last row of every frame, on all timelines"
     SWEEPS = "every sweep on `sweep`, the last one of every frame on the others"
-    FOUND = "when there is something to say, on all timelines"
+    FOUND = "in frames with a warning, on all timelines"
     STATIC = "once, without a time"
 
     @property
     def timelines(self) -> frozenset[str]:
+        """The timelines of these rows."""
         if self is When.STATIC:
             return frozenset()
         return frozenset({entities.FRAME, entities.SWEEP, entities.TIME, entities.STRAIN})
 
 
 class Condition(Enum):
-    """Which recordings have an entity."""
+    """The recordings that have an entity."""
 
     ALWAYS = "always"
     PHOTOGRAPHS = "with photographs"
@@ -59,7 +60,7 @@ class Condition(Enum):
     RADII = "where radii were tuned by the coordination number"
     FLAGS = "where something was flagged"
     WALL_FORCES = "where wall forces were recorded"
-    BUDGET = "where an error budget was asked for"
+    BUDGET = "where an error budget was requested"
     CELL = "of a periodic cell"
 
 
@@ -72,7 +73,7 @@ class Entity:
     components: frozenset[str]
     when: When
     condition: Condition = Condition.ALWAYS
-    per_frame: bool = False  # an entity for some frames, whose number ends the path
+    per_frame: bool = False  # one entity for each of some frames, whose number ends the path
 
 
 def _of(archetype: str, *names: str) -> frozenset[str]:
@@ -113,8 +114,8 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(entities.GRAINS_LOST, "cross over every grain without a pose", _STRIPS, When.START),
     Entity(
         entities.FORCES,
-        "contacts, centre to centre (wall: centre to contact point); width and colour grow with f_n; further colours, "
-        "to be chosen among, by other quantities",
+        "contacts, centre to centre (wall: centre to contact point); width and colour increase with f_n; further "
+        "selectable colours by other quantities",
         _STRIPS | _CONTACT_VALUES | _CONTACT_COLOURS, When.START_AND_SWEEPS,
     ),
     Entity(
@@ -122,10 +123,12 @@ SCHEMA: tuple[Entity, ...] = (
         _STRIPS, When.START, Condition.CELL,
     ),
     Entity(entities.SLIDING, "contacts at the Coulomb limit", _POINTS, When.START_AND_END),
-    Entity(entities.FORCE_DOUBT, "dim edges as wide as f_n and two standard deviations", _STRIPS, When.START_AND_END),
+    Entity(
+        entities.FORCE_UNCERTAINTY, "dim edges as wide as f_n and two standard deviations", _STRIPS, When.START_AND_END,
+    ),
     Entity(entities.GAPS, "contact points, colour by gap", _POINTS | {"gap_um", "grain_a", "body_b"}, When.START),
-    Entity(entities.GAINED, "contacts that the frame before did not have", _STRIPS, When.START),
-    Entity(entities.PARTED, "contacts of the frame before that are gone", _STRIPS, When.START),
+    Entity(entities.NEW_CONTACTS, "contacts that the frame before did not have", _STRIPS, When.START),
+    Entity(entities.LOST_CONTACTS, "contacts of the frame before that are gone", _STRIPS, When.START),
     Entity(
         entities.VERDICTS, "contacts that a reviewer added or forbade", _STRIPS | {"source", "grain_a", "body_b"},
         When.START,
@@ -134,7 +137,7 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(entities.SCALE_BAR_LENGTH, "its length", _TICKS, When.STATIC),
     Entity(entities.FORCE_LEGEND, "width and colour of f_n", _STRIPS, When.STATIC),
     Entity(entities.FORCE_LEGEND_TICKS, "its values [N]", _TICKS, When.STATIC),
-    Entity(entities.FORCE_LEGEND_NOTES, "what points, edges and rims are", _TICKS, When.STATIC),
+    Entity(entities.FORCE_LEGEND_NOTES, "legend of points, edges and rims", _TICKS, When.STATIC),
     Entity(entities.GAP_LEGEND, "colour of the gap", _STRIPS, When.STATIC),
     Entity(entities.GAP_LEGEND_TICKS, "its values [µm]", _TICKS, When.STATIC),
     *(
@@ -173,27 +176,27 @@ SCHEMA: tuple[Entity, ...] = (
     ),
     Entity(entities.STATUS_LANE, "status of the frame", _LANE, When.START),
     Entity(entities.TRACKING_LANE, "whether every grain has a pose", _LANE, When.START),
-    _scalar(entities.TRUST, "estimated correlation with the true forces, given these inputs"),
+    _scalar(entities.TRUST, "T, lower bound of the correlation with the true forces, given these inputs"),
     _scalar(
-        entities.ERROR_BUDGET, "share of each cause in the variance of the forces' error", When.END, Condition.BUDGET,
+        entities.ERROR_BUDGET, "fraction of each cause in the variance of the force error", When.END, Condition.BUDGET,
     ),
     _scalar(entities.SIMILARITY, "correlation of f_n with the frame before, common contacts"),
-    _scalar(entities.CORRECTION, "ε, how much the forces must correct the measured motion"),
+    _scalar(entities.CORRECTION, "ε, correction of the measured motion by the forces"),
     _scalar(entities.OLD_UNBALANCE, "ū, unbalance of the former forces on this network"),
-    _scalar(entities.START_DIFFERENCE, "H, what is left of the difference between two starts"),
+    _scalar(entities.START_DIFFERENCE, "H, remaining difference between two starts"),
     _scalar(entities.FRAMES_SINCE_RESET, "frames since the last reset"),
     _scalar(entities.WARM_RESIDUAL, "log10 of the natural-map residual after one sweep from the former forces"),
-    _scalar(entities.COLD_RESIDUAL, "… after one sweep from zero forces"),
-    _scalar(entities.SAVED_SWEEPS, "sweeps that zero forces need to come as far as the former ones in one"),
+    _scalar(entities.COLD_RESIDUAL, "log10 of the natural-map residual after one sweep from zero forces"),
+    _scalar(entities.SAVED_SWEEPS, "sweeps from zero forces that equal one sweep from the former forces"),
     _scalar(entities.SWEEP_COUNT, "sweeps of the frame"),
     _scalar(entities.FINAL_NATURAL_MAP, "log10 of the natural-map residual reached"),
     _scalar(entities.FINAL_UNBALANCE, "log10 of the worst grain unbalance of the reported field"),
-    _scalar(entities.GAINED_COUNT, "contacts gained since the frame before"),
-    _scalar(entities.PARTED_COUNT, "contacts lost since the frame before"),
+    _scalar(entities.NEW_CONTACT_COUNT, "contacts that the frame before did not have, in number"),
+    _scalar(entities.LOST_CONTACT_COUNT, "contacts of the frame before that are gone, in number"),
     _scalar(entities.EXPECTED_COUNT, "expected number of contacts: the sum of P(touch)"),
-    _scalar(entities.DOUBTFUL_COUNT, "contacts kept though P(touch) < 1/2"),
+    _scalar(entities.AMBIGUOUS_COUNT, "contacts with P(touch) < 1/2 that are kept"),
     Entity(
-        entities.FLAGS, "what a user must know about a frame", _of("TextLog", "text", "level"), When.FOUND,
+        entities.FLAGS, "warnings about a frame", _of("TextLog", "text", "level"), When.FOUND,
         Condition.FLAGS,
     ),
     _scalar(entities.FRICTION_ANGLE, "asin((σ₁−σ₂)/(σ₁+σ₂)) [°]"),
@@ -201,16 +204,16 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(entities.PRINCIPAL_DIRECTION, "direction of σ₁ [°], counter-clockwise from x"),
     _scalar(entities.PRESSURE, "half the trace of the stress [kPa]"),
     _scalar(entities.COORDINATION_NUMBER, "contacts with force per grain"),
-    _scalar(entities.COORDINATION_NUMBER_WITHOUT_RATTLERS, "the same, rattlers left out"),
+    _scalar(entities.COORDINATION_NUMBER_WITHOUT_RATTLERS, "contacts with force per grain, without rattlers"),
     _scalar(entities.RATTLER_COUNT, "grains without load"),
     _scalar(entities.CONTACT_COUNT, "contacts with force"),
-    _scalar(entities.SLIDING_FRACTION, "share of them at the Coulomb limit"),
+    _scalar(entities.SLIDING_FRACTION, "fraction of contacts with force at the Coulomb limit"),
     _scalar(entities.MEAN_FN, "mean f_n [N]"),
     _scalar(entities.MAX_FN, "greatest f_n [N]"),
     _scalar(entities.FABRIC_ANISOTROPY, "2 (F₁ − F₂) of the fabric tensor"),
     _scalar(entities.SIGMA_1, "greatest principal stress [kPa]"),
     _scalar(entities.SIGMA_2, "smallest principal stress [kPa]"),
-    _scalar(entities.ANISOTROPY_ANGLE, "friction angle that the anisotropies add up to [°]"),
+    _scalar(entities.ANISOTROPY_ANGLE, "friction angle from the anisotropies [°]"),
     _scalar(entities.CONTACT_ANISOTROPY, "a_c, of contact directions"),
     _scalar(entities.BRANCH_ANISOTROPY, "a_l, of branch lengths"),
     _scalar(entities.NORMAL_FORCE_ANISOTROPY, "a_n, of normal forces"),
@@ -218,16 +221,16 @@ SCHEMA: tuple[Entity, ...] = (
     _scalar(entities.MOBILISATION, "mean |f_t| / (μ f_n)"),
     _scalar(entities.TAIL_EXPONENT, "β of the exponential tail of P(f_n) above the mean"),
     _scalar(entities.PLATEAU_RATIO, "P(f_n) of the weakest forces over its plateau below the mean; 1: flat"),
-    _scalar(entities.STRONG_SHARE, "share of the contacts with more than the mean f_n"),
-    _scalar(entities.STRONG_PRESSURE_SHARE, "share of the pressure that they carry"),
-    _scalar(entities.STRONG_DEVIATOR_SHARE, "share of the stress deviator that they carry"),
+    _scalar(entities.STRONG_FRACTION, "fraction of the contacts with more than the mean f_n"),
+    _scalar(entities.STRONG_PRESSURE_FRACTION, "fraction of the pressure carried by strong contacts"),
+    _scalar(entities.STRONG_DEVIATOR_FRACTION, "fraction of the stress deviator carried by strong contacts"),
     _scalar(entities.CHAIN_COUNT, "force chains"),
-    _scalar(entities.CHAIN_GRAIN_SHARE, "share of the grains that belong to one"),
+    _scalar(entities.CHAIN_GRAIN_FRACTION, "fraction of the grains that belong to a force chain"),
     _scalar(entities.WALL_NORMAL_FORCE, "force of the packing on every wall along its outward normal [N]"),
-    _scalar(entities.WALL_TANGENTIAL_FORCE, "… along the wall [N]"),
-    _scalar(entities.WALL_NORMAL_RECORDED, "what sensors recorded of it [N]", When.END, Condition.WALL_FORCES),
-    _scalar(entities.WALL_TANGENTIAL_RECORDED, "… along the wall [N]", When.END, Condition.WALL_FORCES),
-    *(_scalar(path + entities.BAND, "the same, two standard deviations less and more") for path in entities.BANDED),
+    _scalar(entities.WALL_TANGENTIAL_FORCE, "force of the packing on every wall along it [N]"),
+    _scalar(entities.WALL_NORMAL_RECORDED, "recorded normal force on every wall [N]", When.END, Condition.WALL_FORCES),
+    _scalar(entities.WALL_TANGENTIAL_RECORDED, "recorded force along every wall [N]", When.END, Condition.WALL_FORCES),
+    *(_scalar(path + entities.BAND, "two standard deviations below and above the curve") for path in entities.BANDED),
     Entity(entities.FORCE_DENSITY, "density of f_n over its mean, this frame", _POINTS, When.END),
     Entity(entities.FORCE_DENSITY_TAIL, "exponential tail above the mean, this frame", _STRIPS, When.END),
     Entity(entities.FORCE_DENSITY_TAIL_VALUE, "its exponent", _TICKS, When.END),
@@ -239,13 +242,13 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(entities.STRESS_CURVE, "normal stress over the pressure in every direction", _STRIPS, When.END),
     Entity(entities.STRESS_AXES, "circle of the pressure, axes", _STRIPS, When.STATIC),
     Entity(entities.ROSE, "directions of contacts with force, relative number", _STRIPS, When.END),
-    Entity(entities.ROSE_OF_FORCES, "the same, weighted by f_n", _STRIPS, When.END),
+    Entity(entities.ROSE_OF_FORCES, "directions of contacts, weighted by f_n", _STRIPS, When.END),
     Entity(entities.ROSE_AXES, "circle of an isotropic packing, axes", _STRIPS, When.STATIC),
     Entity(entities.ROSE_TICKS, "names of the curves", _TICKS, When.STATIC),
     Entity(entities.RADIUS_CURVE, "coordination number over a common change of all radii", _STRIPS, When.STATIC,
            Condition.RADII),
-    Entity(entities.RADIUS_FOUND, "the change that was taken", _POINTS, When.STATIC, Condition.RADII),
-    Entity(entities.RADIUS_AXES, "axes and the wanted number", _STRIPS, When.STATIC, Condition.RADII),
+    Entity(entities.RADIUS_FOUND, "the change that was applied", _POINTS, When.STATIC, Condition.RADII),
+    Entity(entities.RADIUS_AXES, "axes and the target coordination number", _STRIPS, When.STATIC, Condition.RADII),
     Entity(entities.RADIUS_TICKS, "their values", _TICKS, When.STATIC, Condition.RADII),
     Entity(
         entities.RODS, "rods as cylinders [m]",
@@ -260,7 +263,7 @@ SCHEMA: tuple[Entity, ...] = (
         _FILM, When.STATIC, per_frame=True,
     ),
     Entity(
-        entities.FILM_PLACE, "which of them is the nearest",
+        entities.FILM_PLACE, "frame of the picture nearest to the time cursor",
         _of("LineStrips2D", "strips", "radii", "colors"), When.START,
     ),
     Entity(entities.FILM_SWEEPS, "strong forces of some sweeps side by side", _FILM, When.START),

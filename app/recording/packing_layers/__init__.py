@@ -1,1 +1,1 @@
-"""What is drawn over the packing, a file for each layer."""
+"""The layers drawn over the packing, one file each."""

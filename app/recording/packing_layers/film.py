@@ -1,6 +1,6 @@
-"""Writes force networks side by side, as pictures of a film: frames of the run, and sweeps of a frame.
+"""Writes force networks side by side: frames of the run, and sweeps of a frame.
 
-Only strong contacts are drawn, and of few frames and sweeps, so that the film stays small.
+Only the strong contacts of few frames and sweeps are drawn, so that the film is small.
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT
-from solver.sequence.frame_forces import FrameForces
-
+from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import STRAIGHT
+from ...solver.frame_forces import FrameForces
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.clock import Clock
@@ -23,21 +22,21 @@ from ..look.scene import Scene
 from .forces.network import SweepChoice, visible_sweeps
 
 COLUMNS, ROWS = 3, 3  # of frames
-SWEEP_COLUMNS = 2  # … of sweeps, in as many rows
-PICTURES = COLUMNS * ROWS  # frames of the run, at most
-SWEEP_PICTURES = SWEEP_COLUMNS * ROWS  # sweeps of a frame, the reported field among them
-STEP_DOWN = 1.14  # from row to row over the height of a picture: room for a name
-STRONG = 1.0  # times the mean f_n of the run: the weakest force that is drawn of frames
-STRONG_SWEEPS = 1.5  # … of sweeps, which every frame has a film of
+SWEEP_COLUMNS = 2  # of sweeps, in ROWS rows
+PICTURES = COLUMNS * ROWS  # greatest number of frames
+SWEEP_PICTURES = SWEEP_COLUMNS * ROWS  # greatest number of sweeps, including the reported field
+STEP_DOWN = 1.14  # distance of rows over the height of a picture, with space for a name
+STRONG = 1.0  # times the mean f_n of the run: the least force drawn in pictures of frames
+STRONG_SWEEPS = 1.5  # times the mean f_n of the run: the least force drawn in pictures of sweeps
 
 
 def film_frames(frame_count: int) -> NDArray[np.int64]:
-    """The frames that have a picture, the first and the last among them."""
+    """Return the frames that have a picture, including the first and the last."""
     return np.unique(np.round(np.linspace(0, frame_count - 1, min(frame_count, PICTURES))).astype(np.int64))
 
 
 def film_bounds(canvas: Canvas, columns: int) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What a film of so many columns covers, across and down [px]."""
+    """Return the bounds of a film with this number of columns, in x and y [px]."""
     above = 0.5 * (STEP_DOWN - 1.0) * canvas.height
     top = canvas.top - above
     return (canvas.left, canvas.left + columns * canvas.width), (top, top + ROWS * STEP_DOWN * canvas.height)
@@ -51,7 +50,7 @@ class FilmWriter:
         self._frames = film_frames(scene.tracks.frame_count)
 
     def log(self, clock: Clock, forces: FrameForces) -> None:
-        """Log one frame: its picture, static, where it has one; which is the nearest; the film of its sweeps."""
+        """Log one frame: its picture, static, if it has one; the nearest picture; the film of its sweeps."""
         frame = clock.frame
         nearest = int(np.argmin(np.abs(self._frames - frame)))
         if frame == self._frames[nearest]:
@@ -89,13 +88,13 @@ class FilmWriter:
         return self._scene.canvas.grain_radius
 
     def _places(self, pictures: NDArray[np.int64], columns: int) -> Array:
-        """Where pictures (k,) lie beside the first (k, 2) [px]."""
+        """Return the offsets of pictures (k,) from the first (k, 2) [px]."""
         canvas = self._scene.canvas
         row, column = np.divmod(pictures, columns)
         return np.column_stack([column * canvas.width, row * STEP_DOWN * canvas.height])
 
     def _lines(self, forces: FrameForces, fn: NDArray[np.floating], at: Array, strong: float) -> rr.LineStrips2D:
-        """The strong contacts of fn (k, c) [N] in pictures at their places (k, 2) [px], and faint outlines."""
+        """Return the strong contacts of fn (k, c) [N] in pictures at offsets (k, 2) [px], and faint outlines."""
         scene, style = self._scene, self._scene.style
         picture, row = np.nonzero(np.nan_to_num(fn) > strong * style.range.mean)
         force = np.asarray(fn[picture, row], np.float64)
@@ -103,7 +102,7 @@ class FilmWriter:
         outline = self._outline(forces.frame)
         outlines = (outline[None] + at[:, None, None]).reshape(-1, 2, 2)
         faint: Rgba = (*FAINT[:3], 200)
-        # One array of lines of two points: a list of arrays takes ten times as long.
+        # One array of lines of two points: a list of arrays needs ten times the time.
         return rr.LineStrips2D(
             np.concatenate([lines, outlines]).astype(np.float32),
             radii=np.concatenate([style.radii(force), np.full(len(outlines), 0.05 * self._grain, np.float32)]),
@@ -112,7 +111,7 @@ class FilmWriter:
         )
 
     def _outline(self, frame: int) -> Array:
-        """The walls of a frame and what joins straight ones, or the cell, as lines (l, 2, 2) [px]."""
+        """Return walls and joins of straight walls, or the cell, of a frame as lines (l, 2, 2) [px]."""
         walls = self._scene.walls
         corners = self._scene.outline(frame)
         circles = [line for line, side in zip(walls.outlines(frame), walls.sides, strict=True) if side != STRAIGHT]
@@ -123,7 +122,7 @@ class FilmWriter:
         return self._scene.canvas.points(np.concatenate(ends))
 
     def _names(self, at: Array, names: list[str]) -> rr.Points2D:
-        """Names of pictures above them."""
+        """Return the names of pictures, placed above them."""
         canvas = self._scene.canvas
         middle = np.array([0.5 * (canvas.left + canvas.right), canvas.top - 0.05 * canvas.height])
         return rr.Points2D(

@@ -6,20 +6,19 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.sequence.frame_forces import FrameForces
-
+from ...solver.bodies.grains import Array
+from ...solver.frame_forces import FrameForces
 from ...tracks import TrackStatus, WallTracks
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, INK, LOADED_WALL, LOST, OUTLINE, SUSPECT, WALL, packed_one
-from ..look.detail import is_outlined
+from ..look.level_of_detail import is_outlined
+from ..look.printable_text import printable
 from ..look.scene import Scene, cell_corners
-from ..look.texts import printable
-from ..look.values import known
+from ..look.values import nullable
 
-SEAM = 0.94  # of a radius, of discs without outlines: a dark seam shows where one ends
-DISC = 0.55  # of the colour of an outline, for a whole disc
+SEAM = 0.94  # of a radius, for discs without outlines: a dark seam separates them
+DISC = 0.55  # of the brightness of an outline, for a whole disc
 
 
 def log_grains_and_walls(clock: Clock, scene: Scene, forces: FrameForces) -> None:
@@ -30,7 +29,7 @@ def log_grains_and_walls(clock: Clock, scene: Scene, forces: FrameForces) -> Non
 
 
 def last_seen(position: Array, frame: int) -> Array:
-    """Positions at a frame; a grain without one keeps its last, or else its next (n, 2)."""
+    """Return positions (n, 2) at a frame; for a grain without one its last, or else its next position."""
     shown = position[frame].copy()
     order = [*range(frame - 1, -1, -1), *range(frame + 1, len(position))]
     for other in order:
@@ -107,21 +106,21 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         ),
         rr.AnyValues(
             id=tracks.id,
-            x_mm=known(1e3 * tracks.position[frame, :, 0]),
-            y_mm=known(1e3 * tracks.position[frame, :, 1]),
-            theta_deg=known(np.degrees(tracks.rotation[frame])),
-            sigma_um=known((1e6 * tracks.sigma[frame]).astype(np.float32)),
-            zncc=known(tracks.zncc[frame].astype(np.float32)),
+            x_mm=nullable(1e3 * tracks.position[frame, :, 0]),
+            y_mm=nullable(1e3 * tracks.position[frame, :, 1]),
+            theta_deg=nullable(np.degrees(tracks.rotation[frame])),
+            sigma_um=nullable((1e6 * tracks.sigma[frame]).astype(np.float32)),
+            zncc=nullable(tracks.zncc[frame].astype(np.float32)),
             status=[TrackStatus(s).name.lower() for s in status.tolist()],
-            unbalance=known(np.asarray(unbalance, np.float32)),
+            unbalance=nullable(np.asarray(unbalance, np.float32)),
         ),
     )
-    turned = tracks.rotation[frame] - _first_rotation(tracks.rotation)
-    shown = present & np.isfinite(turned) & outlined
+    rotation = tracks.rotation[frame] - _first_rotation(tracks.rotation)
+    shown = present & np.isfinite(rotation) & outlined
     clock.stream.log(
         entities.GRAIN_SPINS,
         rr.LineStrips2D(
-            _spin_marks(centre[shown], radius[shown], turned[shown]),
+            _spin_marks(centre[shown], radius[shown], rotation[shown]),
             radii=np.float32(0.03 * canvas.grain_radius),
             colors=packed_one(INK),
             draw_order=11.0,
@@ -141,7 +140,7 @@ def _log_grains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 def grain_colours(
     status: NDArray[np.uint8], present: NDArray[np.bool_], boundary: NDArray[np.bool_] | None = None
 ) -> NDArray[np.uint32]:
-    """Outline colours (n,): grey, of the boundary sand, doubtful amber, inferred blue, red where there is no pose."""
+    """Return outline colours (n,): grey; boundary sand; suspect pose amber; inferred blue; without a pose red."""
     usual = np.full(len(status), packed_one(OUTLINE))
     if boundary is not None:
         usual[boundary] = packed_one(BOUNDARY)
@@ -151,26 +150,26 @@ def grain_colours(
 
 
 def dimmed(colours: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Outline colours (n,) for whole discs, over which forces must stand out."""
+    """Darken outline colours (n,) for whole discs, on which forces must be visible."""
     parts = np.stack([(colours >> shift) & 0xFF for shift in (24, 16, 8)], axis=-1).astype(np.float64)
     red, green, blue = np.rint(DISC * parts).astype(np.uint32).T
     return (red << 24) | (green << 16) | (blue << 8) | (colours & 0xFF)
 
 
 def _first_rotation(rotation: Array) -> Array:
-    """Every grain's rotation at frame 0, or where it first has one (n,) [rad]."""
-    seen = np.isfinite(rotation)
-    return rotation[np.argmax(seen, axis=0), np.arange(rotation.shape[1])]
+    """Return the first known rotation of every grain (n,) [rad]."""
+    known = np.isfinite(rotation)
+    return rotation[np.argmax(known, axis=0), np.arange(rotation.shape[1])]
 
 
-def _spin_marks(centre: Array, radius: Array, turned: Array) -> NDArray[np.float32]:
-    """Short strokes at the rim (k, 2, 2) [px], at the top where turned (counter-clockwise seen, [rad]) is 0."""
-    way = np.stack([-np.sin(turned), -np.cos(turned)], axis=1)  # y down: up is −y, counter-clockwise goes left
+def _spin_marks(centre: Array, radius: Array, rotation: Array) -> NDArray[np.float32]:
+    """Return short strokes at the rim (k, 2, 2) [px], at the top for rotation 0 [rad] (counter-clockwise)."""
+    direction = np.stack([-np.sin(rotation), -np.cos(rotation)], axis=1)  # y down: up is −y, counter-clockwise is left
     reach = radius[:, None, None] * np.array([0.62, 0.92])[None, :, None]
-    return (centre[:, None] + reach * way[:, None]).astype(np.float32)
+    return (centre[:, None] + reach * direction[:, None]).astype(np.float32)
 
 
 def _crosses(centre: Array, radius: Array) -> NDArray[np.float32]:
-    """Two strokes through every centre (2 k, 2, 2) [px]."""
+    """Return two strokes through every centre (2 k, 2, 2) [px]."""
     arms = np.array([[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]]) * 0.7
     return (centre[:, None, None] + radius[:, None, None, None] * arms).reshape(-1, 2, 2).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Writes the rods in three dimensions, with the strong forces as capsules before their ends."""
+"""Writes the rods in three dimensions, with the strong forces as capsules in front of their ends."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.sequence.frame_forces import FrameForces
-
+from ...solver.bodies.grains import Array
+from ...solver.frame_forces import FrameForces
 from ...tracks import TrackStatus
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import BOUNDARY, INFERRED, LOST, SUSPECT, packed_one
-from ..look.detail import is_outlined
+from ..look.level_of_detail import is_outlined
 from ..look.scene import Scene
 
-ALUMINIUM = (34, 39, 48, 255)  # dark: forces before the rods stand out in grey, too
-CHAIN_RADIUS_SHARE = 0.55  # of the grain's, for a chain at the top of the range
+ALUMINIUM = (34, 39, 48, 255)  # dark, so that forces in front of the rods are visible, also in grey
+CHAIN_RADIUS_FRACTION = 0.55  # of the radius of a grain, for a force at the top of the range
 
 
 def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
@@ -26,15 +25,15 @@ def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     tracks, present = scene.tracks, scene.tracks.present[clock.frame]
     position, radius = tracks.position[clock.frame], tracks.radius
     status = tracks.status[clock.frame]
-    doubtful = status == TrackStatus.SUSPECT
-    shade = np.where(doubtful, packed_one(SUSPECT), packed_one(ALUMINIUM))
+    suspect = status == TrackStatus.SUSPECT
+    shade = np.where(suspect, packed_one(SUSPECT), packed_one(ALUMINIUM))
     if tracks.boundary is not None:
         shade = np.where(tracks.boundary, packed_one(BOUNDARY), shade)
     shade = np.where(status == TrackStatus.INFERRED, packed_one(INFERRED), shade)
     shade = np.where(status == TrackStatus.LOST, packed_one(LOST), shade)
     outlined = is_outlined(tracks.grain_count)
     centre = np.column_stack([position, np.full(len(position), -0.5 * scene.rod_length if outlined else 0.0)])
-    size = (0.97 * radius[present]).astype(np.float32)  # a dark seam shows where one ends
+    size = (0.97 * radius[present]).astype(np.float32)  # a dark seam separates the rods
     clock.stream.log(
         entities.RODS,
         rr.Cylinders3D(
@@ -55,24 +54,25 @@ def _log_chains(clock: Clock, scene: Scene, forces: FrameForces) -> None:
     strong = np.nan_to_num(forces.fn) > style.range.mean
     start, end = scene.lines(clock.frame, contacts)[strong].transpose(1, 0, 2)
     branch = end - start
-    height = np.full(len(start), 0.6 * CHAIN_RADIUS_SHARE * scene.tracks.radius.max())  # just clear of the ends
-    share = np.clip(forces.fn[strong] / style.range.top, 0.0, 1.0)
-    radius = CHAIN_RADIUS_SHARE * float(np.mean(scene.tracks.radius)) * share
+    height = np.full(len(start), 0.6 * CHAIN_RADIUS_FRACTION * scene.tracks.radius.max())  # just in front of the ends
+    fraction = np.clip(forces.fn[strong] / style.range.top, 0.0, 1.0)
+    radius = CHAIN_RADIUS_FRACTION * float(np.mean(scene.tracks.radius)) * fraction
     clock.stream.log(
         entities.ROD_CHAINS,
         rr.Capsules3D(
             lengths=np.linalg.norm(branch, axis=1).astype(np.float32),
             radii=radius.astype(np.float32),
             translations=np.column_stack([start, height]).astype(np.float32),
-            quaternions=turns_from_axis(branch),
+            quaternions=rotations_from_axis(branch),
             colors=style.colours(forces.fn[strong]),
             fill_mode=rr.components.FillMode.Solid,
         ),
     )  # fmt: skip
 
 
-def turns_from_axis(branch: Array) -> NDArray[np.float32]:
-    """Quaternions (c, 4) (x, y, z, w) that turn the z axis onto branches (c, 2) in the plane z = 0."""
-    way = branch / np.linalg.norm(branch, axis=1)[:, None]
-    half = np.sqrt(0.5)  # a quarter turn about (−y, x, 0)
-    return (half * np.column_stack([-way[:, 1], way[:, 0], np.zeros(len(way)), np.ones(len(way))])).astype(np.float32)
+def rotations_from_axis(branch: Array) -> NDArray[np.float32]:
+    """Return quaternions (c, 4) (x, y, z, w) that rotate the z axis onto branches (c, 2) in the plane z = 0."""
+    direction = branch / np.linalg.norm(branch, axis=1)[:, None]
+    half = np.sqrt(0.5)  # of a rotation by 90° about (−y, x, 0)
+    zero, one = np.zeros(len(branch)), np.ones(len(branch))
+    return (half * np.column_stack([-direction[:, 1], direction[:, 0], zero, one])).astype(np.float32)

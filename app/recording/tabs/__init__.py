@@ -1,1 +1,1 @@
-"""The blueprint: tabs, their views and their layout."""
+"""The blueprint: tabs, views and their layout."""

@@ -1,4 +1,4 @@
-"""Ranges of axes that leave room for the legend: the viewer draws it over the curves."""
+"""Ranges of axes with space for the legend, which the viewer draws over the curves."""
 
 from __future__ import annotations
 
@@ -6,30 +6,29 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solver.bodies.walls import Walls
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
-
+from ...solver.bodies.walls import Walls
+from ...solver.frame_forces import FrameForces
+from ...solver.statistics.frame_statistics import FrameStatistics
 from ...tracks import WallTracks
 from ..curve_layers.statistic_curves import band_values, recorded_values, statistic_values, wall_values
 from ..look import entities
 
-Extremes = Mapping[str, tuple[float, float]]  # of the curves at a path
+Extremes = Mapping[str, tuple[float, float]]  # least and greatest value of the curves, by path
 
-ENTRY, FRAME = 23.0, 18.0  # px of a legend, per entry and around them
-MOST_ROOM = 0.55  # of a plot, for its legend
-MARGIN = 0.06  # of the span, where there is no legend
+ENTRY, FRAME = 23.0, 18.0  # [px] height of a legend per entry, and of its frame
+MAX_LEGEND_FRACTION = 0.55  # of the height of a plot
+MARGIN = 0.06  # of the span, at an end without legend
 
 
 class CurveExtremes:
-    """Least and greatest value of every curve whose values are known before the recording is written."""
+    """Collects the least and greatest value of every curve that is known before the recording is written."""
 
     def __init__(self, walls: WallTracks) -> None:
         self._walls = walls
         self.found: dict[str, tuple[float, float]] = {}
 
     def add(self, frame: int, forces: FrameForces, statistics: FrameStatistics) -> None:
-        """Have them hold one frame, a row of the walls."""
+        """Add the values of one frame."""
         values = [*statistic_values(statistics), (entities.CORRECTION, forces.correction)]
         values += [(entities.OLD_UNBALANCE, forces.old_unbalance), (entities.START_DIFFERENCE, forces.start_difference)]
         values += [(entities.FRAMES_SINCE_RESET, float(forces.frames_since_reset))]
@@ -50,20 +49,36 @@ class CurveExtremes:
                 self.found[path] = min(low, value), max(high, value)
 
 
-def range_with_room(
+def range_with_legend(
     extremes: Extremes, paths: Sequence[str], *, entries: int, height: float, top: bool
 ) -> tuple[float, float] | None:
-    """A range of the axis in which `entries` lines of legend cover no curve; None where no value is known.
+    """Return a range of the axis in which the legend covers no curve.
 
-    height [px] of the plot; top: where the legend is.
+    Parameters
+    ----------
+    extremes : mapping
+        Least and greatest value of the curves, by path.
+    paths : sequence of str
+        The curves of the plot.
+    entries : int
+        Lines of the legend; 0: no legend.
+    height : float
+        Height of the plot [px].
+    top : bool
+        The legend is at the top, otherwise at the bottom.
+
+    Returns
+    -------
+    tuple of float, or None
+        Ends of the range; None if no value is known.
     """
     known = [extremes[path] for path in paths if path in extremes]
     if not known:
         return None
     low, high = min(low for low, _ in known), max(high for _, high in known)
     span = high - low if high > low else max(abs(high), 1.0) * 0.2
-    room = min((ENTRY * entries + FRAME) / height, MOST_ROOM) if entries else MARGIN
-    wide = span * room / (1.0 - room)
+    legend = min((ENTRY * entries + FRAME) / height, MAX_LEGEND_FRACTION) if entries else MARGIN
+    extension = span * legend / (1.0 - legend)
     if top:
-        return low - MARGIN * span, high + wide
-    return low - wide, high + MARGIN * span
+        return low - MARGIN * span, high + extension
+    return low - extension, high + MARGIN * span

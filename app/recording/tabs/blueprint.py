@@ -1,4 +1,4 @@
-"""The blueprint: which tabs there are and what each shows."""
+"""The blueprint: the tabs and their views."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Tab(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """What the blueprint must know of a recording."""
+class RecordingLayout:
+    """The properties of a recording that define its blueprint."""
 
     canvas: Canvas
     rod_length: float  # [m]
@@ -55,29 +55,41 @@ class Layout:
     truth: bool
     wall_count: int = 4
     radius_curve: bool = False
-    wall_forces: bool = False  # were recorded
-    budget: bool = False  # of errors
-    extremes: Extremes = field(default_factory=dict)  # of curves whose values are known beforehand
+    wall_forces: bool = False  # recorded by sensors
+    budget: bool = False  # error budget
+    extremes: Extremes = field(default_factory=dict)  # of the curves known before the recording is written
 
 
 _PACKING = [entities.WALLS, entities.CELL, f"{entities.GRAINS}/**"]
 _LOW, _HIGH = rrb.Corner2D.LeftBottom, rrb.Corner2D.LeftTop
 _FORCES = [
-    entities.FORCE_DOUBT,
+    entities.FORCE_UNCERTAINTY,
     entities.FORCES,
     entities.FORCES_ACROSS,
     entities.SLIDING,
     f"{entities.FORCE_LEGEND}/**",
 ]
-_PLAIN_LEGEND = [entities.FORCE_LEGEND, entities.FORCE_LEGEND_TICKS]  # where there are no edges, points or rims
-_SHARE = (-0.04, 1.05)  # of an axis for shares and correlations
-_RESIDUALS = (-6.4, 3.0)  # log10; room for a legend above
+_PLAIN_LEGEND = [entities.FORCE_LEGEND, entities.FORCE_LEGEND_TICKS]  # for views without edges, points and rims
+_UNIT_RANGE = (-0.04, 1.05)  # of an axis for fractions and correlations
+_RESIDUALS = (-6.4, 3.0)  # log10, with space for a legend above
 
 
-def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: bool = False) -> rrb.Blueprint:
-    """Make the blueprint with one tab in front; `following` keeps the cursor at the newest frame.
+def make_blueprint(layout: RecordingLayout, *, active: Tab = Tab.EXPERIMENT, following: bool = False) -> rrb.Blueprint:
+    """Make the blueprint.
 
-    The Convergence tab in front starts on the timeline `sweep`.
+    Parameters
+    ----------
+    layout : RecordingLayout
+        The properties of the recording.
+    active : Tab
+        The tab in front; with the Convergence tab the timeline is `sweep`.
+    following : bool
+        The cursor stays at the newest frame.
+
+    Raises
+    ------
+    ValueError
+        If the recording has no such tab.
     """
     tabs: dict[Tab, rrb.Container | rrb.View] = {
         Tab.EXPERIMENT: _experiment(layout),
@@ -111,7 +123,7 @@ def make_blueprint(layout: Layout, *, active: Tab = Tab.EXPERIMENT, following: b
     )
 
 
-def _experiment(layout: Layout) -> rrb.Container:
+def _experiment(layout: RecordingLayout) -> rrb.Container:
     photograph = [entities.PHOTOGRAPH] if layout.photographs else []
     angles = [entities.FRICTION_ANGLE, entities.WALL_RATIO_ANGLE]
     return rrb.Horizontal(
@@ -119,7 +131,7 @@ def _experiment(layout: Layout) -> rrb.Container:
         rrb.Vertical(
             lanes_view(),
             curve_view("Friction angle [°]", angles, layout.extremes, height=200.0, corner=_HIGH),
-            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_UNIT_RANGE, corner=_LOW),
             flags_view(),
             row_shares=[1.15, 2.0, 2.0, 1.5],
         ),
@@ -128,7 +140,7 @@ def _experiment(layout: Layout) -> rrb.Container:
     )
 
 
-def _convergence(layout: Layout) -> rrb.Container:
+def _convergence(layout: RecordingLayout) -> rrb.Container:
     maps = [entities.WALLS, entities.UNBALANCE_MAP, entities.CHANGE_MAP, f"{entities.MAP_LEGEND}/**"]
     residuals = [entities.SWEEP_NATURAL_MAP, entities.SWEEP_UNBALANCE, entities.SWEEP_FORCE_CHANGE]
     low, high = layout.extremes.get(entities.SWEEP_COUNT, (0.0, 1.0))
@@ -139,7 +151,7 @@ def _convergence(layout: Layout) -> rrb.Container:
             y_range=(-6.4, 4.4), axis=near_axis(),
         ),
     ]  # fmt: skip
-    if high > low:  # the same number in every frame is no curve
+    if high > low:  # no curve for a constant number
         plots.append(curve_view("Sweeps per frame", [entities.SWEEP_COUNT], layout.extremes))
     return rrb.Horizontal(
         packing_view("Network as it forms", layout.canvas, [*_PACKING, *_FORCES]),
@@ -150,23 +162,23 @@ def _convergence(layout: Layout) -> rrb.Container:
     )  # fmt: skip
 
 
-def _settling(layout: Layout) -> rrb.Container:
+def _settling(layout: RecordingLayout) -> rrb.Container:
     starts = [entities.COLD_RESIDUAL, entities.WARM_RESIDUAL, entities.FINAL_NATURAL_MAP, entities.FINAL_UNBALANCE]
-    doubts = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
+    indicators = [entities.CORRECTION, entities.OLD_UNBALANCE, entities.START_DIFFERENCE]
     below = [
-        curve_view("Doubts: ε, ū and H", doubts, layout.extremes, height=190.0),
-        curve_view("Sweeps that the former forces save", [entities.SAVED_SWEEPS]),
+        curve_view("Settling: ε, ū and H", indicators, layout.extremes, height=190.0),
+        curve_view("Sweeps saved by the former forces", [entities.SAVED_SWEEPS]),
     ]
     longest = layout.extremes.get(entities.FRAMES_SINCE_RESET, (0.0, 0.0))[1]
-    if longest < layout.frame_count - 1:  # counting the frames is no curve
+    if longest < layout.frame_count - 1:  # no curve that only counts the frames
         below.append(curve_view("Frames since reset", [entities.FRAMES_SINCE_RESET], layout.extremes))
     if layout.budget:
-        below[1:] = [curve_view("Error budget: shares of the variance", [entities.ERROR_BUDGET], y_range=_SHARE,
+        below[1:] = [curve_view("Error budget: fractions of the variance", [entities.ERROR_BUDGET], y_range=_UNIT_RANGE,
                                 entries=6)]  # fmt: skip
     return rrb.Vertical(
         lanes_view(),
         rrb.Horizontal(
-            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_SHARE, corner=_LOW),
+            curve_view("Trust and similarity", [entities.TRUST, entities.SIMILARITY], y_range=_UNIT_RANGE, corner=_LOW),
             curve_view("log₁₀ residuals: cold start, warm start, reached", starts, y_range=_RESIDUALS),
         ),
         rrb.Horizontal(
@@ -179,15 +191,15 @@ def _settling(layout: Layout) -> rrb.Container:
     )
 
 
-def _statistics(layout: Layout) -> rrb.Container:
+def _statistics(layout: RecordingLayout) -> rrb.Container:
     density = drawn_view("P(f_n / mean f_n), logarithmic", "/statistics/force_density", *PLOT_BOUNDS)
     coordination = [entities.COORDINATION_NUMBER, entities.COORDINATION_NUMBER_WITHOUT_RATTLERS]
-    strong = [entities.STRONG_SHARE, entities.STRONG_PRESSURE_SHARE, entities.STRONG_DEVIATOR_SHARE]
+    strong = [entities.STRONG_FRACTION, entities.STRONG_PRESSURE_FRACTION, entities.STRONG_DEVIATOR_FRACTION]
     plots: list[tuple[str, list[str]]] = [
         ("Coordination number", coordination),
         ("Tail and plateau of P(f_n)", [entities.TAIL_EXPONENT, entities.PLATEAU_RATIO]),
         ("Sliding and mobilisation", [entities.SLIDING_FRACTION, entities.MOBILISATION]),
-        ("Strong network, force chains", [*strong, entities.CHAIN_GRAIN_SHARE]),
+        ("Strong network, force chains", [*strong, entities.CHAIN_GRAIN_FRACTION]),
     ]
     below: list[rrb.View] = [curve_view(name, paths, layout.extremes, height=330.0) for name, paths in plots]
     if layout.radius_curve:
@@ -205,7 +217,7 @@ def _statistics(layout: Layout) -> rrb.Container:
     )
 
 
-def _loads(layout: Layout) -> rrb.Container:
+def _loads(layout: RecordingLayout) -> rrb.Container:
     angles = [entities.FRICTION_ANGLE, entities.ANISOTROPY_ANGLE, entities.WALL_RATIO_ANGLE]
     anisotropies = [
         entities.CONTACT_ANISOTROPY, entities.BRANCH_ANISOTROPY, entities.NORMAL_FORCE_ANISOTROPY,
@@ -237,25 +249,25 @@ def _loads(layout: Layout) -> rrb.Container:
     )
 
 
-def _contacts(layout: Layout) -> rrb.Container:
-    changes = [entities.GAPS, entities.GAINED, entities.PARTED, entities.VERDICTS]
+def _contacts(layout: RecordingLayout) -> rrb.Container:
+    changes = [entities.GAPS, entities.NEW_CONTACTS, entities.LOST_CONTACTS, entities.VERDICTS]
     touching = [entities.WALLS, entities.GRAINS, entities.FORCES, entities.SLIDING]
-    touching.append(f"{entities.COLOUR_LEGENDS}/{entities.TOUCHES}/**")
+    touching.append(f"{entities.COLOUR_LEGENDS}/{entities.TOUCHING_PROBABILITY}/**")
     counts = [entities.CONTACT_COUNT, entities.EXPECTED_COUNT]
     plots = [
-        curve_view("Contacts in number", counts, layout.extremes, height=220.0),
-        curve_view("Doubtful contacts", [entities.DOUBTFUL_COUNT]),
-        curve_view("Contacts gained and lost", [entities.GAINED_COUNT, entities.PARTED_COUNT]),
+        curve_view("Number of contacts", counts, layout.extremes, height=220.0),
+        curve_view("Ambiguous contacts", [entities.AMBIGUOUS_COUNT]),
+        curve_view("New and lost contacts", [entities.NEW_CONTACT_COUNT, entities.LOST_CONTACT_COUNT]),
     ]
     if layout.extremes and entities.EXPECTED_COUNT not in layout.extremes:
-        del plots[1]  # probabilities were not computed
+        del plots[1]  # the probabilities were not computed
     return rrb.Horizontal(
         packing_view("Gaps, changes, verdicts", layout.canvas, [*_PACKING, *changes, f"{entities.GAP_LEGEND}/**"]),
         packing_view(
             "Probability that they touch; points: sliding",
             layout.canvas,
             touching,
-            contacts_by(entities.TOUCHES, radius=0.1 * layout.canvas.grain_radius),
+            contacts_by(entities.TOUCHING_PROBABILITY, radius=0.1 * layout.canvas.grain_radius),
         ),
         rrb.Vertical(*plots),
         column_shares=[1.0, 1.0, 0.8],
@@ -263,8 +275,8 @@ def _contacts(layout: Layout) -> rrb.Container:
     )
 
 
-def _maps(layout: Layout) -> rrb.Container:
-    """The contacts, each map coloured by another quantity; what is chosen in one is chosen in all."""
+def _maps(layout: RecordingLayout) -> rrb.Container:
+    """Return maps of the contacts, each coloured by another quantity; a selection applies to all."""
     thin = 0.13 * layout.canvas.grain_radius
     first = [entities.WALLS, entities.FORCES, *_PLAIN_LEGEND]
     views = [packing_view("Normal force f_n", layout.canvas, first)]
@@ -272,9 +284,9 @@ def _maps(layout: Layout) -> rrb.Container:
         (entities.TANGENTIAL, "Tangential force f_t", None),
         (entities.CHANGE, "Change of f_n since the frame before", None),
         (entities.ERROR, "Standard deviation of f_n", None),
-        (entities.SLIDES, "Probability that it slides", thin),
-        (entities.BEARS, "Probability that it bears force", thin),
-        (entities.TOUCHES, "Probability that it touches", thin),
+        (entities.SLIDING_PROBABILITY, "Probability that it slides", thin),
+        (entities.BEARING_PROBABILITY, "Probability that it bears force", thin),
+        (entities.TOUCHING_PROBABILITY, "Probability that it touches", thin),
         (entities.AGE, "Age: frames since it began", thin),
     ):
         contents = [entities.WALLS, entities.FORCES, f"{entities.COLOUR_LEGENDS}/{quantity}/**"]
@@ -282,13 +294,13 @@ def _maps(layout: Layout) -> rrb.Container:
     return rrb.Grid(*views, grid_columns=4, name=Tab.MAPS)
 
 
-def _rods(layout: Layout) -> rrb.View:
+def _rods(layout: RecordingLayout) -> rrb.View:
     x, y, size = _middle(layout.canvas)
     eye = (x + 0.4 * size, y - 0.18 * size, 1.09 * size)
     return solid_view(Tab.RODS, "/rods", eye, (x, y, -0.3 * layout.rod_length))
 
 
-def _film(layout: Layout) -> rrb.Container:
+def _film(layout: RecordingLayout) -> rrb.Container:
     return rrb.Horizontal(
         drawn_view("Strong forces of frames, the nearest framed", "/film/frames", *film_bounds(layout.canvas, COLUMNS)),
         drawn_view("Strong forces of this frame's sweeps", "/film/sweeps", *film_bounds(layout.canvas, SWEEP_COLUMNS)),
@@ -298,7 +310,7 @@ def _film(layout: Layout) -> rrb.Container:
 
 
 def _middle(canvas: Canvas) -> tuple[float, float, float]:
-    """Middle of the packing [m] in the world, and its greater side [m]."""
+    """Return the middle of the packing and its greater side [m]."""
     metre = canvas.scale.pixel_size * canvas.shrink
     across, down = 0.5 * (canvas.left + canvas.right), 0.5 * (canvas.top + canvas.bottom)
     x = (across - 0.5) * metre
@@ -306,7 +318,7 @@ def _middle(canvas: Canvas) -> tuple[float, float, float]:
     return x, y, metre * max(canvas.width, canvas.height)
 
 
-def _truth(layout: Layout) -> rrb.Container:
+def _truth(layout: RecordingLayout) -> rrb.Container:
     agreement = [entities.TRUTH_R_FN, entities.TRUTH_R_FT, entities.TRUTH_ERROR]
     return rrb.Vertical(
         rrb.Horizontal(

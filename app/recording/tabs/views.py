@@ -1,4 +1,4 @@
-"""The views that tabs are put together from."""
+"""The views of which tabs consist."""
 
 from __future__ import annotations
 
@@ -10,14 +10,26 @@ from rerun.blueprint.visualizers import Visualizer  # pyright: ignore[reportPriv
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.colours import BACKGROUND
-from .axis_ranges import Extremes, range_with_room
+from .axis_ranges import Extremes, range_with_legend
 
-PLOT_HEIGHT = 300.0  # px, of a curve view whose height is not told
+PLOT_HEIGHT = 300.0  # [px] height of a curve view by default
 _TOP = (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop)
 
 
 def packing_view(name: str, canvas: Canvas, contents: list[str], contacts: Visualizer | None = None) -> rrb.View:
-    """A view of the packing with a scale bar, and room for a legend below it; contacts: how else they are drawn."""
+    """Return a view of the packing with a scale bar and space for a legend below.
+
+    Parameters
+    ----------
+    name : str
+        Title of the view.
+    canvas : Canvas
+        Bounds of the packing.
+    contents : list of str
+        Entities.
+    contacts : Visualizer, optional
+        Style of the contacts; None: by f_n.
+    """
     return rrb.Spatial2DView(
         origin="/",
         contents=[*contents, f"{entities.SCALE_BAR}/**"],
@@ -31,7 +43,7 @@ def packing_view(name: str, canvas: Canvas, contents: list[str], contacts: Visua
 
 
 def contacts_by(quantity: str, *, radius: float | None = None) -> Visualizer:
-    """Contacts coloured by one of entities.COLOURED_BY; radius [px]: of all lines, else they are as wide as f_n."""
+    """Return a style of contacts coloured by one of entities.COLOURED_BY; radius [px] of all lines, None: by f_n."""
     style = rr.LineStrips2D.from_fields(radii=None if radius is None else [radius])
     source = f"{entities.coloured_by(quantity)}:colors"
     chosen = VisualizerComponentMapping(
@@ -41,7 +53,7 @@ def contacts_by(quantity: str, *, radius: float | None = None) -> Visualizer:
 
 
 def drawn_view(name: str, origin: str, x_range: tuple[float, float], y_range: tuple[float, float]) -> rrb.View:
-    """A plot drawn as lines, with all that is below an entity."""
+    """Return a view of a plot drawn as lines: all entities below one."""
     return rrb.Spatial2DView(
         origin=origin,
         contents="$origin/**",
@@ -52,13 +64,13 @@ def drawn_view(name: str, origin: str, x_range: tuple[float, float], y_range: tu
 
 
 def polar_view(name: str, origin: str, circles: float) -> rrb.View:
-    """A drawing about a unit circle; circles: how far it reaches."""
+    """Return a view of a plot about a unit circle, up to a radius of `circles` unit circles."""
     reach = 100.0 * circles
     return drawn_view(name, origin, (-reach, reach), (-reach, reach))
 
 
 def solid_view(name: str, origin: str, eye: tuple[float, float, float], target: tuple[float, float, float]) -> rrb.View:
-    """A view in three dimensions, y up."""
+    """Return a view in three dimensions, y up, from the point `eye` to the point `target` [m]."""
     return rrb.Spatial3DView(
         origin=origin,
         name=name,
@@ -70,7 +82,7 @@ def solid_view(name: str, origin: str, eye: tuple[float, float, float], target: 
 
 
 def lanes_view() -> rrb.View:
-    """Status and tracking of the frames as lanes."""
+    """Return a view of the status and tracking of frames as lanes."""
     return rrb.StateTimelineView(
         origin="/frames", contents=[entities.STATUS_LANE, entities.TRACKING_LANE], name="Status of the frames",
         time_view=whole_axis(),
@@ -78,7 +90,7 @@ def lanes_view() -> rrb.View:
 
 
 def flags_view() -> rrb.View:
-    """What a user must know, as a list."""
+    """Return a view of the warnings as a list."""
     columns = rrb.TextLogColumns(timeline_columns=[entities.FRAME], text_log_columns=["LogLevel", "Body"])
     return rrb.TextLogView(origin=entities.FLAGS, name="Flags", columns=columns)
 
@@ -94,17 +106,33 @@ def curve_view(
     corner: rrb.Corner2D = rrb.Corner2D.RightTop,
     axis: rrb.TimeAxis | None = None,
 ) -> rrb.View:
-    """A plot of curves and of the bands of those that have one, over the whole test where no other axis is given.
+    """Return a plot of curves with the bands of those that have one.
 
-    extremes: of the curves, to leave room for the legend; y_range is taken instead where it is given. height [px] of
-    the plot in a usual window; entries of the legend, by default one per path, none for a single one. Bands share one.
+    Parameters
+    ----------
+    name : str
+        Title of the view.
+    contents : list of str
+        Paths of the curves.
+    extremes : mapping, optional
+        Least and greatest values of the curves, for an axis with space for the legend.
+    y_range : tuple of float, optional
+        Range of the axis, instead of that from `extremes`.
+    height : float
+        Height of the plot in a window of usual size [px].
+    entries : int, optional
+        Entries of the legend; None: one per path and one for all bands, none for a single curve.
+    corner : Corner2D
+        Corner of the legend.
+    axis : TimeAxis, optional
+        Range of the timeline; None: the whole test.
     """
     bands = [path + entities.BAND for path in contents if path in entities.BANDED]
     if entries is None:
         entries = len(contents) + bool(bands) if len(contents) + bool(bands) > 1 else 0
     contents = [*contents, *bands]
     if y_range is None:
-        y_range = range_with_room(extremes or {}, contents, entries=entries, height=height, top=corner in _TOP)
+        y_range = range_with_legend(extremes or {}, contents, entries=entries, height=height, top=corner in _TOP)
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
@@ -112,16 +140,16 @@ def curve_view(
         axis_x=axis or whole_axis(),
         axis_y=rrb.ScalarAxis(range=y_range) if y_range else None,
         plot_legend=rrb.PlotLegend(corner, visible=entries > 0),
-        background=rrb.archetypes.PlotBackground(color=BACKGROUND),  # the curves' colours are made for a dark one
+        background=rrb.archetypes.PlotBackground(color=BACKGROUND),  # for which the curves have their colours
     )
 
 
 def whole_axis() -> rrb.TimeAxis:
-    """All of the timeline: else the viewer shows a minute, or 2000 of a sequence, about the cursor."""
+    """Return an axis of the whole timeline; by default the viewer shows a minute, or 2000 values, about the cursor."""
     everything = rrb.TimeRangeBoundary.infinite()
     return rrb.TimeAxis(link="Independent", view_range=rrb.TimeRange(start=everything, end=everything))
 
 
 def near_axis() -> rrb.TimeAxis:
-    """A minute of the timeline, or 2000 of a sequence, about the cursor: of what has a value for every sweep."""
+    """Return an axis of a minute, or 2000 values, about the cursor, for curves with a value at every sweep."""
     return rrb.TimeAxis(link="Independent")

@@ -1,1 +1,1 @@
-"""The viewer: opened, served to a browser, driven without a screen for pictures."""
+"""The viewer: opened in a window, served to a browser, run without a screen for pictures."""

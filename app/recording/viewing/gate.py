@@ -1,9 +1,10 @@
-"""Who may talk to the page: this browser, this page, this machine.
+"""Access control of the local pages: only this browser, this page and this machine are admitted.
 
-The first address carries a random token; it is turned into a cookie that no other site's request carries (same-site,
-strict) and no script reads. `Host` must name this machine, so that a foreign name which resolves to it opens
-nothing; `Origin`, where a browser sends it, must be this page's own, and a request that changes something must have
-one. No answer carries a CORS header. The content policy lets the page, and the viewer in it, talk to this server only.
+The first address contains a random token. The server exchanges it for a cookie that requests of other sites do not
+carry (same-site, strict) and that scripts cannot read. `Host` must name this machine, so that a foreign name that
+resolves to it is refused. `Origin`, where a browser sends it, must be that of this page, and a request that changes
+something must have one. No answer carries a CORS header. The content policy restricts the page, and the viewer in it,
+to requests to this server.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ SAFE_HEADERS = {
 
 
 class QuietServer(ThreadingHTTPServer):
-    """A server that says nothing of clients that break off; the terminal belongs to the person."""
+    """A server that prints nothing about clients that disconnect: the terminal shows messages for the user only."""
 
     daemon_threads = True
 
@@ -49,21 +50,21 @@ class QuietServer(ThreadingHTTPServer):
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """The rules of one server."""
+    """The access rules of one server."""
 
     port: int
-    command: str = "review"  # that printed the address
+    command: str = "review"  # the command that printed the address
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # in the first address
     secret: str = field(default_factory=lambda: secrets.token_urlsafe(32))  # in the cookie
 
     @property
     def address(self) -> str:
-        """The first address, to be opened once."""
+        """The address to open first, once; it contains the token."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     @property
     def cookie_name(self) -> str:
-        # Cookies do not tell ports apart: two pages on one machine must not throw each other out.
+        # Cookies ignore the port: two pages on one machine must not overwrite the cookie of each other.
         return f"rodsight_{self.command}_{self.port}"
 
     @property
@@ -71,32 +72,47 @@ class Gate:
         return f"{self.cookie_name}={self.secret}; Path=/; HttpOnly; SameSite=Strict"
 
     def refusal(self, headers: Message, *, changes: bool, entering: bool = False) -> tuple[HTTPStatus, str] | None:
-        """Likewise `objection`, for headers as they came: with a status."""
+        """Return status and reason for which a request with these headers is refused, None if it is admitted."""
         for name in ("Host", "Origin"):
             if len(headers.get_all(name) or []) > 1:
-                return HTTPStatus.BAD_REQUEST, f"{name} stands twice"
-        told = {name: value for name in _HEADERS if (value := headers.get(name)) is not None}
-        objection = self.objection(told, changes=changes, entering=entering)
+                return HTTPStatus.BAD_REQUEST, f"the header {name} is given twice"
+        known = {name: value for name in _HEADERS if (value := headers.get(name)) is not None}
+        objection = self.objection(known, changes=changes, entering=entering)
         return None if objection is None else (HTTPStatus.FORBIDDEN, objection)
 
     def opens(self, token: str) -> bool:
+        """Return whether a token is that of the first address."""
         return secrets.compare_digest(token.encode(), self.token.encode())
 
-    def objection(self, headers: Mapping[str, str], *, changes: bool, entering: bool = False) -> str | None:
-        """Why a request is refused; None: it may pass.
+    def admits_at_once(self, headers: Mapping[str, str]) -> bool:
+        """Return whether a browser sends the new cookie with the redirection of the first visit.
 
-        changes: it is a POST. entering: it is the first visit, which has no cookie yet and may be a link elsewhere.
+        It does not if a page or a file elsewhere led to the first visit; a page of this server must lead on then.
+        """
+        return (headers.get("Sec-Fetch-Site") or "none") in ("same-origin", "none")
+
+    def objection(self, headers: Mapping[str, str], *, changes: bool, entering: bool = False) -> str | None:
+        """Return why a request is refused, None if it is admitted.
+
+        Parameters
+        ----------
+        headers : mapping
+            Headers of the request by name.
+        changes : bool
+            The request changes something: it is a POST.
+        entering : bool
+            The request is the first visit, which has no cookie yet and may come from a link on another page.
         """
         host = headers.get("Host") or ""
         if host not in (f"127.0.0.1:{self.port}", f"localhost:{self.port}"):
             return "this host name is not served"
         origin = headers.get("Origin")
         if (origin is None and changes) or (origin is not None and origin != f"http://{host}"):
-            return "this origin may not ask"
+            return "requests from this origin are refused"
         if not entering and (headers.get("Sec-Fetch-Site") or "none") not in ("same-origin", "none"):
-            return "another site may not ask"
+            return "requests from another site are refused"
         if changes and (headers.get("Content-Type") or "").split(";")[0].strip() != "application/json":
-            return "only JSON is taken"
+            return "only JSON is accepted"
         if not entering and not self._has_cookie(headers.get("Cookie") or ""):
             return f"open the address that `rodsight {self.command}` printed"
         return None

@@ -1,4 +1,4 @@
-"""One connection behind the gate: how it enters, is refused, and is answered; what it is given says the subclass."""
+"""One connection behind the gate: admission, refusal and answers; the subclass defines the content."""
 
 from __future__ import annotations
 
@@ -7,31 +7,32 @@ from http.server import BaseHTTPRequestHandler
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from ...process.browser import redirect_page
 from .gate import SAFE_HEADERS, Gate
 
-PATIENCE = 60.0  # [s] for a client that says nothing
+TIMEOUT = 60.0  # [s] without data from the client
 
 
 class GatedHandler(BaseHTTPRequestHandler):
-    """Subclassed with what it gives, and once more with the server it belongs to, whose `gate` is named."""
+    """A request handler with a gate. A subclass answers GET requests; a second one names server and `gate`."""
 
     gate: Gate
     protocol_version = "HTTP/1.1"
     server_version = "rodsight"
     sys_version = ""
-    timeout = PATIENCE
+    timeout = TIMEOUT
     disable_nagle_algorithm = True
 
-    def give(self, path: str, query: dict[str, str]) -> None:
-        """Answer a GET that may pass."""
+    def answer_get(self, path: str, query: dict[str, str]) -> None:
+        """Answer an admitted GET request."""
         raise NotImplementedError
 
     def is_open(self, path: str) -> bool:
-        """Whether a path may be asked for without the cookie, by a viewer that keeps none."""
+        """Return whether a path is served without the cookie, for a viewer that stores none."""
         return False
 
-    def entrance(self, query: dict[str, str]) -> str:
-        """Where the first address leads."""
+    def first_page(self, query: dict[str, str]) -> str:
+        """Return the address to which the first visit is redirected."""
         return "/"
 
     def do_GET(self) -> None:
@@ -41,34 +42,40 @@ class GatedHandler(BaseHTTPRequestHandler):
         if self.refused(changes=False, entering=entering or self.is_open(parts.path)):
             return
         if not entering:
-            self.give(parts.path, query)
+            self.answer_get(parts.path, query)
         elif self.gate.opens(query["token"]):
-            place, cookie = self.entrance(query), self.gate.set_cookie
-            self.send(b"", "text/plain", HTTPStatus.SEE_OTHER, Location=place, Set_Cookie=cookie)
+            place, cookie = self.first_page(query), self.gate.set_cookie
+            if self.gate.admits_at_once(dict(self.headers.items())):
+                self.send(b"", "text/plain", HTTPStatus.SEE_OTHER, Location=place, Set_Cookie=cookie)
+            else:
+                self.send(redirect_page(place).encode(), "text/html; charset=utf-8", Set_Cookie=cookie)
         else:
-            self.say(HTTPStatus.FORBIDDEN, f"this token is not the one that `rodsight {self.gate.command}` printed")
+            sentence = f"this token is not the one that `rodsight {self.gate.command}` printed"
+            self.send_text(HTTPStatus.FORBIDDEN, sentence)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: the terminal belongs to the person."""
+        """Print nothing: the terminal shows messages for the user only."""
 
     def refused(self, *, changes: bool, entering: bool = False) -> bool:
-        """Whether the gate refuses the request; then it is answered, and the connection ends."""
+        """Return whether the gate refuses the request; a refusal is sent and the connection ends."""
         refusal = self.gate.refusal(self.headers, changes=changes, entering=entering)
         if refusal is not None:
             self.close_connection = True  # the body, if any, was not read
-            self.say(*refusal)
+            self.send_text(*refusal)
         return refusal is not None
 
-    def say(self, status: HTTPStatus, sentence: str) -> None:
+    def send_text(self, status: HTTPStatus, sentence: str) -> None:
+        """Answer with a sentence as plain text."""
         self.send(sentence.encode(), "text/plain; charset=utf-8", status)
 
     def send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
-        """Answer with a content of known length; headers by name, _ for -."""
+        """Answer with content of known length; headers by name, with _ for -."""
         named = {key.replace("_", "-"): value for key, value in headers.items()}
         self.head(kind, status, {"Content-Length": str(len(content)), **named})
         self.wfile.write(content)
 
     def head(self, kind: str, status: HTTPStatus, headers: dict[str, str]) -> None:
+        """Send status and headers."""
         self.send_response(status)
         for name, value in {"Content-Type": kind, "Cache-Control": "no-store", **SAFE_HEADERS, **headers}.items():
             self.send_header(name, value)

@@ -1,6 +1,6 @@
-"""The native viewer without a screen: opens a recording, moves its cursor, takes pictures of tabs and views.
+"""The native viewer without a screen: opens a recording, moves its time cursor, takes pictures of tabs and views.
 
-It draws with any Vulkan driver; without a graphics card the software one of Mesa does (package
+It draws with any Vulkan driver; without a graphics card the software driver of Mesa serves (package
 mesa-vulkan-drivers).
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import glob
 import hashlib
-import socket
 import subprocess
 import tempfile
 import time
@@ -19,33 +18,41 @@ from types import TracebackType
 from rerun.experimental import ViewerClient
 
 from ..parts import parts_of
-from .viewer import viewer_binary, viewer_environment
+from .viewer import free_port, viewer_binary, viewer_environment
 
 START_SECONDS = 60.0
 ANSWER_SECONDS = 60.0
-NOTICE_SECONDS = 9.0  # for which the viewer shows what it says at the start over a corner of the window
-STILL_SECONDS = 0.25  # between two pictures that must be equal: data is fetched on demand
+NOTICE_SECONDS = 9.0  # for which the viewer shows its start notices over a corner of the window
+PICTURE_INTERVAL = 0.25  # [s] between two pictures that must be equal: the viewer fetches data on demand
 
 
 class NoPictureError(RuntimeError):
-    """The viewer could not be started or did not draw; the message says what to install or to change."""
+    """The viewer could not be started or did not draw; the message names what to install or to change."""
 
 
 def vulkan_drivers() -> list[str]:
-    """Files of the installed Vulkan drivers; empty where no picture can be taken."""
+    """Return the files of the installed Vulkan drivers; empty if no picture can be taken."""
     places = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
     return [file for place in places for file in sorted(glob.glob(f"{place}/*.json"))]
 
 
-def free_port() -> int:
-    """A port of this machine that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class HeadlessViewer:
-    """One viewer process with one recording. Use it in a `with` block: the process ends with it."""
+    """One viewer process with one recording, used in a `with` block; the process ends with the block.
+
+    Parameters
+    ----------
+    recording : Path or str
+        The recording.
+    width, height : int
+        Size of the window [px].
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no recording.
+    NoPictureError
+        If the viewer cannot be started.
+    """
 
     def __init__(self, recording: Path | str, *, width: int = 1600, height: int = 1000) -> None:
         self.recording = Path(recording)
@@ -55,7 +62,7 @@ class HeadlessViewer:
         self._process: subprocess.Popen[bytes] | None = None
         self._client: ViewerClient | None = None
         self._tab: str | None = None
-        self._clear_at = 0.0  # when the notices of the start are gone
+        self._clear_at = 0.0  # time at which the start notices have disappeared
 
     def __enter__(self) -> HeadlessViewer:
         try:
@@ -93,7 +100,7 @@ class HeadlessViewer:
         return [view.name or "" for view in self._running().get_state().views]
 
     def timeline(self, name: str) -> tuple[int, int]:
-        """First and last value of a timeline."""
+        """Return the first and last value of a timeline."""
         state = self._running().get_state()
         for recording in state.recordings:
             for line in recording.timelines:
@@ -102,13 +109,13 @@ class HeadlessViewer:
         raise NoPictureError(f"{self.recording} has no timeline {name!r}")
 
     def warnings(self) -> list[str]:
-        """What the viewer says it could not draw, of all views drawn so far."""
+        """Return the viewer's reports of missing data, of all views drawn so far."""
         return [
             f"{view.name}: {report.summary}" for view in self._running().get_state().views for report in view.reports
         ]
 
     def show_tab(self, name: str) -> None:
-        """Bring a tab to the front; raises NoPictureError where there is none of that name."""
+        """Bring a tab to the front; raise NoPictureError if there is none of that name."""
         path, root = self._root()
         for each in root["contents"]:
             if self._name(each) == name:
@@ -124,29 +131,45 @@ class HeadlessViewer:
         self._running().set_time(timeline, sequence=value, play_state="paused")
 
     def draw(self) -> None:
-        """Draw the window once, as it is."""
+        """Draw the window once."""
         self._running().take_screenshot()
 
     def picture(self, view: str | None = None) -> bytes:
-        """A picture (PNG) of the window, or of one view, whose tab comes to the front, taken once it stands still."""
+        """Take a picture once two consecutive ones are equal.
+
+        Parameters
+        ----------
+        view : str, optional
+            The view, whose tab comes to the front; None: the whole window.
+
+        Returns
+        -------
+        bytes
+            The picture as PNG.
+
+        Raises
+        ------
+        NoPictureError
+            If there is no such view, or the picture still changes after ANSWER_SECONDS.
+        """
         client = self._running()
         view_id = None if view is None else self._bring_to_front(view)
         while time.monotonic() < self._clear_at:
             client.take_screenshot(max_size=64)
             time.sleep(0.3)
-        end, former = time.monotonic() + ANSWER_SECONDS, b""
+        end, previous = time.monotonic() + ANSWER_SECONDS, b""
         while time.monotonic() < end:
             try:
                 picture = client.take_screenshot(view_id)
             except ConnectionError as error:
                 if "NotFound" not in str(error):
                     raise
-                picture = b""  # a view that has just come to the front is still laid out
+                picture = b""  # a view that has just come to the front has no layout yet
             digest = hashlib.sha256(picture).digest()
-            if picture and digest == former:
+            if picture and digest == previous:
                 return picture
-            former = digest
-            time.sleep(STILL_SECONDS)
+            previous = digest
+            time.sleep(PICTURE_INTERVAL)
         raise NoPictureError(f"{self.recording}: the picture still changed after {ANSWER_SECONDS:g} s")
 
     def _start(self) -> None:
@@ -172,7 +195,7 @@ class HeadlessViewer:
         while time.monotonic() < end:
             if self._process.poll() is not None:
                 raise NoPictureError(f"the viewer ended with status {self._process.returncode} instead of drawing")
-            with suppress(Exception):  # until it listens, whatever the client raises means: not yet
+            with suppress(Exception):  # until the viewer listens, the client raises various errors
                 client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
                 client.get_state()
                 self._client = client
@@ -181,7 +204,8 @@ class HeadlessViewer:
         raise NoPictureError(f"the viewer did not answer within {START_SECONDS:g} s")
 
     def _open(self) -> None:
-        for file in parts_of(self.recording.resolve()):  # one by one: a viewer that loads a long part hears nothing
+        # One by one: the viewer does not answer while it loads a long part.
+        for file in parts_of(self.recording.resolve()):
             self._running().open(str(file))
             self._wait_until_loaded()
         self._running().set_time(play_state="paused")  # a blueprint may start it playing
@@ -190,7 +214,7 @@ class HeadlessViewer:
         client, end = self._running(), time.monotonic() + ANSWER_SECONDS
         while True:
             with suppress(TimeoutError):
-                client.take_screenshot(max_size=64)  # views exist once they were drawn
+                client.take_screenshot(max_size=64)  # a view exists after it was drawn
                 state = client.get_state()
                 if not state.loading and state.active_recording is not None and state.views:
                     return
@@ -200,11 +224,11 @@ class HeadlessViewer:
 
     def _running(self) -> ViewerClient:
         if self._client is None:
-            raise RuntimeError("HeadlessViewer is used in a with block")
+            raise RuntimeError("HeadlessViewer must be used in a with block")
         return self._client
 
     def _root(self) -> tuple[str, dict]:
-        """Path and content of the container that holds the tabs."""
+        """Return path and content of the container of the tabs."""
         for path, parts in self._running().get_blueprint().blueprint.items():
             container = parts.get("ContainerBlueprint", {})
             if container.get("container_kind") == "Tabs":
@@ -215,7 +239,7 @@ class HeadlessViewer:
         return _display_name(self._running().get_blueprint().blueprint[_path(item)])
 
     def _bring_to_front(self, name: str) -> str:
-        """The view of this name in the tab in front, or else in the first tab that has one."""
+        """Return the view of this name in the front tab, or else in the first tab that has one, and show that tab."""
         named = {str(view.view_id) for view in self._running().get_state().views if view.name == name}
         if not named:
             shown = ", ".join(sorted(repr(each) for each in set(self.views)))
@@ -231,19 +255,19 @@ class HeadlessViewer:
 
     def _views_of_tab(self, tab: str) -> set[str]:
         blueprint = self._running().get_blueprint().blueprint
-        todo = [each for each in self._root()[1]["contents"] if self._name(each) == tab]
+        pending = [each for each in self._root()[1]["contents"] if self._name(each) == tab]
         views: set[str] = set()
-        while todo:
-            item = todo.pop()
+        while pending:
+            item = pending.pop()
             if _path(item).startswith("/view/"):
                 views.add(_path(item).removeprefix("/view/"))
             else:
-                todo += blueprint[_path(item)]["ContainerBlueprint"]["contents"]
+                pending += blueprint[_path(item)]["ContainerBlueprint"]["contents"]
         return views
 
 
 def _path(item: str) -> str:
-    """Blueprint path of a container's content, which is named with or without its leading slash."""
+    """Return the blueprint path of a container's item, which is stored with or without a leading slash."""
     return "/" + item.lstrip("/")
 
 

@@ -1,4 +1,4 @@
-"""Pictures and films of a recording without a screen, by the viewer itself."""
+"""Pictures and films of a recording, drawn by the viewer without a screen."""
 
 from __future__ import annotations
 
@@ -6,40 +6,63 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from ...atomic import replacing, write_atomically
-from ..parts import chunks_of
+from ...process.atomic import write_atomically
+from ..parts import read_chunks
+from .film_file import encode_film
 from .headless import HeadlessViewer, NoPictureError
 
 PictureProgress = Callable[[int, int], None]  # pictures done, pictures in all
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
-    """What a picture is of."""
+class PictureSettings:
+    """Timeline, tab, view and size of the pictures."""
 
     timeline: str = "frame"
     tab: str | None = None  # None: the one in front
-    view: str | None = None  # of that tab; None: all of them
+    view: str | None = None  # of that tab; None: all views
     size: tuple[int, int] = (1600, 1000)  # [px]
 
 
-FRAMES_IN_FRONT = Shown()
+DEFAULT_PICTURE = PictureSettings()
 
 
 def write_pictures(
     recording: Path,
     folder: Path,
     times: Sequence[int],
-    shown: Shown = FRAMES_IN_FRONT,
+    shown: PictureSettings = DEFAULT_PICTURE,
     *,
     progress: PictureProgress | None = None,
 ) -> list[Path]:
-    """Write a PNG for every one of the times on the timeline shown.
+    """Write a PNG for each time of a timeline.
 
-    Raises FileNotFoundError where there is no recording, NoPictureError where it cannot be drawn.
+    Parameters
+    ----------
+    recording : Path
+        The recording.
+    folder : Path
+        Folder of the pictures; it is created.
+    times : sequence of int
+        Values on the timeline of `shown`.
+    shown : PictureSettings
+        Timeline, tab, view and size.
+    progress : callable, optional
+        Called with the pictures done and their total number.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no recording.
+    NoPictureError
+        If it cannot be drawn.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files = []
@@ -53,56 +76,61 @@ def write_film(
     recording: Path,
     file: Path,
     times: Sequence[int],
-    shown: Shown = FRAMES_IN_FRONT,
+    shown: PictureSettings = DEFAULT_PICTURE,
     *,
     rate: float = 6.0,
     progress: PictureProgress | None = None,
 ) -> int:
-    """Write an MP4 (MPEG-4 part 2) with a picture for every one of the times, `rate` a second; returns its size.
+    """Write a film with a picture for each time of a timeline; the suffix of its file selects the format.
 
-    Raises like write_pictures.
+    Parameters
+    ----------
+    recording : Path
+        The recording.
+    file : Path
+        The film, .mp4 or .webm.
+    times : sequence of int
+        Values on the timeline of `shown`.
+    shown : PictureSettings
+        Timeline, tab, view and size.
+    rate : float
+        Pictures per second.
+    progress : callable, optional
+        Called with the pictures done and their total number.
+
+    Returns
+    -------
+    int
+        Size of the film [bytes].
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no recording.
+    NoPictureError
+        If there is no time, or a picture or the film cannot be made.
     """
     if not times:
         raise NoPictureError("a film needs at least one picture")
-    with replacing(file) as part:
-        # The container is known by the name's end, which must be that of a film.
-        loose = part.with_name(f"{file.stem}.part.mp4")
-        writer: cv2.VideoWriter | None = None
-        try:
-            for _, picture in _pictures(recording, times, shown, progress):
-                image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
-                assert image is not None
-                height, width = (side - side % 2 for side in image.shape[:2])  # films have even sides
-                if writer is None:
-                    code = cv2.VideoWriter.fourcc(*"mp4v")
-                    writer = cv2.VideoWriter(str(loose), code, rate, (width, height))
-                    if not writer.isOpened():
-                        raise NoPictureError(f"{file}: this OpenCV cannot write an MP4 of {width} × {height} pixels")
-                writer.write(image[:height, :width])
-            if writer is not None:
-                writer.release()
-            loose.replace(part)
-        finally:
-            loose.unlink(missing_ok=True)
-    return file.stat().st_size
+    return encode_film(file, (picture for _, picture in _pictures(recording, times, shown, progress)), rate)
 
 
 def timeline_values(recording: Path, timeline: str) -> tuple[int, int]:
-    """First and last value of a timeline, read from the file."""
-    least, most = [], []
-    for chunk in chunks_of(recording, timeline=timeline):
+    """Return the first and last value of a timeline, read from the file; raise NoPictureError if there is none."""
+    first, last = [], []
+    for chunk in read_chunks(recording, timeline=timeline):
         values = np.asarray(chunk.to_record_batch().column(timeline).to_pylist())
-        least.append(int(values.min()))
-        most.append(int(values.max()))
-    if not least:
+        first.append(int(values.min()))
+        last.append(int(values.max()))
+    if not first:
         raise NoPictureError(f"{recording} has no timeline {timeline!r}")
-    return min(least), max(most)
+    return min(first), max(last)
 
 
 def _pictures(
     recording: Path,
     times: Sequence[int],
-    shown: Shown,
+    shown: PictureSettings,
     progress: PictureProgress | None,
 ) -> Iterator[tuple[int, bytes]]:
     with HeadlessViewer(recording, width=shown.size[0], height=shown.size[1]) as viewer:

@@ -1,8 +1,8 @@
-"""Recordings shown in a browser on this machine: page, viewer and files from one server, behind the gate.
+"""Serves recordings to a browser on this machine: page, viewer and files from one server behind the gate.
 
-The viewer's own server gives a recording to whoever asks, be it a page of another site under a name that was made to
-point here. This one knows a fixed list of names, and asks for the token that was printed. A recording that still grows
-is sent as it grows.
+The viewer's own server sends a recording to any client, also to a page of another site whose name was made to resolve
+to this machine. This server has a fixed list of paths and requires the printed token. A recording that is still being
+written is sent as it grows.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from .gate import Gate, QuietServer
 from .gated_handler import GatedHandler
 from .web_viewer import WebViewer, read_web_viewer
 
-IDLE = 3600.0  # [s] without a question after which a server of its own ends
-LOOK = 0.1  # [s] between two looks at a recording that grows
-LAST = 5.0  # [s] that those who watch have to take the end of it
-PIECE = 1 << 20  # [bytes]
+IDLE_LIMIT = 3600.0  # [s] without a request after which a server process ends
+POLL_INTERVAL = 0.1  # [s] between two reads of a growing recording
+CLOSE_TIMEOUT = 5.0  # [s] in which clients can receive the end of a recording
+PIECE_SIZE = 1 << 20  # [bytes]
 RENDERERS = ("webgl", "webgpu")
-COMMAND = f"from {__name__} import serve_alone; serve_alone()"
+COMMAND = f"from {__name__} import run_server_process; run_server_process()"
 
 _PAGE = {
     "/": ("recording_page.html", "text/html; charset=utf-8"),
@@ -38,16 +38,26 @@ _PAGE = {
 
 
 class RecordingServer:
-    """Serves recordings on 127.0.0.1; port 0 takes a free one. grows: the file is still written to."""
+    """Serves recordings on 127.0.0.1.
 
-    def __init__(self, recordings: Sequence[Path], port: int = 0, *, grows: bool = False) -> None:
+    Parameters
+    ----------
+    recordings : sequence of Path
+        The files, in the order of their paths on the server.
+    port : int
+        The port; 0: a free one.
+    growing : bool
+        The file is still being written.
+    """
+
+    def __init__(self, recordings: Sequence[Path], port: int = 0, *, growing: bool = False) -> None:
         self.recordings = tuple(recordings)
-        self.asked = time.monotonic()  # last
-        self._whole = threading.Event()
-        self._watchers = 0
-        self._left = threading.Condition()
-        if not grows:
-            self._whole.set()
+        self.last_request = time.monotonic()
+        self._complete = threading.Event()
+        self._client_count = 0
+        self._client_left = threading.Condition()
+        if not growing:
+            self._complete.set()
         server = self
 
         class Handler(_Handler):
@@ -55,14 +65,14 @@ class RecordingServer:
 
         self._http = QuietServer(("127.0.0.1", port), Handler)
         self.gate = Handler.gate = Gate(self._http.server_address[1], "view")
-        room = files(__name__.rpartition(".")[0])
-        self.assets = {path: (room.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
+        folder = files(__name__.rpartition(".")[0]).joinpath("pages")
+        self.assets = {path: (folder.joinpath(name).read_bytes(), kind) for path, (name, kind) in _PAGE.items()}
         page, kind = self.assets["/"]
-        # The viewer asks for the recording without a cookie: its address is known to the page alone.
+        # The viewer requests the recording without a cookie; only the page contains its address.
         key = secrets.token_urlsafe(32)
         page = page.replace(b"@FILES@", str(len(self.recordings)).encode()).replace(b"@KEY@", key.encode())
         self.assets["/"] = (page, kind)
-        self.named = {f"/{key}/{number}.rrd": file for number, file in enumerate(self.recordings)}
+        self.recording_paths = {f"/{key}/{number}.rrd": file for number, file in enumerate(self.recordings)}
         self._viewer: WebViewer | None = None
         self._lock = threading.Lock()
         threading.Thread(target=self._http.serve_forever, args=(0.2,), daemon=True).start()
@@ -74,48 +84,61 @@ class RecordingServer:
 
     @property
     def port(self) -> int:
+        """The port of the server."""
         return self.gate.port
 
     def viewer(self) -> WebViewer:
+        """Return the files of the web viewer, read once."""
         with self._lock:
             if self._viewer is None:
                 self._viewer = read_web_viewer()
             return self._viewer
 
-    def pieces(self, recording: Path) -> Iterator[bytes]:
-        """What is in a recording, and what comes, until it is whole."""
-        with self._left:
-            self._watchers += 1
+    def read_pieces(self, recording: Path) -> Iterator[bytes]:
+        """Yield the content of a recording, piece by piece, until it is complete."""
+        with self._client_left:
+            self._client_count += 1
         try:
             with recording.open("rb") as stream:
-                yield from grown(stream, self._whole)
+                yield from read_growing_file(stream, self._complete)
         finally:
-            with self._left:
-                self._watchers -= 1
-                self._left.notify_all()
+            with self._client_left:
+                self._client_count -= 1
+                self._client_left.notify_all()
 
     def close(self) -> None:
-        """The recording is whole: let those who watch have the rest, and end."""
-        self._whole.set()
-        with self._left:
-            self._left.wait_for(lambda: self._watchers == 0, LAST)
+        """Send the rest of the complete recording to all clients and end the server."""
+        self._complete.set()
+        with self._client_left:
+            self._client_left.wait_for(lambda: self._client_count == 0, CLOSE_TIMEOUT)
         self._http.shutdown()
         self._http.server_close()
 
 
-def grown(stream: IO[bytes], whole: threading.Event) -> Iterator[bytes]:
-    """What is in a file, and what comes, until it is whole."""
+def read_growing_file(stream: IO[bytes], complete: threading.Event) -> Iterator[bytes]:
+    """Yield the content of a file while it is written, until the event `complete` is set."""
     while True:
-        last = whole.is_set()  # before the look, or its end could be missed
-        while piece := stream.read(PIECE):
+        last = complete.is_set()  # read before the file, or its end could be missed
+        while piece := stream.read(PIECE_SIZE):
             yield piece
         if last:
             return
-        whole.wait(LOOK)
+        complete.wait(POLL_INTERVAL)
 
 
-def serve_apart(recordings: Sequence[Path]) -> str:
-    """Serve recordings from a process that outlives this one; gives the address to open."""
+def start_server_process(recordings: Sequence[Path]) -> str:
+    """Serve recordings from a process that outlives this one.
+
+    Returns
+    -------
+    str
+        The address to open.
+
+    Raises
+    ------
+    OSError
+        If the server does not start.
+    """
     process = subprocess.Popen(
         [sys.executable, "-c", COMMAND, *map(str, recordings)],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -123,39 +146,39 @@ def serve_apart(recordings: Sequence[Path]) -> str:
         start_new_session=True,
     )  # fmt: skip
     assert process.stdout is not None
-    with process.stdout as told:
-        address = told.readline().strip()
+    with process.stdout as output:
+        address = output.readline().strip()
     if not address:
-        raise OSError("the server of the page did not start")
+        raise OSError("the server of the page did not start: run the command again, or without --web")
     return address
 
 
-def serve_alone() -> None:
-    """What that process does: tell the address, and serve until nobody has asked for long."""
+def run_server_process() -> None:
+    """Print the address and serve the recordings of the command line until IDLE_LIMIT passes without a request."""
     server = RecordingServer([Path(each) for each in sys.argv[1:]])
     print(server.address, flush=True)
     sys.stdout.close()
-    while (rest := IDLE - (time.monotonic() - server.asked)) > 0:
+    while (rest := IDLE_LIMIT - (time.monotonic() - server.last_request)) > 0:
         time.sleep(rest)
     server.close()
 
 
 class _Handler(GatedHandler):
-    """One connection. Subclassed with the server it belongs to."""
+    """One connection; a subclass names its server."""
 
     recordings: RecordingServer
 
     def is_open(self, path: str) -> bool:
-        return path in self.recordings.named
+        return path in self.recordings.recording_paths
 
-    def entrance(self, query: dict[str, str]) -> str:
+    def first_page(self, query: dict[str, str]) -> str:
         return f"/?renderer={query['renderer']}" if query.get("renderer") in RENDERERS else "/"
 
-    def give(self, path: str, query: dict[str, str]) -> None:
-        self.recordings.asked = time.monotonic()
-        self._give(path, self.recordings.named.get(path))
+    def answer_get(self, path: str, query: dict[str, str]) -> None:
+        self.recordings.last_request = time.monotonic()
+        self._answer(path, self.recordings.recording_paths.get(path))
 
-    def _give(self, path: str, recording: Path | None) -> None:
+    def _answer(self, path: str, recording: Path | None) -> None:
         server = self.recordings
         if path in server.assets:
             self.send(*server.assets[path])
@@ -166,16 +189,16 @@ class _Handler(GatedHandler):
         elif recording is not None:
             self._stream(recording)
         else:
-            self.say(HTTPStatus.NOT_FOUND, "there is nothing here")
+            self.send_text(HTTPStatus.NOT_FOUND, "there is nothing here")
 
     def _stream(self, recording: Path) -> None:
         if not recording.is_file():
-            self.say(HTTPStatus.NOT_FOUND, "the recording is not there any more")
+            self.send_text(HTTPStatus.NOT_FOUND, "the recording is not there any more: it was moved or deleted")
             return
         self.head("application/octet-stream", HTTPStatus.OK, {"Transfer-Encoding": "chunked"})
         try:
-            for piece in self.recordings.pieces(recording):
+            for piece in self.recordings.read_pieces(recording):
                 self.wfile.write(b"%x\r\n%s\r\n" % (len(piece), piece))
             self.wfile.write(b"0\r\n\r\n")
-        except OSError:  # the page went away, or the file: the answer is cut
+        except OSError:  # the client disconnected or the file was removed: the answer is incomplete
             self.close_connection = True

@@ -1,8 +1,8 @@
-"""One file that shows recordings in any browser, opened from a disk: the viewer and the data inside the page.
+"""One HTML file that shows recordings in any browser, opened from a disk: it contains the viewer and the data.
 
-Nothing is loaded from the network, and the page forbids the viewer to call out. The viewer, most of the file, is in it
-once, however many recordings are. A file is written in UTF-16, of which nearly all characters may stand for two bytes
-of what is compressed: a quarter less than base64. Its byte order mark tells every browser so, whatever a server says.
+Nothing is loaded from the network, and the content policy of the page forbids requests. The viewer, most of the file,
+is included once for all recordings. The file is written in UTF-16: nearly every character encodes two bytes of the
+compressed data, a quarter less than base64. Its byte order mark declares the encoding to every browser.
 """
 
 from __future__ import annotations
@@ -17,28 +17,49 @@ from pathlib import Path
 
 import numpy as np
 
-from ...atomic import write_atomically
-from ..look.texts import printable
+from ...process.atomic import write_atomically
+from ..look.printable_text import printable
 from ..parts import parts_of
 from .web_viewer import read_web_viewer
 
-TEMPLATE = "single_page.html"
-WHAT_TO_DO = (
+TEMPLATE = "pages/single_page.html"
+INSTRUCTIONS = (
     "Drag the slider at the bottom to go through the photographs. A click on a contact or a grain shows its numbers. "
-    "The tabs above show how far to trust the forces, how they are distributed, and who touches whom."
+    "The tabs above show the trust in the forces, their distribution, and which bodies are in contact."
 )
-SURROGATES = (0xD800, 0xDFFF)  # no characters on their own
-ESCAPE, FLIPPED = 0x3D, 0x8000  # before a character that HTML would not leave alone, and what such a one is told with
-NOT_LEFT_ALONE = (0x00, 0x0D, ord("<"), ESCAPE)
-COME_BACK = " Reload the page to come back to this list."
+SURROGATES = (0xD800, 0xDFFF)  # not characters by themselves
+ESCAPE, FLIPPED_BIT = 0x3D, 0x8000  # the mark before a character that HTML would alter, and the bit flipped in it
+UNSAFE_UNITS = (0x00, 0x0D, ord("<"), ESCAPE)
+RELOAD_HINT = " Reload the page to come back to this list."
 
 
 def write_single_page(recordings: Sequence[Path], target: Path | str, *, title: str, cards: Sequence[str] = ()) -> int:
-    """Write a page that holds the web viewer and recordings; returns its size [bytes].
+    """Write a page that contains the web viewer and recordings.
 
-    cards: what the page shows of every recording before one is opened, as HTML; none: it opens the first at once. The
-    page needs a browser with WebAssembly and WebGL 2 or WebGPU; `?renderer=webgl` after its address forbids the
-    latter. Raises FileNotFoundError where there is no recording, RuntimeError where the viewer has no web part.
+    The page needs a browser with WebAssembly and WebGL 2 or WebGPU; `?renderer=webgl` after its address selects WebGL.
+
+    Parameters
+    ----------
+    recordings : sequence of Path
+        The recordings; one in parts opens as one.
+    target : Path or str
+        The HTML file.
+    title : str
+        Title of the page.
+    cards : sequence of str
+        HTML shown for every recording before one is opened; empty: the first opens at once.
+
+    Returns
+    -------
+    int
+        Size of the file [bytes].
+
+    Raises
+    ------
+    FileNotFoundError
+        If a recording does not exist.
+    RuntimeError
+        If the viewer does not serve its web files.
     """
     page = _page(recordings, title, cards, as_characters)
     write_atomically(Path(target), BOM_UTF16_LE + page.encode("utf-16-le"))
@@ -46,33 +67,31 @@ def write_single_page(recordings: Sequence[Path], target: Path | str, *, title: 
 
 
 def single_page(recordings: Sequence[Path], *, title: str, cards: Sequence[str] = ()) -> str:
-    """The text of such a page, in letters that stay small in UTF-8, too; of a recording in parts all open as one."""
-    return _page(recordings, title, cards, _as_letters)
+    """Return the text of such a page, with base64 data, which stay small in UTF-8 as well."""
+    return _page(recordings, title, cards, _as_base64)
 
 
 def as_characters(data: bytes) -> str:
-    """Bytes, two a character; the page turns them back."""
+    """Encode bytes as characters of two bytes each; the script of the page decodes them."""
     units = np.frombuffer(data + b"\0" * (len(data) % 2), "<u2")
     low, high = SURROGATES
-    told_otherwise = ((units >= low) & (units <= high)) | np.isin(units, NOT_LEFT_ALONE)
-    place = np.arange(len(units)) + np.cumsum(told_otherwise)
-    text = np.empty(len(units) + int(told_otherwise.sum()), "<u2")
-    text[place] = np.where(told_otherwise, units ^ FLIPPED, units)
-    text[place[told_otherwise] - 1] = ESCAPE
+    escaped = ((units >= low) & (units <= high)) | np.isin(units, UNSAFE_UNITS)
+    place = np.arange(len(units)) + np.cumsum(escaped)
+    text = np.empty(len(units) + int(escaped.sum()), "<u2")
+    text[place] = np.where(escaped, units ^ FLIPPED_BIT, units)
+    text[place[escaped] - 1] = ESCAPE
     return text.tobytes().decode("utf-16-le")
 
 
-def _as_letters(data: bytes) -> str:
+def _as_base64(data: bytes) -> str:
     return base64.b64encode(data).decode("ascii")
 
 
-def _page(recordings: Sequence[Path], title: str, cards: Sequence[str], written: Callable[[bytes], str]) -> str:
+def _page(recordings: Sequence[Path], title: str, cards: Sequence[str], encode: Callable[[bytes], str]) -> str:
     def packed(name: str, data: bytes) -> str:
         small = gzip.compress(data, 6, mtime=0)
-        letters = ' data-letters=""' if written is _as_letters else ""
-        return (
-            f'<script type="application/gzip" id="{name}" data-size="{len(small)}"{letters}>{written(small)}</script>'
-        )
+        mark = ' data-base64=""' if encode is _as_base64 else ""
+        return f'<script type="application/gzip" id="{name}" data-size="{len(small)}"{mark}>{encode(small)}</script>'
 
     viewer = read_web_viewer()
     script = viewer.script.decode("utf-8").replace("</script", "<\\/script")
@@ -94,13 +113,13 @@ def _page(recordings: Sequence[Path], title: str, cards: Sequence[str], written:
 
 
 def _cover(title: str, cards: Sequence[str]) -> str:
-    """What is there before the viewer is: a card and a button for every recording, and what to do with them."""
+    """Return the content shown before the viewer starts: a card and a button for every recording, and instructions."""
     several = len(cards) > 1
     articles = [
         f'<article>{card}<button data-recording="{k}">Open the recording</button></article>'
         for k, card in enumerate(cards)
     ]
-    told = WHAT_TO_DO + (COME_BACK if several else "")
+    instructions = INSTRUCTIONS + (RELOAD_HINT if several else "")
     head = f"<h1>{html.escape(printable(title))}</h1>" if several else ""
     kind = "several" if several else "single"
-    return f'<div id="cover" class="{kind}">{head}<p>{told}</p><main>{"".join(articles)}</main></div>'
+    return f'<div id="cover" class="{kind}">{head}<p>{instructions}</p><main>{"".join(articles)}</main></div>'

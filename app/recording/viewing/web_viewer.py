@@ -1,60 +1,92 @@
-"""The web viewer's two files, taken from the installed wheel: always the version of the SDK, and no network."""
+"""The two files of the web viewer, read out of the installed package: no port that another user may take is involved.
+
+The viewer's program holds both files one after the other, as they are served. The program is compared with the hash
+that its package states.
+"""
 
 from __future__ import annotations
 
-import socket
-import subprocess
-import time
-import urllib.request
+import base64
+import hashlib
+import mmap
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 
-from .viewer import viewer_binary, viewer_environment
+from .viewer import viewer_binary
 
-START_SECONDS = 30.0
+PACKAGE = "rerun-sdk"
+SCRIPT_START = b"let wasm_bindgen = (function(exports) {"
+MODULE_START = b"\0asm\x01\0\0\0"  # WebAssembly, version 1
+LAST_SECTION = 13  # greatest number of a section of a module
+LARGEST_SCRIPT = 4_000_000  # [bytes] more than the script has ever had
 
 
 @dataclass(frozen=True, slots=True)
 class WebViewer:
+    """The web viewer as bytes."""
+
     script: bytes  # defines wasm_bindgen
     module: bytes  # WebAssembly
 
 
-def read_web_viewer() -> WebViewer:
-    """Read the files from the wheel's own viewer, which serves them to this machine for a moment.
+def read_web_viewer(program: Path | None = None) -> WebViewer:
+    """Read the files out of the viewer's program in the installed package.
 
-    Raises RuntimeError where it does not start.
+    Parameters
+    ----------
+    program : Path, optional
+        The program; default: that of the installed package, which must have the hash that the package states.
+
+    Raises
+    ------
+    RuntimeError
+        If the program differs from its package, or does not hold the two files.
     """
-    web_port, data_port = _free_port(), _free_port()
-    command = [
-        str(viewer_binary()), "--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(web_port), "--port",
-        str(data_port),
-    ]  # fmt: skip
-    viewer = subprocess.Popen(
-        command, env=viewer_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+    if program is None:
+        program = viewer_binary()
+        _refuse_changed(program)
+    with program.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        script = content.find(SCRIPT_START)
+        module = content.find(MODULE_START, script, script + LARGEST_SCRIPT) if script >= 0 else -1
+        if module < 0:
+            raise RuntimeError("the viewer of the installed rerun-sdk does not hold its page: reinstall rerun-sdk")
+        return WebViewer(content[script:module], content[module : _end_of_module(content, module)])
+
+
+def _end_of_module(content: mmap.mmap, start: int) -> int:
+    """Return the end of a WebAssembly module: its sections, each a number and a length, follow one another."""
+    end = start + len(MODULE_START)
+    while end < len(content) and content[end] <= LAST_SECTION:
+        length, place = _unsigned(content, end + 1)
+        if place + length > len(content):
+            break
+        end = place + length
+    return end
+
+
+def _unsigned(content: mmap.mmap, place: int) -> tuple[int, int]:
+    """Return a number in LEB128, seven bits a byte, and the place after it."""
+    value = shift = 0
+    while True:
+        byte = content[place]
+        place += 1
+        value |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            return value, place
+        shift += 7
+
+
+def _refuse_changed(program: Path) -> None:
+    """Raise RuntimeError where the program has another hash than its package states."""
     try:
-        give_up = time.monotonic() + START_SECONDS
-        while True:
-            try:
-                return WebViewer(_read(web_port, "re_viewer.js"), _read(web_port, "re_viewer_bg.wasm"))
-            except OSError:
-                if viewer.poll() is not None or time.monotonic() > give_up:
-                    raise RuntimeError("the viewer of the installed rerun-sdk did not serve its files") from None
-                time.sleep(0.02)
-    finally:
-        viewer.terminate()
-        viewer.wait(10)
-
-
-def _read(port: int, name: str) -> bytes:
-    # No proxy of the environment stands between this machine and itself.
-    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    with opener.open(f"http://127.0.0.1:{port}/{name}", timeout=START_SECONDS) as answer:
-        return answer.read()
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+        listed = distribution(PACKAGE).files or []
+    except PackageNotFoundError:  # installed in another way, without a list of its files
+        return
+    for file in listed:
+        if file.hash is None or file.name != program.name or Path(str(file.locate())).resolve() != program.resolve():
+            continue
+        with program.open("rb") as stream:
+            digest = hashlib.file_digest(stream, file.hash.mode).digest()
+        if base64.urlsafe_b64encode(digest).rstrip(b"=").decode() != file.hash.value:
+            raise RuntimeError(f"{program} differs from its package: reinstall {PACKAGE}")

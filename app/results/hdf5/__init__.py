@@ -1,1 +1,1 @@
-"""results.h5: written frame by frame, read as it is asked for, of every version of the schema."""
+"""Write results.h5 frame by frame, and read it on access, in every version of the schema."""

@@ -1,4 +1,4 @@
-"""What every frame adds to the columns of a stored run, and how long these become: found frame after frame."""
+"""The rows of every frame in the columns of a stored run, and the lengths of these columns."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.bodies.quantity import columns
-from solver.nlgs.sweep_record import SweepHistory
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
-
+from ...solver.frame_forces import FrameForces
+from ...solver.nlgs.sweep_record import SweepHistory
+from ...solver.quantity import columns
+from ...solver.statistics.frame_statistics import FrameStatistics
 from ..checkpoint import flatten
 from ..schema import (
     CONTACT_OFFSET,
@@ -29,14 +28,14 @@ Shapes = dict[str, tuple[int, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Extents:
-    """The columns that all frames have, and which rows of them belong to which frame."""
+    """The columns that all frames have, and the rows of each frame in them."""
 
-    shape: Shapes  # of what frames add to
+    shape: Shapes  # of the columns
     rows: Columns  # offsets and counts
 
 
-def piece_of(forces: FrameForces, statistics: FrameStatistics) -> Columns:
-    """The rows that one frame adds to each column; what it does not have has no piece."""
+def rows_of_frame(forces: FrameForces, statistics: FrameStatistics) -> Columns:
+    """Return the rows of one frame for each column; columns that the frame lacks are left out."""
     measured = measured_sweeps(forces.history)
     piece = {SWEEP_NUMBER.path: measured, SWEEP_COUNT.path: np.array([forces.history.count])}
     for part, whole in (("frames", forces), ("statistics", statistics)):
@@ -47,8 +46,8 @@ def piece_of(forces: FrameForces, statistics: FrameStatistics) -> Columns:
     return piece
 
 
-def find_extents(pieces: Iterable[Columns]) -> Extents:
-    """Go through the pieces of all frames; raises ValueError where the shapes of two frames disagree."""
+def measure_extents(pieces: Iterable[Columns]) -> Extents:
+    """Return the extents of the columns of all frames. Raises ValueError where the shapes of two frames disagree."""
     shape: Shapes = {}
     seen: dict[str, int] = {}
     ends: dict[str, list[int]] = {path: [0] for path in OFFSETS}
@@ -60,7 +59,9 @@ def find_extents(pieces: Iterable[Columns]) -> Extents:
                 continue
             rows, *rest = shape.get(path, (0, *values.shape[1:]))
             if values.shape[1:] != tuple(rest):
-                raise ValueError(f"{path} has rows of shape {values.shape[1:]} in frame {count - 1}, and {tuple(rest)}")
+                raise ValueError(
+                    f"{path} has rows of shape {values.shape[1:]} in frame {count - 1}, but {tuple(rest)} before"
+                )
             shape[path] = (rows + len(values), *rest)
             seen[path] = seen.get(path, 0) + 1
         for path, counted in OFFSETS.items():
@@ -70,12 +71,12 @@ def find_extents(pieces: Iterable[Columns]) -> Extents:
 
 
 def measured_sweeps(history: SweepHistory) -> np.ndarray:
-    """Sweeps of a frame, from 0, whose residuals were measured."""
+    """Return the indices of a frame's sweeps, from 0, whose residuals were measured."""
     rows = np.stack([getattr(history, name) for name in columns(SweepHistory, "sweep")])
     return np.flatnonzero(~np.isnan(rows).all(axis=0))
 
 
-OFFSETS = {  # where rows of a frame begin, by a column that every frame adds to
+OFFSETS = {  # first rows of the frames, by a column that every frame has
     CONTACT_OFFSET.path: "contacts/i",
     SWEEP_OFFSET.path: SWEEP_NUMBER.path,
     KEPT_OFFSET.path: "sweeps/recorded",
@@ -83,7 +84,7 @@ OFFSETS = {  # where rows of a frame begin, by a column that every frame adds to
 
 
 def _rows_of(entry: Entry, value: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """What a frame has as rows of a column."""
+    """Return a frame's value as rows of a column."""
     if entry.dims[0] == "frame":
         return value[None]
     if entry.dims == ("sweep",):
@@ -92,5 +93,5 @@ def _rows_of(entry: Entry, value: np.ndarray, measured: np.ndarray) -> np.ndarra
 
 
 def _fits(entry: Entry, values: np.ndarray) -> bool:
-    """NaN in place of whole numbers: an earlier version did not store them."""
+    """Whether values can be stored; NaN instead of whole numbers were not stored by an earlier version."""
     return values.dtype.kind != "f" or entry.dtype.kind == "f" or bool(np.isfinite(values).all())

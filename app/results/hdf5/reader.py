@@ -1,7 +1,7 @@
-"""The columns of a stored file, of any version of the schema, and the objects that they were.
+"""Read the columns of a stored file, of any version of the schema, back into objects.
 
-What a file lacks is absent: the value that its field declares. What it cannot do without, and what has another shape
-than the rest, is an InputError that names the dataset.
+A missing dataset gets the value that its field declares for it. A missing essential dataset, or one of a wrong shape,
+raises an InputError that names the dataset.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ...errors import InputError
+from ...process.errors import InputError
 from ..checkpoint import restore
 from ..schema import (
     CONTACT_OFFSET,
@@ -32,48 +32,48 @@ from ..schema import (
     Entry,
     entries,
 )
-from .lazy import Lazily
+from .lazy_sequences import LazySequence
 
-MOST_KEPT = 4  # frames that were read last
-KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps whose forces are kept
-CACHE = 1 << 16  # [bytes] of decompressed values that are kept of each dataset
+CACHED_FRAMES = 4  # most recent frames
+KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps with stored forces
+CACHE = 1 << 16  # [bytes] of cached decompressed values per dataset
 
 
-class Stored:
-    """A file that is being read."""
+class StoredRun:
+    """An open file of a run."""
 
     def __init__(self, file: Path, store: h5py.File) -> None:
         self.file, self._store = file, store
-        self._forgotten: set[str] = set()
-        self._found: dict[str, h5py.Dataset | None] | None = None  # once nothing changes any more
+        self._absent_dims: set[str] = set()
+        self._found: dict[str, h5py.Dataset | None] | None = None  # filled once the file is checked
         self._sizes = self._find_sizes()
 
     def part(self, part: str) -> Any:
-        """One of PARTS of which there is one in the file, None if nothing of it is there."""
+        """Return one of PARTS that occurs once in the file, None if the file has no dataset of it."""
         here = entries(part)
         if all(self._find(each) is None for each in here if each.path.startswith(part)):
             return None
         return restore(PARTS[part], {each.attribute: self.read(each) for each in here}, "")
 
-    def need(self, part: str) -> Any:
-        """Likewise, but it has to be there."""
+    def require(self, part: str) -> Any:
+        """Return one of PARTS. Raises InputError where it is missing."""
         whole = self.part(part)
         if whole is None:
             raise InputError(self.file, f"group {part}", "is missing")
         return whole
 
     def frames(self, grain_count: int, wall_count: int) -> StoredFrames:
-        """The forces of every frame, each read when it is asked for; all columns are checked now."""
+        """Return the forces of every frame, read on access; all columns are checked at once."""
         rows = self._rows_of_frames()
         for each in entries("frames"):
             dataset = self._dataset(each)
             if dataset is not None and each.quantity.names is not None:
-                self._renumbered(each, dataset, np.asarray(dataset[()]))
+                self._map_enumeration(each, dataset, np.asarray(dataset[()]))
         bodies = {"contacts.grain_count": grain_count, "contacts.wall_count": wall_count}
-        return StoredFrames(self._opened_again(), rows, bodies, self._sizes["frame"])
+        return StoredFrames(self._reopened(), rows, bodies, self._sizes["frame"])
 
-    def frame(self, k: int, rows: _Rows, bodies: dict[str, int]) -> Any:
-        """The forces of one frame."""
+    def frame(self, k: int, rows: _FrameRows, bodies: dict[str, int]) -> Any:
+        """Read the forces of one frame."""
         own = {each.attribute: rows.shaped(k, each, self._part(each, rows.of(k, each))) for each in entries("frames")}
         count = bodies["contacts.grain_count"]
         for name, known in (("i", count), ("j", count + bodies["contacts.wall_count"])):
@@ -83,21 +83,21 @@ class Stored:
         return restore(PARTS["frames"], own | bodies | {"frame": k}, "")
 
     def statistics(self) -> Sequence[Any]:
-        """The statistics of every frame, each made when it is asked for of columns that are read now."""
+        """Return the statistics of every frame, made on access from columns that are read at once."""
         columns = {each.attribute: self.read(each) for each in entries("statistics")}
 
         def statistics_of(k: int) -> Any:
             own = {name: None if values is None else values[k] for name, values in columns.items()}
             return restore(PARTS["statistics"], own, "")
 
-        return Lazily(self._sizes["frame"], statistics_of)
+        return LazySequence(self._sizes["frame"], statistics_of)
 
     def read(self, entry: Entry) -> Any:
-        """All values of a dataset; where there is none, what stands for absent ones."""
+        """Read all values of a dataset, or its declared value where the dataset is absent."""
         return self._part(entry, slice(None))
 
     def _part(self, entry: Entry, rows: slice) -> Any:
-        """Some rows of a dataset; where there is none, what stands for absent ones."""
+        """Read some rows of a dataset, or its declared value where the dataset is absent."""
         dataset = self._dataset(entry)
         if dataset is None:
             return self._absent(entry, rows)
@@ -106,11 +106,11 @@ class Stored:
             return self._texts(entry, dataset, part)
         values = np.asarray(dataset[part])
         if entry.quantity.names is not None:
-            values = self._renumbered(entry, dataset, values)
+            values = self._map_enumeration(entry, dataset, values)
         return values.astype(entry.dtype, copy=False)[()]
 
     def _dataset(self, entry: Entry) -> h5py.Dataset | None:
-        """What the file has of it, of the right shape and kind; None: nothing. Raises InputError."""
+        """Return the dataset after checking shape and type; None where it is absent. Raises InputError."""
         if self._found is not None and entry.path in self._found:
             return self._found[entry.path]
         dataset = self._checked(entry)
@@ -120,7 +120,7 @@ class Stored:
 
     def _checked(self, entry: Entry) -> h5py.Dataset | None:
         dataset = self._find(entry)
-        if dataset is None or self._forgotten.intersection(entry.dims):
+        if dataset is None or self._absent_dims.intersection(entry.dims):
             if entry.quantity.essential:
                 raise self._error(entry, "is missing")
             return None
@@ -133,8 +133,8 @@ class Stored:
             raise self._error(entry, f"holds {dataset.dtype}, not text")
         return dataset
 
-    def _opened_again(self) -> Stored:
-        """The same by a handle of its own, which is closed once nobody holds it; a file put in its place is another."""
+    def _reopened(self) -> StoredRun:
+        """Return a copy with its own file handle, closed with the last reference; a replaced file is not read."""
         again = copy(self)
         stream = self.file.open("rb")
         again._store = store = h5py.File(stream, "r", rdcc_nbytes=CACHE)
@@ -147,21 +147,21 @@ class Stored:
         weakref.finalize(again, close)
         return again
 
-    def _rows_of_frames(self) -> _Rows:
-        """Without all that says which sweep is which, no sweep was measured; likewise of those that are kept."""
+    def _rows_of_frames(self) -> _FrameRows:
+        """Return the rows of each frame; sweeps are absent where one of their offsets is missing."""
         contact, count, sweep, number, kept = (self._ascending(each) for each in ROWS)
-        nothing = np.zeros_like(contact)
+        empty = np.zeros_like(contact)
         if count is None or sweep is None or number is None:
-            count, sweep, number = nothing[1:], nothing, nothing[:0]
-            self._forget("sweep")
+            count, sweep, number = empty[1:], empty, empty[:0]
+            self._treat_as_absent("sweep")
         if kept is None or any(self._find(each) is None for each in entries("frames") if each.dims[0] in KEPT):
-            kept = nothing
-            self._forget(*KEPT)
+            kept = empty
+            self._treat_as_absent(*KEPT)
         if np.any(number >= np.repeat(count, np.diff(sweep))):
             raise self._error(SWEEP_NUMBER, f"names a sweep beyond those of {SWEEP_COUNT.path}")
         force = np.concatenate([[0], np.cumsum(np.diff(kept) * np.diff(contact))])
         self._sizes["kept_force"] = int(force[-1])
-        return _Rows(contact, count, sweep, number, kept, force)
+        return _FrameRows(contact, count, sweep, number, kept, force)
 
     def _ascending(self, entry: Entry) -> Any:
         values = self.read(entry)
@@ -171,14 +171,14 @@ class Stored:
             raise self._error(entry, "does not ascend from 0")
         return values
 
-    def _forget(self, *dims: str) -> None:
-        """Take what has these dimensions for absent, and empty."""
+    def _treat_as_absent(self, *dims: str) -> None:
+        """Treat datasets with these dimensions as absent and empty."""
         self._sizes |= dict.fromkeys(dims, 0)
-        self._forgotten |= set(dims)
+        self._absent_dims |= set(dims)
 
     def _find_sizes(self) -> dict[str, int]:
-        """Of every dimension: of frames, grains, walls and contacts by what names them, of others by what is there."""
-        sizes = {name: len(told.labels) for name, told in DIMENSIONS.items() if told.labels is not None}
+        """Return the size of every dimension, of frames, grains, walls and contacts by the dataset that labels them."""
+        sizes = {name: len(each.labels) for name, each in DIMENSIONS.items() if each.labels is not None}
         for each in (*_by_path("frames/time", "grains/id", "walls/name"), *ROWS, *entries()):
             dataset = self._find(each)
             if dataset is not None and len(dataset.shape) == len(each.dims):
@@ -194,7 +194,7 @@ class Stored:
 
     def _find(self, entry: Entry) -> h5py.Dataset | None:
         for path in (entry.path, entry.quantity.formerly):
-            if path is not None and self._lies_in_the_file(path):
+            if path is not None and self._has_object(path):
                 dataset = self._store.get(path)
                 if isinstance(dataset, h5py.Dataset):
                     if dataset.external or dataset.is_virtual:
@@ -202,8 +202,8 @@ class Stored:
                     return dataset
         return None
 
-    def _lies_in_the_file(self, path: str) -> bool:
-        """Whether there is something by this name; raises InputError where it is a link, which may lead anywhere."""
+    def _has_object(self, path: str) -> bool:
+        """Whether the file has an object of this name. Raises InputError for a link, which may point to any file."""
         place = ""
         for part in path.split("/"):
             place = f"{place}/{part}"
@@ -218,7 +218,7 @@ class Stored:
         if entry.absent is None or not entry.dims:
             return entry.absent
         value = np.asarray(entry.absent)
-        unknown = value.dtype.kind == "f" and entry.dtype.kind in "iu"  # NaN in place of whole numbers
+        unknown = value.dtype.kind == "f" and entry.dtype.kind in "iu"  # NaN instead of whole numbers
         first, *rest = (self._sizes.get(name, 0) for name in entry.dims)
         shape = (len(range(*rows.indices(first))), *rest)
         return np.full(shape, value, value.dtype if unknown else entry.dtype)
@@ -226,19 +226,19 @@ class Stored:
     def _texts(self, entry: Entry, dataset: h5py.Dataset, part: Any) -> Any:
         return dataset.asstr()[part]
 
-    def _renumbered(self, entry: Entry, dataset: h5py.Dataset, values: np.ndarray) -> np.ndarray:
-        """The numbers that we use for the names that the file has."""
-        ours = {member.name.lower(): member.value for member in entry.quantity.names or ()}
-        theirs: dict[str, int] = h5py.check_enum_dtype(dataset.dtype) or ours
-        named = {number: name for name, number in theirs.items()}
+    def _map_enumeration(self, entry: Entry, dataset: h5py.Dataset, values: np.ndarray) -> np.ndarray:
+        """Convert the file's enumeration to ours by the names of its values."""
+        own = {member.name.lower(): member.value for member in entry.quantity.names or ()}
+        stored: dict[str, int] = h5py.check_enum_dtype(dataset.dtype) or own
+        named = {number: name for name, number in stored.items()}
         found = np.unique(values).tolist()
-        unknown = [named.get(number, number) for number in found if named.get(number) not in ours]
+        unknown = [named.get(number, number) for number in found if named.get(number) not in own]
         if unknown:
-            raise self._error(entry, f"holds {unknown[0]}, which this version does not know")
-        renumbered = values.copy()
+            raise self._error(entry, f"holds {unknown[0]}, which is unknown to this version")
+        converted = values.copy()
         for number in found:
-            renumbered[values == number] = ours[named[number]]
-        return renumbered
+            converted[values == number] = own[named[number]]
+        return converted
 
     def _error(self, entry: Entry, problem: str) -> InputError:
         return InputError(self.file, f"dataset {entry.path}", problem)
@@ -249,25 +249,25 @@ def _by_path(*paths: str) -> list[Entry]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Rows:
-    """Which rows of what lies end to end are a frame's."""
+class _FrameRows:
+    """The rows of each frame in the columns of a run."""
 
     contact: np.ndarray  # (f + 1,)
-    sweep_count: np.ndarray  # (f,) sweeps done
-    sweep: np.ndarray  # (f + 1,) rows of those that were measured
-    number: np.ndarray  # which they are, from 0
-    kept: np.ndarray  # (f + 1,) rows of sweeps whose forces are kept
+    sweep_count: np.ndarray  # (f,) number of sweeps
+    sweep: np.ndarray  # (f + 1,) rows of measured sweeps
+    number: np.ndarray  # indices of the measured sweeps, from 0
+    kept: np.ndarray  # (f + 1,) rows of sweeps with stored forces
     force: np.ndarray  # (f + 1,) rows of their forces
 
     def of(self, k: int, entry: Entry) -> slice:
-        """Which rows of a column are frame k's."""
+        """Return the rows of frame k in a column."""
         edges = {
             "contact": self.contact, "sweep": self.sweep, "kept_sweep": self.kept, "kept_force": self.force,
         }.get(entry.dims[0])  # fmt: skip
         return slice(k, k + 1) if edges is None else slice(int(edges[k]), int(edges[k + 1]))
 
     def shaped(self, k: int, entry: Entry, values: Any) -> Any:
-        """Those rows as a frame has them: one for every sweep, NaN where nothing was measured."""
+        """Return rows in the shape of a frame's field: one value per sweep, NaN where it was not measured."""
         if values is None:
             return None
         if entry.dims[0] == "sweep":
@@ -279,10 +279,10 @@ class _Rows:
         return values if entry.dims[0] in ("contact", "kept_sweep") else values[0]
 
 
-class StoredFrames(Lazily[Any]):
-    """The forces of every frame of a file; a few that were read last are kept."""
+class StoredFrames(LazySequence[Any]):
+    """The forces of every frame of a file, with a cache of the most recent frames."""
 
-    def __init__(self, stored: Stored, rows: _Rows, bodies: dict[str, int], count: int) -> None:
+    def __init__(self, stored: StoredRun, rows: _FrameRows, bodies: dict[str, int], count: int) -> None:
         super().__init__(count, self._find)
         self._stored, self._rows, self._bodies = stored, rows, bodies
         self._kept: OrderedDict[int, Any] = OrderedDict()
@@ -293,7 +293,7 @@ class StoredFrames(Lazily[Any]):
             if k not in self._kept:
                 self._kept[k] = self._read(k)
             self._kept.move_to_end(k)
-            while len(self._kept) > MOST_KEPT:
+            while len(self._kept) > CACHED_FRAMES:
                 self._kept.popitem(last=False)
             return self._kept[k]
 

@@ -1,60 +1,73 @@
-"""results.h5: what a run found out, in one file that any HDF5 reader opens.
+"""Save and load results.h5, one file with all results of a run for any HDF5 reader.
 
-What is in it is the table of `schema`; this file says how it begins and ends, and where it comes from.
+`schema` lists its datasets; this module writes and checks its attributes and its provenance.
 """
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import h5py
 import numpy as np
 
-from solver.sequence.ensemble import MEMBERS
-
 from ... import __version__
-from ...atomic import replacing
-from ...errors import InputError
+from ...process.atomic import replacing
+from ...process.errors import InputError
+from ...process.frame_range import FrameRange
+from ...solver.sequence.ensemble import MEMBERS
 from ...tracks import Tracks, WallTracks
 from ..manifest import MANIFEST, Manifest
 from ..results import Results
 from ..schema import DEVIATIONS, SCHEMA, SCHEMA_VERSION
-from .reader import Stored
-from .refusable import created
+from .file_creation import create_file
+from .reader import StoredRun
 from .writer import columns_of, write_columns, write_results
 
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where results come from; stored as attributes."""
+    """The input and settings of results; stored as attributes."""
 
-    fingerprint: str  # of the input and the settings that matter for what is stored
+    fingerprint: str  # hash of the input and of the settings that affect the stored results
     experiment: str  # name of the experiment file; earlier versions: its path
-    frames: tuple[int, int | None]  # the experiment's frames that are in it: first, and end or None
+    frames: FrameRange  # stored frames of the experiment
     checksums: dict[str, str]  # SHA-256 by input file
+    inputs: str = ""  # hash of the input and the settings alone: the same for other code
+    code: str = ""  # hash of all sources that the results depend on
+    libraries: dict[str, str] = field(default_factory=dict)  # versions by name
+
+    @property
+    def program(self) -> dict[str, Any]:
+        """What the manifest stores beside the fingerprint, to distinguish other code from other input."""
+        return {"inputs": self.inputs, "code": self.code, "libraries": self.libraries}
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frames", FrameRange(*self.frames))
 
 
 def save_tracks(file: Path, name: str, tracks: Tracks, walls: WallTracks | None, origin: Provenance) -> None:
-    """Write tracks alone, as the tracking stage leaves them."""
+    """Write the tracks of the tracking stage."""
     with _creating(file) as store:
         _write_origin(store, name, origin)
         write_columns(store, columns_of("tracks", tracks) | columns_of("walls", walls))
 
 
 def load_tracks(file: Path) -> tuple[Tracks, WallTracks | None]:
+    """Read tracks. Raises InputError where the file is damaged or something else."""
     with _open(file) as store:
-        stored = Stored(file, store)
+        stored = StoredRun(file, store)
         return stored.part("tracks"), stored.part("walls")
 
 
 def save_results(file: Path, results: Results, origin: Provenance) -> None:
-    """Write everything, frame after frame; float64 where it was computed so, recorded sweeps in float32."""
+    """Write all results frame after frame, in float64 as computed, recorded sweeps in float32."""
     with _creating(file) as store:
         _write_origin(store, results.name, origin)
         store.attrs["configuration"] = results.configuration
@@ -68,12 +81,12 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
 
 
 def load_results(file: Path) -> Results:
-    """Read what save_results wrote, in any version; raises InputError if the file is something else."""
+    """Read results of any schema version. Raises InputError where the file is damaged or something else."""
     with _open(file) as store:
         if "forces" not in store:
             raise InputError(file, "", "holds no forces: solve the experiment first")
-        stored = Stored(file, store)
-        tracks, walls, grains = (stored.need(part) for part in ("tracks", "walls", "grains"))
+        stored = StoredRun(file, store)
+        tracks, walls, grains = (stored.require(part) for part in ("tracks", "walls", "grains"))
         return Results(
             name=str(_attribute(file, store, "name")),
             tracks=tracks,
@@ -92,43 +105,51 @@ def load_results(file: Path) -> Results:
 
 
 def read_origin(file: Path) -> Provenance | None:
-    """Where a stored file comes from; None if there is no such file, or it is not one of ours."""
+    """Return the provenance of a stored file; None if it is missing or not of Rodsight."""
     try:
         with h5py.File(file, "r") as store:
             sums = store["origin/checksums"].attrs
-            first, stop = cast(np.ndarray, store.attrs["frames"])
+            first, stop, *step = (int(each) for each in cast(np.ndarray, store.attrs["frames"]))
             return Provenance(
                 str(store.attrs["fingerprint"]),
                 str(store.attrs["experiment"]),
-                (int(first), int(stop) if stop >= 0 else None),
+                FrameRange(first, stop if stop >= 0 else None, *step),
                 {str(key): str(value) for key, value in sums.items()},
+                str(store.attrs.get("inputs", "")),
+                str(store.attrs.get("code", "")),
+                _libraries(store),
             )
-    except (OSError, KeyError, TypeError, ValueError):
+    except (OSError, KeyError, TypeError, ValueError, RecursionError):
         return None
 
 
+def _libraries(store: h5py.File) -> dict[str, str]:
+    stored = json.loads(str(store.attrs.get("libraries", "{}")))
+    return {str(name): str(version) for name, version in stored.items()} if isinstance(stored, dict) else {}
+
+
 def origin_of(file: Path) -> Provenance:
-    """Where a stored file comes from. Raises InputError where it does not say so."""
+    """Return the provenance of a stored file. Raises InputError where it is missing."""
     origin = read_origin(file)
     if origin is None:
-        raise InputError(file, "", "does not say where it comes from")
+        raise InputError(file, "", "has no provenance: it is not a results.h5 of Rodsight")
     return origin
 
 
 @contextmanager
 def _creating(file: Path) -> Iterator[h5py.File]:
-    with replacing(file) as part, created(part) as store:
+    with replacing(file) as part, create_file(part) as store:
         yield store
 
 
 @contextmanager
 def _open(file: Path) -> Iterator[h5py.File]:
-    """Open one of our files; what cannot be read of it is an InputError."""
+    """Open a file of Rodsight; errors of reading it become an InputError."""
     store = _opened(file)
     try:
         with store:
             yield store
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:  # the library reads when it is asked
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:  # the library reads on access
         if isinstance(error, OSError) and error.filename is not None:
             raise
         raise InputError(file, "", f"is damaged: {error}") from None
@@ -138,17 +159,19 @@ def _opened(file: Path) -> h5py.File:
     if file.exists() and not file.is_file():
         raise InputError(file, "", "is not a file")
     if not Manifest(file.parent).is_whole(file.name):
-        raise InputError(file, "", f"is not what {MANIFEST} lists: it was damaged or changed; run the experiment again")
+        raise InputError(
+            file, "", f"differs from its entry in {MANIFEST}: it was damaged or changed; run the experiment again"
+        )
     try:
         store = h5py.File(file, "r")
     except FileNotFoundError:
         raise InputError(file, "", "there is no such file") from None
     except OSError:
-        raise InputError(file, "", "is not an HDF5 file that can be read") from None
+        raise InputError(file, "", "is not a readable HDF5 file") from None
     found = store.attrs.get(SCHEMA)
     if not isinstance(found, np.integer) or not 1 <= found <= SCHEMA_VERSION:
         store.close()
-        known = f"those that this version reads (1 to {SCHEMA_VERSION})"
+        known = f"the versions that this program reads (1 to {SCHEMA_VERSION})"
         raise InputError(file, f"{SCHEMA} {found}", f"is not one of {known}")
     return store
 
@@ -182,7 +205,7 @@ def _ensemble_size(store: h5py.File) -> int:
 
 def _source_of_deviation(ensemble_size: int) -> str:
     if ensemble_size:
-        return f"spread of {ensemble_size} sequences solved again with resampled noise and varied settings"
+        return f"standard deviation of {ensemble_size} sequences solved with resampled noise and varied settings"
     return "formula fitted on simulated truth"
 
 
@@ -192,9 +215,11 @@ def _write_origin(store: h5py.File, name: str, origin: Provenance) -> None:
     store.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
     store.attrs["name"] = name
     store.attrs["fingerprint"] = origin.fingerprint
+    store.attrs["inputs"] = origin.inputs
+    store.attrs["code"] = origin.code
+    store.attrs["libraries"] = json.dumps(origin.libraries)
     store.attrs["experiment"] = origin.experiment
-    first, stop = origin.frames
-    store.attrs["frames"] = (first, -1 if stop is None else stop)
+    store.attrs["frames"] = origin.frames.stored
     sums = store.create_group("origin/checksums").attrs
     for file, digest in origin.checksums.items():
         sums[file] = digest

@@ -1,7 +1,7 @@
-"""Results laid out as the columns of the schema, and written as HDF5 with labelled dimensions.
+"""Convert results to the columns of the schema, and write them as HDF5 with labelled dimensions.
 
-Every dimension is an HDF5 dimension scale at the root of the file, as netCDF has them: xarray opens the file with the
-names and labels of its dimensions. What frames have is written frame after frame, in blocks of one size.
+Every dimension is an HDF5 dimension scale at the root of the file, as in netCDF: xarray opens the file with the names
+and labels of its dimensions. Columns of frames are written frame after frame, in blocks of one size.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 from ..checkpoint import flatten
 from ..results import Results
 from ..schema import DIMENSIONS, PARTS, PER_FRAME, Entry, entries
-from .frame_pieces import Columns, Shapes, find_extents, piece_of
+from .frame_pieces import Columns, Shapes, measure_extents, rows_of_frame
 
-COMPRESSED = 1024  # [bytes] and more: an index of compressed blocks takes twice as much
-BLOCK = 1 << 15  # [bytes] that are compressed together, and wait in memory until they are
-TEXTS = 256  # that wait likewise
-NO_LABELS = "This is a netCDF dimension but not a netCDF variable. {:10d}"  # what netCDF calls such a dimension
+MIN_COMPRESSED = 1024  # [bytes]: smaller datasets would double by the index of their compressed blocks
+BLOCK = 1 << 15  # [bytes] of a compressed block, and of the rows in memory before it is written
+TEXTS = 256  # number of texts in memory before they are written
+NO_LABELS = "This is a netCDF dimension but not a netCDF variable. {:10d}"  # netCDF's name of such a dimension
 
 
 def columns_of(part: str, whole: Any) -> Columns:
-    """What one object holds; nothing if it is None."""
+    """Return the columns of one object; none if it is None."""
     if whole is None:
         return {}
     named = dict(flatten(whole))
@@ -32,53 +32,53 @@ def columns_of(part: str, whole: Any) -> Columns:
 
 
 def columns_of_results(results: Results) -> Columns:
-    """Everything that results hold, in memory: for tables, which are made of all frames at once."""
-    every = list(_pieces(results))
-    extents = find_extents(every)
+    """Return all columns of results in memory, for tables of all frames."""
+    pieces = list(_pieces(results))
+    extents = measure_extents(pieces)
     of_frames = {
-        each.path: np.concatenate([_as_stored(each, piece[each.path]) for piece in every])
+        each.path: np.concatenate([_as_stored(each, piece[each.path]) for piece in pieces])
         for each in entries()
         if each.path in extents.shape
     }
-    return _of_the_whole(results) | extents.rows | of_frames
+    return _columns_of_run(results) | extents.rows | of_frames
 
 
 def write_results(store: h5py.File, results: Results) -> None:
-    """Write everything. Frames are gone through twice, one after the other, and are never all in memory.
+    """Write all results. Frames are read twice, one after the other, and are never all in memory.
 
     Raises ValueError where sizes disagree.
     """
-    extents = find_extents(_pieces(results))
-    whole = _of_the_whole(results) | extents.rows
+    extents = measure_extents(_pieces(results))
+    whole = _columns_of_run(results) | extents.rows
     _write_scales(store, _shapes(whole) | extents.shape, whole)
     _write_whole(store, whole)
     shape = extents.shape
-    growing = [_GrowingColumn(store, each, shape[each.path]) for each in entries() if each.path in shape]
+    writers = [_BlockWriter(store, each, shape[each.path]) for each in entries() if each.path in shape]
     for piece in _pieces(results):
-        for column in growing:
-            column.add(piece)
-    for column in growing:
-        column.end()
+        for writer in writers:
+            writer.add(piece)
+    for writer in writers:
+        writer.end()
 
 
 def write_columns(store: h5py.File, columns: Columns) -> None:
-    """Write the columns with their dimensions, units and meaning; raises ValueError where their sizes disagree."""
+    """Write columns with their dimensions, units and meaning. Raises ValueError where their sizes disagree."""
     _write_scales(store, _shapes(columns), columns)
     _write_whole(store, columns)
 
 
-class _GrowingColumn:
-    """A dataset that is filled from its first row on, in whole blocks."""
+class _BlockWriter:
+    """Writer of a dataset from its first row on, in whole blocks."""
 
     def __init__(self, store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> None:
         self._entry, self._dataset = entry, _make_dataset(store, entry, shape)
         self._block = self._dataset.chunks[0] if self._dataset.chunks else TEXTS
-        self._waiting: list[np.ndarray] = []
-        self._count = self._written = 0  # rows that wait, and that are there
+        self._pending: list[np.ndarray] = []
+        self._count = self._written = 0  # pending and written rows
 
     def add(self, piece: Columns) -> None:
         rows = _as_stored(self._entry, piece[self._entry.path])
-        self._waiting.append(rows)
+        self._pending.append(rows)
         self._count += len(rows)
         if self._count >= self._block:
             self._write(self._count - self._count % self._block)
@@ -88,14 +88,14 @@ class _GrowingColumn:
             self._write(self._count)
 
     def _write(self, count: int) -> None:
-        rows = np.concatenate(self._waiting)
+        rows = np.concatenate(self._pending)
         self._dataset[self._written : self._written + count] = rows[:count]
-        self._waiting, self._count = [rows[count:].copy()], len(rows) - count
+        self._pending, self._count = [rows[count:].copy()], len(rows) - count
         self._written += count
 
 
-def _of_the_whole(results: Results) -> Columns:
-    """What a run has once."""
+def _columns_of_run(results: Results) -> Columns:
+    """Return the columns of a run that are not per frame."""
     columns: Columns = {}
     for part in PARTS:
         if part not in PER_FRAME:
@@ -105,11 +105,11 @@ def _of_the_whole(results: Results) -> Columns:
 
 def _pieces(results: Results) -> Iterator[Columns]:
     for forces, statistics in zip(results.frames, results.statistics, strict=True):
-        yield piece_of(forces, statistics)
+        yield rows_of_frame(forces, statistics)
 
 
 def _as_stored(entry: Entry, values: np.ndarray) -> np.ndarray:
-    return values.astype(entry.dtype, copy=False)  # an integer where an enumeration was given
+    return values.astype(entry.dtype, copy=False)  # enumerations become integers
 
 
 def _shapes(columns: Columns) -> Shapes:
@@ -117,7 +117,7 @@ def _shapes(columns: Columns) -> Shapes:
 
 
 def _write_scales(store: h5py.File, shapes: Shapes, columns: Columns) -> None:
-    """Write the dimensions of all columns, once their sizes are found to agree."""
+    """Write the dimensions of all columns, after checking that their sizes agree."""
     sizes: dict[str, int] = {}
     for each in entries():
         if each.path in shapes:
@@ -141,7 +141,7 @@ def _write_scale(store: h5py.File, name: str, size: int, columns: Mapping[str, n
     if name == "frame":
         labels = np.arange(size)
     if labels is None:
-        scale = store.create_dataset(name, (size,), np.float32)  # never filled: takes no room
+        scale = store.create_dataset(name, (size,), np.float32)  # never filled: takes no space
         scale.make_scale(NO_LABELS.format(size))
     else:
         labels = np.asarray(labels)
@@ -153,7 +153,7 @@ def _write_scale(store: h5py.File, name: str, size: int, columns: Mapping[str, n
 
 
 def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5py.Dataset:
-    """A dataset that is still to be filled, with what it is said to hold."""
+    """Create an empty dataset with its dimensions, unit and meaning."""
     quantity = entry.quantity
     kind: Any = entry.dtype
     if quantity.names is not None:
@@ -162,14 +162,14 @@ def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5p
         kind = h5py.string_dtype()
     options: dict[str, Any] = {}
     size = int(np.prod(shape)) * entry.dtype.itemsize
-    if size >= COMPRESSED and entry.dtype.kind != "O":
+    if size >= MIN_COMPRESSED and entry.dtype.kind != "O":
         rows = max(min(BLOCK * shape[0] // size, shape[0]), 1)
         options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": 1, "shuffle": True}
     dataset = store.create_dataset(entry.path, shape, kind, **options)
     for axis, name in enumerate(entry.dims):
         dataset.dims[axis].label = name
         dataset.dims[axis].attach_scale(store[name])
-    dataset.attrs["long_name"] = quantity.meaning  # as netCDF's conventions and xarray call it
+    dataset.attrs["long_name"] = quantity.meaning  # the name in netCDF's conventions and xarray
     if quantity.unit:
         dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit
     if quantity.names is not None:

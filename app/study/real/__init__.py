@@ -1,1 +1,1 @@
-"""Runs held against forces that were measured. Stands on results alone."""
+"""Runs compared with measured forces, from stored results only."""

@@ -1,1 +1,1 @@
-"""Whether intervals, trust and status hold, as figures and as a page. Stands on the worlds."""
+"""Reports on the calibration of intervals, trust and status against simulated truth."""

@@ -1,7 +1,7 @@
-"""Error bars against the truth: how often they cover it, from the free formula and from an ensemble.
+"""Coverage of error bars on simulated truth, from the formula and from an ensemble.
 
-Windows of simulated truths are solved as `rodsight run --ensemble K` would. The constants of the ensemble's error
-bars are fitted on some packings and judged on others.
+Windows of simulated truths are solved with the settings of `rodsight run --ensemble K`. The constants of the ensemble's
+error bars are fitted on some packings and judged on others.
 """
 
 from __future__ import annotations
@@ -16,36 +16,34 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import minimize
 
-from solver.bodies.grains import Array
-from solver.contacts.pairs import recall
-from solver.dem.simulation import DemTruth
-from solver.together import available_cores
-
-from ...inference.inference import infer_frames
-from ...progress import Progress, silent
-from ...sensitivity.spread import (
-    DEVIATION,
+from ...inference.infer_sequence import infer_sequence
+from ...process.progress import Progress, no_progress
+from ...robustness.ensemble_sd import (
+    SD_WEIGHTS,
     calibrated_inputs,
-    deviation,
+    combine_sd,
+    measure_ensemble_sd,
     solve_members,
-    spread_around,
 )
-from ..truths import observe, simulate, starts_of, true_forces
+from ...solver.bodies.grains import Array
+from ...solver.contacts.pairs import match_values
+from ...solver.dem.dem_truth import DemTruth
+from ...solver.parallel import available_cores
+from ..scenarios.interval_coverage import COVERED, coverage
+from ..truths import NEGLIGIBLE, observe, simulate, true_forces, window_starts
 
 WINDOW = 12  # photographs of one sequence
 NOISES = (1e-5, 2e-5, 4e-5)  # [m]
-WEAK = 1e-3  # of the mean force: contacts below it, inferred and true, have no error worth a bar
-COVERED = (0.683, 0.954)  # of one and of two standard deviations
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorBars:
-    """Contacts of all photographs that a motion leads to; forces over the mean f_n of their photograph."""
+    """Contacts of all photographs with a preceding motion; forces over the mean f_n of their photograph."""
 
     noise: Array  # (c,) [m]
     error: Array  # (c, 2) of f_n and f_t
-    spread: Array  # (c, 2) of the members
-    free: Array  # (c, 2) standard deviation by the free formula
+    ensemble_sd: Array  # (c, 2) standard deviation of the ensemble
+    formula_sd: Array  # (c, 2) standard deviation without an ensemble
 
 
 def study_uncertainty(
@@ -57,20 +55,38 @@ def study_uncertainty(
     estimator: str,
     folder: Path,
     console: Console,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Fit on the packings `seeds`, judge on `held_out`; print coverages and the constants of f_n and f_t."""
+    """Fit on the packings `seeds`, judge on `held_out`, and print coverages and the constants of f_n and f_t.
+
+    Parameters
+    ----------
+    seeds, held_out : sequence of int
+    members : int
+        Ensemble members of each window.
+    grains : int
+    estimator : {'ensemble', 'nlgs'}
+    folder : Path
+        Cache of simulated truths.
+    console : rich.console.Console
+    progress : Progress
+
+    Returns
+    -------
+    tuple of tuple of float
+        a and b of σ² = (a S)² + (b s)² for f_n and f_t.
+    """
     samples = []
     for some in (seeds, held_out):
         truths = [simulate(seed, grains=grains, folder=folder, progress=progress) for seed in some]
         samples.append(measure_error_bars(truths, members, estimator, progress=progress))
-    fit = (fit_deviation(samples[0], 0), fit_deviation(samples[0], 1))
-    for name, new, old in zip(("f_n", "f_t"), fit, DEVIATION[estimator], strict=True):
-        told = f"{name}: σ² = (a S)² + (b s)², fitted a = {new[0]:.2f}, b = {new[1]:.2f}; in use {old[0]}, {old[1]}"
-        console.print(told, highlight=False)
+    fit = (fit_sd_weights(samples[0], 0), fit_sd_weights(samples[0], 1))
+    for name, new, old in zip(("f_n", "f_t"), fit, SD_WEIGHTS[estimator], strict=True):
+        line = f"{name}: σ² = (a S)² + (b s)², fitted a = {new[0]:.2f}, b = {new[1]:.2f}; in use {old[0]}, {old[1]}"
+        console.print(line, highlight=False)
     for name, sample in zip(("packings of the fit", "packings held out"), samples, strict=True):
-        title = f"{estimator}, {name}, {members} members: share of contacts within one and two σ, %"
-        console.print(_coverage_table(title, sample, DEVIATION[estimator]))
+        title = f"{estimator}, {name}, {members} members: fraction of contacts within one and two σ, %"
+        console.print(_coverage_table(title, sample, SD_WEIGHTS[estimator]))
     return fit
 
 
@@ -80,11 +96,13 @@ def measure_error_bars(
     estimator: str,
     *,
     noises: Sequence[float] | None = None,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> ErrorBars:
-    """Solve windows of all truths, up and down, at every noise [m], with an ensemble."""
+    """Solve loading and unloading windows of all truths at every noise [m] with an ensemble."""
     noises = NOISES if noises is None else noises
-    jobs = [(t, start, noise) for t in range(len(truths)) for start in starts_of(truths[t], WINDOW) for noise in noises]
+    jobs = [
+        (t, start, noise) for t in range(len(truths)) for start in window_starts(truths[t], WINDOW) for noise in noises
+    ]
     parts = []
     for done, (t, start, noise) in enumerate(jobs):
         progress("uncertainty", done, len(jobs))
@@ -92,55 +110,55 @@ def measure_error_bars(
         parts.append(_measure_window(truths[t], range(start, start + WINDOW), noise, members, estimator, rng))
     progress("uncertainty", len(jobs), len(jobs))
     return ErrorBars(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("noise", "error", "spread", "free"))
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("noise", "error", "ensemble_sd", "formula_sd")
+        )
     )
 
 
-def fit_deviation(sample: ErrorBars, component: int) -> tuple[float, float]:
-    """a and b: likeliest for Student's t, then scaled until both coverages are near."""
-    size, spread, free = (np.abs(each[:, component]) for each in (sample.error, sample.spread, sample.free))
+def fit_sd_weights(sample: ErrorBars, component: int) -> tuple[float, float]:
+    """Fit a and b of σ² = (a S)² + (b s)² by maximum likelihood for Student's t, then scale to the coverages."""
+    size, ensemble_sd, formula_sd = (
+        np.abs(each[:, component]) for each in (sample.error, sample.ensemble_sd, sample.formula_sd)
+    )
 
-    def loss(x: Array) -> float:  # four degrees of freedom: contact forces err with heavy tails
-        sigma = np.hypot(np.exp(x[0]) * spread, np.exp(x[1]) * free)
+    def loss(x: Array) -> float:  # four degrees of freedom, for the heavy tails of force errors
+        sigma = np.hypot(np.exp(x[0]) * ensemble_sd, np.exp(x[1]) * formula_sd)
         return float(np.mean(np.log(sigma) + 2.5 * np.log1p((size / sigma) ** 2 / 4.0)))
 
     x = minimize(loss, np.log([0.5, 0.8]), method="Nelder-Mead").x
-    ratio = size / np.hypot(np.exp(x[0]) * spread, np.exp(x[1]) * free)
+    ratio = size / np.hypot(np.exp(x[0]) * ensemble_sd, np.exp(x[1]) * formula_sd)
     scale = math.sqrt(float(np.quantile(ratio, COVERED[0])) * float(np.quantile(ratio, COVERED[1])) / 2.0)
     a, b = (float(each) for each in np.exp(x) * scale)
     return a, b
-
-
-def coverage(error: Array, sigma: Array) -> tuple[float, float]:
-    """Share of errors (c,) within one and within two of their standard deviations (c,)."""
-    return tuple(float(np.mean(np.abs(error) <= times * sigma)) for times in (1.0, 2.0))  # type: ignore[return-value]
 
 
 def _measure_window(
     truth: DemTruth, photographs: range, noise: float, members: int, estimator: str, rng: np.random.Generator
 ) -> ErrorBars:
     inputs = calibrated_inputs(observe(truth, photographs, noise, rng, estimator=estimator))
-    nominal = [solved.forces for solved in infer_frames(inputs)]
+    nominal = list(infer_sequence(inputs).frames)
     others = solve_members(inputs, members, workers=available_cores())
-    errors, spreads, free = [], [], []
+    errors, ensemble_sds, formula_sds = [], [], []
     for k, frame in enumerate(nominal[1:], start=1):
         key, force = frame.contacts.key, np.column_stack([frame.fn, frame.ft])
         true_key, true_force = true_forces(truth, photographs[k])
-        true = recall(key, true_key, true_force)
-        spread = spread_around(key, force, [each.at(k) for each in others])
+        true = match_values(key, true_key, true_force)
+        ensemble_sd = measure_ensemble_sd(key, force, [each.at(k) for each in others])
         mean = float(frame.fn[frame.fn > 0].mean())
-        told = np.maximum(frame.fn, true[:, 0]) > WEAK * mean
-        errors.append((force - true)[told] / mean)
-        spreads.append(np.column_stack([spread.fn, spread.ft])[told] / mean)
-        free.append(np.column_stack([frame.fn_sd, frame.ft_sd])[told] / mean)
+        bearing = np.maximum(frame.fn, true[:, 0]) > NEGLIGIBLE * mean
+        errors.append((force - true)[bearing] / mean)
+        ensemble_sds.append(np.column_stack([ensemble_sd.fn, ensemble_sd.ft])[bearing] / mean)
+        formula_sds.append(np.column_stack([frame.fn_sd, frame.ft_sd])[bearing] / mean)
     error = np.concatenate(errors)
-    return ErrorBars(np.full(len(error), noise), error, np.concatenate(spreads), np.concatenate(free))
+    return ErrorBars(np.full(len(error), noise), error, np.concatenate(ensemble_sds), np.concatenate(formula_sds))
 
 
 def _coverage_table(title: str, sample: ErrorBars, in_use: Sequence[tuple[float, float]]) -> Table:
     table = Table(title=title, box=None, pad_edge=False)
     for heading in ("noise [µm]", "contacts", *(f"{kind} {f} {t}σ" for f in ("f_n", "f_t") for kind in
-                    ("ensemble", "free") for t in (1, 2)), "rms σ / rms error: ensemble", "free"):  # fmt: skip
+                    ("ensemble", "formula") for t in (1, 2)), "rms σ / rms error: ensemble", "formula"):  # fmt: skip
         table.add_column(heading, justify="right")
     for noise in (*np.unique(sample.noise), None):
         here = np.ones(len(sample.noise), np.bool_) if noise is None else sample.noise == noise
@@ -148,9 +166,9 @@ def _coverage_table(title: str, sample: ErrorBars, in_use: Sequence[tuple[float,
         ratios = []
         for component, constants in enumerate(in_use):
             error = sample.error[here, component]
-            free = sample.free[here, component]
-            for sigma in (deviation(sample.spread[here, component], free, constants), free):
-                cells += [f"{100.0 * share:.0f}" for share in coverage(error, sigma)]
+            formula_sd = sample.formula_sd[here, component]
+            for sigma in (combine_sd(sample.ensemble_sd[here, component], formula_sd, constants), formula_sd):
+                cells += [f"{100.0 * fraction:.0f}" for fraction in coverage(error, sigma)]
                 ratios.append(float(np.sqrt(np.mean(sigma**2) / np.mean(error**2))))
         table.add_row(*cells, f"{ratios[0]:.2f}", f"{ratios[1]:.2f}")
     return table

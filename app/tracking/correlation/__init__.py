@@ -1,1 +1,1 @@
-"""Patches of one photograph found again in another, to hundredths of a pixel."""
+"""Correlation of patches between two photographs, accurate to hundredths of a pixel."""

@@ -1,4 +1,4 @@
-"""Patches of the reference photograph, and their correlation with another one, many grains at a time."""
+"""Fits and searches of patches of the reference photograph in another one, for many grains at a time."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from . import kernels as kernels
+from .coarse_to_fine import search_all, search_coarse_to_fine, search_parts_all
 from .patches import Patches
-from .sifting import search_all, search_parts_all, sift_all
 from .splines import HALFWAY_VARIANCE, Pyramid
 
 Rows = NDArray[np.intp]
 
-# Grains of one task. It is fixed, and no grain's result depends on another's within a task, so the number
-# of workers cannot change anything.
+# Grains of one task. The number is fixed and no grain's result depends on another's within a task, so results do not
+# depend on the number of workers.
 CHUNK = 32
 
-# A patch is sifted on the next coarser level first, if it has this radius there and a pixel of it is not coarser than
-# paint.
-SIFTED_REACH = 4.5
-SIFTED_COARSEST = 4
+# A patch is first searched on the next coarser level if its radius there is at least this [px], and if that level's
+# factor is at most the other: its pixels are then no coarser than paint.
+COARSE_RADIUS_MIN = 4.5
+COARSE_FACTOR_MAX = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +34,9 @@ class Fits:
     pose: Array  # (m, 3) x [px], y [px], rotation [rad]
     zncc: Array  # (m,)
     residual: Array  # (m,) [grey²] variance of a pixel's residual
-    gain: Array  # (m,) [grey] image = gain · f + offset, f the reference of unit norm
+    gain: Array  # (m,) [grey] image = gain · f + offset, f: the reference of unit norm
     offset: Array  # (m,) [grey]
-    kept: Array  # (m,) share of the pixels that the fit rests on
+    kept: Array  # (m,) weighted fraction of the pixels that the fit uses
     code: NDArray[np.uint8]  # (m,) CONVERGED, LEFT_IMAGE, WANDERED, UNFINISHED
     covariance: Array  # (m, 3, 3) of the pose, from the residual and the Hessian
 
@@ -53,15 +52,15 @@ class Fits:
 
 @dataclass(frozen=True, slots=True)
 class SearchRange:
-    """Where m grains are searched for."""
+    """The ranges of positions and angles in which m grains are searched for."""
 
     middle: Array  # (m, 3) x [px], y [px], rotation [rad]
     window: Array  # (m,) [px] half width
-    sweep: float  # [rad] half width of the angles
+    angle_window: float  # [rad] half width of the angles
 
 
 class Correlator:
-    """Fits patches to photographs with some threads. Results do not depend on their number."""
+    """Fits patches to photographs in several threads. Results do not depend on their number."""
 
     def __init__(self, patches: Patches, *, workers: int, tolerance: float, limit: int) -> None:
         self.patches = patches
@@ -70,43 +69,65 @@ class Correlator:
         self._limit = limit
 
     def with_patches(self, patches: Patches) -> Correlator:
-        """The same with other patches."""
+        """Return a correlator with the same settings and other patches."""
         return Correlator(patches, workers=self._workers, tolerance=self._tolerance, limit=self._limit)
 
     def fit(
-        self, photograph: Pyramid, rows: Rows, pose: Array, leash: Array, *, steps: int | None = None
+        self, photograph: Pyramid, rows: Rows, pose: Array, max_shift: Array, *, steps: int | None = None
     ) -> Fits:  # fmt: skip
-        """Gauss-Newton from `pose` (m, 3) for the grains `rows` (m,), no farther than `leash` (m,) [px].
+        """Fit grains by Gauss-Newton; fits whose ZNCC is low after a few steps are stopped.
 
-        What is not promising after a few steps is given up. steps: at most, instead of the limit.
+        Parameters
+        ----------
+        photograph : Pyramid
+            The photograph that the grains are fitted in.
+        rows : (m,) array
+            The grains.
+        pose : (m, 3) array
+            Starts: x, y [px], rotation [rad].
+        max_shift : (m,) array
+            Greatest distance from the start [px].
+        steps : int, optional
+            Greatest number of steps, instead of the correlator's limit.
         """
         patches = self.patches
-        coefficients = photograph.fine_coefficients()
+        coefficients = photograph.quintic_coefficients()
         pose = self._from_reference(rows, pose)
         fit = np.zeros((len(rows), kernels.FIT_COLUMNS))
-        hopeless = patches.accidental_zncc[rows]
+        min_zncc = patches.accidental_zncc[rows]
         limit = self._limit if steps is None else steps
 
-        rows, leash = np.ascontiguousarray(rows, np.intp), np.ascontiguousarray(leash, np.float64)
+        rows, max_shift = np.ascontiguousarray(rows, np.intp), np.ascontiguousarray(max_shift, np.float64)
 
-        def some(part: slice) -> None:
+        def run_chunk(part: slice) -> None:
             kernels.fit_all(
                 coefficients, patches.data, patches.start, patches.coarse_inverse, patches.hessian_inverse,
-                patches.reach, rows[part], leash[part], hopeless[part], self._tolerance, limit, pose[part], fit[part],
+                patches.radius, rows[part], max_shift[part], min_zncc[part], self._tolerance, limit, pose[part],
+                fit[part],
             )  # fmt: skip
 
-        self._in_parts(len(rows), some)
+        self._run_in_chunks(len(rows), run_chunk)
         gain = fit[:, kernels.GAIN]
         with np.errstate(divide="ignore", invalid="ignore"):
-            scale = fit[:, kernels.RESIDUAL] / gain**2 * _interpolation_loss(pose, patches.reach[rows])
+            scale = fit[:, kernels.RESIDUAL] / gain**2 * _interpolation_loss(pose, patches.radius[rows])
         return self._fits(rows, pose, fit, patches.hessian_inverse[rows] * scale[:, None, None])
 
     def fit_robust(
-        self, photograph: Pyramid, rows: Rows, pose: Array, leash: Array, noise: float, gain: Array, offset: Array
+        self, photograph: Pyramid, rows: Rows, pose: Array, max_shift: Array, noise: float, gain: Array, offset: Array
     ) -> Fits:
-        """Tukey-weighted refit; gain, offset (m,): the light to begin with; noise [grey]: least residual."""
+        """Refit grains with Tukey's weights.
+
+        Parameters
+        ----------
+        photograph, rows, pose, max_shift
+            As of `fit`.
+        noise : float
+            Least scale of the residuals [grey].
+        gain, offset : (m,) array
+            Initial gain and offset of the light [grey].
+        """
         patches = self.patches
-        coefficients = photograph.fine_coefficients()
+        coefficients = photograph.quintic_coefficients()
         pose = self._from_reference(rows, pose)
         fit = np.zeros((len(rows), kernels.FIT_COLUMNS))
         covariance = np.full((len(rows), 3, 3), np.nan)
@@ -114,117 +135,136 @@ class Correlator:
         def one(k: int) -> None:
             row = rows[k]
             kernels.fit_robust(
-                coefficients, patches.data[patches.start[row] : patches.start[row + 1]], patches.reach[row],
-                leash[k], noise, gain[k], offset[k], 2 * self._limit, pose[k], fit[k], covariance[k],
+                coefficients, patches.data[patches.start[row] : patches.start[row + 1]], patches.radius[row],
+                max_shift[k], noise, gain[k], offset[k], 2 * self._limit, pose[k], fit[k], covariance[k],
             )  # fmt: skip
 
-        self._each(len(rows), one)
-        loss = _interpolation_loss(pose, patches.reach[rows])
+        self._run_each(len(rows), one)
+        loss = _interpolation_loss(pose, patches.radius[rows])
         return self._fits(rows, pose, fit, covariance * loss[:, None, None])
 
-    def sifts(self, rows: Rows) -> NDArray[np.bool_]:
-        """Which grains (m,) are first looked for on a level coarser still than their patch is searched on."""
+    def uses_coarse_level(self, rows: Rows) -> NDArray[np.bool_]:
+        """Which grains (m,) are first searched for on a level coarser than their search level."""
         factor = self.patches.search_factor[rows]
-        return (self.patches.reach[rows] >= SIFTED_REACH * 2.0 * factor) & (2 * factor <= SIFTED_COARSEST)
+        return (self.patches.radius[rows] >= COARSE_RADIUS_MIN * 2.0 * factor) & (2 * factor <= COARSE_FACTOR_MAX)
 
     def search(
-        self, photograph: Pyramid, rows: Rows, within: SearchRange, count: int, *, looks: int = 0, parts: bool = False
-    ) -> Array:
-        """The `count` most similar places of every grain (m, count, 4): x, y [px], rotation [rad], ZNCC.
+        self, photograph: Pyramid, rows: Rows, within: SearchRange, count: int, *, coarse_count: int = 0,
+        parts: bool = False,
+    ) -> Array:  # fmt: skip
+        """Search for the most similar places of every grain.
 
-        Places that are not there have ZNCC −1.
-        looks: the places of a coarser level, where there is one to be sifted, that are looked at more closely; 0: the
-        level itself is searched, which takes ten times as long. parts: halves of a patch are searched for, too.
+        Parameters
+        ----------
+        photograph : Pyramid
+            The photograph that is searched.
+        rows : (m,) array
+            The grains.
+        within : SearchRange
+            Where each is searched for.
+        count : int
+            Number of places of each grain.
+        coarse_count : int
+            Number of places of the coarser level that are refined, where that level is used; 0: the level itself is
+            searched, which takes ten times as long.
+        parts : bool
+            Halves of a patch are searched for as well.
+
+        Returns
+        -------
+        (m, count, 4) array
+            x, y [px], rotation [rad], ZNCC, best first; ZNCC −1 where fewer places exist.
         """
         patches = self.patches
         best = np.empty((len(rows), count, 4))
-        factor, sifted = patches.search_factor[rows], self.sifts(rows) & (looks > 0)
+        factor, coarse_first = patches.search_factor[rows], self.uses_coarse_level(rows) & (coarse_count > 0)
         source = np.array([row if int(row) in patches.renewed else -1 for row in rows])
-        # What is looked for with the same pictures on the same level is one task of many grains.
-        for level, own, coarser in sorted(set(zip(factor.tolist(), source.tolist(), sifted.tolist(), strict=True))):
-            these = np.flatnonzero((factor == level) & (source == own) & (sifted == coarser))
-            self._search_alike(
-                photograph, rows[these], _some(within, these), best, these, level, looks * coarser, parts
+        # Grains that are searched for with the same images on the same level are one group.
+        for key in sorted(set(zip(factor.tolist(), source.tolist(), coarse_first.tolist(), strict=True))):
+            level, own, coarser = key
+            group = np.flatnonzero((factor == level) & (source == own) & (coarse_first == coarser))
+            self._search_group(
+                photograph, rows[group], _subset(within, group), best, group, level, coarse_count * coarser, parts
             )
         return best
 
-    def _search_alike(
-        self, photograph: Pyramid, rows: Rows, within: SearchRange, best: Array, at: Rows, factor: int, looks: int,
-        parts: bool,
+    def _search_group(
+        self, photograph: Pyramid, rows: Rows, within: SearchRange, best: Array, at: Rows, factor: int,
+        coarse_count: int, parts: bool,
     ) -> None:  # fmt: skip
-        """Write best[at] (m, c, 4) of grains `rows` (m,) whose reference is one picture, on the level `factor`."""
+        """Write best[at] (m, c, 4) of grains `rows` (m,) that have one reference image, on the level `factor`."""
         patches = self.patches
-        picture = patches.source(int(rows[0]))
-        levels = (factor, 2 * factor) if looks else (factor,)
-        pictures = [each for level in levels for each in (picture.coefficients(level), photograph.level(level))]
+        source = patches.source(int(rows[0]))
+        levels = (factor, 2 * factor) if coarse_count else (factor,)
+        images = [each for level in levels for each in (source.coefficients(level), photograph.level(level))]
         pose = self._from_reference(rows, within.middle)
         window = np.ascontiguousarray(within.window, np.float64)
-        place, reach = patches.place[rows], patches.reach[rows]
-        beyond_doubt = np.minimum(patches.accidental_zncc[rows] + 0.2, 0.9)
+        place, radius = patches.source_centre[rows], patches.radius[rows]
+        sufficient_zncc = np.minimum(patches.accidental_zncc[rows] + 0.2, 0.9)
         found = np.empty((len(rows), best.shape[1], 4))
 
-        def some(part: slice) -> None:
-            told = place[part], reach[part], pose[part], window[part]
-            if looks:
-                sift_all(
-                    pictures[0], pictures[1], pictures[2], pictures[3], factor, *told, within.sweep, looks,
-                    beyond_doubt[part], found[part],
+        def run_chunk(part: slice) -> None:
+            discs = place[part], radius[part], pose[part], window[part]
+            if coarse_count:
+                search_coarse_to_fine(
+                    images[0], images[1], images[2], images[3], factor, *discs, within.angle_window, coarse_count,
+                    sufficient_zncc[part], found[part],
                 )  # fmt: skip
             elif parts:
-                search_parts_all(pictures[0], pictures[1], factor, *told, within.sweep, found[part])
+                search_parts_all(images[0], images[1], factor, *discs, within.angle_window, found[part])
             else:
-                search_all(pictures[0], pictures[1], factor, *told, within.sweep, found[part])
+                search_all(images[0], images[1], factor, *discs, within.angle_window, found[part])
 
-        self._in_parts(len(rows), some)
-        found[:, :, 2] += patches.turn[rows, None]
+        self._run_in_chunks(len(rows), run_chunk)
+        found[:, :, 2] += patches.source_rotation[rows, None]
         best[at] = found
 
     def _from_reference(self, rows: Rows, pose: Array) -> Array:
-        """Poses (m, 3) whose rotation counts from where each patch was cut, as a new array."""
+        """A copy of poses (m, 3) with rotations relative to the image that each patch was cut from."""
         pose = np.array(pose, dtype=np.float64, order="C")
-        pose[:, 2] -= self.patches.turn[rows]
+        pose[:, 2] -= self.patches.source_rotation[rows]
         return pose
 
     def _fits(self, rows: Rows, pose: Array, fit: Array, covariance: Array) -> Fits:
-        """Fits whose rotation and covariance (m, 3, 3) count from the first photograph."""
-        pose[:, 2] += self.patches.turn[rows]
-        covariance[:, :2, :2] += self.patches.variance[rows, None, None] * np.eye(2)
+        """Fits with rotation and covariance (m, 3, 3) relative to the first photograph."""
+        pose[:, 2] += self.patches.source_rotation[rows]
+        covariance[:, :2, :2] += self.patches.source_variance[rows, None, None] * np.eye(2)
         return Fits(
             pose, fit[:, kernels.ZNCC], fit[:, kernels.RESIDUAL], fit[:, kernels.GAIN], fit[:, kernels.OFFSET],
             fit[:, kernels.KEPT], fit[:, kernels.CODE].astype(np.uint8), covariance,
         )  # fmt: skip
 
-    def _each(self, count: int, one: Callable[[int], None]) -> None:
-        def some(part: slice) -> None:
+    def _run_each(self, count: int, one: Callable[[int], None]) -> None:
+        def run_chunk(part: slice) -> None:
             for k in range(part.start, part.stop):
                 one(k)
 
-        self._in_parts(count, some)
+        self._run_in_chunks(count, run_chunk)
 
-    def _in_parts(self, count: int, some: Callable[[slice], None]) -> None:
+    def _run_in_chunks(self, count: int, run_chunk: Callable[[slice], None]) -> None:
         parts = [slice(first, min(first + CHUNK, count)) for first in range(0, count, CHUNK)]
         if self._workers == 1 or count <= CHUNK:
             for part in parts:
-                some(part)
+                run_chunk(part)
             return
         with ThreadPoolExecutor(self._workers) as pool:
-            list(pool.map(some, parts))
+            list(pool.map(run_chunk, parts))
 
 
-def _some(within: SearchRange, rows: Rows) -> SearchRange:
-    return SearchRange(within.middle[rows], within.window[rows], within.sweep)
+def _subset(within: SearchRange, rows: Rows) -> SearchRange:
+    return SearchRange(within.middle[rows], within.window[rows], within.angle_window)
 
 
-def _interpolation_loss(pose: Array, reach: Array) -> Array:
-    """By how much the residual understates the noise that moves the pose (m,).
+def _interpolation_loss(pose: Array, radius: Array) -> Array:
+    """Factor (m,) by which the residual variance underestimates the noise variance that displaces the pose.
 
-    Interpolation smooths the photograph's noise but not the part of it that looks like the speckle's slope.
-    Half of the residual is the reference's noise, which is not interpolated.
+    Interpolation smooths the photograph's noise but not its component along the speckle's gradient. Half of the
+    residual is the reference's noise, which is not interpolated.
     """
     depth = 1.0 - HALFWAY_VARIANCE
-    # Once the grid is turned by a pixel at the rim, every position between the pixels occurs in the patch.
-    turn = np.abs(np.angle(np.exp(4j * pose[:, 2]))) / 4.0
-    mixed = np.clip(turn * reach, 0.0, 1.0)
+    # Once the grid is rotated by a pixel at the rim, every position between the pixels occurs in the patch.
+    angle = np.abs(np.angle(np.exp(4j * pose[:, 2]))) / 4.0
+    mixed = np.clip(angle * radius, 0.0, 1.0)
     phases = np.sin(np.pi * pose[:, :2]) ** 2
-    share = 1.0 - depth * (mixed[:, None] * 0.5 + (1.0 - mixed[:, None]) * phases)
-    return 2.0 / (1.0 + share[:, 0] * share[:, 1])
+    variance = 1.0 - depth * (mixed[:, None] * 0.5 + (1.0 - mixed[:, None]) * phases)
+    return 2.0 / (1.0 + variance[:, 0] * variance[:, 1])

@@ -1,4 +1,4 @@
-"""The value of a spline between the pixels."""
+"""Values of cubic and quintic splines between the pixels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ONE = np.float32(1.0)
 SIXTH = np.float32(1.0 / 6.0)
 TWO_THIRDS = np.float32(2.0 / 3.0)
 
-# The quintic B-spline's polynomials (Unser, Aldroubi & Eden 1993), in the distance from its middle.
+# Coefficients of the quintic B-spline's polynomials (Unser, Aldroubi & Eden 1993) in the distance from its middle.
 ONE_120TH = np.float32(1.0 / 120.0)
 ELEVEN_20THS = np.float32(11.0 / 20.0)
 SEVENTEEN_40THS = np.float32(17.0 / 40.0)
@@ -20,8 +20,8 @@ THREE_8THS, ONE_24TH = np.float32(3.0 / 8.0), np.float32(1.0 / 24.0)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def interpolate(coefficients, ix, iy, tx, ty):
-    """Value of the cubic spline at (ix + tx, iy + ty), 0 ≤ t < 1."""
+def interpolate_cubic(coefficients, ix, iy, tx, ty):
+    """Interpolate the cubic spline at (ix + tx, iy + ty), 0 ≤ t < 1."""
     sx = ONE - tx
     ax = sx * sx * sx * SIXTH
     dx = tx * tx * tx * SIXTH
@@ -42,21 +42,22 @@ def interpolate(coefficients, ix, iy, tx, ty):
 
 @njit(cache=True, nogil=True)
 def sample(coefficients, x, y, out):
-    """Interpolate the cubic spline at points x, y (p,); outside the image the value is NaN."""
+    """Interpolate the cubic spline at points x, y (p,); NaN outside the image."""
     height, width = coefficients.shape
     for p in range(len(x)):
         if not (x[p] >= 1.0 and y[p] >= 1.0 and x[p] < width - 2 and y[p] < height - 2):
             out[p] = np.nan
             continue
         ix, iy = int(x[p]), int(y[p])
-        out[p] = interpolate(coefficients, ix, iy, np.float32(x[p] - ix), np.float32(y[p] - iy))
+        out[p] = interpolate_cubic(coefficients, ix, iy, np.float32(x[p] - ix), np.float32(y[p] - iy))
 
 
 @njit(cache=True, nogil=True, inline="always")
-def interpolate_finely(coefficients, ix, iy, tx, ty):
-    """Value of the quintic spline at (ix + tx, iy + ty), 0 ≤ t < 1.
+def interpolate_quintic(coefficients, ix, iy, tx, ty):
+    """Interpolate the quintic spline at (ix + tx, iy + ty), 0 ≤ t < 1.
 
-    At quarters of a pixel the cubic one takes a speckle of two pixels to be .003 px nearer the half, this one .0007 px.
+    At a quarter of a pixel the cubic spline displaces a speckle of two pixels by .003 px towards the half, the quintic
+    one by .0007 px.
     """
     sx = ONE - tx
     ux = tx * tx

@@ -1,12 +1,11 @@
-"""The loops of correlation: interpolate a photograph under a patch, sum, solve three unknowns, repeat.
+"""Compiled loops of correlation: plain and robust Gauss-Newton fits of a patch's position and rotation.
 
-Inverse-compositional Gauss-Newton (Baker & Matthews 2004): the steepest descent images belong to the
-fixed reference, so they and their Hessian are made once. Gain and offset of the light are projected
-out of them, so that neither has to be known.
+Inverse-compositional Gauss-Newton (Baker & Matthews 2004): the steepest descent images belong to the fixed reference,
+so they and their Hessian are computed once. Gain and offset of the light are projected out of them, so that neither has
+to be known.
 
-A patch is a run of rows of `data`, one per pixel: dx, dy (from the grain's centre), f (reference, zero
-mean and unit norm over the patch), and the three steepest descent values jx, jy, jr, orthogonal to f
-and to a constant.
+A patch is a block of rows of `data`, one per pixel: dx, dy (from the grain's centre), f (reference, zero mean and unit
+norm over the patch), and the three steepest descent values jx, jy, jr, orthogonal to f and to a constant.
 """
 
 from __future__ import annotations
@@ -18,60 +17,98 @@ from .spline_vectors import add_projections, read_cubic, read_quintic
 
 CONVERGED = 0
 LEFT_IMAGE = 1
-WANDERED = 2
+DIVERGED = 2
 UNFINISHED = 3
 
 # Columns of a fit.
 ZNCC, RESIDUAL, GAIN, OFFSET, KEPT, CODE = range(6)
 FIT_COLUMNS = 6
 
-# Tukey's biweight keeps 95 % of the efficiency on Gaussian noise with this width.
+# Tukey's biweight has 95 % efficiency on Gaussian noise with this cutoff, in standard deviations.
 TUKEY_WIDTH = 4.685
-# Steps for which the robust fit keeps the light it was given.
-HELD_STEPS = 3
-# A step [px] below which the patch is interpolated with all six taps; before that four of them show the way.
+# Steps for which the robust fit keeps the given gain and offset.
+FIXED_LIGHT_STEPS = 3
+# Step [px] below which the patch is interpolated with the quintic spline's six taps; the steps before use the cubic's
+# four.
 FINE_STEP = 0.1
-# Pixels that show the way before that: more tell it no better than the last steps put right.
+# Number of pixels that the steps before use: the fine steps correct the small loss of accuracy.
 COARSE_PIXELS = 400
-# Steps after which a fit must be promising. A step is a pixel and a half at most, and a fit's basin two or three.
-PATIENCE = 5
-# Steps after which most of a patch must fit robustly, and the share of its contrast by which it may then be off: a ZNCC
-# of .8 is the least that is ever accepted, and corresponds to .6.
-ROBUST_PATIENCE = 8
-HOPELESS_MISFIT = 0.6
-# The scale is read from the calmer pixels alone, so that half a patch may be something else: this share of them, and
-# the quantile of that share of the absolute value of a standard normal variable.
-CALM = 0.35
-NORMAL_CALM = 0.4538
+# Step at which a fit of low ZNCC is stopped. A step is at most 1.5 px long, and the basin of convergence two or three.
+CHECK_STEP = 5
+# Step at which most of a patch must fit robustly, and the greatest residual then, as a fraction of the patch's
+# contrast: .6 corresponds to a ZNCC of .8, the least that is ever accepted.
+ROBUST_CHECK_STEP = 8
+MAX_MISFIT = 0.6
+# The scale of the residuals is this quantile of them, so that half of a patch may be covered, over the same quantile of
+# the absolute value of a standard normal variable.
+SCALE_QUANTILE = 0.35
+NORMAL_QUANTILE = 0.4538
+# Pivot of a normal matrix, as a fraction of its diagonal, below which the pixels do not determine the solution.
+SINGULAR = 1e-12
 
 
 @njit(cache=True, nogil=True)
-def inside(height, width, x, y, reach):
+def inside(height, width, x, y, radius):
     """Whether a disc about (x, y) and the quintic spline's support lie within the image."""
-    return x - reach >= 3.0 and y - reach >= 3.0 and x + reach <= width - 4.0 and y + reach <= height - 4.0
+    return x - radius >= 3.0 and y - radius >= 3.0 and x + radius <= width - 4.0 and y + radius <= height - 4.0
 
 
 @njit(cache=True, nogil=True)
-def count_pixels(cx, cy, reach):
-    """Whole pixels within `reach` of the centre."""
+def is_positive_definite(matrix):
+    """Whether a symmetric matrix (n, n) has an inverse, by Cholesky's pivots; false where it holds a NaN."""
+    n = len(matrix)
+    factor = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            left = matrix[i, j]
+            for k in range(j):
+                left -= factor[i, k] * factor[j, k]
+            if i == j:
+                if not (left > SINGULAR * matrix[i, i] and left < np.inf):
+                    return False
+                factor[i, i] = np.sqrt(left)
+            else:
+                factor[i, j] = left / factor[j, j]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def count_pixels(cx, cy, radius):
+    """Number of pixels within `radius` of the centre."""
     count = 0
-    for iy in range(int(np.ceil(cy - reach)), int(np.floor(cy + reach)) + 1):
-        half = np.sqrt(max(reach * reach - (iy - cy) ** 2, 0.0))
+    for iy in range(int(np.ceil(cy - radius)), int(np.floor(cy + radius)) + 1):
+        half = np.sqrt(max(radius * radius - (iy - cy) ** 2, 0.0))
         count += int(np.floor(cx + half)) - int(np.ceil(cx - half)) + 1
     return count
 
 
 @njit(cache=True, nogil=True)
-def fill_patch(image, coefficients, cx, cy, reach, data, hessian_inverse, facts):
-    """Write one patch: its rows of data, its inverse Hessian (3, 3) for a unit-norm f, and facts.
+def fill_patch(image, coefficients, cx, cy, radius, data, hessian_inverse, statistics):
+    """Write the data of one patch and its inverse Hessian.
 
-    facts: norm of the reference about its mean, mean, squared correlation length [px²]. Returns False
-    where the patch has no texture.
+    Parameters
+    ----------
+    image, coefficients : (h, w) array
+        The reference photograph [grey] and its cubic spline coefficients.
+    cx, cy, radius : float
+        The disc [px].
+    data : (p, 6) array
+        Receives dx, dy, f, jx, jy, jr of every pixel.
+    hessian_inverse : (3, 3) array
+        Receives the inverse Hessian for an f of unit norm.
+    statistics : (3,) array
+        Receives the norm of the reference about its mean [grey], its mean [grey], and the squared correlation length
+        [px²].
+
+    Returns
+    -------
+    bool
+        Whether the patch has a texture, in both directions.
     """
     p = 0
     mean = 0.0
-    for iy in range(int(np.ceil(cy - reach)), int(np.floor(cy + reach)) + 1):
-        half = np.sqrt(max(reach * reach - (iy - cy) ** 2, 0.0))
+    for iy in range(int(np.ceil(cy - radius)), int(np.floor(cy + radius)) + 1):
+        half = np.sqrt(max(radius * radius - (iy - cy) ** 2, 0.0))
         for ix in range(int(np.ceil(cx - half)), int(np.floor(cx + half)) + 1):
             c = coefficients
             gx = (
@@ -101,41 +138,43 @@ def fill_patch(image, coefficients, cx, cy, reach, data, hessian_inverse, facts)
         power += (data[p, 2] - mean) ** 2
         slope += 0.5 * (data[p, 3] ** 2 + data[p, 4] ** 2)
     norm = np.sqrt(power)
-    facts[0] = norm
-    facts[1] = mean
+    statistics[0] = norm
+    statistics[1] = mean
     if norm < 0.5 * np.sqrt(count) or slope == 0.0:
         return False
-    facts[2] = power / slope
+    statistics[2] = power / slope
     h = np.zeros((3, 3))
-    along = np.zeros(3)
+    projection = np.zeros(3)
     level = np.zeros(3)
     for p in range(count):
         f = (data[p, 2] - mean) / norm
         data[p, 2] = f
         for k in range(3):
             data[p, 3 + k] /= norm
-            along[k] += data[p, 3 + k] * f
+            projection[k] += data[p, 3 + k] * f
             level[k] += data[p, 3 + k]
     for p in range(count):
         for k in range(3):
-            data[p, 3 + k] -= along[k] * data[p, 2] + level[k] / count
+            data[p, 3 + k] -= projection[k] * data[p, 2] + level[k] / count
     for p in range(count):
         for k in range(3):
             for m in range(3):
                 h[k, m] += data[p, 3 + k] * np.float64(data[p, 3 + m])
+    if not is_positive_definite(h):
+        return False
     hessian_inverse[:, :] = np.linalg.inv(h)
     return True
 
 
 @njit(cache=True, nogil=True)
 def coarse_stride(count):
-    """Of every so many pixels of a patch one leads a fit to where all of them end it."""
+    """Stride of the pixels of a patch that the coarse steps use."""
     return max(count // COARSE_PIXELS, 1)
 
 
 @njit(cache=True, nogil=True)
 def fill_coarse(data, coarse):
-    """Write the inverse normal matrix (5, 5) of jx, jy, jr, f and 1 over the pixels that lead a fit."""
+    """Write the inverse normal matrix (5, 5) of jx, jy, jr, f and 1 over the pixels of the coarse steps."""
     normal = np.zeros((5, 5))
     row = np.ones(5)
     for p in range(0, len(data), coarse_stride(len(data))):
@@ -147,25 +186,50 @@ def fill_coarse(data, coarse):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fit_rigid(coefficients, data, coarse, hessian_inverse, reach, leash, hopeless, tolerance, limit, pose, fit, sums):
-    """Move `pose` (x, y, θ) until the patch fits; give up beyond `leash` [px] from where it began.
+def fit_rigid(
+    coefficients, data, coarse, hessian_inverse, radius, max_shift, min_zncc, tolerance, limit, pose, fit, sums
+):
+    """Fit one patch by inverse-compositional Gauss-Newton.
 
-    A fit whose ZNCC is below `hopeless` after some steps is given up, too: at a wrong place it would run to the limit.
-    coefficients: of the quintic spline. Read with the cubic one's four taps they show a crisper photograph at the same
-    place, which is enough for every step but the last, and so is a part of the pixels; coarse: see `fill_coarse`.
-    fit: ZNCC, residual variance per pixel [grey²], gain, offset [grey] (image = gain · f + offset, f of
-    unit norm), share of the pixels kept, code. sums (4,): room to work in.
+    Parameters
+    ----------
+    coefficients : (h, w) array
+        Quintic spline coefficients of the photograph.
+    data, coarse, hessian_inverse, radius
+        The patch, see `fill_patch` and `fill_coarse`.
+    max_shift : float
+        Distance from the start [px] beyond which the fit is stopped.
+    min_zncc : float
+        ZNCC below which the fit is stopped at step `CHECK_STEP`: at a wrong place it would run to the limit.
+    tolerance : float
+        Step [px] below which the fit has converged.
+    limit : int
+        Greatest number of steps; 0: only the quality at the given pose is computed.
+    pose : (3,) array
+        Start and result: x, y [px], θ [rad].
+    fit : (FIT_COLUMNS,) array
+        Receives ZNCC, residual variance of a pixel [grey²], gain, offset [grey] (image = gain · f + offset, f of unit
+        norm), fraction of the pixels used, code.
+    sums : (4,) array
+        Workspace.
+
+    Notes
+    -----
+    With H = Σ jᵀj and g the interpolated photograph, a step is t = H⁻¹ Σ jᵀ g / gain, gain = Σ f g, and the warp is
+    W ← W ∘ W(t)⁻¹ (Baker & Matthews 2004). The quintic coefficients read with the cubic spline's four taps give a
+    sharper photograph without displacement. That, and a part of the pixels, is accurate enough for all steps but the
+    last ones.
     """
     height, width = coefficients.shape
     count = len(data)
     stride = coarse_stride(count)
     x0, y0 = pose[0], pose[1]
-    margin = int(reach) + 2
+    margin = int(radius) + 2
     fit[CODE] = UNFINISHED
     fit[KEPT] = 1.0
     fine = limit == 0
     for step in range(limit + 1):
-        if not inside(height, width, pose[0], pose[1], reach):
+        if not inside(height, width, pose[0], pose[1], radius):
             fit[CODE] = LEFT_IMAGE
             fit[ZNCC] = 0.0
             return
@@ -206,43 +270,43 @@ def fit_rigid(coefficients, data, coarse, hessian_inverse, reach, leash, hopeles
         fit[RESIDUAL] = max(power - gain * gain * used / count, 0.0) / max(used - 5, 1)
         fit[GAIN] = gain
         fit[OFFSET] = s0 / used + level
-        if not gain > 0.0 or (step == PATIENCE and fit[ZNCC] < hopeless):
-            fit[CODE] = WANDERED
+        if not gain > 0.0 or (step == CHECK_STEP and fit[ZNCC] < min_zncc):
+            fit[CODE] = DIVERGED
             return
         if step == limit:
             return
-        _compose(pose, tx, ty, tr, reach)
-        if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > leash * leash:
-            fit[CODE] = WANDERED
+        _compose(pose, tx, ty, tr, radius)
+        if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > max_shift * max_shift:
+            fit[CODE] = DIVERGED
             return
-        length = abs(tx) + abs(ty) + reach * abs(tr)
+        length = abs(tx) + abs(ty) + radius * abs(tr)
         if not fine:
             fine = length < FINE_STEP or step == limit - 1
         elif length < tolerance:
-            # Gauss-Newton's error after this step is far below the step: what was summed before it stands,
-            # its ZNCC differing by less than the square of the tolerance.
+            # The error after this step is far below the step. The sums before it are kept: their ZNCC differs by less
+            # than the square of the tolerance.
             fit[CODE] = CONVERGED
             return
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def fit_all(
-    coefficients, data, start, coarse, hessian_inverse, reach, rows, leash, hopeless, tolerance, limit, pose, fit
+    coefficients, data, start, coarse, hessian_inverse, radius, rows, max_shift, min_zncc, tolerance, limit, pose, fit
 ):
     """Fit the patches `rows` (m,), the pixels of patch k being data[start[k] : start[k + 1]]; see `fit_rigid`."""
     sums = np.empty(4)
     for m in range(len(rows)):
         k = rows[m]
         fit_rigid(
-            coefficients, data[start[k] : start[k + 1]], coarse[k], hessian_inverse[k], reach[k],
-            leash[m], hopeless[m], tolerance, limit, pose[m], fit[m], sums,
+            coefficients, data[start[k] : start[k + 1]], coarse[k], hessian_inverse[k], radius[k],
+            max_shift[m], min_zncc[m], tolerance, limit, pose[m], fit[m], sums,
         )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _compose(pose, tx, ty, tr, reach):
-    """W ← W ∘ W(t)⁻¹, a step no longer than a pixel and a half at the centre or at the rim."""
-    longest = max(np.sqrt(tx * tx + ty * ty), reach * abs(tr))
+def _compose(pose, tx, ty, tr, radius):
+    """Set W ← W ∘ W(t)⁻¹ with a step of at most 1.5 px at the centre and at the rim."""
+    longest = max(np.sqrt(tx * tx + ty * ty), radius * abs(tr))
     if longest > 1.5:
         tx *= 1.5 / longest
         ty *= 1.5 / longest
@@ -255,27 +319,40 @@ def _compose(pose, tx, ty, tr, reach):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pose, fit, covariance):
-    """Refit with Tukey's weights, beginning with the light (gain, offset) that the neighbours have.
+def fit_robust(coefficients, data, radius, max_shift, noise, gain, offset, limit, pose, fit, covariance):
+    """Refit one patch with Tukey's weights.
 
-    noise [grey]: the standard deviation a clean residual has; the scale comes down to it, never below.
-    covariance (3, 3): of the pose, from the weighted residual.
+    Parameters
+    ----------
+    coefficients, data, radius, max_shift, limit, pose, fit
+        As of `fit_rigid`.
+    noise : float
+        Least scale of the residuals [grey]: the standard deviation of a clean one.
+    gain, offset : float
+        Initial gain and offset of the light [grey], as the neighbours have them.
+    covariance : (3, 3) array
+        Receives the covariance of the pose, from the weighted residual.
+
+    Notes
+    -----
+    Iteratively reweighted least squares of g = gain · f(W(t)) + offset in t, gain and offset, with weights
+    w = (1 − (r / (4.685 s))²)² for |r| < 4.685 s, else 0; r: residual, s: its scale.
     """
     height, width = coefficients.shape
     count = len(data)
     x0, y0 = pose[0], pose[1]
-    margin = int(reach) + 2
+    margin = int(radius) + 2
     g = np.empty(count)
     misfit = np.empty(count)
     inverse = np.zeros((5, 5))
     a, b = gain, offset
-    # The given light is held for some steps: what covers the patch would drag a free one along, and then
-    # hide among residuals that are large everywhere.
-    held = HELD_STEPS
-    second = False
+    # The given light is fixed for some steps: a covering object would bias a free one, and all residuals would then be
+    # large.
+    fixed_steps = FIXED_LIGHT_STEPS
+    restarted = False
     fit[CODE] = UNFINISHED
     for step in range(limit):
-        if not inside(height, width, pose[0], pose[1], reach):
+        if not inside(height, width, pose[0], pose[1], radius):
             fit[CODE] = LEFT_IMAGE
             fit[ZNCC] = 0.0
             return
@@ -288,9 +365,9 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             ix, iy = int(x), int(y)
             g[p] = read_quintic(coefficients, bx + ix, by + iy, x - np.float32(ix), y - np.float32(iy))
             misfit[p] = abs(g[p] - a * data[p, 2] - b)
-        scale = max(np.quantile(misfit, CALM) / NORMAL_CALM, noise)
-        if step == ROBUST_PATIENCE and scale > HOPELESS_MISFIT * a / np.sqrt(count):
-            fit[CODE] = WANDERED
+        scale = max(np.quantile(misfit, SCALE_QUANTILE) / NORMAL_QUANTILE, noise)
+        if step == ROBUST_CHECK_STEP and scale > MAX_MISFIT * a / np.sqrt(count):
+            fit[CODE] = DIVERGED
             fit[ZNCC] = 0.0
             return
         normal = np.zeros((5, 5))
@@ -318,13 +395,17 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             sff += w * f * f
             sfg += w * f * g[p]
         if sw < 0.15 * count:
-            fit[CODE] = WANDERED
+            fit[CODE] = DIVERGED
             fit[ZNCC] = 0.0
             return
         for k in range(5):
             normal[k, k] *= 1.0 + 1e-12
             for m in range(k):
                 normal[k, m] = normal[m, k]
+        if not is_positive_definite(normal):
+            fit[CODE] = DIVERGED
+            fit[ZNCC] = 0.0
+            return
         inverse = np.linalg.inv(normal)
         tx, ty, tr, a_new, b_new = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(5):
@@ -333,31 +414,31 @@ def fit_robust(coefficients, data, reach, leash, noise, gain, offset, limit, pos
             tr += inverse[2, k] * right[k]
             a_new += inverse[3, k] * right[k]
             b_new += inverse[4, k] * right[k]
-        spread = np.sqrt(max(sgg - sg * sg / sw, 1e-12) * max(sff - sf * sf / sw, 1e-12))
-        fit[ZNCC] = (sfg - sf * sg / sw) / spread
+        norms = np.sqrt(max(sgg - sg * sg / sw, 1e-12) * max(sff - sf * sf / sw, 1e-12))
+        fit[ZNCC] = (sfg - sf * sg / sw) / norms
         fit[RESIDUAL] = sww / max(sw - 5.0, 1.0)
         fit[KEPT] = sw / count
         if not a_new > 0.0:
-            fit[CODE] = WANDERED
+            fit[CODE] = DIVERGED
             return
-        # Before the light and the scale have settled a large share of a step is an artefact.
-        still = abs(a_new - a) < 0.01 * a and abs(tx) + abs(ty) + reach * abs(tr) < 0.005
-        if held > 0:
-            held -= 1
-            still = False
+        # Before the light and the scale have converged, a large part of a step is an artefact.
+        converged = abs(a_new - a) < 0.01 * a and abs(tx) + abs(ty) + radius * abs(tr) < 0.005
+        if fixed_steps > 0:
+            fixed_steps -= 1
+            converged = False
         else:
             a, b = a_new, b_new
         fit[GAIN], fit[OFFSET] = a, b
-        _compose(pose, tx, ty, tr, reach)
-        if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > leash * leash:
-            fit[CODE] = WANDERED
+        _compose(pose, tx, ty, tr, radius)
+        if (pose[0] - x0) ** 2 + (pose[1] - y0) ** 2 > max_shift * max_shift:
+            fit[CODE] = DIVERGED
             return
-        if still and not second and fit[ZNCC] < 0.95:
-            # Often the place is right by now and only the light is not: once more from the given one.
-            second = True
-            held = HELD_STEPS
+        if converged and not restarted and fit[ZNCC] < 0.95:
+            # Often the place is right and only the light is wrong: restart with the given light.
+            restarted = True
+            fixed_steps = FIXED_LIGHT_STEPS
             a, b = gain, offset
-        elif still:
+        elif converged:
             fit[CODE] = CONVERGED
             break
     for k in range(3):

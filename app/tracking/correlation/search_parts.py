@@ -1,7 +1,8 @@
 """Exhaustive search for a patch that is partly covered.
 
-What covers a third of a patch, and is brighter or darker than the paint, governs the correlation of the whole. The half
-of it that is turned away still correlates: at every position and angle the four halves are tried beside the whole.
+An object that covers a third of a patch, and is brighter or darker than the paint, dominates the correlation of the
+whole. The opposite half of the patch still correlates. At every position and angle the four halves are therefore
+correlated besides the whole.
 """
 
 from __future__ import annotations
@@ -11,74 +12,74 @@ from numba import njit
 
 from .search import (
     BLOCK,
-    collect,
+    angles_to_try,
+    clip_window,
+    collect_maxima,
     correlate,
-    cut_window,
-    disc,
-    lay_out,
-    turn_template,
-    turns_to_try,
+    disc_offsets,
+    gather_pixels,
+    rotate_template,
 )
 
-# A half has half the pixels, so accidental correlations are greater by this factor.
+# A half has half of the pixels, so its accidental correlations are greater by this factor.
 HALF_ACCIDENT = np.sqrt(2.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def search_parts(reference, image, origin_x, origin_y, reach, x, y, angle, window, sweep, spacing, best):
-    """As `search_patch`; the ZNCC of a place is that of the whole, or that of a half over √2 where this is more."""
-    x_from, y_from, nx, ny = cut_window(image, reach, x, y, window)
+def search_parts(reference, image, origin_x, origin_y, radius, x, y, angle, window, angle_window, spacing, best):
+    """Search as `search_patch` does, with the greater of the whole's ZNCC and a half's ZNCC / √2."""
+    x_from, y_from, nx, ny = clip_window(image, radius, x, y, window)
     best[:, :] = 0.0
     best[:, 3] = -1.0
     if nx < 1 or ny < 1:
         return
-    offset_x, offset_y, start = disc(reach)
+    offset_x, offset_y, start = disc_offsets(radius)
     count = len(offset_x)
-    turn, sectors = turns_to_try(angle, reach, sweep)
-    trials = len(turn)
+    angles, sectors = angles_to_try(angle, radius, angle_window)
+    trials = len(angles)
     template = np.empty((trials, count), np.float32)
     mean = np.empty((trials, 4), np.float32)
     scale = np.empty((trials, 4), np.float32)
     for trial in range(trials):
-        turn_template(reference, origin_x, origin_y, turn[trial], offset_x, offset_y, template[trial])
-        _weigh_halves(template[trial], start, mean[trial], scale[trial])
+        rotate_template(reference, origin_x, origin_y, angles[trial], offset_x, offset_y, template[trial])
+        _half_norms(template[trial], start, mean[trial], scale[trial])
 
     peak = np.full((sectors, ny, nx), np.float32(-1.0))
-    steepest = np.zeros((sectors, ny, nx), np.int16)
+    best_trial = np.zeros((sectors, ny, nx), np.int16)
     rows_at_once = max(BLOCK // nx, 1)
     size = rows_at_once * nx
-    under = np.empty((count, size), np.float32)
-    total, energy = np.empty((2, size), np.float32)
-    level, power = np.empty((2, 4, size), np.float32)
+    pixels = np.empty((count, size), np.float32)
+    total, inverse_norm = np.empty((2, size), np.float32)
+    level, inverse_norms = np.empty((2, 4, size), np.float32)
     part = np.empty((4, size), np.float32)
     value = np.empty(size, np.float32)
     for first in range(0, ny, rows_at_once):
-        ahead = min(rows_at_once, ny - first)
-        length = ahead * nx
-        lay_out(image, offset_x, offset_y, x_from, y_from + first, nx, ahead, under, total, energy)
-        _halves_energy(under, start, length, level, power)
+        row_count = min(rows_at_once, ny - first)
+        length = row_count * nx
+        gather_pixels(image, offset_x, offset_y, x_from, y_from + first, nx, row_count, pixels, total, inverse_norm)
+        _half_inverse_norms(pixels, start, length, level, inverse_norms)
         for trial in range(trials):
             for k in range(4):
-                correlate(template[trial, start[k] : start[k + 1]], under[start[k] : start[k + 1]], length, part[k])
+                correlate(template[trial, start[k] : start[k + 1]], pixels[start[k] : start[k + 1]], length, part[k])
             for p in range(length):
-                value[p] = (part[0, p] + part[1, p] + part[2, p] + part[3, p]) * energy[p]
+                value[p] = (part[0, p] + part[1, p] + part[2, p] + part[3, p]) * inverse_norm[p]
             for k in range(4):
                 other = (k + 1) % 4
                 for p in range(length):
                     half = part[k, p] + part[other, p] - mean[trial, k] * level[k, p]
-                    value[p] = max(value[p], half * scale[trial, k] * power[k, p])
+                    value[p] = max(value[p], half * scale[trial, k] * inverse_norms[k, p])
             sector = trial * sectors // trials
-            for k in range(ahead):
+            for k in range(row_count):
                 for m in range(nx):
                     if value[k * nx + m] > peak[sector, first + k, m]:
                         peak[sector, first + k, m] = value[k * nx + m]
-                        steepest[sector, first + k, m] = trial
-    collect(peak, steepest, turn, x_from, y_from, spacing, best)
+                        best_trial[sector, first + k, m] = trial
+    collect_maxima(peak, best_trial, angles, x_from, y_from, spacing, best)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _weigh_halves(template, start, mean, scale):
-    """Mean of the template over every half, and one over its norm about it, over √2."""
+def _half_norms(template, start, mean, scale):
+    """Write the mean of the template over every half, and its inverse norm about that mean, over √2."""
     for k in range(4):
         total, power, count = 0.0, 0.0, 0
         for quarter in (k, (k + 1) % 4):
@@ -92,12 +93,12 @@ def _weigh_halves(template, start, mean, scale):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _halves_energy(under, start, length, level, power):
-    """Sum of what lies under every half (4, p), and one over its norm about its mean (4, p)."""
+def _half_inverse_norms(pixels, start, length, level, inverse_norms):
+    """Write the sum of the pixels under every half (4, p), and their inverse norm about their mean (4, p)."""
     sums = np.zeros((2, 4, length), np.float32)
     for k in range(4):
         for q in range(start[k], start[k + 1]):
-            row, total, square = under[q], sums[0, k], sums[1, k]
+            row, total, square = pixels[q], sums[0, k], sums[1, k]
             for p in range(length):
                 total[p] += row[p]
                 square[p] += row[p] * row[p]
@@ -106,5 +107,5 @@ def _halves_energy(under, start, length, level, power):
         count = start[k + 1] - start[k] + start[other + 1] - start[other]
         for p in range(length):
             level[k, p] = sums[0, k, p] + sums[0, other, p]
-            left = sums[1, k, p] + sums[1, other, p] - level[k, p] ** 2 / count
-            power[k, p] = 1.0 / np.sqrt(left) if left > count else 0.0
+            power = sums[1, k, p] + sums[1, other, p] - level[k, p] ** 2 / count
+            inverse_norms[k, p] = 1.0 / np.sqrt(power) if power > count else 0.0

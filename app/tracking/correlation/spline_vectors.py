@@ -1,8 +1,8 @@
-"""Splines between the pixels, several taps in one instruction.
+"""Vectorised spline interpolation: several taps in one instruction.
 
-Reading a photograph between its pixels is nearly all that correlation does. Compilers leave the taps of one point as
-single multiplications; here each row of them is one vector. The order of additions is written down, so that the bits
-are the same on every machine. Uncompiled, the plain functions of `interpolation` stand in.
+Interpolation takes nearly all of the time of correlation. Compilers multiply the taps of one point one by one; here
+each row of taps is one vector. The order of additions is fixed, so that results are bit-identical on every machine.
+Without compilation, the plain functions of `interpolation` are used.
 """
 
 from __future__ import annotations
@@ -17,14 +17,13 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from scipy.interpolate import BSpline
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from . import interpolation
 
 SINGLE, DOUBLE, INDEX, BYTE = ir.FloatType(), ir.DoubleType(), ir.IntType(32), ir.IntType(8)
 SINGLE_BYTES = 4
 
-# Columns of a patch's data: where it is, then what a photograph is projected on.
+# Columns of a patch's data: the position, then the images that a photograph is projected on.
 PLACE, PROJECTED = 2, 4
 
 
@@ -36,15 +35,15 @@ def weight_polynomials(degree: int, first: int, lanes: int) -> Array:
     return np.asarray(np.linalg.solve(np.vander(t, degree + 1, increasing=True), weight), np.float64)
 
 
-def _reader(degree: int, lanes: int):
-    """What reads a spline of some degree; lanes: the taps of a row with as many of weight zero as fill a vector.
+def _spline_reader(degree: int, lanes: int):
+    """An intrinsic that interpolates a spline; lanes: length of a vector, the taps of a row and padding of weight zero.
 
-    One column beyond the taps of either side is loaded where lanes are to spare: it must be in memory, no more.
+    The padding loads a column beyond the taps on either side, which must exist in memory.
     """
     taps = degree + 1
-    spare = (lanes - taps) // 2
+    padding = (lanes - taps) // 2
     before = degree // 2  # rows and columns of taps before the point's own
-    polynomials = weight_polynomials(degree, -before - spare, lanes)
+    polynomials = weight_polynomials(degree, -before - padding, lanes)
     vector = ir.VectorType(SINGLE, lanes)
 
     @intrinsic
@@ -53,22 +52,22 @@ def _reader(degree: int, lanes: int):
 
         def build(context, builder, signature, arguments):
             photograph, column, row, part_x, part_y = arguments
-            stored = context.make_array(signature.args[0])(context, builder, photograph)
-            stride = builder.extract_value(stored.strides, 0)
+            array = context.make_array(signature.args[0])(context, builder, photograph)
+            stride = builder.extract_value(array.strides, 0)
             whole = stride.type
             row = builder.sub(row, ir.Constant(whole, before))
-            column = builder.sub(column, ir.Constant(whole, before + spare))
-            at = builder.add(builder.mul(row, stride), builder.mul(column, ir.Constant(whole, SINGLE_BYTES)))
+            column = builder.sub(column, ir.Constant(whole, before + padding))
+            offset = builder.add(builder.mul(row, stride), builder.mul(column, ir.Constant(whole, SINGLE_BYTES)))
             across = _polynomial(builder, polynomials, part_x, vector)
             down = _polynomial(builder, polynomials, part_y, vector)
             total = None
             for k in range(taps):
-                pixels = _load(builder, stored.data, at, vector, SINGLE_BYTES)
-                weight = _repeat(builder, down, k + spare)
+                pixels = _load(builder, array.data, offset, vector, SINGLE_BYTES)
+                weight = _broadcast(builder, down, k + padding)
                 product = builder.fmul(pixels, weight)
-                total = product if total is None else _add_product(builder, pixels, weight, total)
-                at = builder.add(at, stride)
-            return _sum(builder, builder.fmul(total, across))
+                total = product if total is None else _fused_multiply_add(builder, pixels, weight, total)
+                offset = builder.add(offset, stride)
+            return _sum_lanes(builder, builder.fmul(total, across))
 
         return signature, build
 
@@ -76,32 +75,32 @@ def _reader(degree: int, lanes: int):
 
 
 def _polynomial(builder, coefficients: Array, t, vector):
-    """Σ c[d] t^d of every lane, by Horner's rule."""
+    """Evaluate Σ c[d] t^d in every lane by Horner's rule."""
     single = builder.insert_element(ir.Constant(vector, ir.Undefined), t, INDEX(0))
-    t = _repeat(builder, single, 0)
+    t = _broadcast(builder, single, 0)
     constants = [ir.Constant(vector, [float(np.float32(value)) for value in row]) for row in coefficients]
     result = constants[-1]
     for constant in reversed(constants[:-1]):
-        result = _add_product(builder, result, t, constant)
+        result = _fused_multiply_add(builder, result, t, constant)
     return result
 
 
 def _load(builder, data, offset, vector, alignment: int):
-    """The vector at an offset [bytes]."""
+    """Load the vector at an offset [bytes]."""
     begin = builder.gep(builder.bitcast(data, BYTE.as_pointer()), [offset])
     loaded = builder.load(builder.bitcast(begin, vector.as_pointer()))
     loaded.align = alignment
     return loaded
 
 
-def _repeat(builder, vector, lane: int):
-    """One lane in every lane."""
+def _broadcast(builder, vector, lane: int):
+    """Copy one lane to every lane."""
     chosen = ir.Constant(ir.VectorType(INDEX, vector.type.count), [lane] * vector.type.count)
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), chosen)
 
 
-def _add_product(builder, a, b, c):
-    """a · b + c, rounded once."""
+def _fused_multiply_add(builder, a, b, c):
+    """Compute a · b + c, rounded once."""
     kind = f"v{a.type.count}f{64 if a.type.element == DOUBLE else 32}"
     multiply_add = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(a.type, (a.type,) * 3), f"llvm.fma.{kind}"
@@ -109,8 +108,8 @@ def _add_product(builder, a, b, c):
     return builder.call(multiply_add, (a, b, c))
 
 
-def _sum(builder, vector):
-    """All lanes, halves onto halves."""
+def _sum_lanes(builder, vector):
+    """Sum all lanes, halves onto halves."""
     while vector.type.count > 1:
         half = vector.type.count // 2
         lanes = ir.VectorType(INDEX, half)
@@ -122,7 +121,7 @@ def _sum(builder, vector):
 
 @intrinsic
 def _add_projections(typing, sums, data, p, g):
-    """sums (4,) += g · data[p, 2:6], in double precision."""
+    """Add g · data[p, 2:6] to sums (4,) in double precision."""
     signature = types.void(sums, data, types.intp, types.float32)
 
     def build(context, builder, signature, arguments):
@@ -130,15 +129,15 @@ def _add_projections(typing, sums, data, p, g):
         total = context.make_array(signature.args[0])(context, builder, total)
         rows = context.make_array(signature.args[1])(context, builder, rows)
         stride = builder.extract_value(rows.strides, 0)
-        at = builder.add(builder.mul(p, stride), ir.Constant(stride.type, PLACE * SINGLE_BYTES))
+        offset = builder.add(builder.mul(p, stride), ir.Constant(stride.type, PLACE * SINGLE_BYTES))
         singles, doubles = (ir.VectorType(kind, PROJECTED) for kind in (SINGLE, DOUBLE))
-        row = builder.fpext(_load(builder, rows.data, at, singles, SINGLE_BYTES), doubles)
+        row = builder.fpext(_load(builder, rows.data, offset, singles, SINGLE_BYTES), doubles)
         one = builder.insert_element(ir.Constant(doubles, ir.Undefined), builder.fpext(g, DOUBLE), INDEX(0))
-        there = builder.bitcast(total.data, doubles.as_pointer())
-        before = builder.load(there)
+        address = builder.bitcast(total.data, doubles.as_pointer())
+        before = builder.load(address)
         before.align = 8
-        stored = builder.store(_add_product(builder, row, _repeat(builder, one, 0), before), there)
-        stored.align = 8
+        array = builder.store(_fused_multiply_add(builder, row, _broadcast(builder, one, 0), before), address)
+        array.align = 8
         return context.get_dummy_value()
 
     return signature, build
@@ -148,13 +147,13 @@ def _add_projections_plainly(sums: Array, data: Array, p: int, g: float) -> None
     sums += np.float64(g) * data[p, PLACE : PLACE + PROJECTED]
 
 
-# (coefficients, ix, iy, tx, ty): the spline at (ix + tx, iy + ty), 0 ≤ t < 1, as `interpolation` reads it.
+# (coefficients, ix, iy, tx, ty): the spline at (ix + tx, iy + ty), 0 ≤ t < 1, as in `interpolation`.
 read_cubic: Any
 read_quintic: Any
 add_projections: Any
 if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-    read_cubic, read_quintic = interpolation.interpolate, interpolation.interpolate_finely
+    read_cubic, read_quintic = interpolation.interpolate_cubic, interpolation.interpolate_quintic
     add_projections = _add_projections_plainly
 else:
-    read_cubic, read_quintic = _reader(3, 4), _reader(5, 8)
+    read_cubic, read_quintic = _spline_reader(3, 4), _spline_reader(5, 8)
     add_projections = _add_projections

@@ -1,7 +1,7 @@
 """B-spline interpolation of a photograph, and its pyramid.
 
-The image is I(x, y) = Σ c[l, k] β(x − k) β(y − l) with pixel centres at whole coordinates, β the cubic B-spline or,
-where a hundredth of a pixel counts, the quintic one.
+The image is I(x, y) = Σ c[l, k] β(x − k) β(y − l) with pixel centres at whole coordinates. β is the cubic B-spline, or
+the quintic one for accuracies of a hundredth of a pixel.
 """
 
 from __future__ import annotations
@@ -14,30 +14,32 @@ import numpy as np
 from ...experiment.photographs import Image
 
 # Unser, Aldroubi & Eden 1993: the inverse of the sampled cubic B-spline is sqrt(3) z^|k|, z = sqrt(3) − 2.
-# The first tap left out is 1e-6 of the middle one: a thousandth of a grey level.
+# The first tap that is omitted is 1e-6 of the middle one: a thousandth of a grey level.
 HALF_WIDTH = 10
 POLE = np.sqrt(3.0) - 2.0
 PREFILTER = (np.sqrt(3.0) * POLE ** np.abs(np.arange(-HALF_WIDTH, HALF_WIDTH + 1))).astype(np.float32)
 
-# The same for the quintic one, whose samples are (1, 26, 66, 26, 1)/120: the first tap left out is 1e-6, too.
-FINE_HALF_WIDTH = 17
+# The inverse of the sampled quintic B-spline (1, 26, 66, 26, 1)/120: the first tap that is omitted is 1e-6 as well.
+QUINTIC_HALF_WIDTH = 17
 _ANGLE = 2.0 * np.pi * np.arange(64) / 64
 _RESPONSE = np.fft.ifft(120.0 / (66.0 + 52.0 * np.cos(_ANGLE) + 2.0 * np.cos(2.0 * _ANGLE))).real
-FINE_PREFILTER = _RESPONSE[np.abs(np.arange(-FINE_HALF_WIDTH, FINE_HALF_WIDTH + 1))].astype(np.float32)
+QUINTIC_PREFILTER = _RESPONSE[np.abs(np.arange(-QUINTIC_HALF_WIDTH, QUINTIC_HALF_WIDTH + 1))].astype(np.float32)
 
-# Interpolating white noise halfway between two pixels with the quintic spline keeps this part of its variance.
+# Fraction of the variance of white noise that quintic interpolation halfway between two pixels preserves.
 HALFWAY_VARIANCE = 0.8365
 
 
 def spline_coefficients(image: Image) -> Image:
-    """The cubic spline's coefficients c of an image (H, W), mirrored beyond its borders."""
+    """Compute the cubic spline coefficients c of an image (H, W), mirrored at its borders."""
     filtered = cv2.sepFilter2D(image, cv2.CV_32F, PREFILTER, PREFILTER, borderType=cv2.BORDER_REFLECT_101)
     return np.asarray(filtered, dtype=np.float32)
 
 
-def fine_coefficients(image: Image) -> Image:
-    """The quintic spline's coefficients c of an image (H, W), mirrored beyond its borders."""
-    filtered = cv2.sepFilter2D(image, cv2.CV_32F, FINE_PREFILTER, FINE_PREFILTER, borderType=cv2.BORDER_REFLECT_101)
+def quintic_coefficients(image: Image) -> Image:
+    """Compute the quintic spline coefficients c of an image (H, W), mirrored at its borders."""
+    filtered = cv2.sepFilter2D(
+        image, cv2.CV_32F, QUINTIC_PREFILTER, QUINTIC_PREFILTER, borderType=cv2.BORDER_REFLECT_101
+    )
     return np.asarray(filtered, dtype=np.float32)
 
 
@@ -52,27 +54,27 @@ def shrink(image: Image, factor: int) -> Image:
 
 @dataclass(frozen=True, slots=True)
 class Pyramid:
-    """One photograph with what the tracker needs of it, each level made when first asked for."""
+    """One photograph with its shrunk copies and spline coefficients, each computed at its first use."""
 
     image: Image
     _levels: dict[int, Image] = field(default_factory=dict)
     _coefficients: dict[int, Image] = field(default_factory=dict)
-    _fine: list[Image] = field(default_factory=list)
+    _quintic: list[Image] = field(default_factory=list)
 
     def level(self, factor: int) -> Image:
-        """The photograph shrunk by a factor."""
+        """Return the photograph shrunk by a factor."""
         if factor not in self._levels:
             self._levels[factor] = shrink(self.image, factor)
         return self._levels[factor]
 
-    def fine_coefficients(self) -> Image:
-        """The quintic spline's coefficients of the photograph itself."""
-        if not self._fine:
-            self._fine.append(fine_coefficients(self.image))
-        return self._fine[0]
+    def quintic_coefficients(self) -> Image:
+        """Return the quintic spline coefficients of the photograph itself."""
+        if not self._quintic:
+            self._quintic.append(quintic_coefficients(self.image))
+        return self._quintic[0]
 
     def coefficients(self, factor: int = 1) -> Image:
-        """The cubic spline's coefficients of a level."""
+        """Return the cubic spline coefficients of a level."""
         if factor not in self._coefficients:
             self._coefficients[factor] = spline_coefficients(self.level(factor))
         return self._coefficients[factor]

@@ -1,1 +1,1 @@
-"""The grains of the first photograph: circles, and the rims that they are measured by."""
+"""Detection of the grains of the first photograph: candidate circles, and their measurement by their rims."""

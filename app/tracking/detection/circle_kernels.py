@@ -1,4 +1,4 @@
-"""Circles measured one after the other in compiled code: their edges, and the circle through them."""
+"""Compiled measurement of circles: their edges, and the circle fitted through them."""
 
 from __future__ import annotations
 
@@ -9,58 +9,68 @@ from numba import njit
 
 from .edges import centre_variance, fit_points, trace, weighted_median
 
-# An edge is one where the light falls by this share of the local contrast per pixel, as surely as by the other;
+# Least slope of an edge per pixel, as a fraction of the local contrast, and the slope from which its weight is full.
 EDGE_SLOPE, SURE_SLOPE = 0.08, 0.3
-# what is brighter than this share of the way from the dark about a grain to its light is paint, not a gap.
+# The level beyond an edge is at most this fraction of the local contrast above the local dark, else it is paint.
 DARK_HALF = 0.5
-# A circle that has left the window in which its points were looked for, by this many times, is none of theirs.
-ASTRAY = 2.5
-# Points this close to the circle [px] count as its outline.
+# Greatest displacement of a fitted circle, in widths of the window in which its points were searched for.
+MAX_SHIFT_RATIO = 2.5
+# Points this close to the circle [px] belong to its outline.
 ON_CIRCLE = 0.7
-# The radius [px] of a small circle. It is none if its points lie on one side: a chipped rim has as many. Half a
-# circle's have 0.64.
+# Greatest radius [px] of a small circle. A small circle is rejected if its points lie on one side, as those of a
+# chipped rim do. The points of half a circle have a one-sidedness of 0.64.
 SMALL = 12.0
 ONE_SIDED = 0.55
-SCALE_LEAST = 0.1  # [px] residuals of steepest points below it are never outliers
+MIN_SCALE = 0.1  # [px] residuals of steepest points below it are never outliers
 
 
 @njit(cache=True, nogil=True)
 def measure_circles(coefficients, dark, contrast, rough, rules, out):
-    """The circle through the steepest points near each of the rough ones (c, 6).
+    """Fit circles through the steepest points near rough ones.
 
-    rough: x, y, radius [px]; the window [px] about radius + shift; that shift [px]; standard deviation of the radius
-    [px], infinite: it is free. rules (c, 6): excess of the dark; narrow gaps, 0 or 1; share and least number of rays
-    that must see an edge, and the number that always suffices; share of them that must be in view. out (c, 5): x, y,
-    radius, standard deviation of the centre's components [px], share of the outline in view that is seen; NaN and 0
-    where there is no circle.
+    Parameters
+    ----------
+    coefficients : (H, W) array
+        Cubic spline coefficients of the photograph.
+    dark, contrast : (H, W) array
+        Local dark level and contrast [grey].
+    rough : (c, 6) array
+        x, y, radius [px]; half width of the window about radius + shift [px]; that shift [px]; standard deviation of
+        the radius [px], infinite: it is free.
+    rules : (c, 6) array
+        Excess of the dark, as a fraction of the contrast; narrow gaps, 0 or 1; fraction and least number of rays that
+        must meet an edge, and the number that always suffices; fraction of the rays that must be in view.
+    out : (c, 5) array
+        Receives x, y, radius, standard deviation of the centre's components [px], and the fraction of the outline in
+        view that is detected; NaN and 0 where there is no circle.
     """
     for c in range(len(rough)):
-        x, y, radius, window, shift, scatter = rough[c]
-        excess, narrow, share, fewest, enough, least_view = rules[c]
+        x, y, radius, window, shift, radius_sd = rough[c]
+        excess, narrow, fraction, fewest, enough, min_view = rules[c]
         out[c, 0], out[c, 1], out[c, 2], out[c, 3], out[c, 4] = x, y, radius, np.nan, 0.0
         wanted = radius + shift
         angle, _, edges, in_view = trace(coefficients, x, y, wanted, window, narrow != 0.0)
         seen = np.zeros(len(angle), np.bool_)
         local = see_edges(edges, dark, contrast, x, y, excess, seen)
         count, viewed = seen.sum(), in_view.sum()
-        least = max(min(enough, np.rint(share * len(angle))), fewest)
-        if count < least or viewed / len(angle) < least_view:
+        least = max(min(enough, np.rint(fraction * len(angle))), fewest)
+        if count < least or viewed / len(angle) < min_view:
             continue
         at, distance = angle[seen], edges[:, 0][seen]
         weight = edges[:, 1][seen].astype(np.float32) / np.float32(SURE_SLOPE * local)
         weight = np.minimum(weight, np.float32(1.0)) ** 2
-        start = weighted_median(distance - wanted, weight) if np.isinf(scatter) else 0.0
+        start = weighted_median(distance - wanted, weight) if np.isinf(radius_sd) else 0.0
         residual, w = np.empty_like(distance), np.empty_like(distance)
         moved, scale, inverse, score = fit_points(
-            at, distance, weight.astype(np.float64), wanted, start, scatter, SCALE_LEAST, residual, w
+            at, distance, weight.astype(np.float64), wanted, start, radius_sd, MIN_SCALE, residual, w
         )
         there = x + moved[0], y + moved[1], wanted + moved[2]
-        if not np.hypot(there[0] - x, there[1] - y) + abs(there[2] - radius - shift) < ASTRAY * window:
+        if not np.hypot(there[0] - x, there[1] - y) + abs(there[2] - radius - shift) < MAX_SHIFT_RATIO * window:
             continue
         on = np.abs(residual) < ON_CIRCLE
         if radius <= SMALL and _one_sidedness(at[on]) > ONE_SIDED:
             continue
-        variance = centre_variance(at, wanted, w, score, inverse, scale, scatter)
+        variance = centre_variance(at, wanted, w, score, inverse, scale, radius_sd)
         out[c, 0], out[c, 1], out[c, 2] = there[0], there[1], there[2] - shift
         out[c, 3] = np.sqrt(variance) if variance >= 0.0 else np.inf
         out[c, 4] = on.sum() / viewed
@@ -68,9 +78,9 @@ def measure_circles(coefficients, dark, contrast, rough, rules, out):
 
 @njit(cache=True, nogil=True)
 def see_edges(edges, dark, contrast, x, y, excess, seen):
-    """Mark which rays (p,) meet an edge; gives the local contrast [grey].
+    """Mark the rays (p,) that meet an edge, and return the local contrast [grey].
 
-    excess: of the contrast, by which what lies beyond an edge may exceed the darkest that is met.
+    excess: greatest difference between the level beyond an edge and the darkest level, as a fraction of the contrast.
     """
     height, width = contrast.shape
     row, column = min(max(int(y), 0), height - 1), min(max(int(x), 0), width - 1)
@@ -82,7 +92,7 @@ def see_edges(edges, dark, contrast, x, y, excess, seen):
         seen[p] = np.isfinite(edges[p, 0]) and strength > steep and beyond < bright
         count += seen[p]
     if count:
-        # The tenth-darkest part, not the single darkest ray: noise makes that one.
+        # The tenth percentile, because noise determines the single darkest ray.
         limit = np.float32(float(lowest_tenth(edges[:, 2][seen].astype(np.float32))) + excess * local)
         for p in range(len(seen)):
             seen[p] = seen[p] and np.float32(edges[p, 2]) < limit
@@ -91,7 +101,7 @@ def see_edges(edges, dark, contrast, x, y, excess, seen):
 
 @njit(cache=True, nogil=True)
 def lowest_tenth(values):
-    """The tenth percentile of values (p,), as numpy interpolates it; none of them is NaN."""
+    """Return the tenth percentile of values (p,) without NaN, as numpy interpolates it."""
     ordered = np.sort(values)
     place = (len(values) - 1) * 0.1
     low = int(place)
@@ -105,7 +115,7 @@ def lowest_tenth(values):
 
 @njit(cache=True, nogil=True)
 def _one_sidedness(angle):
-    """How much points at these angles (p,) [rad] lie on one side: 0 all about, 1 in one place."""
+    """Length of the mean unit vector at angles (p,) [rad]: 0 all around, 1 in one place."""
     if len(angle) == 0:
         return 1.0
     x = y = 0.0

@@ -1,10 +1,10 @@
-"""Find the grains of the first photograph: centre and radius to a part of a pixel.
+"""Detection of the grains of the first photograph: centre and radius with subpixel accuracy.
 
-Circles that might be grains are found by the slope along rings of every radius, then each is judged by
-its own outline at full resolution: edges towards the dark between the grains, wherever there is dark.
-Contacts have no edge and are passed over. What moves all edges alike (the blur's definition of an edge,
-the mean shading of the rims) is measured over all grains and taken out where the radii are known, so that
-an outline seen only on one side does not pull the centre.
+Candidate circles are found by the slope along rings of every radius. Each is then tested by its own outline at full
+resolution: edges towards the dark between the grains, wherever there is dark. Contacts have no edge and are ignored.
+The common displacement of all edges (the blur's definition of an edge, the mean shading of the rims) is measured over
+all grains and removed where the radii are known, so that an outline that is visible on one side does not bias the
+centre.
 """
 
 from __future__ import annotations
@@ -17,59 +17,57 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from solver.bodies.grains import Array
-from solver.together import available_cores, work_together
-
 from ...experiment.photographs import Image
+from ...solver.bodies.grains import Array
+from ...solver.parallel import available_cores, parallel_map
+from .circle_measurement import CIRCLES_PER_THREAD, CircleMeasurer, MeasuredCircle
 from .discs import OVERLAP, Discs, find_discs
-from .outlines import TOGETHER, Measured, Outliner
 from .rings import Circles, find_circles, without_overlap
 
-# Rings leave the centre uncertain by this much [px], besides the difference of two classes' radii.
+# Greatest error of a ring's centre [px], besides the difference of two classes' radii.
 RING_UNCERTAINTY = 3.0
-# Of a small circle they leave less, in parts of its radius.
-SMALL_SHARE = 0.2
+# Greatest error of a small circle's centre, as a fraction of its radius.
+SMALL_FRACTION = 0.2
 
-# Standard deviation of what a narrow gap makes of the steepest points' centre [px].
+# Standard deviation of the error that a narrow gap adds to the steepest points' centre [px].
 ROUGH_SIGMA = 0.15
 
-# A centre less certain than this [px], and than this share of the radius, is none; nor is one of a small circle that is
-# less certain than the other share.
-SIGMA_MOST = 1.0
-SIGMA_SHARE = 0.05
-SIGMA_SHARE_SMALL = 0.1
-# Looked at closely, this part of the outline asked for must still be seen: noise has none of it.
-CLOSE_SHARE = 1.0 / 3.0
+# Greatest standard deviation of a centre [px], or as a fraction of the radius, of any circle and of a small one.
+MAX_SIGMA = 1.0
+MAX_RELATIVE_SIGMA = 0.05
+MAX_RELATIVE_SIGMA_SMALL = 0.1
+# Least quality after the close measurement, as a fraction of the least quality before: of noise it is zero.
+CLOSE_FRACTION = 1.0 / 3.0
 
-# Radii looked for when nothing is said about them [px], and the share of the picture's shorter side that is the most.
+# Default range of the radii [px], and the largest as a fraction of the photograph's shorter side.
 RADIUS_RANGE = (8.0, 160.0)
-LARGEST_SHARE = 0.3
+LARGEST_FRACTION = 0.3
 
-# Of bright discs, smaller ones are told apart from paint and noise, too [px].
-SMALLEST = 4.0
-# Discs that cover this share of a photograph's bright are its grains, each where this part of the outline asked for of
-# others is seen;
-CLEAN, CLEAN_QUALITY = 0.93, 0.6
-# they must be lit as evenly as this, as a share of the contrast, or there is texture on them.
-EVEN = 0.2
-# Of the bright that found grains leave, this share: in a rest there is always some of no shape.
-CLEAN_REST = 0.8
+# Least default radius of bright discs [px], which are distinguished from paint and noise at smaller sizes.
+MIN_RADIUS = 4.0
+# Discs that cover this fraction of a photograph's bright area are its grains, with the second as a factor of the least
+# quality.
+CLEAN_COVER, CLEAN_QUALITY = 0.93, 0.6
+# Greatest range of the light on such discs, as a fraction of the contrast: more is texture.
+MAX_LIGHT_RANGE = 0.2
+# Least covered fraction of the bright area that found grains leave, a part of which is always without shape.
+CLEAN_COVER_REST = 0.8
 DISC_PASSES = 4
-# When grains have taken all but this share of the bright, all are found.
-BRIGHT_LEFT = 0.01
+# Fraction of the bright area left, below which all grains are found.
+MAX_BRIGHT_LEFT = 0.01
 
-# Circles of unknown radius are known no better than the steps in which they were looked for.
+# Ratio of successive radii in the search for circles of unknown radius.
 SCAN_STEP = 1.06
 
 
 @dataclass(frozen=True, slots=True)
 class DetectionSettings:
-    """What is known of the grains. Lengths in pixels."""
+    """Known properties of the grains, and thresholds. Lengths in pixels."""
 
     radii: tuple[float, ...] = ()  # [px] the radius classes; empty: unknown
     radius_range: tuple[float, float] | None = None  # [px] searched when the classes are unknown; None: RADIUS_RANGE
-    score_least: float = 0.15  # slope along a ring, as a share of a full edge, of a circle worth a look
-    quality_least: float = 0.3  # share of a grain's outline that must be seen as an edge in its place
+    min_score: float = 0.15  # least slope along a ring of a candidate, as a fraction of a full edge
+    min_quality: float = 0.3  # least fraction of a grain's outline with an edge on the circle
 
     def __post_init__(self) -> None:
         if any(not radius > 3.0 for radius in self.radii):
@@ -86,7 +84,7 @@ class Detection:
     y: Array  # (n,) [px] row, down
     radius: Array  # (n,) [px]; a class, where classes are known
     sigma: Array  # (n,) [px] standard deviation of a component of the centre
-    quality: Array  # (n,) share of the outline in view that is seen as an edge, 0 … 1
+    quality: Array  # (n,) fraction of the outline in view with an edge on the circle
 
     @property
     def count(self) -> int:
@@ -94,35 +92,39 @@ class Detection:
 
 
 def detect_grains(image: Image, settings: DetectionSettings | None = None) -> Detection:
-    """Find the grains of a photograph (H, W)."""
+    """Find the grains of a photograph (H, W) [grey]."""
     settings = settings if settings is not None else DetectionSettings()
     known = bool(settings.radii)
-    radii = np.array(sorted(set(settings.radii))) if known else _scan(settings.radius_range or _usual_range(image))
-    smallest = SMALLEST if settings.radius_range is None else settings.radius_range[0]
-    outliner = Outliner(image, float(radii.max()))
+    radii = (
+        np.array(sorted(set(settings.radii)))
+        if known
+        else _radius_steps(settings.radius_range or _default_range(image))
+    )
+    smallest = MIN_RADIUS if settings.radius_range is None else settings.radius_range[0]
+    measurer = CircleMeasurer(image, float(radii.max()))
     table, complete = np.empty((0, 4)), False
-    whole = find_discs(outliner.level, table, min(smallest, SMALLEST)) if not known else None
-    if whole is not None and whole.covered > CLEAN and whole.spread < EVEN:
-        # Nothing is painted on the grains, so a little of an outline tells, and gaps may be as narrow as they like.
-        outliner.plain = True
-        first_discs = whole if smallest <= SMALLEST else None
-        table, complete = _judge_discs(outliner, table, smallest, CLEAN_QUALITY * settings.quality_least, first_discs)
+    whole = find_discs(measurer.level, table, min(smallest, MIN_RADIUS)) if not known else None
+    if whole is not None and whole.covered > CLEAN_COVER and whole.light_range < MAX_LIGHT_RANGE:
+        # Without paint a small part of an outline suffices, and gaps may be arbitrarily narrow.
+        measurer.plain = True
+        first_discs = whole if smallest <= MIN_RADIUS else None
+        table, complete = _judge_discs(measurer, table, smallest, CLEAN_QUALITY * settings.min_quality, first_discs)
     if not complete:
-        rough = find_circles(image, radii, score_least=settings.score_least)
-        table = _judge(outliner, rough, table, known, settings.quality_least)
+        rough = find_circles(image, radii, min_score=settings.min_score)
+        table = _judge(measurer, rough, table, known, settings.min_quality)
         count = len(table)
         if not known:
-            # What is lost among rings of its neighbours' outlines, or smaller than was looked for.
-            table, _ = _judge_discs(outliner, table, smallest, settings.quality_least)
+            # Grains that were hidden by rings of their neighbours' outlines, or smaller than the range.
+            table, _ = _judge_discs(measurer, table, smallest, settings.min_quality)
         if len(table) > count and smallest < radii[0]:
-            rough = find_circles(image, _scan((smallest, radii[0])), score_least=settings.score_least)
-            table = _judge(outliner, rough, table, known, settings.quality_least)
-    found = _refine(outliner, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
+            rough = find_circles(image, _radius_steps((smallest, radii[0])), min_score=settings.min_score)
+            table = _judge(measurer, rough, table, known, settings.min_quality)
+    found = _refine(measurer, table[:, 0], table[:, 1], table[:, 2], fixed_radius=known)
     order = np.lexsort((found.x, found.y))
-    # What cannot be measured closely is not a grain, or too little of it is in view.
-    most = np.minimum(SIGMA_MOST, SIGMA_SHARE_SMALL * found.radius)
-    good = found.sigma < np.maximum(most, SIGMA_SHARE * found.radius)
-    good &= found.quality > CLOSE_SHARE * settings.quality_least
+    # A circle that cannot be measured closely is not a grain, or too little of it is in view.
+    most = np.minimum(MAX_SIGMA, MAX_RELATIVE_SIGMA_SMALL * found.radius)
+    good = found.sigma < np.maximum(most, MAX_RELATIVE_SIGMA * found.radius)
+    good &= found.quality > CLOSE_FRACTION * settings.min_quality
     if not known:
         good &= (found.radius > 0.9 * smallest) & (found.radius < 1.1 * radii[-1])
     order = order[good[order]]
@@ -130,146 +132,165 @@ def detect_grains(image: Image, settings: DetectionSettings | None = None) -> De
 
 
 def refine_grains(image: Image, x: Array, y: Array, radius: Array, *, fixed_radius: bool = True) -> Detection:
-    """Refine rough positions x, y (n,) [px], good to two pixels, of grains of radius (n,) [px].
+    """Refine rough circles.
 
-    fixed_radius: the radii are true; else they are estimated too. Grains keep their order. A grain whose
-    outline is not seen stays where it was, with quality 0 and sigma NaN.
+    Parameters
+    ----------
+    image : (H, W) array
+        The photograph [grey].
+    x, y : (n,) array
+        Positions accurate to two pixels [px].
+    radius : (n,) array
+        Radii [px].
+    fixed_radius : bool
+        The radii are exact; else they are estimated as well.
+
+    Returns
+    -------
+    Detection
+        The grains in the given order. A grain whose outline is not detected keeps its position, with quality 0 and
+        sigma NaN.
     """
     x, y, radius = (np.asarray(value, dtype=np.float64) for value in (x, y, radius))
     if len(x) == 0:
         return Detection(x, y, radius, np.empty(0), np.empty(0))
-    return _refine(Outliner(image, float(radius.max())), x, y, radius, fixed_radius=fixed_radius)
+    return _refine(CircleMeasurer(image, float(radius.max())), x, y, radius, fixed_radius=fixed_radius)
 
 
-def _refine(outliner: Outliner, x: Array, y: Array, radius: Array, *, fixed_radius: bool) -> Detection:
+def _refine(measurer: CircleMeasurer, x: Array, y: Array, radius: Array, *, fixed_radius: bool) -> Detection:
     if len(x) == 0:
         return Detection(x, y, radius, np.empty(0), np.empty(0))
     window = np.minimum([_window(each, True) for each in radius], 2.0)
-    first = [Measured(*one) for one in outliner.measure(_rough(x, y, radius, window, np.inf)).tolist()]
-    width = outliner.estimate_blur(first)
-    free = _each(
-        len(x), lambda k: _closer(outliner, first[k], outliner.measure_closely(*first[k].circle, width, 0.0, np.inf))
+    first = [MeasuredCircle(*one) for one in measurer.measure(_rough(x, y, radius, window, np.inf)).tolist()]
+    width = measurer.estimate_blur(first)
+    free = _measure_each(
+        len(x),
+        lambda k: _better_measurement(
+            measurer, first[k], measurer.measure_closely(*first[k].circle, width, 0.0, np.inf)
+        ),
     )
     if not fixed_radius:
         return _detection(free, np.array([one.radius for one in free]))
     excess = np.array([one.radius for one in free]) - radius
     shift = float(np.median(excess))
-    # The rims' shading differs from grain to grain: their radii scatter about the common shift.
-    scatter = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
-    tied = _each(
+    # The rims' shading differs from grain to grain, so their radii deviate from the common shift.
+    radius_sd = max(1.4826 * float(np.median(np.abs(excess - shift))), 0.01)
+    tied = _measure_each(
         len(x),
-        lambda k: _closer(
-            outliner, free[k], outliner.measure_closely(free[k].x, free[k].y, radius[k], width, shift, scatter)
+        lambda k: _better_measurement(
+            measurer, free[k], measurer.measure_closely(free[k].x, free[k].y, radius[k], width, shift, radius_sd)
         ),
     )  # fmt: skip
     return _detection(tied, radius)
 
 
-def _closer(outliner: Outliner, rough: Measured, close: Measured) -> Measured:
-    """The close measurement; where narrow gaps leave too little for it, the rough one with what that leaves open."""
-    if not np.isfinite(rough.sigma) or not outliner.narrow(rough.radius):
+def _better_measurement(measurer: CircleMeasurer, rough: MeasuredCircle, close: MeasuredCircle) -> MeasuredCircle:
+    """The close measurement, or with narrow gaps the rough one if it has the smaller standard deviation."""
+    if not np.isfinite(rough.sigma) or not measurer.narrow(rough.radius):
         return close
     sigma = float(np.hypot(rough.sigma, ROUGH_SIGMA))
     return close if close.sigma < sigma else replace(rough, sigma=sigma)
 
 
 def _judge_discs(
-    outliner: Outliner, table: Array, smallest: float, quality_least: float, first: Discs | None = None
+    measurer: CircleMeasurer, table: Array, smallest: float, min_quality: float, first: Discs | None = None
 ) -> tuple[Array, bool]:
-    """The table x, y, radius, quality (c, 4) with the discs that prove grains, in passes over what each leaves.
+    """Add the discs that are grains to the table x, y, radius, quality (c, 4), in passes over the bright area left.
 
-    Discs that leave much of the bright uncovered are not taken for grains. first: the discs of the first pass, where
-    they are known. Returns also whether next to nothing of the bright is left.
+    Discs that leave much of the bright area uncovered are no grains. first: the discs of the first pass, where they are
+    known. Returns also whether hardly any bright area remains.
     """
-    level = outliner.level
+    level = measurer.level
     whole, left = 0.0, np.inf
     for k in range(DISC_PASSES + 1):
         discs = first if k == 0 and first is not None else find_discs(level, table, smallest)
         whole, left = max(whole, discs.area), discs.area
-        if k == DISC_PASSES or len(discs.candidates.x) == 0 or discs.covered < CLEAN_REST:
+        if k == DISC_PASSES or len(discs.candidates.x) == 0 or discs.covered < CLEAN_COVER_REST:
             break
         count = len(table)
-        table = _judge(outliner, discs.candidates, table, False, quality_least, OVERLAP)
+        table = _judge(measurer, discs.candidates, table, False, min_quality, OVERLAP)
         if len(table) <= count:
             break
-    return table, left < BRIGHT_LEFT * whole
+    return table, left < MAX_BRIGHT_LEFT * whole
 
 
 def _judge(
-    outliner: Outliner, rough: Circles, table: Array, known: bool, quality_least: float, overlap: float = 0.15
+    measurer: CircleMeasurer, rough: Circles, table: Array, known: bool, min_quality: float, overlap: float = 0.15
 ) -> Array:
-    """The table x, y, radius, quality (c, 4) with those candidates that prove grains and overlap no better one.
+    """Add the candidates that are grains and overlap no better one to the table x, y, radius, quality (c, 4).
 
-    overlap: the share of the smaller radius that is let pass.
+    overlap: greatest overlap, as a fraction of the smaller radius.
     """
     unjudged = np.ones(len(rough.x), dtype=np.bool_)
     judged_circles = np.full((len(rough.x), 4), np.nan)  # x, y, radius, quality of those that were measured
     tree = KDTree(np.stack([rough.x, rough.y], axis=1)) if known and len(rough.x) else None
     while True:
         left = np.flatnonzero(unjudged)
-        left = left[_apart(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
+        left = left[_not_overlapping(rough.x[left], rough.y[left], rough.radius[left], table, allowed=0.6)]
         if len(left) == 0:
             return table
-        # What has struck out a true circle and then proved none itself makes room for another pass; so does
-        # what a better circle strikes out later.
+        # A candidate may remove a true circle and then prove no grain itself, or be removed later by a better circle.
+        # Another pass then tests the removed ones.
         chosen = left[without_overlap(rough.x[left], rough.y[left], rough.radius[left], allowed=0.6)]
         unjudged[chosen] = False
-        if tree is not None:  # which is the grain is told by those of the other known radii about it
-            chosen = np.concatenate([_around(rough, tree, k) for k in chosen])
+        if tree is not None:  # the candidates of the other known radii at that place are compared
+            chosen = np.concatenate([_best_of_every_radius(rough, tree, k) for k in chosen])
         new = np.unique(chosen[np.isnan(judged_circles[chosen, 0])])
-        judged_circles[new] = _measure(outliner, rough, new, known, quality_least)
+        judged_circles[new] = _measure(measurer, rough, new, known, min_quality)
         judged = judged_circles[chosen]
-        table = np.concatenate([table, judged[judged[:, 3] > quality_least]])
-        # A longer outline is the more significant at the same share.
+        table = np.concatenate([table, judged[judged[:, 3] > min_quality]])
+        # A longer outline is more significant at the same quality.
         table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
         table = table[without_overlap(table[:, 0], table[:, 1], table[:, 2], allowed=overlap)]
 
 
-def _measure(outliner: Outliner, rough: Circles, rows: NDArray[np.intp], known: bool, quality_least: float) -> Array:
-    """x, y, radius, quality (c, 4) of some of the rough circles."""
+def _measure(
+    measurer: CircleMeasurer, rough: Circles, rows: NDArray[np.intp], known: bool, min_quality: float
+) -> Array:
+    """Measure x, y, radius, quality (c, 4) of some of the rough circles."""
     size = rough.radius[rows]
     window = np.array([_window(each, known) for each in size])
-    scatter = 0.3 if known else np.inf
-    found = outliner.measure(_rough(rough.x[rows], rough.y[rows], size, window, scatter))
+    radius_sd = 0.3 if known else np.inf
+    found = measurer.measure(_rough(rough.x[rows], rough.y[rows], size, window, radius_sd))
     if not known:
         return found[:, [0, 1, 2, 4]]
     quality = 2.0 * found[:, 4]
-    # Now that it is centred, a narrower view keeps paint near the rim out of it. Alone it is too easily satisfied.
-    again = np.flatnonzero(quality > quality_least)
+    # Around the fitted circle, a narrower window excludes paint near the rim. Alone it would accept too many circles.
+    again = np.flatnonzero(quality > min_quality)
     window = np.full(len(again), 0.5 * RING_UNCERTAINTY)
-    found[again] = outliner.measure(_rough(found[again, 0], found[again, 1], size[again], window, scatter))
+    found[again] = measurer.measure(_rough(found[again, 0], found[again, 1], size[again], window, radius_sd))
     quality[again] = np.minimum(found[again, 4], quality[again])
     return np.column_stack([found[:, :2], size, quality])
 
 
-def _rough(x: Array, y: Array, radius: Array, window: Array, scatter: float) -> Array:
-    """Rough circles (c, 6) as they are measured, without a shift of their edges."""
-    return np.column_stack([x, y, radius, window, np.zeros(len(x)), np.full(len(x), scatter)])
+def _rough(x: Array, y: Array, radius: Array, window: Array, radius_sd: float) -> Array:
+    """Rough circles (c, 6) for `CircleMeasurer.measure`, without a shift of their edges."""
+    return np.column_stack([x, y, radius, window, np.zeros(len(x)), np.full(len(x), radius_sd)])
 
 
-def _around(rough: Circles, tree: KDTree, k: int) -> NDArray[np.intp]:
-    """The most convincing circle of every radius about circle k."""
+def _best_of_every_radius(rough: Circles, tree: KDTree, k: int) -> NDArray[np.intp]:
+    """The candidate with the highest score of every radius around candidate k."""
     widest = float(rough.radius.max() - rough.radius.min())
     near = np.sort(np.asarray(tree.query_ball_point([rough.x[k], rough.y[k]], widest + RING_UNCERTAINTY)))
     distance = np.hypot(rough.x[near] - rough.x[k], rough.y[near] - rough.y[k])
     near = near[distance <= np.abs(rough.radius[near] - rough.radius[k]) + RING_UNCERTAINTY]
-    # They are in the order of their score: the first of every radius is its best.
+    # Candidates are in the order of their score: the first of every radius is its best.
     _, first = np.unique(rough.radius[near], return_index=True)
     return near[np.sort(first)]
 
 
 def _window(radius: float, known: bool) -> float:
-    """How far from a rough circle its edges are looked for [px]: a small grain's neighbours are never far."""
-    window = min(RING_UNCERTAINTY, max(SMALL_SHARE * radius, 0.5 * RING_UNCERTAINTY))
+    """Half width of the search for edges around a rough circle [px]: narrower for small grains, beside neighbours."""
+    window = min(RING_UNCERTAINTY, max(SMALL_FRACTION * radius, 0.5 * RING_UNCERTAINTY))
     return window if known else max(window, 0.6 * (SCAN_STEP - 1.0) * radius)
 
 
-def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -> NDArray[np.bool_]:
-    """Which circles do not overlap what has been found, x, y, radius, … (c, 4), by more than the share allowed."""
+def _not_overlapping(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -> NDArray[np.bool_]:
+    """Which circles overlap none of the found ones, x, y, radius, … (c, 4), by more than the fraction `allowed`."""
     if len(found) == 0 or len(x) == 0:
         return np.ones(len(x), dtype=np.bool_)
     tree, apart = KDTree(found[:, :2]), np.ones(len(x), dtype=np.bool_)
-    for count in (1, min(8, len(found))):  # most overlap the nearest one already
+    for count in (1, min(8, len(found))):  # most overlaps are with the nearest one
         rows = np.flatnonzero(apart)
         nearest = tree.query(np.stack([x[rows], y[rows]], axis=1), k=count)
         distance, index = (np.reshape(each, (len(rows), count)) for each in nearest)
@@ -278,29 +299,29 @@ def _apart(x: Array, y: Array, radius: Array, found: Array, *, allowed: float) -
     return apart
 
 
-def _each(count: int, one: Callable[[int], Measured]) -> list[Measured]:
-    """What is measured of each grain, on all cores."""
-    parts = np.array_split(np.arange(count), max(min(available_cores(), count // TOGETHER), 1))
+def _measure_each(count: int, one: Callable[[int], MeasuredCircle]) -> list[MeasuredCircle]:
+    """Measure each grain, on all cores."""
+    parts = np.array_split(np.arange(count), max(min(available_cores(), count // CIRCLES_PER_THREAD), 1))
 
-    def some(part: NDArray[np.intp]) -> list[Measured]:
+    def some(part: NDArray[np.intp]) -> list[MeasuredCircle]:
         return [one(k) for k in part.tolist()]
 
-    found = work_together([partial(some, part) for part in parts], None)
+    found = parallel_map([partial(some, part) for part in parts], None)
     return [each for part in found for each in part]
 
 
-def _detection(measured: list[Measured], radius: Array) -> Detection:
+def _detection(measured: list[MeasuredCircle], radius: Array) -> Detection:
     def column(name: str) -> Array:
         return np.array([getattr(one, name) for one in measured], dtype=np.float64)
 
     return Detection(column("x"), column("y"), radius, column("sigma"), column("quality"))
 
 
-def _usual_range(image: Image) -> tuple[float, float]:
+def _default_range(image: Image) -> tuple[float, float]:
     low, high = RADIUS_RANGE
-    return low, max(min(high, LARGEST_SHARE * min(image.shape)), 1.5 * low)
+    return low, max(min(high, LARGEST_FRACTION * min(image.shape)), 1.5 * low)
 
 
-def _scan(limits: tuple[float, float]) -> Array:
+def _radius_steps(limits: tuple[float, float]) -> Array:
     steps = int(np.ceil(np.log(limits[1] / limits[0]) / np.log(SCAN_STEP)))
     return np.geomspace(limits[0], limits[1], steps + 1)

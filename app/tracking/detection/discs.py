@@ -1,9 +1,9 @@
-"""Bright discs where a photograph separates cleanly into bright grains and dark gaps.
+"""Bright discs in a photograph that separates cleanly into bright grains and dark gaps.
 
-Pixels brighter than halfway between the dark and the light about them are the grains'; a grain is the largest disc
-that fits into the bright at its place, a local maximum of the distance to the dark. Texture and paint break the bright
-up, and backing is of no shape: discs that hardly overlap then leave much of it uncovered, which tells that they are
-not the grains.
+Pixels brighter than the mean of the local dark and bright levels belong to grains. A grain is the largest disc that
+fits into the bright area at its place, a local maximum of the distance to the dark. Texture and paint divide the bright
+area, and a background has no shape: discs that hardly overlap then leave much of it uncovered, which shows that they
+are not the grains.
 """
 
 from __future__ import annotations
@@ -13,37 +13,43 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from solver.bodies.grains import Array
-
 from ...experiment.photographs import Image
+from ...solver.bodies.grains import Array
 from .rings import Circles, without_overlap
 
-# Distances are measured on a photograph enlarged by this factor, unless it has more pixels than that: memory.
+# Distances are measured on a photograph enlarged by this factor, unless it has more pixels than that, to save memory.
 ENLARGED = 2
 ENLARGED_PIXELS = 12_000_000
 
-# Light above this share of the way from the dark to the bright is a grain's.
+# Relative light (0 dark, 1 bright) above which a pixel belongs to a grain.
 BRIGHT = 0.5
-# Overlap of two discs as a share of the smaller radius: blurred contacts join grains, which widens the discs.
+# Greatest overlap of two discs, as a fraction of the smaller radius: blurred contacts join grains, which widens discs.
 OVERLAP = 0.25
-# Pixels about a grain that has been found [px] that may still be its blurred rim.
+# Width of the blurred rim around a grain that has been found [px].
 RIM = 0.7
 
 
 @dataclass(frozen=True, slots=True)
 class Discs:
-    """What a photograph's bright consists of."""
+    """The discs of a photograph's bright area."""
 
     candidates: Circles  # the largest first
-    area: float  # [px²] of the bright that is not narrower than the smallest disc looked for
-    covered: float  # share of it that the discs cover
-    spread: float  # of its light in the middle, between the twentieth parts at both ends: 0 is even, 1 full contrast
+    area: float  # [px²] of the bright area that is not narrower than the smallest disc searched for
+    covered: float  # fraction of it that the discs cover
+    light_range: float  # 5th to 95th percentile of its relative light: 0 is even, 1 full contrast
 
 
 def find_discs(level: Image, found: Array, smallest: float) -> Discs:
-    """Discs of at least `smallest` [px] radius in the bright of a photograph.
+    """Find discs in the bright area of a photograph.
 
-    level (H, W): 0 the local dark, 1 the local light; found: x, y, radius, … (c, 3 or more) [px], left out.
+    Parameters
+    ----------
+    level : (H, W) array
+        Relative light: 0 at the local dark, 1 at the local bright level.
+    found : (c, 3 or more) array
+        x, y, radius, … of discs that are excluded [px].
+    smallest : float
+        Least radius [px].
     """
     factor = ENLARGED if level.size <= ENLARGED_PIXELS else 1
     if factor > 1:
@@ -52,7 +58,7 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     _paint_discs(
         bright, _enlarged(found[:, 0], factor), _enlarged(found[:, 1], factor), factor * (found[:, 2] + RIM), 0
     )
-    # The distance from a pixel's centre to that of the nearest dark one is half a pixel more than that to the edge.
+    # The distance between the centres of a pixel and the nearest dark one exceeds that to the edge by half a pixel.
     distance = cv2.distanceTransform(bright, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     least = factor * smallest
     inner = (distance >= least + 0.5).view(np.uint8)
@@ -66,18 +72,18 @@ def find_discs(level: Image, found: Array, smallest: float) -> Discs:
     kept = without_overlap(column, row, radius, allowed=OVERLAP)
     column, row, radius = column[kept], row[kept], radius[kept]
     middle = level[::factor, ::factor][inner[::factor, ::factor] > 0]  # the other pixels were interpolated
-    spread = float(np.ptp(np.percentile(middle, [5.0, 95.0]))) if len(middle) else np.inf
+    light_range = float(np.ptp(np.percentile(middle, [5.0, 95.0]))) if len(middle) else np.inf
     wide = cv2.dilate(inner, _full_disc(least)) > 0
     area = int(np.count_nonzero(wide))
     _paint_discs(bright, column, row, radius, 2)
     covered = int(np.count_nonzero(wide & (bright == 2)))
     place = [(axis + 0.5) / factor - 0.5 for axis in (column, row)]
     candidates = Circles(place[0], place[1], radius / factor, np.ones(len(radius)))
-    return Discs(candidates, area / factor**2, covered / max(area, 1), spread)
+    return Discs(candidates, area / factor**2, covered / max(area, 1), light_range)
 
 
 def _full_disc(radius: float) -> np.ndarray:
-    """The pixels no farther than that from the middle one."""
+    """Mask of the pixels within `radius` of the middle one."""
     reach = np.arange(-int(radius), int(radius) + 1)
     return (np.hypot(*np.meshgrid(reach, reach)) <= radius).astype(np.uint8)
 

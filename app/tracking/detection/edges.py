@@ -1,4 +1,4 @@
-"""A grain's outline to a part of a pixel, and the circle through it."""
+"""Edges along a grain's outline with subpixel accuracy, and the circle fitted through them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
 from ...experiment.photographs import Image
-from ..correlation.interpolation import interpolate
+from ...solver.bodies.grains import Array
+from ..correlation.interpolation import interpolate_cubic
 
 # Samples along a radius [1/px].
 DENSITY = 4
-MARGIN = 3.0  # [px] that they reach beyond the window in which edges are looked for
+MARGIN = 3.0  # [px] length of the rays beyond the window in which edges are searched for
 HALF, TWICE, NOWHERE = np.float32(0.5), np.float32(2.0), np.float32(np.inf)
 
-# Points of the outline, one per pixel, that one dot of paint may spoil together.
-POINTS_OF_A_STRETCH = 8.0
+# Number of points of the outline, one per pixel, in an arc that one dot of paint may affect.
+POINTS_PER_ARC = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +27,13 @@ class Outline:
 
     angle: Array  # (p,) [rad] from the rough centre
     edges: Array  # (p, 3) distance [px], slope [grey/px], grey level two pixels outside, or the darkest up to there
-    in_view: NDArray[np.bool_]  # (p,) whether the photograph reaches there
-    rays: Image  # (p, s) [grey] the rays themselves, at distances first + k / DENSITY
+    in_view: NDArray[np.bool_]  # (p,) whether the ray lies within the photograph
+    rays: Image  # (p, s) [grey] values at distances first + k / DENSITY
     first: float  # [px]
 
     @property
     def distance(self) -> Array:
-        """Of the edge from the rough centre (p,) [px], NaN where there is none."""
+        """Distance of the edge from the rough centre (p,) [px], NaN without an edge."""
         return self.edges[:, 0]
 
     @property
@@ -45,7 +44,7 @@ class Outline:
 
 @njit(cache=True, nogil=True)
 def sample_rays(coefficients, cx, cy, angles, first, step, out):
-    """Grey values along rays: out (p, s) at distances first + step · k; NaN outside the photograph."""
+    """Write the grey values (p, s) along rays at distances first + step · k; NaN outside the photograph."""
     height, width = coefficients.shape
     for p in range(len(angles)):
         cos, sin = np.cos(angles[p]), np.sin(angles[p])
@@ -56,15 +55,15 @@ def sample_rays(coefficients, cx, cy, angles, first, step, out):
                 out[p, k] = np.nan
                 continue
             ix, iy = int(x), int(y)
-            out[p, k] = interpolate(coefficients, ix, iy, np.float32(x - ix), np.float32(y - iy))
+            out[p, k] = interpolate_cubic(coefficients, ix, iy, np.float32(x - ix), np.float32(y - iy))
 
 
 def trace_outline(
     coefficients: Image, x: float, y: float, radius: float, window: float, *, narrow: bool = False
 ) -> Outline:
-    """Look along every ray for the steepest descent outwards within `window` [px] of the radius [px].
+    """Find the steepest outward descent along every ray, within `window` [px] of the radius [px].
 
-    narrow: gaps may end before the two pixels outside the edge where their dark is read.
+    narrow: gaps may be narrower than the two pixels outside the edge where their dark is read.
     """
     angle, rays, edges, in_view = trace(coefficients, x, y, radius, window, narrow)
     return Outline(angle, edges, in_view, rays, radius - window - MARGIN)
@@ -72,7 +71,7 @@ def trace_outline(
 
 @njit(cache=True, nogil=True)
 def trace(coefficients, x, y, radius, window, narrow):
-    """Rays (p, s) about a place, their angles (p,), the steepest descent of each (p, 3) and which lie in view (p,)."""
+    """Return angles (p,), rays (p, s), edges (p, 3) and visibility (p,) around a place, see `find_steepest`."""
     step = 1.0 / radius
     angle = np.empty(int(np.ceil(2.0 * np.pi / step)))
     for p in range(len(angle)):
@@ -87,14 +86,26 @@ def trace(coefficients, x, y, radius, window, narrow):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def find_steepest(ray, first, radius, window, narrow, edges, in_view):
-    """Write of every ray (p, s) the edge [px], NaN where there is none, its slope, and the grey level beyond it (p, 3).
+    """Find the edge of every ray with subpixel accuracy.
 
-    first [px]: where the rays begin; in_view (p,): whether the whole ray lies in the photograph; narrow: the darkest
-    level up to two pixels outside counts, not the one there.
+    Parameters
+    ----------
+    ray : (p, s) array
+        Grey values of the rays.
+    first : float
+        Distance of the rays' first sample [px].
+    radius, window : float
+        Middle and half width of the search [px].
+    narrow : bool
+        The level beyond an edge is the darkest up to two pixels outside, not the one at two pixels.
+    edges : (p, 3) array
+        Receives the distance of the edge [px] (NaN: none), its slope [grey/px] and the level beyond it [grey].
+    in_view : (p,) array
+        Receives whether the whole ray lies within the photograph.
     """
     samples = ray.shape[1]
     half = DENSITY // 2
-    # A second difference over half a pixel to each side: the slope, smoothed by less than the lens's blur.
+    # Central difference over half a pixel to each side: smoothed by less than the lens's blur.
     scale = np.float32(DENSITY / (2.0 * half))
     slopes = samples - 2 * half
     slope = np.empty(slopes, np.float32)
@@ -112,7 +123,7 @@ def find_steepest(ray, first, radius, window, narrow, edges, in_view):
         before, at, after = slope[top - 1], slope[top], slope[top + 1]
         bend = before - TWICE * at + after
         shift = HALF * (before - after) / bend if bend != 0.0 else NOWHERE
-        # A maximum at the window's end is not one.
+        # The greatest slope at the window's end is no maximum.
         peaked = in_view[p] and at >= before and at >= after and abs(shift) <= 1.0 and at > 0.0
         edges[p, 0] = first + (top + half) / DENSITY + shift / DENSITY if peaked else np.nan
         edges[p, 1] = at if peaked else 0.0
@@ -142,48 +153,71 @@ def fit_circle(
     distance: Array,
     weight: Array,
     *,
-    radius_scatter: float,
-    scale_least: float,
+    radius_sd: float,
+    min_scale: float,
 ) -> Circle:
-    """Tukey-weighted circle through points at angle (p,) [rad], distance (p,) [px] from (x, y).
+    """Fit a circle through points with Tukey's weights.
 
-    radius_scatter [px]: standard deviation of the true radius about the given one, infinite where it is
-    unknown. scale_least [px]: residuals below it are never outliers. The centre's standard deviation
-    comes from the scores summed over stretches of the outline, because one dot of paint spoils several
-    points at once.
+    Parameters
+    ----------
+    x, y, radius : float
+        Rough circle [px].
+    angle, distance : (p,) array
+        Points about (x, y) [rad, px].
+    weight : (p,) array
+        Weights of the points.
+    radius_sd : float
+        Standard deviation of the true radius about the given one [px]; infinite where it is unknown.
+    min_scale : float
+        Residuals below it are never outliers [px].
+
+    Notes
+    -----
+    Minimises Σ w r² + prior · Δradius² by Gauss-Newton, r: distance from the circle, w: the given weights times Tukey's
+    (1 − (r / (4.685 s))²)², s: 1.4826 times the median of |r|. The centre's variance is the sandwich estimate
+    H⁻¹ (Σ g gᵀ) H⁻¹ with the scores g summed over arcs of the outline, because one dot of paint affects several points.
     """
-    # Start from the radius that the points themselves have, lest a common shift make outliers of them.
-    start = weighted_median(distance - radius, weight) if np.isinf(radius_scatter) else 0.0
+    # Start from the points' own radius: with a common shift they would all be outliers.
+    start = weighted_median(distance - radius, weight) if np.isinf(radius_sd) else 0.0
     residual, w = np.empty_like(distance), np.empty_like(distance)
     shift, scale, inverse, score = fit_points(
-        angle, distance, np.asarray(weight, dtype=np.float64), radius, start, radius_scatter, scale_least, residual, w
+        angle, distance, np.asarray(weight, dtype=np.float64), radius, start, radius_sd, min_scale, residual, w
     )
-    variance = centre_variance(angle, radius, w, score, inverse, scale, radius_scatter)
-    # Where too few points are left to fix a circle, nothing but rounding errors is.
+    variance = centre_variance(angle, radius, w, score, inverse, scale, radius_sd)
+    # With too few points for a circle the variance consists of rounding errors.
     sigma = float(np.sqrt(variance)) if variance >= 0.0 else np.inf
     return Circle(x + shift[0], y + shift[1], radius + shift[2], sigma, residual)
 
 
 @njit(cache=True, nogil=True)
-def fit_points(angle, distance, weight, radius, start, radius_scatter, scale_least, residual, w):
-    """Shift (3,) of centre and radius, scale, inverse normal matrix (3, 3) and the scores (s, 3) of the stretches.
+def fit_points(angle, distance, weight, radius, start, radius_sd, min_scale, residual, w):
+    """Fit a circle, see `fit_circle`; writes the last residuals and weights w (p,).
 
-    residual, w (p,): filled with the last residuals and weights.
+    Returns
+    -------
+    shift : (3,) array
+        Change of centre and radius [px].
+    scale : float
+        Scale of the residuals [px].
+    inverse : (3, 3) array
+        Inverse normal matrix.
+    score : (s, 3) array
+        Scores of the arcs.
     """
     count = len(angle)
     px, py = distance * np.cos(angle), distance * np.sin(angle)
     design = np.ones((count, 3))
     shift, step = np.zeros(3), np.zeros(3)
     shift[2] = start
-    scale, inverse = scale_least, np.eye(3)
+    scale, inverse = min_scale, np.eye(3)
     for _ in range(30):
         for p in range(count):
             ex, ey = px[p] - shift[0], py[p] - shift[1]
             length = np.hypot(ex, ey)
             residual[p] = length - radius - shift[2]
             design[p, 0], design[p, 1] = ex / length, ey / length
-        scale = max(weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
-        prior = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
+        scale = max(weighted_median(np.abs(residual), weight) / 0.6745, min_scale)
+        prior = (scale / radius_sd) ** 2 * POINTS_PER_ARC
         normal, right = np.zeros((3, 3)), np.zeros(3)
         for p in range(count):
             w[p] = weight[p] * max(1.0 - (residual[p] / (4.685 * scale)) ** 2, 0.0) ** 2
@@ -198,38 +232,38 @@ def fit_points(angle, distance, weight, radius, start, radius_scatter, scale_lea
         shift += step
         if np.abs(step).max() < 1e-4:
             break
-    score = np.zeros((int(angle.max() * radius / POINTS_OF_A_STRETCH) + 1, 3))
+    score = np.zeros((int(angle.max() * radius / POINTS_PER_ARC) + 1, 3))
     for p in range(count):
-        row = int(angle[p] * radius / POINTS_OF_A_STRETCH)
+        row = int(angle[p] * radius / POINTS_PER_ARC)
         for i in range(3):
             score[row, i] += design[p, i] * w[p] * residual[p]
     return shift, scale, inverse, score
 
 
 @njit(cache=True, nogil=True)
-def centre_variance(angle, radius, w, score, inverse, scale, radius_scatter):
-    """Variance of a component of the centre [px²], from the scores (s, 3) of those stretches that weigh anything."""
+def centre_variance(angle, radius, w, score, inverse, scale, radius_sd):
+    """Return the variance of a component of the centre [px²], from the scores (s, 3) of the arcs with a weight."""
     weight = np.zeros(len(score))
     for p in range(len(angle)):
-        weight[int(angle[p] * radius / POINTS_OF_A_STRETCH)] += w[p]
-    stretches, variance, squares = 0, 0.0, 0.0
+        weight[int(angle[p] * radius / POINTS_PER_ARC)] += w[p]
+    arcs, variance, squares = 0, 0.0, 0.0
     for k in range(len(score)):
         if weight[k] > 0.0:
-            stretches += 1
+            arcs += 1
             for i in range(2):
                 step = inverse[i, 0] * score[k, 0] + inverse[i, 1] * score[k, 1] + inverse[i, 2] * score[k, 2]
                 squares += step * step
-    variance = squares * stretches / max(stretches - 3, 1)
-    # What the radius' prior leaves open counts too.
-    prior = (scale / radius_scatter) ** 2 * POINTS_OF_A_STRETCH
+    variance = squares * arcs / max(arcs - 3, 1)
+    # The variance of the radius's prior is added.
+    prior = (scale / radius_sd) ** 2 * POINTS_PER_ARC
     for i in range(2):
-        variance += inverse[i, 2] * prior * inverse[2, i] * scale**2 * POINTS_OF_A_STRETCH
+        variance += inverse[i, 2] * prior * inverse[2, i] * scale**2 * POINTS_PER_ARC
     return 0.5 * variance
 
 
 @njit(cache=True, nogil=True)
 def weighted_median(value, weight):
-    """The value (p,) with half of the weight (p,) on either side."""
+    """Return the value (p,) with half of the weight (p,) on either side."""
     order = np.argsort(value)
     total = np.cumsum(weight[order])
     return value[order[min(np.searchsorted(total, 0.5 * total[-1]), len(value) - 1)]]

@@ -1,16 +1,16 @@
-"""Where an outline is, when the rim before it grows darker.
+"""Position of an outline whose rim is shaded.
 
 Along a ray outwards the light is a level A that changes by C per pixel, cut off at the edge r₀, above the
 dark B beyond it, and blurred by a Gaussian of width s. With t = (r₀ − r)/s,
 
     I(r) = B + A Φ(t) + C s (t Φ(t) + φ(t)).
 
-The steepest point of such a profile lies inside r₀ by about −2 s² C/A. A rod that leans, or light from one
-side, darkens one side of the rim more than the other: taking the steepest point for the edge then moves the
-centre, by a tenth of a pixel with common lenses. Fitting C as well does not.
+The steepest point of such a profile lies inside r₀ by about −2 s² C/A. A rod that leans, or light from one side,
+darkens one side of the rim more than the other. The steepest points then displace the centre, by a tenth of a pixel
+with common lenses. Fitting C as well avoids this.
 
-Paint makes C scatter from ray to ray. What shading makes of C/A varies slowly round the grain, as
-b₀ + b₁ cos + b₂ sin, and is what the rays of one grain agree on; it is the prior of the next round.
+Paint makes C vary randomly from ray to ray. Shading makes C/A vary slowly around the grain, as b₀ + b₁ cos + b₂ sin.
+This common part is fitted to the rays of a grain and is the prior of the next round.
 """
 
 from __future__ import annotations
@@ -20,21 +20,20 @@ import math
 import numpy as np
 from numba import njit
 
-from solver.bodies.grains import Array
-
 from ...experiment.photographs import Image
+from ...solver.bodies.grains import Array
 
-# What is fitted of a ray, and where its dark is read [px from the edge], and the same in widths of the blur where that
-# is more: a soft edge is still falling where a sharp one has ended, and a dark that is read there moves the edge.
+# Fitted part of a ray and range of its dark [px from the edge], and the same in widths of the blur where that is more:
+# a soft edge still falls where a sharp one has ended, and a dark that is read there displaces the edge.
 INSIDE, INSIDE_WIDTHS = 1.0, 1.5
 OUTSIDE, OUTSIDE_WIDTHS = 2.5, 3.75
 DARK, DARK_WIDTHS = 2.0, 3.0
 NEAREST_DARK = 1.0
 
-# Scatter of C/A that paint makes [1/px], and misfit of the model [grey] against which it is weighed.
+# Standard deviation of C/A due to paint [1/px], and of the model's error [grey], which set the prior's weight.
 PAINT_SLOPE = 0.25
 MISFIT = 3.0
-FAR = 6.0  # widths of the blur beyond which an edge is over: 1e-9 of it is left
+FAR = 6.0  # widths of the blur beyond which an edge is neglected: 1e-9 of it remains
 
 
 def locate_edges(
@@ -42,9 +41,31 @@ def locate_edges(
 ) -> tuple[Array, Array, Array, Array]:
     """Fit the profile to every ray.
 
-    rays (p, s): grey values at first + step · k [px]; start (p,): rough edges [px], NaN where there is none; angle
-    (p,) [rad]; width: of the blur [px]; extent: the width [px] for which the fitted part of a ray is chosen. Returns
-    edge [px] (NaN where none fits), level A [grey], misfit [grey] and dark B [grey], all (p,).
+    Parameters
+    ----------
+    rays : (p, s) array
+        Grey values at the distances first + step · k [px].
+    first, step : float
+        Those distances [px].
+    start : (p,) array
+        Rough edges [px]; NaN without an edge.
+    angle : (p,) array
+        Angles of the rays [rad].
+    width : float
+        Width of the blur [px].
+    extent : float
+        Width of the blur for which the fitted part of a ray is chosen [px].
+    rounds : int
+        Rounds of the fit, each but the first with the prior of the round before.
+
+    Returns
+    -------
+    edge, level, misfit, dark : (p,) array
+        Edge [px] (NaN without a fit), level A, misfit and dark B [grey].
+
+    Notes
+    -----
+    I(r) = B + A Φ(t) + C s (t Φ(t) + φ(t)), t = (r₀ − r)/s; fitted are r₀, A and C.
     """
     count = len(start)
     dark, end = np.empty(count), np.empty(count)
@@ -54,7 +75,7 @@ def locate_edges(
     harmonics = np.stack([np.ones(count), np.cos(angle), np.sin(angle)], axis=1)
     expected = np.zeros(count)
     for k in range(rounds):
-        # The first round knows nothing of the shading, only that paint scatters about some slope.
+        # The first round has no estimate of the shading, so its prior is wider.
         scatter = 3.0 * PAINT_SLOPE if k == 0 else PAINT_SLOPE
         _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expected, scatter, fitted)
         good = np.isfinite(fitted[:, 0])
@@ -67,7 +88,7 @@ def locate_edges(
 
 @njit(cache=True, nogil=True)
 def _find_darks(rays, first, step, start, beyond, dark, where):
-    """Write the lowest grey level (p,) of every ray up to `beyond` [px] outside its edge, and where it is met [px].
+    """Write the lowest grey level (p,) of every ray up to `beyond` [px] outside its edge, and its distance [px].
 
     Farther out is the light of the next grain.
     """
@@ -82,7 +103,7 @@ def _find_darks(rays, first, step, start, beyond, dark, where):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _robust_regression(design, value, strength):
-    """Coefficients (3,) of value (p,) over design (p, 3), by Tukey's weights."""
+    """Coefficients (3,) of value (p,) over design (p, 3), with Tukey's weights."""
     count = len(value)
     weight, size, residual = np.empty(count), np.empty(count), np.empty(count)
     total = 0.0
@@ -98,7 +119,7 @@ def _robust_regression(design, value, strength):
             residual[p] = value[p] - modelled
             size[p] = abs(residual[p])
         scale = max(1.4826 * np.median(size), 1e-3)
-        # A prior as wide as any shading is likely to be keeps a half-seen outline from inventing one.
+        # A prior as wide as usual shading prevents a false one from half an outline.
         prior = (scale / 0.3) ** 2
         n00, n01, n02, n11, n12, n22 = prior, 0.0, 0.0, prior, 0.0, prior
         v0, v1, v2 = 0.0, 0.0, 0.0
@@ -165,7 +186,7 @@ def _fit_rays(rays, first, step, start, dark, end, width, inside, outside, expec
                 v1 += cumulative * e
                 v2 += ramp * e
                 square += e * e
-            # C − b A = 0 within the scatter of the paint; b is what the whole grain says.
+            # Prior: C − b A = 0 within the paint's standard deviation, b: fitted to the whole grain.
             pull = (MISFIT / (slope_scatter * max(level, 1.0))) ** 2 / step
             b = expected[p]
             e = -(slope - b * level)

@@ -1,4 +1,4 @@
-"""Where circles of a given radius might be: bright inside, dark outside, whatever is painted on them."""
+"""Candidate circles of given radii: bright inside, dark outside, with any paint on them."""
 
 from __future__ import annotations
 
@@ -8,57 +8,65 @@ import cv2
 import numpy as np
 from numba import njit
 
-from solver.bodies.grains import Array
-
 from ...experiment.photographs import Image
+from ...solver.bodies.grains import Array
 from ..correlation.splines import shrink
 
-# Circles are looked for on shrunk photographs, where the smallest has at least this radius [px], and each about that of
-# COARSE_RADIUS.
-LEAST_RADIUS = 10.0
+# Circles are searched for on shrunk photographs, where the smallest has at least the first radius [px], and each about
+# the second.
+MIN_COARSE_RADIUS = 10.0
 COARSE_RADIUS = 20.0
 
-# Light differs over distances that do not grow with the grains: above this radius [px] they no longer set them.
+# Greatest radius [px] that sets the size of the tiles of local contrast: uneven light does not scale with the grains.
 LARGEST_LOCAL = 80.0
 
 
 @dataclass(frozen=True, slots=True)
 class Circles:
-    """Circles that might be grains, the most convincing first."""
+    """Candidate circles, in the order of their significance."""
 
     x: Array  # (c,) [px]
     y: Array  # (c,) [px]
     radius: Array  # (c,) [px]
-    score: Array  # (c,) mean inward slope along the circle, as a share of a full edge's
+    score: Array  # (c,) mean inward slope along the circle, as a fraction of a full edge's
 
 
-def find_circles(image: Image, radii: Array, *, score_least: float) -> Circles:
-    """Local maxima over position of the mean inward slope along circles of every radius (k,) [px].
+def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
+    """Find the local maxima, over position, of the mean inward slope along circles.
 
-    Slopes are measured against the local contrast and cut off at that of a full edge, so neither uneven
-    light nor a single strong edge decides; paint inside a grain slopes every way and cancels.
+    Slopes are relative to the local contrast and limited to that of a full edge, so that neither uneven light nor a
+    single strong edge dominates. The slopes of paint inside a grain have all directions and cancel.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        The photograph [grey].
+    radii : (k,) array
+        Radii that are tried [px].
+    min_score : float
+        Least mean slope, as a fraction of a full edge's.
     """
-    least = max(int(radii.min() / LEAST_RADIUS), 1)
+    least = max(int(radii.min() / MIN_COARSE_RADIUS), 1)
     factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
     found = []
     for factor in np.unique(factors):
         slope_x, slope_y = _slopes(shrink(image, int(factor)), int(tile_size(float(radii.max())) / factor))
         for radius in radii[factors == factor]:
             score = _ring_response(slope_x, slope_y, radius / factor)
-            peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > score_least)
+            peak = (score == cv2.dilate(score, np.ones((5, 5), np.uint8))) & (score > min_score)
             row, column = np.nonzero(peak)
             place = [axis * factor + 0.5 * (factor - 1) for axis in (column, row)]
             found.append(np.stack([*place, np.full(len(row), radius), score[peak]], axis=1))
     table = np.concatenate(found)
-    # A mean over a longer circle is the more significant at the same value.
+    # A mean over a longer circle is more significant at the same value.
     table = table[np.argsort(-table[:, 3] * np.sqrt(table[:, 2]), kind="stable")]
     return Circles(table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
 
 def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.ndarray:
-    """Rows that remain (ascending) when each, in order, strikes out the later ones that overlap it.
+    """Return the rows (ascending) that remain when each circle, in order, removes the later ones that overlap it.
 
-    allowed: overlap as a share of the smaller radius that is let pass.
+    allowed: greatest overlap, as a fraction of the smaller radius.
     """
     if len(x) == 0:
         return np.empty(0, np.intp)
@@ -74,8 +82,18 @@ def without_overlap(x: Array, y: Array, radius: Array, *, allowed: float) -> np.
 def strike_out(x, y, radius, allowed, cell, head, following, alive):
     """Clear alive (n,) where a circle overlaps an earlier one that is alive.
 
-    cell [px]: side of the squares of a grid, no less than the greatest radius; head (rows, columns), −1, and following
-    (n,): the circles of each square that are alive, one after the other.
+    Parameters
+    ----------
+    x, y, radius : (n,) array
+        Circles [px].
+    allowed : float
+        Greatest overlap, as a fraction of the smaller radius.
+    cell : float
+        Side of the squares of a grid [px], no less than the greatest radius.
+    head, following : (rows, columns), (n,) array
+        Workspace: linked lists of the alive circles of each square, −1 at their ends.
+    alive : (n,) array
+        True at first.
     """
     rows, columns = head.shape
     left, top = x.min(), y.min()
@@ -95,12 +113,12 @@ def strike_out(x, y, radius, allowed, cell, head, following, alive):
 
 
 def tile_size(radius: float) -> int:
-    """Side of what counts as local [px] where the largest grain has `radius` [px]."""
+    """Return the side of the tiles of local contrast [px], for a largest grain of `radius` [px]."""
     return int(4 * min(radius, LARGEST_LOCAL))
 
 
 def local_contrast(image: Image, tile: int) -> tuple[Image, Image]:
-    """Dark level and contrast about every pixel, two (H, W) [grey], from tiles of some grains' size."""
+    """Return the dark level and the contrast around every pixel, two (H, W) [grey], from tiles of several grains."""
     height, width = image.shape
     rows, columns = max(round(height / tile), 1), max(round(width / tile), 1)
     dark = np.empty((rows, columns), np.float32)
@@ -112,7 +130,7 @@ def local_contrast(image: Image, tile: int) -> tuple[Image, Image]:
             ]
             dark[j, i], bright[j, i] = np.percentile(part, [3.0, 95.0])
     contrast = bright - dark
-    # Where there is only backing, its faint texture must not be blown up into edges.
+    # In tiles of background alone, the faint texture must not be amplified into edges.
     contrast = np.maximum(contrast, max(0.5 * float(np.percentile(contrast, 90.0)), 1.0)).astype(np.float32)
     size = (width, height)
     return (

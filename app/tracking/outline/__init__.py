@@ -1,1 +1,1 @@
-"""Discs followed by their rims, whatever is or changes within them: x and y, no rotation. Uses registration's poses."""
+"""Tracking of discs by their rims: x and y without rotation."""

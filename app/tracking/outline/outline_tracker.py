@@ -1,8 +1,8 @@
-"""Follow discs by their rims: plain ones, and those whose inside changes with the forces that are looked for.
+"""Tracking of discs by their rims: plain discs, and photoelastic ones whose inside changes with their forces.
 
-The rim tells x and y, and nothing of a rotation, which stays unknown. A disc is looked for about where its own motion
-leads, then about where its neighbours' leads, then in a wide window among the rings that no other disc has. What is
-found is as exact as the circle through its edges; a photograph is not compared with any other, so errors do not add up.
+The rim gives x and y; the rotation stays unknown. A disc is searched for around its own extrapolated motion, then
+around its neighbours' motion, then in a wide window among the rings of no other disc. The accuracy is that of the
+circle through its edges. A photograph is not compared with any other, so errors do not accumulate.
 """
 
 from __future__ import annotations
@@ -14,37 +14,36 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
 from ...experiment.photographs import Image
+from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from ..correlation.correlator import Rows
 from ..correlation.noise import image_noise
 from ..correlation.splines import spline_coefficients
 from ..detection.detect import Detection
-from ..registration.manual_poses import HAND_SIGMA, ManualPoses
+from ..registration.manual_poses import MANUAL_SIGMA, ManualPoses
 from ..registration.neighbours import local_motion, overlaps
 from ..registration.poses import FramePoses
 from ..settings import TrackingSettings
 from .rim_kernels import COLUMNS, QUALITY, SIGMA, VIEW, X, Y, find_rings, measure_rims
 
-# Where a ring is looked for about its prediction, as a share of the radius, and at least [px].
-NEAR_SHARE, NEAR_LEAST = 0.35, 3.0
-# Edges are looked for within the first width of a ring that was found, then within the second [px].
+# Half width of the search for a ring around its prediction, as a fraction of the radius, and at least [px].
+NEAR_FRACTION, NEAR_MIN = 0.35, 3.0
+# Half widths of the search for edges [px]: the first around a ring, the second around the circle that was then fitted.
 WINDOWS = (2.5, 1.3)
-# By how much the radius may seem to differ from that of the first photograph [px]: edges move with the light.
-RADIUS_SCATTER = 0.3
-# Share of the rim in view that must be seen on the circle, itself and as a part of that in the first photograph.
-QUALITY_LEAST, QUALITY_SHARE = 0.3, 0.4
-# Less of a rim in view does not make a disc.
-VIEW_LEAST = 0.55
-SIGMA_MOST = 0.5  # [px] beyond which a centre is not to be relied on
-PLACES = 6  # rings that are looked at in a wide search
-ROUNDS = 3  # of looking where neighbours lead
+# Standard deviation of the apparent radius about that of the first photograph [px]: edges move with the light.
+RADIUS_SD = 0.3
+# Least fraction of the rim in view with an edge on the circle, and its least ratio to that of the first photograph.
+MIN_QUALITY, MIN_QUALITY_RATIO = 0.3, 0.4
+# Least fraction of a rim that must be in view.
+MIN_VIEW = 0.55
+MAX_SIGMA = 0.5  # [px] standard deviation of a centre above which it is suspect
+PLACES = 6  # rings that are measured in a wide search
+ROUNDS = 3  # of searches around the neighbours' predictions
 
 
 class OutlineTracker:
-    """Places of the discs of one photograph in others. It holds no state of the sequence."""
+    """Positions of the discs of one photograph in others, without state of the sequence."""
 
     def __init__(
         self, reference_image: Image, grains: Detection, settings: TrackingSettings | None = None, workers: int = 2
@@ -53,150 +52,153 @@ class OutlineTracker:
         self.reference = np.zeros(grains.count, dtype=np.int32)
         self._shape = reference_image.shape
         rough = np.asarray(grains.radius, np.float64)
-        look = _Look(reference_image)
+        rim_image = _RimImage(reference_image)
         centre = np.stack([grains.x, grains.y], axis=1)
-        # What an edge is differs from that of detection by the same for all: radii are measured once as they will be.
-        seen = look.measure(centre, rough, np.full(len(rough), np.inf))
-        good = np.isfinite(seen[:, SIGMA]) & (np.abs(seen[:, 2] - rough) < 0.1 * rough)
-        self.radius = np.where(good, seen[:, 2], rough + (np.median((seen[:, 2] - rough)[good]) if good.any() else 0.0))
-        found = look.measure(centre, self.radius, np.full(len(rough), RADIUS_SCATTER))
+        # The definition of an edge differs from that of detection, by the same for all discs: radii are measured anew.
+        measured = rim_image.measure(centre, rough, np.full(len(rough), np.inf))
+        excess = measured[:, 2] - rough
+        good = np.isfinite(measured[:, SIGMA]) & (np.abs(excess) < 0.1 * rough)
+        self.radius = np.where(good, measured[:, 2], rough + (np.median(excess[good]) if good.any() else 0.0))
+        found = rim_image.measure(centre, self.radius, np.full(len(rough), RADIUS_SD))
         self._quality = np.where(np.isfinite(found[:, SIGMA]), found[:, QUALITY], 0.0)
-        good = np.isfinite(found[:, SIGMA]) & (found[:, VIEW] >= VIEW_LEAST)
-        place = np.where(good[:, None], found[:, :2], centre)
-        sigma = np.where(good, found[:, SIGMA], np.where(np.isfinite(grains.sigma), grains.sigma, HAND_SIGMA))
+        good = np.isfinite(found[:, SIGMA]) & (found[:, VIEW] >= MIN_VIEW)
+        position = np.where(good[:, None], found[:, :2], centre)
+        sigma = np.where(good, found[:, SIGMA], np.where(np.isfinite(grains.sigma), grains.sigma, MANUAL_SIGMA))
         status = np.where(good, TrackStatus.OK, TrackStatus.SUSPECT).astype(np.uint8)
-        self._first = self._poses(place, sigma, status)
+        self._first = self._poses(position, sigma, status)
 
     @property
     def grain_count(self) -> int:
         return len(self.radius)
 
     def first(self) -> FramePoses:
-        """The places in the first photograph."""
+        """Return the positions in the first photograph."""
         return self._first
 
     def find_damaged(self, history: Sequence[FramePoses], first_frame: int, photograph: Callable[[int], Image]) -> Rows:
-        """None: a rim is not compared with that of another photograph."""
+        """Return no grain: a rim is not compared with that of another photograph."""
         return np.empty(0, np.intp)
 
     def renew(self, rows: Rows, frame: int, photograph: Image, poses: FramePoses) -> None:
-        """Nothing is to be renewed."""
+        """Do nothing: there is no reference to renew."""
 
-    def follow(self, image: Image, history: Sequence[FramePoses], told: ManualPoses | None = None) -> FramePoses:
-        """Find the discs in the next photograph. history: earlier frames, most recent last, at least one."""
+    def follow(self, image: Image, history: Sequence[FramePoses], given: ManualPoses | None = None) -> FramePoses:
+        """Find the discs in the next photograph; parameters as of `Tracker.follow`."""
         if image.shape != self._shape:
             raise ValueError(f"the photograph is {image.shape}, the first one {self._shape}")
-        look = _Look(image)
+        rim_image = _RimImage(image)
         last = self._last_known(history)
         n = self.grain_count
-        place, sigma = np.full((n, 2), np.nan), np.full(n, np.nan)
+        position, sigma = np.full((n, 2), np.nan), np.full(n, np.nan)
         quality, status = np.zeros(n), np.full(n, TrackStatus.LOST, np.uint8)
-        if told is not None:
-            seen = np.isfinite(told.pose[:, 0])
-            rows = told.row[seen]
-            place[rows], sigma[rows], status[rows] = told.pose[seen, :2], HAND_SIGMA, TrackStatus.GIVEN
+        if given is not None:
+            visible = np.isfinite(given.pose[:, 0])
+            rows = given.row[visible]
+            position[rows], sigma[rows], status[rows] = given.pose[visible, :2], MANUAL_SIGMA, TrackStatus.GIVEN
         lost = np.zeros(n, np.bool_)
-        if told is not None:
-            lost[told.lost] = True
+        if given is not None:
+            lost[given.lost] = True
 
-        def take(rows: Rows, guess: Array, window: Array, kind: TrackStatus) -> None:
+        def accept(rows: Rows, guess: Array, window: Array, kind: TrackStatus) -> None:
             if len(rows) == 0:
                 return
-            found = look.find(guess, self.radius[rows], window)
+            found = rim_image.find(guess, self.radius[rows], window)
             good = self._convincing(rows, found)
             chosen = rows[good]
-            place[chosen], sigma[chosen], quality[chosen] = found[good, :2], found[good, SIGMA], found[good, QUALITY]
+            position[chosen], sigma[chosen], quality[chosen] = found[good, :2], found[good, SIGMA], found[good, QUALITY]
             status[chosen] = kind
 
-        near = np.maximum(NEAR_LEAST, NEAR_SHARE * self.radius)
+        near = np.maximum(NEAR_MIN, NEAR_FRACTION * self.radius)
         step = np.zeros((n, 2))
         if len(history) > 1:
             step = np.nan_to_num(history[-1].pose[:, :2] - history[-2].pose[:, :2])
         rows = np.flatnonzero((status == TrackStatus.LOST) & ~lost)
-        take(rows, last[rows] + step[rows], near[rows], TrackStatus.OK)
-        self._part_rivals(place, quality, status)
+        accept(rows, last[rows] + step[rows], near[rows], TrackStatus.OK)
+        self._resolve_duplicates(position, quality, status)
         for _ in range(ROUNDS):
             rows = np.flatnonzero((status == TrackStatus.LOST) & ~lost)
             known = np.flatnonzero(status != TrackStatus.LOST)
             if len(rows) == 0 or len(known) == 0:
                 break
-            moved, _ = local_motion(last[known], place[known] - last[known], last[rows], itself=False)
-            take(rows, last[rows] + moved, near[rows], TrackStatus.OK)
-            self._part_rivals(place, quality, status)
+            moved, _ = local_motion(last[known], position[known] - last[known], last[rows], exclude_self=False)
+            accept(rows, last[rows] + moved, near[rows], TrackStatus.OK)
+            self._resolve_duplicates(position, quality, status)
         for row in np.flatnonzero((status == TrackStatus.LOST) & ~lost):
-            self._search(look, int(row), last[row], place, sigma, quality, status)
-        self._doubt(last, place, sigma, quality, status)
+            self._search(rim_image, int(row), last[row], position, sigma, quality, status)
+        self._flag_inconsistent(last, position, sigma, quality, status)
         leaving = self._leaves(last + step) | (history[-1].status == TrackStatus.OUT_OF_FRAME)
         status[(status == TrackStatus.LOST) & leaving & ~lost] = TrackStatus.OUT_OF_FRAME
-        return self._poses(place, sigma, status)
+        return self._poses(position, sigma, status)
 
     def _convincing(self, rows: Rows, found: Array) -> NDArray[np.bool_]:
-        least = np.maximum(QUALITY_LEAST, QUALITY_SHARE * self._quality[rows])
-        good = np.isfinite(found[:, SIGMA]) & (found[:, QUALITY] >= least) & (found[:, VIEW] >= VIEW_LEAST)
-        return good & (found[:, SIGMA] < np.maximum(SIGMA_MOST, 0.05 * self.radius[rows]))
+        min_quality = np.maximum(MIN_QUALITY, MIN_QUALITY_RATIO * self._quality[rows])
+        good = np.isfinite(found[:, SIGMA]) & (found[:, QUALITY] >= min_quality) & (found[:, VIEW] >= MIN_VIEW)
+        return good & (found[:, SIGMA] < np.maximum(MAX_SIGMA, 0.05 * self.radius[rows]))
 
-    def _part_rivals(self, place: Array, quality: Array, status: NDArray[np.uint8]) -> None:
-        """Of two that took one and the same ring, the one that it fits worse is still to be found."""
+    def _resolve_duplicates(self, position: Array, quality: Array, status: NDArray[np.uint8]) -> None:
+        """Of two discs on the same ring, reset the one of lower quality to lost."""
         rows = np.flatnonzero(status != TrackStatus.LOST)
-        for i, j in rows[overlaps(place[rows], self.radius[rows], 0.5)]:
+        for i, j in rows[overlaps(position[rows], self.radius[rows], 0.5)]:
             worse = i if (quality[i] < quality[j] or status[j] == TrackStatus.GIVEN) else j
             if status[worse] != TrackStatus.GIVEN:
-                place[worse], status[worse] = np.nan, TrackStatus.LOST
+                position[worse], status[worse] = np.nan, TrackStatus.LOST
 
     def _search(
-        self, look: _Look, row: int, middle: Array, place: Array, sigma: Array, quality: Array,
+        self, rim_image: _RimImage, row: int, middle: Array, position: Array, sigma: Array, quality: Array,
         status: NDArray[np.uint8],
     ) -> None:  # fmt: skip
-        """Look in the widest window for a ring that no other disc has taken."""
+        """Search in the widest window for a ring of no other disc."""
         radius = self.radius[row]
         taken = np.flatnonzero(status != TrackStatus.LOST)
-        for x, y, value in look.rings(middle, radius, self.settings.search_window, PLACES):
-            apart = np.hypot(place[taken, 0] - x, place[taken, 1] - y)
+        for x, y, value in rim_image.find_strongest(middle, radius, self.settings.search_window, PLACES):
+            apart = np.hypot(position[taken, 0] - x, position[taken, 1] - y)
             if value < 0.0 or (apart < 0.7 * (radius + self.radius[taken])).any():
                 continue
-            found = look.measure(np.array([[x, y]]), np.array([radius]), np.array([RADIUS_SCATTER]))
+            found = rim_image.measure(np.array([[x, y]]), np.array([radius]), np.array([RADIUS_SD]))
             if self._convincing(np.array([row]), found)[0]:
-                place[row], sigma[row], quality[row] = found[0, :2], found[0, SIGMA], found[0, QUALITY]
+                position[row], sigma[row], quality[row] = found[0, :2], found[0, SIGMA], found[0, QUALITY]
                 status[row] = TrackStatus.RESCUED
                 return
 
-    def _doubt(self, last: Array, place: Array, sigma: Array, quality: Array, status: NDArray[np.uint8]) -> None:
-        """Mark what contradicts its neighbours, overlaps them, or is seen badly."""
+    def _flag_inconsistent(
+        self, last: Array, position: Array, sigma: Array, quality: Array, status: NDArray[np.uint8]
+    ) -> None:
+        """Mark discs as suspect that contradict their neighbours, overlap them, or have a large standard deviation."""
         rows = np.flatnonzero(status != TrackStatus.LOST)
         if len(rows) == 0:
             return
-        moved = place[rows] - last[rows]
-        predicted, scatter = local_motion(last[rows], moved, last[rows], itself=True)
-        odd = np.linalg.norm(moved - predicted, axis=1) > 6.0 * scatter + 0.5 * self.radius[rows]
-        pairs = overlaps(place[rows], self.radius[rows], self.settings.overlap_allowed)
-        odd[np.where(quality[rows[pairs[:, 0]]] < quality[rows[pairs[:, 1]]], pairs[:, 0], pairs[:, 1])] = True
-        doubtful = rows[odd | (sigma[rows] > SIGMA_MOST)]
-        status[doubtful[status[doubtful] != TrackStatus.GIVEN]] = TrackStatus.SUSPECT
+        moved = position[rows] - last[rows]
+        predicted, radius_sd = local_motion(last[rows], moved, last[rows], exclude_self=True)
+        inconsistent = np.linalg.norm(moved - predicted, axis=1) > 6.0 * radius_sd + 0.5 * self.radius[rows]
+        pairs = overlaps(position[rows], self.radius[rows], self.settings.overlap_allowed)
+        inconsistent[np.where(quality[rows[pairs[:, 0]]] < quality[rows[pairs[:, 1]]], pairs[:, 0], pairs[:, 1])] = True
+        suspect = rows[inconsistent | (sigma[rows] > MAX_SIGMA)]
+        status[suspect[status[suspect] != TrackStatus.GIVEN]] = TrackStatus.SUSPECT
 
     def _last_known(self, history: Sequence[FramePoses]) -> Array:
-        """The most recent place of every disc (n, 2)."""
+        """The most recent position of every disc (n, 2)."""
         last = self._first.pose[:, :2].copy()
         for frame in history:
-            seen = frame.has_pose
-            last[seen] = frame.pose[seen, :2]
+            visible = frame.has_pose
+            last[visible] = frame.pose[visible, :2]
         return last
 
-    def _leaves(self, place: Array) -> NDArray[np.bool_]:
+    def _leaves(self, position: Array) -> NDArray[np.bool_]:
         height, width = self._shape
-        x, y = place[:, 0], place[:, 1]
+        x, y = position[:, 0], position[:, 1]
         return (x < self.radius) | (y < self.radius) | (x > width - 1 - self.radius) | (y > height - 1 - self.radius)
 
-    def _poses(self, place: Array, sigma: Array, status: NDArray[np.uint8]) -> FramePoses:
+    def _poses(self, position: Array, sigma: Array, status: NDArray[np.uint8]) -> FramePoses:
         missing = (status == TrackStatus.LOST) | (status == TrackStatus.OUT_OF_FRAME)
         unknown = np.full(len(status), np.nan)
         return FramePoses(
-            np.where(missing, np.nan, place[:, 0]), np.where(missing, np.nan, place[:, 1]), unknown,
+            np.where(missing, np.nan, position[:, 0]), np.where(missing, np.nan, position[:, 1]), unknown,
             np.where(missing, np.nan, sigma), unknown, unknown, status, self.reference,
         )  # fmt: skip
 
 
-class _Look:
-    """One photograph, as rims are looked for in it."""
+class _RimImage:
+    """One photograph with the gradients and coefficients that rims are measured with."""
 
     def __init__(self, image: Image) -> None:
         image = np.ascontiguousarray(image, np.float32)
@@ -207,30 +209,30 @@ class _Look:
         self._slope_x = np.asarray(cv2.Sobel(smooth, dx=1, dy=0, **slope), np.float32)
         self._slope_y = np.asarray(cv2.Sobel(smooth, dx=0, dy=1, **slope), np.float32)
 
-    def measure(self, centre: Array, radius: Array, scatter: Array) -> Array:
-        """Circles (n, 6) through the edges about centre (n, 2) [px]; see `measure_rims`."""
+    def measure(self, centre: Array, radius: Array, radius_sd: Array) -> Array:
+        """Measure the circles (n, 6) through the edges around centre (n, 2) [px]; see `measure_rims`."""
         found = np.empty((len(radius), COLUMNS))
         x, y = np.array(centre[:, 0], np.float64), np.array(centre[:, 1], np.float64)
         for width in WINDOWS:
             window = np.minimum(width, 0.4 * radius)
-            measure_rims(self._coefficients, x, y, radius, window, float(scatter[0]), self._noise, found)
+            measure_rims(self._coefficients, x, y, radius, window, float(radius_sd[0]), self._noise, found)
             good = np.isfinite(found[:, SIGMA])
             x, y = np.where(good, found[:, X], x), np.where(good, found[:, Y], y)
         return found
 
     def find(self, guess: Array, radius: Array, window: Array) -> Array:
-        """The best ring's circle (m, 6) about each guess (m, 2) [px]."""
+        """Measure the circle (m, 6) of the best ring around each guess (m, 2) [px]."""
         places = np.empty((len(radius), 1, 3))
         x, y = np.ascontiguousarray(guess[:, 0]), np.ascontiguousarray(guess[:, 1])
         find_rings(self._slope_x, self._slope_y, x, y, radius, window, 1.0, places)
         centre = np.where(places[:, 0, 2:] > 0.0, places[:, 0, :2], guess)
-        scatter = np.full(len(radius), RADIUS_SCATTER)
-        found, still = self.measure(centre, radius, scatter), self.measure(guess, radius, scatter)
-        # Fringes may outshine the rim: then it is where it was expected.
-        return np.where((still[:, QUALITY] > found[:, QUALITY])[:, None], still, found)
+        radius_sd = np.full(len(radius), RADIUS_SD)
+        found, at_guess = self.measure(centre, radius, radius_sd), self.measure(guess, radius, radius_sd)
+        # Fringes may be stronger than the rim; the circle at the guess is then the better one.
+        return np.where((at_guess[:, QUALITY] > found[:, QUALITY])[:, None], at_guess, found)
 
-    def rings(self, middle: Array, radius: float, window: float, count: int) -> Array:
-        """The best rings (c, 3) in a wide window: x, y [px], their strength."""
+    def find_strongest(self, middle: Array, radius: float, window: float, count: int) -> Array:
+        """Find the best rings (c, 3) in a wide window: x, y [px], mean radial slope."""
         places = np.empty((1, count, 3))
         x, y = middle[:1].astype(np.float64), middle[1:2].astype(np.float64)
         step = max(1.0, 0.08 * radius)

@@ -1,1 +1,1 @@
-"""One photograph against the references: where every grain is expected, fitted, searched for, doubted."""
+"""Registration of one photograph against the references: prediction, fits, searches and consistency checks."""

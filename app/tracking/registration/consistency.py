@@ -1,44 +1,59 @@
-"""What was found is doubted where it fits badly, is not unique, or contradicts what was found beside it."""
+"""Checks of found poses: the fit's residual, the uniqueness of the place, and agreement with the neighbours."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from .neighbours import local_motion, overlaps
 from .registration import Registration
 
 
 def refit_poor(registration: Registration) -> None:
-    """Refit robustly what fits worse than noise explains, and doubt what is no better then."""
-    findings = registration.findings
-    registration.judge_residuals()
-    poor = np.flatnonzero(findings.poor & (findings.status != TrackStatus.ROBUST))
-    registration.refit_hidden(poor, findings.pose[poor])
-    findings.doubt(np.flatnonzero(findings.poor & (findings.status != TrackStatus.ROBUST)))
+    """Refit poor fits robustly, and mark the grains as suspect that stay poor."""
+    results = registration.results
+    registration.flag_poor()
+    poor = np.flatnonzero(results.poor & (results.status != TrackStatus.ROBUST))
+    registration.refit_occluded(poor, results.pose[poor])
+    results.mark_suspect(np.flatnonzero(results.poor & (results.status != TrackStatus.ROBUST)))
 
 
-def doubt_inconsistent(registration: Registration, radius: Array) -> None:
-    """Mark what is not unique, and what contradicts its neighbours or overlaps them unless its ZNCC is high.
+def flag_inconsistent(registration: Registration, radius: Array) -> None:
+    """Mark ambiguous grains as suspect, and those that contradict or overlap their neighbours unless ZNCC is high.
 
-    radius (n,) [px] of the grains.
+    Parameters
+    ----------
+    registration : Registration
+        The photograph; the status of its results is changed.
+    radius : (n,) array
+        Radii of the grains [px].
+
+    Notes
+    -----
+    A grain is marked
+
+    - where its displacement differs from its neighbours' local affine motion by more than 6 m + 0.25 R, m: the median
+      deviation of the neighbours, R: its radius, unless its ZNCC exceeds both 0.8 and every accidental one;
+    - where a second place correlates nearly as well: ZNCC₂ > ZNCC − margin;
+    - where it overlaps another one and its ZNCC is the lower of the two. A pose given by hand has the lowest.
     """
-    findings, last, settings = registration.findings, registration.last, registration.settings
-    rows = np.flatnonzero(findings.accepted)
+    results, last, settings = registration.results, registration.last, registration.settings
+    rows = np.flatnonzero(results.accepted)
     if len(rows) == 0:
         return
-    moved = findings.pose[rows, :2] - last[rows, :2]
-    predicted, scatter = local_motion(last[rows, :2], moved, last[rows, :2], itself=True)
-    # Grains do move against their neighbours, by a share of a radius between photographs.
+    known = rows[np.isfinite(last[rows, 0])]  # a grain without a reference may have its first pose here, given by hand
+    moved = results.pose[known, :2] - last[known, :2]
+    predicted, median_deviation = local_motion(last[known, :2], moved, last[known, :2], exclude_self=True)
+    # Grains do move against their neighbours, by a fraction of a radius between photographs.
     deviation = np.linalg.norm(moved - predicted, axis=1)
-    odd = deviation > 6.0 * scatter + 0.25 * radius[rows]
-    certain = findings.zncc[rows] > np.maximum(findings.accepted_zncc[rows], 0.8)
-    findings.doubt(rows[odd & ~certain])
-    # A grain that another place resembles nearly as well may be there.
-    findings.doubt(rows[findings.second_zncc[rows] > findings.zncc[rows] - settings.margin])
-    pairs = rows[overlaps(findings.pose[rows, :2], radius[rows], settings.overlap_allowed)]
-    trust = np.where(findings.status == TrackStatus.GIVEN, np.inf, findings.zncc)
+    inconsistent = deviation > 6.0 * median_deviation + 0.25 * radius[known]
+    certain = results.zncc[known] > np.maximum(results.accepted_zncc[known], 0.8)
+    results.mark_suspect(known[inconsistent & ~certain])
+    # Where a second place is nearly as similar, the grain may be there.
+    results.mark_suspect(rows[results.second_zncc[rows] > results.zncc[rows] - settings.margin])
+    pairs = rows[overlaps(results.pose[rows, :2], radius[rows], settings.overlap_allowed)]
+    # A pose that nothing but a hand supports makes no other grain suspect.
+    quality = np.where(results.status == TrackStatus.GIVEN, -1.0, results.zncc)
     for i, j in pairs:
-        findings.doubt(np.array([i if trust[i] < trust[j] else j]))
+        results.mark_suspect(np.array([i if quality[i] < quality[j] else j]))

@@ -1,4 +1,4 @@
-"""The poses of the grains in one photograph, as they are handed out."""
+"""Poses of the grains in one photograph: the result of its registration."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from ..correlation.patches import Patches
 from .registration import Registration
 
-# What a patch needs about it to be correlated [px]: splines reach that far.
-SPLINE_REACH = 3.0
+# Margin around a patch that correlation needs [px]: the support of the splines.
+SPLINE_SUPPORT = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +27,8 @@ class FramePoses:
     zncc: Array  # (n,) correlation with the reference patch
     second_zncc: Array  # (n,) of the best other place where a search found the grain, 0: none; NaN: not searched
     status: NDArray[np.uint8]  # (n,) TrackStatus
-    reference: NDArray[np.int32]  # (n,) photograph that the reference patch was cut out of
-    failed_reason: str = ""  # why the photograph shows nothing; empty where it does
+    reference: NDArray[np.int32]  # (n,) photograph that the reference patch was cut from
+    failed_reason: str = ""  # why no grain was tracked; empty where some were
 
     @property
     def has_pose(self) -> NDArray[np.bool_]:
@@ -42,9 +41,18 @@ class FramePoses:
 
 
 def reference_poses(patches: Patches, noise: float, reference: NDArray[np.int32]) -> FramePoses:
-    """The poses in the reference itself: no displacement by definition, known as its noise [grey] allows.
+    """Return the poses in the reference itself: zero displacement by definition.
 
-    Grains whose patch leaves the photograph or has no texture cannot be followed and have no pose.
+    Grains whose patch leaves the photograph or has no texture cannot be tracked and have no pose.
+
+    Parameters
+    ----------
+    patches : Patches
+        The reference patches.
+    noise : float
+        Standard deviation of a pixel's noise [grey], which gives that of a position.
+    reference : (n,) array
+        Photograph of every grain's patch.
     """
     n, good = len(patches.centre), patches.usable
     x, y = patches.centre[:, 0], patches.centre[:, 1]
@@ -59,33 +67,44 @@ def reference_poses(patches: Patches, noise: float, reference: NDArray[np.int32]
 
 
 def found_poses(registration: Registration, first: FramePoses, reference: NDArray[np.int32]) -> FramePoses:
-    """The poses that a photograph has shown; first: those in the reference, which tell what was never to be seen."""
-    findings, last, patches = registration.findings, registration.last, registration.patches
-    status = findings.status.copy()
-    missing = ~findings.accepted
-    expected = np.where(np.isfinite(findings.expected), findings.expected, last)
-    leaving = _leave_photograph(patches, expected)
+    """Return the poses found in a photograph.
+
+    Parameters
+    ----------
+    registration : Registration
+        The finished registration.
+    first : FramePoses
+        The poses in the reference: they give the status of grains that were never visible.
+    reference : (n,) array
+        Photograph of every grain's patch.
+    """
+    results, last, patches = registration.results, registration.last, registration.patches
+    status = results.status.copy()
+    missing = ~results.accepted
+    predicted = np.where(np.isfinite(results.predicted), results.predicted, last)
+    leaving = _leave_photograph(patches, predicted)
     status[missing] = np.where(leaving, TrackStatus.OUT_OF_FRAME, TrackStatus.LOST)[missing]
-    unseen = ~patches.usable & missing
-    status[unseen] = first.status[unseen]
-    pose = np.where(missing[:, None], np.nan, findings.pose)
-    rotation = last[:, 2] + np.angle(np.exp(1j * (pose[:, 2] - last[:, 2])))
+    never_visible = ~patches.usable & missing
+    status[never_visible] = first.status[never_visible]
+    pose = np.where(missing[:, None], np.nan, results.pose)
+    before = np.nan_to_num(last[:, 2])  # a grain without a reference has no earlier rotation
+    rotation = before + np.angle(np.exp(1j * (pose[:, 2] - before)))
     blank = np.where(missing, np.nan, 1.0)
     return FramePoses(
-        pose[:, 0], pose[:, 1], rotation, findings.sigma * blank, findings.zncc * blank,
-        findings.second_zncc * blank, status, reference,
+        pose[:, 0], pose[:, 1], rotation, results.sigma * blank, results.zncc * blank,
+        results.second_zncc * blank, status, reference,
     )  # fmt: skip
 
 
 def no_poses(reference: NDArray[np.int32], reason: str) -> FramePoses:
-    """The poses in a photograph that shows nothing, and why it does not."""
-    nothing = np.full(len(reference), np.nan)
+    """Return the poses of a failed photograph, all NaN, with the reason of the failure."""
+    unknown = np.full(len(reference), np.nan)
     status = np.full(len(reference), TrackStatus.LOST, np.uint8)
-    return FramePoses(nothing, nothing, nothing, nothing, nothing, nothing, status, reference, reason)
+    return FramePoses(unknown, unknown, unknown, unknown, unknown, unknown, status, reference, reason)
 
 
 def _leave_photograph(patches: Patches, place: Array) -> NDArray[np.bool_]:
-    """Which grains (n,) show less than their whole patch at places (n, 2+) [px]."""
+    """Which patches (n,) leave the photograph at places (n, 2+) [px]."""
     height, width = patches.reference.image.shape
-    x, y, reach = place[:, 0], place[:, 1], patches.reach + SPLINE_REACH
-    return (x < reach) | (y < reach) | (x > width - 1 - reach) | (y > height - 1 - reach)
+    x, y, margin = place[:, 0], place[:, 1], patches.radius + SPLINE_SUPPORT
+    return (x < margin) | (y < margin) | (x > width - 1 - margin) | (y > height - 1 - margin)

@@ -1,4 +1,4 @@
-"""Where a grain should be: where its own motion leads, and where its neighbours' does."""
+"""Predictions of poses by the grain's own motion and by its neighbours' motion."""
 
 from __future__ import annotations
 
@@ -6,46 +6,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from .poses import FramePoses
 from .registration import Registration
 
 
 def last_known(history: Sequence[FramePoses], first: FramePoses) -> Array:
-    """The most recent pose of every grain (n, 3)."""
+    """Return the most recent pose of every grain (n, 3): x, y [px], rotation [rad]."""
     last = history[-1].pose
     for frame in reversed([first, *history[:-1]]):
-        gone = ~np.isfinite(last[:, 0])
-        if not gone.any():
+        missing = ~np.isfinite(last[:, 0])
+        if not missing.any():
             break
-        last[gone] = frame.pose[gone]
+        last[missing] = frame.pose[missing]
     return last
 
 
-def follow_own_motion(registration: Registration, history: Sequence[FramePoses]) -> None:
-    """Fit every grain from its own motion, and from rest where that leads nowhere."""
-    findings = registration.findings
-    seen = np.isfinite(history[-1].x)
+def fit_from_own_motion(registration: Registration, history: Sequence[FramePoses]) -> None:
+    """Fit every grain from its extrapolated motion, and from its last pose where that fails."""
+    results = registration.results
+    visible = np.isfinite(history[-1].x)
     guess = history[-1].pose
     if len(history) > 1:
         step = history[-1].pose - history[-2].pose
         guess = np.where(np.isfinite(step), guess + step, guess)
-    rows = np.flatnonzero(seen & findings.open)
-    registration.take_fits(rows, guess[rows], TrackStatus.OK)
-    rows = np.flatnonzero(seen & findings.open)
+    rows = np.flatnonzero(visible & results.missing)
+    registration.fit_and_accept(rows, guess[rows], TrackStatus.OK)
+    rows = np.flatnonzero(visible & results.missing)
     if len(history) > 1 and len(rows):
-        registration.take_fits(rows, registration.last[rows], TrackStatus.OK)
+        registration.fit_and_accept(rows, registration.last[rows], TrackStatus.OK)
 
 
-def follow_neighbours(registration: Registration) -> None:
-    """Fit what is open from its neighbours' motion, as long as that finds grains."""
-    findings = registration.findings
+def fit_from_neighbour_motion(registration: Registration) -> None:
+    """Fit the missing grains from their neighbours' motion, repeatedly, until no further grain is found."""
+    results = registration.results
     while True:
-        rows = findings.expect_from_neighbours(registration.last)
-        before = findings.accepted.sum()
+        rows = results.predict_from_neighbours(registration.last)
+        before = results.accepted.sum()
         if len(rows):
-            registration.take_fits(rows, findings.expected[rows], TrackStatus.OK)
-        if findings.accepted.sum() == before:
+            registration.fit_and_accept(rows, results.predicted[rows], TrackStatus.OK)
+        if results.accepted.sum() == before:
             return

@@ -1,4 +1,4 @@
-"""One photograph being registered: its grains are found in it, one kind of guess after the other."""
+"""One photograph during its registration: the references, the photograph and the results so far."""
 
 from __future__ import annotations
 
@@ -7,34 +7,33 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-
+from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from ..correlation.correlator import Correlator, Fits, Rows
 from ..correlation.patches import Patches
 from ..correlation.splines import Pyramid
 from ..settings import TrackingSettings
-from .findings import Findings
+from .registration_results import RegistrationResults
 
 
 @dataclass(slots=True)
 class Registration:
-    """What is compared with what, and what that has shown so far."""
+    """One photograph, the references that it is compared with, and the results so far."""
 
     correlator: Correlator  # holds the patches of the reference
     photograph: Pyramid
-    findings: Findings
+    results: RegistrationResults
     last: Array  # (n, 3) most recent pose of every grain: x, y [px], rotation [rad]
-    noise: float  # [grey] of a pixel, of the noisier one of photograph and reference
-    clean_residual: float  # [grey] deviation of what a right fit leaves, of noise alone until the fits tell
+    noise: float  # [grey] of a pixel, the greater of photograph and reference
+    clean_residual: float  # [grey] standard deviation of a clean residual; of noise alone before the first fits
 
     @classmethod
     def begin(
         cls, correlator: Correlator, photograph: Pyramid, last: Array, noise: float, settings: TrackingSettings
     ) -> Registration:
-        """Nothing is found yet."""
-        findings = Findings(correlator.patches, settings)
-        return cls(correlator, photograph, findings, last, noise, np.sqrt(2.0) * noise)
+        """Begin without any results."""
+        results = RegistrationResults(correlator.patches, settings)
+        return cls(correlator, photograph, results, last, noise, np.sqrt(2.0) * noise)
 
     @property
     def patches(self) -> Patches:
@@ -42,32 +41,32 @@ class Registration:
 
     @property
     def settings(self) -> TrackingSettings:
-        return self.findings.settings
+        return self.results.settings
 
     def fit(self, rows: Rows, pose: Array, *, steps: int | None = None) -> Fits:
-        """Fit the grains `rows` (m,) from `pose` (m, 3); steps: at most, instead of the correlator's limit."""
-        return self.correlator.fit(self.photograph, rows, pose, self._leash(rows), steps=steps)
+        """Fit the grains `rows` (m,) from `pose` (m, 3); steps: greatest number, instead of the correlator's limit."""
+        return self.correlator.fit(self.photograph, rows, pose, self._max_shift(rows), steps=steps)
 
-    def take_fits(self, rows: Rows, pose: Array, status: TrackStatus) -> Fits:
-        """Fit the grains `rows` (m,) from `pose` (m, 3) and keep what convinces."""
+    def fit_and_accept(self, rows: Rows, pose: Array, status: TrackStatus) -> Fits:
+        """Fit the grains `rows` (m,) from `pose` (m, 3) and store the acceptable fits."""
         fits = self.fit(rows, pose)
-        self.findings.take(rows, fits, status)
+        self.results.accept(rows, fits, status)
         return fits
 
-    def refit_hidden(self, rows: Rows, pose: Array) -> None:
-        """Fit with Tukey's weights from `pose` (m, 3): what covers a part of a grain then does not count."""
+    def refit_occluded(self, rows: Rows, pose: Array) -> None:
+        """Fit with Tukey's weights from `pose` (m, 3), which exclude the covered part of a grain."""
         if len(rows) == 0:
             return
-        gain, offset = self.findings.light_at(self.patches, rows, pose)
+        gain, offset = self.results.local_light(self.patches, rows, pose)
         fits = self.correlator.fit_robust(
-            self.photograph, rows, pose, self._leash(rows), self.clean_residual, gain, offset
+            self.photograph, rows, pose, self._max_shift(rows), self.clean_residual, gain, offset
         )
-        self.findings.take_robust(self.patches, rows, fits, self.clean_residual)
+        self.results.accept_robust(self.patches, rows, fits, self.clean_residual)
 
-    def judge_residuals(self) -> None:
-        """Mark the grains that fit worse than noise explains, by what is typical of this photograph."""
-        self.clean_residual = self.findings.judge_residuals(self.noise)
+    def flag_poor(self) -> None:
+        """Flag the grains whose residual exceeds what noise and this photograph's typical residual explain."""
+        self.clean_residual = self.results.flag_poor(self.noise)
 
-    def _leash(self, rows: Rows | NDArray[np.bool_]) -> Array:
-        """How far a fit may run [px]: a small part of the patch, for its basin is a speckle's size."""
-        return np.maximum(4.0, 0.35 * self.patches.reach[rows])
+    def _max_shift(self, rows: Rows | NDArray[np.bool_]) -> Array:
+        """Greatest distance of a fit from its start [px]: a small part of the patch, its basin being a speckle wide."""
+        return np.maximum(4.0, 0.35 * self.patches.radius[rows])

@@ -1,1 +1,1 @@
-"""A page that shows how well tracking went."""
+"""The tracking report: a page with the quality of the tracks."""

@@ -1,4 +1,4 @@
-"""How tracking went from photograph to photograph, as SVG for a page: text stays text, on screen and on paper."""
+"""Charts of the tracking report as SVG, whose text remains text on screen and on paper."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
+from ...solver.bodies.grains import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 SIZE = (5.6, 3.1)  # [in] of a chart, at 72 px each as SVG has it
 INK, FAINT = "#1d2430", "#d5d9df"
 
-# Colours that the colour-blind tell apart (Okabe & Ito 2008); dashes and names tell them apart in print.
+# Colours that colour-blind readers distinguish (Okabe & Ito 2008); dashes and names distinguish them in print.
 LINES = (("#0072b2", "-"), ("#d55e00", "--"), ("#009e73", ":"))
 BARS = ("#56b4e9", "#e69f00", "#cc79a7", "#000000", "#999999")
 
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",  # letters, not their outlines
-    "svg.hashsalt": "tracking",  # the same picture has the same bytes
-    "font.family": "DejaVu Sans",  # comes with matplotlib and is wide: what a page shows instead of it fits, too
+    "svg.hashsalt": "tracking",  # the same chart has the same bytes
+    "font.family": "DejaVu Sans",  # comes with matplotlib and is wide: a page's substitute font fits as well
     "font.size": 10.0,
     "text.color": INK,
     "axes.labelcolor": INK,
@@ -47,7 +47,7 @@ NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """What stands about a chart."""
+    """Title and axis labels of a chart."""
 
     title: str
     across: str
@@ -55,7 +55,7 @@ class Labels:
 
 
 def line_chart(x: NDArray[np.int64], lines: Mapping[str, Array], labels: Labels) -> str:
-    """Lines (f,) by name over x (f,), named where they end; values that are not finite interrupt a line."""
+    """Draw lines (f,) by name over x (f,), labelled at their ends; values that are not finite interrupt a line."""
 
     def draw(axes: Axes) -> None:
         axes.xaxis.set_major_locator(_whole_numbers())
@@ -83,7 +83,7 @@ def line_chart(x: NDArray[np.int64], lines: Mapping[str, Array], labels: Labels)
 
 
 def stacked_chart(x: NDArray[np.int64], bars: Mapping[str, NDArray[np.int64]], labels: Labels) -> str:
-    """Counts (f,) by name over x (f,), one upon the other."""
+    """Draw stacked bars of counts (f,) by name over x (f,)."""
 
     def draw(axes: Axes) -> None:
         axes.xaxis.set_major_locator(_whole_numbers())
@@ -101,7 +101,7 @@ def stacked_chart(x: NDArray[np.int64], bars: Mapping[str, NDArray[np.int64]], l
 
 
 def _draw(draw: Callable[[Axes], None], labels: Labels) -> str:
-    # Nobody who asks for no report waits for it.
+    # Imported here, because runs without a report must not wait for it.
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -125,7 +125,7 @@ def _whole_numbers() -> MaxNLocator:
 
 
 def _apart(values: Sequence[float], least: float) -> list[float]:
-    """The values, moved so far that names written there do not cover one another."""
+    """The values, moved apart so that labels at them do not overlap."""
     places = list(values)
     order = sorted(range(len(values)), key=values.__getitem__)
     for lower, upper in pairwise(order):

@@ -1,6 +1,6 @@
-"""A page that shows how well tracking went: what was detected, how it correlated, and the worst of it, close up.
+"""The tracking report: detected grains, correlation over time, residual maps, and the worst grains in close-up.
 
-What the page says is gathered here; how it looks is told by the template beside this file.
+This module collects the content of the page; the template beside it defines its layout.
 """
 
 from __future__ import annotations
@@ -13,47 +13,55 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT
-
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
+from ...process.frame_range import FrameRange
+from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracks import Tracks, TrackStatus, WallTracks
 from .charts import Labels, line_chart, stacked_chart
-from .residual_pictures import FULL_COLOUR, RAMP, as_data, look_at, photograph_shown, residual_map, side_by_side
+from .residual_pictures import (
+    FULL_COLOUR,
+    RAMP,
+    as_data,
+    compare_patches,
+    display_photograph,
+    residual_map,
+    side_by_side,
+)
 
 TEMPLATE = Path(__file__).with_name("page.html")
 
-WORST = 12  # grains shown close up
-LISTED = 200  # poses listed that need a look
+WORST = 12  # grains shown in close-up
+LISTED = 200  # lost and suspect poses that are listed
 DOUBTFUL = (TrackStatus.SUSPECT, TrackStatus.LOST)
 
-Facts = dict[str, Any]  # by the name that the template knows them by
+Facts = dict[str, Any]  # values by their names in the template
 
 
 @dataclass(frozen=True, slots=True)
-class Tracked:
-    """What a report is made from."""
+class TrackingReportData:
+    """Input of a tracking report."""
 
     name: str
     tracks: Tracks
     walls: WallTracks | None
-    first_frame: int  # of the experiment, that tracks begin with
+    frames: FrameRange  # photographs of the experiment that the tracks cover
     scale: Scale
     centre: Array  # (n, 2) [px] of the grains on photograph 0
     radius: Array  # (n,) [px]
-    quality: Array  # (n,) share of the outline that was seen
+    quality: Array  # (n,) fraction of the outline that was detected
     photograph: Callable[[int], Image]  # by number in the experiment
 
     def pose(self, frame: int) -> Array:
-        """x, y [px], rotation [rad] of the picture (n, 3); NaN where lost."""
+        """Return x, y [px], rotation [rad] of the picture (n, 3); NaN where lost."""
         point = self.scale.to_pixels(self.tracks.position[frame])
         return np.column_stack([point, self.scale.angle_to_world(self.tracks.rotation[frame])])
 
 
-def tracking_report(tracked: Tracked) -> str:
-    """The page, self-contained HTML."""
-    # Nobody who asks for no report waits for it.
+def tracking_report(tracked: TrackingReportData) -> str:
+    """Render the page as self-contained HTML."""
+    # Imported here, because runs without a report must not wait for it.
     from jinja2 import Environment, StrictUndefined
 
     reference = tracked.photograph(0)
@@ -70,9 +78,9 @@ def tracking_report(tracked: Tracked) -> str:
     )
 
 
-def _summary(tracked: Tracked) -> Facts:
+def _summary(tracked: TrackingReportData) -> Facts:
     tracks = tracked.tracks
-    count = {_words(status): int((tracks.status == status).sum()) for status in TrackStatus}
+    count = {_status_words(status): int((tracks.status == status).sum()) for status in TrackStatus}
     return {
         "name": tracked.name,
         "grain_count": tracks.grain_count,
@@ -83,12 +91,12 @@ def _summary(tracked: Tracked) -> Facts:
         "counts": {words: number for words, number in count.items() if number},
         "pose_count": max(tracks.status.size, 1),
         "renewal_count": tracks.renewal_count,
-        "renewed": _renewed(tracks),
+        "renewed": _renewed_grains(tracks),
     }
 
 
-def _renewed(tracks: Tracks) -> list[str]:
-    """The grains that are compared with a later photograph than the first."""
+def _renewed_grains(tracks: Tracks) -> list[str]:
+    """Names of the grains whose reference is a later photograph than the first."""
     if tracks.reference_frame is None:
         return []
     return [
@@ -98,8 +106,8 @@ def _renewed(tracks: Tracks) -> list[str]:
     ]
 
 
-def _detected(tracked: Tracked, reference: Image) -> Facts:
-    picture, scale = photograph_shown(reference)
+def _detected(tracked: TrackingReportData, reference: Image) -> Facts:
+    picture, scale = display_photograph(reference)
     height, width = picture.shape[:2]
     place = (tracked.centre + 0.5) * scale
     grains = [
@@ -107,7 +115,7 @@ def _detected(tracked: Tracked, reference: Image) -> Facts:
         for name, (x, y), radius, quality in zip(tracked.tracks.id, place, tracked.radius, tracked.quality, strict=True)
     ]
     walls = []
-    if tracked.walls is not None and tracked.first_frame == 0:
+    if tracked.walls is not None and tracked.frames.start == 0:
         bars = tracked.walls.select(np.flatnonzero(tracked.walls.sides == STRAIGHT))  # circles were not looked for
         for name, ends in zip(bars.name, tracked.scale.to_pixels(bars.endpoints[0]), strict=True):
             (x1, y1), (x2, y2) = (ends + 0.5) * scale
@@ -116,11 +124,11 @@ def _detected(tracked: Tracked, reference: Image) -> Facts:
     return {"photograph": photograph, "detected": grains, "walls": walls}
 
 
-def _charts(tracked: Tracked) -> list[str]:
+def _charts(tracked: TrackingReportData) -> list[str]:
     tracks = tracked.tracks
-    # What the first photograph shows of itself is no news, and would flatten the rest.
-    begin = 1 if tracked.first_frame == 0 and tracks.frame_count > 1 else 0
-    frame = tracked.first_frame + np.arange(begin, tracks.frame_count)
+    # The first photograph correlates perfectly with itself, which would compress the scale.
+    begin = 1 if tracked.frames.start == 0 and tracks.frame_count > 1 else 0
+    frame = tracked.frames.start + tracked.frames.step * np.arange(begin, tracks.frame_count)
     zncc, sigma, status = tracks.zncc[begin:], 1e6 * tracks.sigma[begin:], tracks.status[begin:]
 
     def over_time(value: Array, percent: float) -> Array:
@@ -136,17 +144,17 @@ def _charts(tracked: Tracked) -> list[str]:
         line_chart(frame, correlation, Labels("Correlation with the first photograph", "photograph", "ZNCC")),
         line_chart(frame, precision, Labels("Standard deviation of a displacement", "photograph", "σ [µm]")),
     ]
-    unusual = {_words(kind): (status == kind).sum(axis=1) for kind in TrackStatus if kind is not TrackStatus.OK}
+    unusual = {_status_words(kind): (status == kind).sum(axis=1) for kind in TrackStatus if kind is not TrackStatus.OK}
     unusual = {words: count for words, count in unusual.items() if count.any()}
     if unusual:
         charts.append(stacked_chart(frame, unusual, Labels("Grains not found where predicted", "photograph", "grains")))
     return charts
 
 
-def _residual_maps(tracked: Tracked, reference: Image) -> list[Facts]:
+def _residual_maps(tracked: TrackingReportData, reference: Image) -> list[Facts]:
     maps = []
-    for frame in _frames_to_show(tracked.tracks, tracked.first_frame):
-        number = tracked.first_frame + frame
+    for frame in _frames_to_show(tracked.tracks, tracked.frames.start):
+        number = tracked.frames.number(frame)
         picture, _ = residual_map(
             reference, tracked.photograph(number), tracked.centre, tracked.pose(frame), tracked.radius
         )
@@ -155,7 +163,7 @@ def _residual_maps(tracked: Tracked, reference: Image) -> list[Facts]:
     return maps
 
 
-def _worst(tracked: Tracked, reference: Image) -> list[Facts]:
+def _worst(tracked: TrackingReportData, reference: Image) -> list[Facts]:
     tracks = tracked.tracks
     order = np.argsort(np.where(tracks.present & np.isfinite(tracks.zncc), tracks.zncc, np.inf), axis=None)
     shown: dict[int, int] = {}  # each grain once, at its worst
@@ -163,38 +171,39 @@ def _worst(tracked: Tracked, reference: Image) -> list[Facts]:
         frame, row = (int(value) for value in np.unravel_index(int(place), tracks.zncc.shape))
         if not np.isfinite(tracks.zncc[frame, row]) or len(shown) == WORST:
             break
-        if tracked.first_frame + frame > 0:
+        if tracked.frames.number(frame) > 0:
             shown.setdefault(row, frame)
     grains = []
     for row, frame in shown.items():
-        number = tracked.first_frame + frame
+        number = tracked.frames.number(frame)
         image = tracked.photograph(number)
-        seen = look_at(reference, image, tracked.centre[row], tracked.pose(frame)[row], float(tracked.radius[row]))
-        data, facts = as_data(side_by_side(seen)), _facts_of_pose(tracks, frame, row)
+        pose, radius = tracked.pose(frame)[row], float(tracked.radius[row])
+        comparison = compare_patches(reference, image, tracked.centre[row], pose, radius)
+        data, facts = as_data(side_by_side(comparison)), _facts_of_pose(tracks, frame, row)
         grains.append({"id": tracks.id[row], "photograph": number, "data": data, "facts": facts})
     return grains
 
 
 def _facts_of_pose(tracks: Tracks, frame: int, row: int) -> list[str]:
-    told = [
+    facts = [
         f"ZNCC {tracks.zncc[frame, row]:.4f}",
         f"σ {1e6 * tracks.sigma[frame, row]:.2f} µm",
-        _words(TrackStatus(tracks.status[frame, row])),
+        _status_words(TrackStatus(tracks.status[frame, row])),
     ]
     if tracks.second_zncc is not None and np.isfinite(tracks.second_zncc[frame, row]):
-        told.append(f"second best ZNCC {tracks.second_zncc[frame, row]:.4f}")
+        facts.append(f"second best ZNCC {tracks.second_zncc[frame, row]:.4f}")
     if tracks.reference_frame is not None and tracks.reference_frame[frame, row] > 0:
-        told.append(f"compared with photograph {tracks.reference_frame[frame, row]}")
-    return told
+        facts.append(f"compared with photograph {tracks.reference_frame[frame, row]}")
+    return facts
 
 
-def _doubtful(tracked: Tracked) -> Facts:
-    """Lost and suspect poses as the rows of a table that can be given back."""
+def _doubtful(tracked: TrackingReportData) -> Facts:
+    """Lost and suspect poses as the rows of a table of corrections."""
     tracks = tracked.tracks
     found = np.argwhere(np.isin(tracks.status, DOUBTFUL))
     lines = []
     for frame, row in found[:LISTED]:
-        number = tracked.first_frame + int(frame)
+        number = tracked.frames.number(int(frame))
         x, y, _ = tracked.pose(int(frame))[row]
         theta = tracks.rotation[frame, row]
         pose = f"{x:.2f},{y:.2f},{theta:.4f}" if np.isfinite(x) else "lost,lost,lost"
@@ -212,7 +221,7 @@ def _frames_to_show(tracks: Tracks, first: int) -> list[int]:
     return sorted({int(later[len(later) // 2]), int(worst), int(later[-1])})
 
 
-def _words(status: TrackStatus) -> str:
+def _status_words(status: TrackStatus) -> str:
     return status.name.lower().replace("_", " ")
 
 

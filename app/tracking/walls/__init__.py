@@ -1,1 +1,1 @@
-"""The bars of the frame, followed as grains are."""
+"""Tracking of the frame's bars by correlation, and detection of the walls' inner edges."""

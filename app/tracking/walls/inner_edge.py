@@ -1,4 +1,4 @@
-"""The inner edge of a bar beside the packing: from a line drawn by hand near it, or from the rods that bear on it."""
+"""Detection of a bar's inner edge, from a line drawn by hand near it or from the rods that touch it."""
 
 from __future__ import annotations
 
@@ -9,28 +9,41 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import ConvexHull
 
-from solver.bodies.grains import Array
-
 from ...experiment.photographs import Image
+from ...solver.bodies.grains import Array
 
-BLUR = 1.5  # [px] of the picture that is searched: paint is smaller than a bar
+BLUR = 1.5  # [px] standard deviation of the smoothing: paint is finer than a bar
 SPACING = 2.0  # [px] between profiles along a line
 STEP = 0.25  # [px] along a profile
 PASSES = 6  # of the robust fit
-OUTLIER = 2.0  # [px] from the line, from which on an edge is something else: a rod, paint
-NARROWEST = 1.0  # [px] to which the search narrows
-ON_CIRCLE = 360  # points on the outline of a rod, of which the hull is made
-ALIKE = np.deg2rad(1.5)  # directions of the hull's sides that belong to one bar
-SAME = np.deg2rad(12.0)  # two bars of a frame never lie as close in direction
+OUTLIER = 2.0  # [px] distance from the line beyond which an edge belongs to something else: a rod, paint
+MIN_WINDOW = 1.0  # [px] half width of the last searches
+RIM_POINTS = 360  # points on the outline of a rod, from which the hull is computed
+SAME_BAR = np.deg2rad(1.5)  # greatest angle between the hull's sides of one bar
+MIN_ANGLE = np.deg2rad(12.0)  # least angle between two bars
 
 
-def snap_to_edge(image: Image, line: Array, reach: float) -> tuple[Array, float]:
-    """Move a line (2, 2) [px] onto the bar's edge beside it, no farther than reach [px].
+def snap_to_edge(image: Image, line: Array, max_shift: float) -> tuple[Array, float]:
+    """Move a line onto the bar's edge near it.
 
-    The packing lies to the left of the line as seen in the world: in the picture, on its right side when y points
-    down. The edge is where the bar's bright ends towards the dark between the rods, the innermost such place. Gives
-    the line, of the same ends as far as they go, and the share of the profiles that agree with it: below a third or so
-    there is no edge.
+    The packing lies on the left of the line in the world, y up. The edge is the innermost transition from the bright
+    bar to the dark between the rods.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        The photograph [grey].
+    line : (2, 2) array
+        End points x, y [px].
+    max_shift : float
+        Greatest distance of the edge from the line [px].
+
+    Returns
+    -------
+    line : (2, 2) array
+        The end points, displaced along the normal [px].
+    fraction : float
+        Fraction of the profiles that agree with the line; below about a third there is no edge.
     """
     smooth = gaussian_filter(np.asarray(image, np.float32), BLUR)
     start, end = np.asarray(line, np.float64)
@@ -38,50 +51,60 @@ def snap_to_edge(image: Image, line: Array, reach: float) -> tuple[Array, float]
     along = (end - start) / max(length, 1e-9)
     inward = np.array([along[1], -along[0]])  # y down: left in the world
     count = max(int(length / SPACING), 8)
-    place = np.linspace(0.02, 0.98, count) * length
-    offset = np.arange(-reach, reach + STEP, STEP)
-    points = start + place[:, None, None] * along + offset[None, :, None] * inward
+    position = np.linspace(0.02, 0.98, count) * length
+    offset = np.arange(-max_shift, max_shift + STEP, STEP)
+    points = start + position[:, None, None] * along + offset[None, :, None] * inward
     profile = map_coordinates(smooth, [points[..., 1], points[..., 0]], order=1, mode="nearest")
     slope = -np.gradient(profile, STEP, axis=1)  # bright outside, dark inside
-    fit, window, share = np.zeros(2), reach, 0.0
-    centred = place / length - 0.5
+    fit, window, fraction = np.zeros(2), max_shift, 0.0
+    centred = position / length - 0.5
     for k in range(PASSES):
         expected = fit[0] + fit[1] * centred
         near = np.abs(offset[None] - expected[:, None]) <= window
-        weighed = np.where(near, slope, 0.0)
-        best = weighed.argmax(axis=1)
-        strength = weighed.max(axis=1)
-        found = offset[best] + peak_between(weighed, best) * STEP
+        slope_in_window = np.where(near, slope, 0.0)
+        best = slope_in_window.argmax(axis=1)
+        strength = slope_in_window.max(axis=1)
+        edge = offset[best] + subpixel_peak(slope_in_window, best) * STEP
         strong = strength > 0.3 * np.percentile(strength, 90)
         if strong.sum() < 4:
             return np.asarray(line, np.float64), 0.0
-        fit = _fit_line(centred[strong], found[strong], consensus=k == 0)
-        within = strong & (np.abs(found - fit[0] - fit[1] * centred) < OUTLIER)
-        share = float(within.mean())
+        fit = _fit_line(centred[strong], edge[strong], consensus=k == 0)
+        within = strong & (np.abs(edge - fit[0] - fit[1] * centred) < OUTLIER)
+        fraction = float(within.mean())
         if within.sum() >= 4:
-            fit = np.polynomial.polynomial.polyfit(centred[within], found[within], 1)
-        window = max(window / 2.5, NARROWEST)
+            fit = np.polynomial.polynomial.polyfit(centred[within], edge[within], 1)
+        window = max(window / 2.5, MIN_WINDOW)
     ends = fit[0] + fit[1] * np.array([-0.5, 0.5])
-    return np.stack([start, end]) + ends[:, None] * inward, share
+    return np.stack([start, end]) + ends[:, None] * inward, fraction
 
 
 def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
-    """The lines (w, 2, 2) [px] that bound circles (n,) [px] on their longest sides: where bars of a frame lie.
+    """Find the lines that bound circles on their longest sides: the faces of a frame's bars.
 
-    In order around the packing, counter-clockwise as seen, beginning with the lowest in the picture; every line runs
-    from corner to corner with the packing on its left in the world. Fewer than count where the hull has fewer sides.
+    Parameters
+    ----------
+    x, y, radius : (n,) array
+        Circles [px].
+    count : int
+        Greatest number of lines.
+
+    Returns
+    -------
+    (w, 2, 2) array
+        Lines from corner to corner [px], the packing on their left in the world, counter-clockwise around it, the
+        lowest in the picture first; fewer than `count` where the hull has fewer sides.
     """
-    turn = np.linspace(0.0, 2.0 * np.pi, ON_CIRCLE, endpoint=False)
-    rim = np.stack([x[:, None] + radius[:, None] * np.cos(turn), y[:, None] + radius[:, None] * np.sin(turn)], axis=-1)
-    rim = rim.reshape(-1, 2) * [1.0, -1.0]  # y up
+    polar = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS, endpoint=False)
+    rim_x, rim_y = x[:, None] + radius[:, None] * np.cos(polar), y[:, None] + radius[:, None] * np.sin(polar)
+    rim = np.stack([rim_x, rim_y], axis=-1).reshape(-1, 2) * [1.0, -1.0]  # y up
     hull = rim[ConvexHull(rim).vertices]  # counter-clockwise
     side = np.roll(hull, -1, axis=0) - hull
     length, angle = np.linalg.norm(side, axis=1), np.arctan2(side[:, 1], side[:, 0])
     chosen: list[tuple[float, Array]] = []
-    weight = np.array([length[np.abs(_wrapped(angle - a)) < ALIKE].sum() for a in angle])
+    weight = np.array([length[np.abs(_wrapped(angle - a)) < SAME_BAR].sum() for a in angle])
     for k in np.argsort(-weight):
-        if all(abs(float(_wrapped(angle[k] - other))) > SAME for other, _ in chosen):
-            group = np.abs(_wrapped(angle - angle[k])) < ALIKE
+        if all(abs(float(_wrapped(angle[k] - other))) > MIN_ANGLE for other, _ in chosen):
+            group = np.abs(_wrapped(angle - angle[k])) < SAME_BAR
             direction = side[group].sum(axis=0)
             direction /= np.linalg.norm(direction)
             outward = np.array([direction[1], -direction[0]])
@@ -94,8 +117,8 @@ def find_bars(x: Array, y: Array, radius: Array, count: int = 4) -> Array:
     return np.array(lines).reshape(-1, 2, 2) * [1.0, -1.0]
 
 
-def meeting_lines(lines: Array) -> Array:
-    """Lines (w, 2, 2) lengthened or cut to the corners where each meets the next."""
+def lines_to_corners(lines: Array) -> Array:
+    """Extend or cut lines (w, 2, 2) to the corners where each meets the next."""
     moved = np.array(lines, dtype=np.float64)
     for k in range(len(lines)):
         a, b = lines[k], lines[(k + 1) % len(lines)]
@@ -109,14 +132,14 @@ def meeting_lines(lines: Array) -> Array:
 
 
 def _meet(angle: float, foot: Array, other_angle: float, other_foot: Array) -> Array:
-    """Where two lines meet, each told by its direction and by its point nearest to the origin."""
+    """Intersection of two lines, each given by its direction and its point nearest to the origin."""
     a, b = np.array([np.cos(angle), np.sin(angle)]), np.array([np.cos(other_angle), np.sin(other_angle)])
     t = np.linalg.solve(np.stack([a, -b], axis=1), other_foot - foot)
     return foot + t[0] * a
 
 
-def peak_between(slope: Array, at: NDArray[np.intp]) -> Array:
-    """Where between the steps the greatest slope of every profile lies (p,), by the parabola through three."""
+def subpixel_peak(slope: Array, at: NDArray[np.intp]) -> Array:
+    """Return the offsets (p,) of the greatest slopes from their steps, by the parabola through three points."""
     rows = np.arange(len(at))
     middle = np.clip(at, 1, slope.shape[1] - 2)
     left, here, right = (slope[rows, middle + k] for k in (-1, 0, 1))
@@ -125,7 +148,7 @@ def peak_between(slope: Array, at: NDArray[np.intp]) -> Array:
 
 
 def _fit_line(x: Array, y: Array, *, consensus: bool) -> Array:
-    """Offset and slope of the line through most of the points; consensus: of all lines through two of them."""
+    """Offset and slope of a line: by least squares, or with consensus the line through two points near most points."""
     if not consensus:
         return np.asarray(np.polynomial.polynomial.polyfit(x, y, 1), dtype=np.float64)
     few = np.unique(np.linspace(0, len(x) - 1, min(len(x), 40)).astype(int))

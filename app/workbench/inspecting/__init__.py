@@ -1,2 +1,1 @@
-"""What a run has found so far, for the page's own drawing: stored numbers put into pixels, nothing computed anew.
-Knows no page."""
+"""Frames of a run for the page, finished or in progress: stored numbers, places in pixels."""

@@ -1,60 +1,103 @@
-// What is open, which step is shown, and the keys that work everywhere. All that is known lies on the server.
+// The open experiment, the step that is shown, and the keys that work in every step. All data are on the server.
 
-import { ask, at, digits, h, sign, tell } from "/page/dom.js";
+import { request, at, digits, h, sign, notify } from "/page/dom.js";
 import { Stage } from "/page/stage.js";
 import { showHome } from "/page/home.js";
-import { photographs } from "/page/photographs.js";
-import { scale } from "/page/scale.js";
-import { walls } from "/page/walls.js";
-import { rods } from "/page/rods.js";
-import { material } from "/page/material.js";
-import { run } from "/page/run.js";
-import { mend } from "/page/mend.js";
-import { inspect } from "/page/inspect.js";
-import { share } from "/page/share.js";
+import { layers, showLayers, toggleLayers } from "/page/parts/layers.js";
+import { photographs } from "/page/steps/photographs.js";
+import { scale } from "/page/steps/scale.js";
+import { walls } from "/page/steps/walls.js";
+import { rods } from "/page/steps/rods.js";
+import { material } from "/page/steps/material.js";
+import { run } from "/page/steps/run.js";
+import { inspect } from "/page/steps/inspect.js";
+import { review } from "/page/steps/review.js";
+import { correct } from "/page/steps/correct.js";
+import { share } from "/page/steps/share.js";
 
-export const STEPS = [photographs, scale, walls, rods, material, run, mend, inspect, share];
+export const STEPS = [photographs, scale, walls, rods, material, run, inspect, review, correct, share];
 
-export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, looks: 0, tell };
-globalThis.bench = app; // for the curious, and for tests
+export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, looks: 0, notify };
+globalThis.workbench = app; // for tests
 
-const waiting = new Set(); // what has been asked for and is not done: asked again meanwhile, it is a double click
+const waiting = new Set(); // actions that are not done: a second one is a double click
 const PATIENCE = 250, LOOKS = 1000; // [ms]
 
-/** One action after the other; what goes wrong is said. once: names an action that is not to be done twice at a time. */
+/** One action after the other; an error is shown. once: name of an action that must not run twice at a time. */
 app.queue = (work, words = "", once = null) => {
   if (once !== null) { if (waiting.has(once)) return app.busy; waiting.add(once); }
+  const { field } = app;
   app.busy = app.busy.then(async () => {
+    app.field = field; // an action of this one belongs to the same field
     const slow = setTimeout(() => { at("busy-text").textContent = words || "One moment …"; at("busy").hidden = false; }, words ? PATIENCE : 2 * PATIENCE);
-    try { await work(); } catch (error) { tell(error.message || String(error), true); app.paint(); } finally { clearTimeout(slow); at("busy").hidden = true; app.done += 1; waiting.delete(once); }
+    try { await work(); if (field?.id === app.refused?.id) app.refused = null; } catch (error) {
+      if (field) app.refused = { ...field, text: error.message || String(error) };
+      notify(error.message || String(error), true); app.paint();
+    } finally { app.field = null; clearTimeout(slow); at("busy").hidden = true; app.done += 1; waiting.delete(once); }
   });
   return app.busy;
 };
 
-/** Ask for a change of the open experiment; the answer is what the experiment is then. */
-app.change = (question, values = {}, words = "", then = null) => app.queue(async () => {
-  const told = await ask(question, { at: app.project.at, ...values });
-  app.take(told);
-  then?.(told);
-}, words, question === "undo" || question === "redo" ? null : question + JSON.stringify(values));
+// The field that an action comes from: a refused value stays in it, with the reason below it.
+app.field = null; app.refused = null;
+addEventListener("change", (event) => {
+  if (!event.target.id) return;
+  const field = { id: event.target.id, value: event.target.value };
+  app.field = field;
+  setTimeout(() => { if (app.field === field) app.field = null; });
+}, true);
 
-/** What another window, or another program, has changed: looked for while this one is seen, and nobody types. */
+function showRefused() {
+  const { refused } = app, input = refused && at(refused.id);
+  if (!input || input.type === "file") return;
+  input.value = refused.value;
+  input.setAttribute("aria-invalid", "true"); input.setAttribute("aria-describedby", "refused");
+  input.closest(".field")?.after(h("p", { class: "refused", id: "refused", role: "alert" }, refused.text));
+}
+
+/** Change the open experiment; the answer is its new state. */
+app.change = (endpoint, values = {}, words = "", then = null) => app.queue(async () => {
+  const answer = await request(endpoint, { at: app.project.at, ...values });
+  app.take(answer);
+  then?.(answer);
+}, words, endpoint === "undo" || endpoint === "redo" ? null : endpoint + JSON.stringify(values));
+
+/** Load changes of other windows and programs, while this window is visible and no field has the focus. */
 async function lookAround() {
   const { project } = app;
   app.looks += 1;
   if (!project || document.hidden || waiting.size || /^(INPUT|SELECT)$/.test(document.activeElement?.tagName ?? "")) return;
   const done = app.done;
   try {
-    const told = await ask("stamp", { at: project.at });
-    if (told.stamp === app.project?.stamp || app.project?.at !== project.at || app.done !== done) return;
-    app.queue(async () => { const fresh = await ask("project", { at: project.at }); if (app.project?.at === project.at) app.take(fresh); });
-  } catch { /* the server has gone, or is busy: the next look tells */ }
+    const answer = await request("stamp", { at: project.at });
+    if (answer.stamp === app.project?.stamp || app.project?.at !== project.at || app.done !== done) return;
+    app.queue(async () => { const fresh = await request("project", { at: project.at }); if (app.project?.at === project.at) app.take(fresh); });
+  } catch { /* the server is gone or busy: the next look finds out */ }
 }
 setInterval(lookAround, LOOKS);
 
+/** A server that is gone is a state of the page, until it answers again. */
+async function listen() {
+  let state = "";
+  try {
+    const answer = await fetch("/page/icon.svg", { cache: "no-store" });
+    if (answer.status === 403) state = "The workbench was started again. Open the address that it printed: this page belongs to the one before.";
+  } catch {
+    state = "The workbench does not answer: was it stopped? Nothing is lost, every action is a file of the experiment's folder. Start rodsight open again, and open the address that it prints.";
+  }
+  at("lost").textContent = state;
+  at("lost").hidden = !state;
+  document.body.classList.toggle("lost", Boolean(state));
+}
+setInterval(() => { if (!document.hidden) listen(); }, 2 * LOOKS);
+addEventListener("unanswered", listen);
+
+/** The state of the experiment after an action that does not answer with it, so that its undo is known. */
+app.refresh = async () => { app.project = await request("project", { at: app.project.at }); };
+
 app.take = (project) => {
   app.project = project;
-  app.frame = Math.min(app.frame, Math.max(project.files.length - 1, 0));
+  app.frame = Math.min(app.frame, Math.max(project.frames - 1, 0));
   app.step.taken?.(app);
   app.paint();
 };
@@ -62,16 +105,25 @@ app.take = (project) => {
 app.goTo = (name) => app.go(STEPS.find((each) => each.name === name));
 
 app.open = (project, step = null) => {
+  document.body.classList.remove("at-home");
+  showLayers(app);
+  if (project.at !== app.project?.at) app.stage.clear();
   at("home").hidden = true;
-  app.frame = 0;
+  app.frame = 0; app.looked = 0;
   app.project = project;
   const first = STEPS.find((each) => markOf(each) !== "good" && project.steps.some((s) => s.name === each.name));
   app.go(STEPS.find((each) => each.name === step) ?? first ?? STEPS[0]);
 };
 
+/** A step shows the photograph that it edits; the others show the one that was looked at last. */
+app.edits = (step = app.step) => (step.edits === undefined ? null : Math.min(step.edits, Math.max(app.project.frames - 1, 0)));
+
 app.go = (step) => {
   app.step.leave?.(app);
+  app.refused = null;
+  if (app.edits() === null) app.looked = app.frame;
   app.step = step;
+  app.frame = app.edits() ?? Math.min(app.looked ?? 0, Math.max(app.project.frames - 1, 0));
   location.hash = new URLSearchParams({ at: app.project.at, step: step.name }).toString();
   step.enter?.(app);
   app.stage.use(step.tool?.(app));
@@ -83,8 +135,10 @@ app.tool = (tool) => app.stage.use(tool);
 app.home = () => {
   app.step.leave?.(app);
   app.project = null;
-  app.stage.draw = () => {}; // what a step draws is drawn over a photograph of its project
-  history.replaceState(null, "", location.pathname);
+  app.stage.draw = () => {}; // the drawing of a step needs its project
+  if (location.hash) location.hash = "";
+  document.body.classList.add("at-home");
+  for (const id of ["steps", "panel", "time"]) at(id).replaceChildren();
   at("crumb").replaceChildren(); at("standing").replaceChildren();
   for (const id of ["undo", "redo"]) at(id).hidden = true;
   showHome(app);
@@ -103,35 +157,52 @@ function markOf(step) {
   return app.project.steps.find((each) => each.name === step.name)?.mark ?? "missing";
 }
 
+const CONTROLS = "button, input, select, summary, a[href]";
+
+/** The control that has the focus keeps it when its part of the page is made anew: by its name, else by its place. */
+function rememberFocus() {
+  const had = document.activeElement, part = had?.closest?.("#panel, #steps");
+  if (!part) return () => {};
+  const { id } = had, place = [...part.querySelectorAll(CONTROLS)].indexOf(had);
+  return () => {
+    if (part.contains(document.activeElement)) return;
+    const again = (id && at(id)) || part.querySelectorAll(CONTROLS)[place];
+    if (again && part.contains(again)) again.focus({ preventScroll: true });
+  };
+}
+
 app.paint = () => {
   const { project, step } = app;
   if (!project) return;
   document.title = `${project.name} · Rodsight`;
   at("crumb").replaceChildren("· ", h("b", {}, project.name));
-  for (const [id, what] of [["undo", project.undo], ["redo", project.redo]]) {
-    at(id).hidden = false; at(id).disabled = !what;
-    at(id).title = what ? `${id === "undo" ? "Undo" : "Do again"}: ${what}` : "Nothing to undo";
+  for (const [id, change] of [["undo", project.undo], ["redo", project.redo]]) {
+    at(id).hidden = false; at(id).disabled = !change;
+    at(id).title = change ? `${id === "undo" ? "Undo" : "Redo"}: ${change}` : `There is no change to ${id}`;
   }
   at("standing").textContent = standing(project);
+  const focused = rememberFocus();
+  at("canvas").setAttribute("aria-label", `Photograph ${app.frame} of ${Math.max(project.frames - 1, 0)}, step ${step.title}. K: a cursor for the keyboard`);
   at("steps").replaceChildren(...STEPS.map((each, k) => h("button", {
-    class: each === step ? "here" : "", onclick: () => app.go(each), title: `Key ${k + 1}`, id: `step-${each.name}`,
-  }, h("span", { class: "number" }, String(k + 1)), each.title, sign(markOf(each)))));
-  const says = project.steps.find((each) => each.name === step.name);
-  const keep = document.activeElement?.id;
+    class: each === step ? "here" : "", "aria-current": each === step ? "step" : null, onclick: () => app.go(each), title: `Key ${(k + 1) % 10}`, id: `step-${each.name}`,
+  }, h("span", { class: "number" }, String((k + 1) % 10)), each.title, sign(markOf(each)))));
+  const entry = project.steps.find((each) => each.name === step.name);
   const top = at("panel").scrollTop;
-  at("panel").replaceChildren(h("h2", {}, step.title), ...(says?.says.length ? [h("div", { class: "says" }, says.says.map((text) => h("p", {}, sign(says.mark), text)))] : []), ...[step.panel(app)].flat(9).filter(Boolean));
+  at("panel").replaceChildren(h("h1", {}, step.title), ...(entry?.messages.length ? [h("div", { class: "messages" }, entry.messages.map((text) => h("p", {}, sign(entry.mark), text)))] : []), ...[step.panel(app)].flat(9).filter(Boolean));
+  showRefused();
   at("panel").scrollTop = top;
-  if (keep && at(keep) && at("panel").contains(at(keep))) at(keep).focus({ preventScroll: true });
-  app.hint(step.hint?.(app) ?? "");
-  app.stage.draw = (c, k) => step.draw?.(app, c, k);
+  focused();
+  const edited = app.edits(), hint = step.hint?.(app) ?? "";
+  app.hint(edited === null || project.tracked ? hint : [`Photograph ${edited}`, hint].filter(Boolean).join(" · "));
+  app.stage.draw = (c, k) => { if (layers.marks || step === inspect || step === run) step.draw?.(app, c, k); };
   app.stage.dim = step.dim ?? 1;
   const beside = app.step.frames || app.step.timeline ? [app.frame + 1, app.frame - 1].filter((each) => project.files[each]) : [];
-  app.stage.show(app.photograph(app.frame), project.width, project.height, beside.map(app.photograph));
+  app.stage.show(app.photograph(app.frame), project.width, project.height, beside.map(app.photograph), project.bounds);
   app.timeline();
 };
 
 app.timeline = () => {
-  const { project } = app, count = project.files.length;
+  const { project } = app, count = project.frames;
   at("time").classList.toggle("shown", count > 1 && Boolean(app.step.frames));
   if (app.step.timeline && count > 1) { app.step.timeline(app); return; }
   if (!app.step.frames || count < 2) return;
@@ -145,7 +216,8 @@ app.timeline = () => {
 };
 
 app.show = (frame) => {
-  const last = app.project.files.length - 1, next = Math.min(Math.max(frame, 0), last);
+  if (app.edits() !== null) { if (frame !== app.frame) notify(`This step edits photograph ${app.frame}: the others are in step 1`); return; }
+  const last = app.project.frames - 1, next = Math.min(Math.max(frame, 0), last);
   if (next === app.frame) return;
   app.frame = next;
   app.step.moved?.(app);
@@ -160,8 +232,8 @@ function standing(project) {
 }
 
 export const KEYS = [
-  ["1 … 9", "the steps"], ["wheel, + −", "zoom"], ["drag; Alt+drag over things", "move the picture"], ["F", "whole picture"], ["L", "loupe"],
-  ["← →", "photographs"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, do again"], ["Esc", "let go"], ["?", "these keys"],
+  ["1 … 9, 0", "the steps"], ["wheel, + −", "zoom"], ["drag; Alt+drag over things", "move the picture"], ["F", "whole picture"], ["L", "loupe"], ["K", "a cursor for the keyboard: arrows move it (Shift: finely), Enter presses, Enter again lets go or clicks, Esc ends"], ["Y", "layers, brightness, contrast"], ["two fingers", "move the picture on a touchpad; pinch to zoom"],
+  ["← →", "photographs"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "deselect"], ["?", "these keys"],
 ];
 
 function showKeys() {
@@ -175,32 +247,48 @@ addEventListener("keydown", (event) => {
   if (event.target.closest?.("dialog, #recording")) return; // the viewer has keys of its own
   if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && app.project && !typing) {
     event.preventDefault();
-    undo(event.shiftKey ? "redo" : "undo");
+    app.undo(event.shiftKey ? "redo" : "undo");
     return;
   }
   if (typing || event.ctrlKey || event.metaKey) return;
   if (event.key === "?") { showKeys(); return; }
   if (!app.project) return;
-  const number = "123456789".indexOf(event.key);
-  if (number >= 0 && number < STEPS.length && !app.step.digits) { app.go(STEPS[number]); return; }
+  if (event.target === app.stage.canvas || event.target === document.body) {
+    if (event.key === "k" && !app.step.digits) { event.preventDefault(); app.stage.toggleCursor(); return; }
+    if (app.stage.cursorKey(event)) { event.preventDefault(); return; }
+  }
+  const number = "1234567890".indexOf(event.key);
+  if (number >= 0 && number < STEPS.length && !app.step.digits?.includes(event.key)) { app.go(STEPS[number]); return; }
   if (app.step.key?.(app, event)) { event.preventDefault(); return; }
-  const keys = { f: () => app.stage.fit(), F: () => app.stage.fit(), l: () => { app.stage.loupe = !app.stage.loupe; app.stage.redraw(); }, "+": () => app.stage.zoom(1.3), "=": () => app.stage.zoom(1.3), "-": () => app.stage.zoom(1 / 1.3), ArrowLeft: () => app.show(app.frame - 1), ArrowRight: () => app.show(app.frame + 1) };
+  const keys = { y: () => toggleLayers(app), f: () => app.stage.fit(), F: () => app.stage.fit(), l: () => { app.stage.loupe = !app.stage.loupe; app.stage.redraw(); }, "+": () => app.stage.zoom(1.3), "=": () => app.stage.zoom(1.3), "-": () => app.stage.zoom(1 / 1.3), ArrowLeft: () => app.show(app.frame - 1), ArrowRight: () => app.show(app.frame + 1) };
   if (keys[event.key] && event.target.type !== "range") { event.preventDefault(); keys[event.key](); }
 });
 
-function undo(which) {
-  const what = app.project[which];
-  if (what) app.change(which, {}, "", () => tell(which === "undo" ? `Undone: ${what}` : `Done again: ${what}`));
-}
+/** Undo the last action, whatever step it was in, or repeat it; a step shows the photograph and pair of a verdict. */
+app.undo = (which = "undo") => {
+  if (!app.project[which]) { notify(`There is no action to ${which}`); return; }
+  app.change(which, {}, "", (answer) => {
+    notify(`${which === "undo" ? "Undone" : "Redone"}: ${answer.undone ?? answer.redone}`);
+    if (answer.verdict) app.step.reverted?.(app, answer.verdict);
+  });
+};
 
 at("brand").addEventListener("click", app.home);
-at("undo").addEventListener("click", () => undo("undo"));
-at("redo").addEventListener("click", () => undo("redo"));
+at("undo").addEventListener("click", () => app.undo("undo"));
+at("redo").addEventListener("click", () => app.undo("redo"));
 at("help").addEventListener("click", showKeys);
 matchMedia("(prefers-color-scheme: light)").addEventListener("change", app.paint);
 
 app.queue(async () => {
-  const asked = new URLSearchParams(location.hash.slice(1));
-  if (!asked.get("at")) { app.home(); return; }
-  try { app.open(await ask("project", { at: asked.get("at") }), asked.get("step")); } catch (error) { tell(error.message, true); app.home(); }
+  const wanted = new URLSearchParams(location.hash.slice(1));
+  if (!wanted.get("at")) { app.home(); return; }
+  try { app.open(await request("project", { at: wanted.get("at") }), wanted.get("step")); } catch (error) { notify(error.message, true); app.home(); }
+});
+
+// Back and Forward of the browser are steps; the first page and other experiments are among them.
+addEventListener("hashchange", () => {
+  const wanted = new URLSearchParams(location.hash.slice(1)), place = wanted.get("at"), name = wanted.get("step");
+  if (!place) { if (app.project) app.home(); return; }
+  if (app.project?.at === place) { if (name !== app.step.name && STEPS.some((each) => each.name === name)) app.goTo(name); return; }
+  app.queue(async () => app.open(await request("project", { at: place }), name));
 });

@@ -1,4 +1,4 @@
-// Elements, questions to the server, sentences for the person. Texts enter the page as text only.
+// Elements, requests to the server, messages to the user. Texts enter the page as text only.
 
 export const at = (id) => document.getElementById(id);
 
@@ -17,16 +17,20 @@ export function h(tag, values = {}, ...children) {
   return element;
 }
 
-export async function ask(question, values = {}) {
-  const answer = await fetch(`/ask/${question}`, {
-    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values),
-  });
+export async function request(endpoint, values = {}) {
+  let answer;
+  try {
+    answer = await fetch(`/api/${endpoint}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values) });
+  } catch {
+    dispatchEvent(new Event("unanswered"));
+    throw new Error("The workbench does not answer: nothing was changed");
+  }
   if (!answer.ok) throw new Error(await answer.text());
   return answer.json();
 }
 
 let timer = 0;
-export function tell(text, wrong = false) {
+export function notify(text, wrong = false) {
   at("toast").textContent = text;
   at("toast").className = wrong ? "shown wrong" : "shown";
   clearTimeout(timer);
@@ -34,9 +38,9 @@ export function tell(text, wrong = false) {
 }
 
 export const SIGNS = { good: "✓", doubtful: "!", missing: "○" };
-export const sign = (mark) => h("span", { class: `sign ${mark}`, title: mark }, SIGNS[mark] ?? "");
+export const sign = (mark) => h("span", { class: `sign ${mark}`, title: mark, role: "img", "aria-label": mark }, SIGNS[mark] ?? "");
 
-/** A number field that tells its value when it is left or Enter is pressed. */
+/** A number field; onvalue gets its text when it is left or Enter is pressed. */
 export function numberField(label, value, unit, onvalue, more = {}) {
   const input = h("input", { type: "text", inputMode: "decimal", value: value === null || value === undefined ? "" : String(value), ...more,
     onchange: () => onvalue(input.value.trim()), onkeydown: (event) => event.key === "Enter" && input.blur() });
@@ -46,7 +50,7 @@ export function numberField(label, value, unit, onvalue, more = {}) {
 
 export const fact = (name, value) => h("div", { class: "fact" }, h("span", {}, name), h("span", {}, value));
 
-/** A number as a person reads it: so many digits that count. */
+/** A number with so many significant digits. */
 export function digits(value, count = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   return String(Number(value.toPrecision(count)));
@@ -58,9 +62,9 @@ export function parse(text, what) {
   return value;
 }
 
-/** The canvas of a chart, sharp on every screen; draw gets (context, width, height). */
-export function chart(height, draw, more = {}) {
-  const canvas = h("canvas", { class: "chart", style: { height: `${height}px` }, ...more });
+/** The canvas of a chart, sharp on every screen; words: what it shows; draw gets (context, width, height). */
+export function chart(height, words, draw) {
+  const canvas = h("canvas", { class: "chart", style: { height: `${height}px` }, role: "img", "aria-label": words });
   requestAnimationFrame(() => {
     const width = canvas.clientWidth, dense = devicePixelRatio || 1;
     canvas.width = width * dense; canvas.height = height * dense;

@@ -1,4 +1,4 @@
-// The units that a person reads and types; the files hold metres and pascals. What is chosen stays on this machine.
+// The units of the page; the files hold metres and pascals. The choice is stored in this browser.
 
 import { digits, h, parse } from "/page/dom.js";
 
@@ -8,9 +8,9 @@ const KINDS = {
 };
 const chosen = {};
 for (const kind of Object.keys(KINDS)) {
-  let told = null;
-  try { told = localStorage.getItem(`unit ${kind}`); } catch { /* a browser that keeps nothing */ }
-  chosen[kind] = Object.hasOwn(KINDS[kind], told ?? "") ? told : Object.keys(KINDS[kind])[0];
+  let stored = null;
+  try { stored = localStorage.getItem(`unit ${kind}`); } catch { /* a browser that keeps nothing */ }
+  chosen[kind] = Object.hasOwn(KINDS[kind], stored ?? "") ? stored : Object.keys(KINDS[kind])[0];
 }
 
 /** What one of the chosen unit is in SI. */

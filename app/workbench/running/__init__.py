@@ -1,2 +1,1 @@
-"""A run as a child process, the same `rodsight run` that a person types: begun, paused, gone on with, cancelled.
-Knows no page."""
+"""A run as a child process, the same `rodsight run` that a user types: started, paused, resumed, cancelled."""

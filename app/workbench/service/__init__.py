@@ -1,2 +1,1 @@
-"""The page's other half: a local server and the questions that it answers.
-Stands on everything that the workbench can do; the page itself, in page/, is plain files."""
+"""The local server of the page and the endpoints that it serves; the page itself, in page/, is plain files."""

@@ -1,97 +1,123 @@
-"""One experiment that is open in the workbench: its draft, what is understood of it, its photographs as pictures."""
+"""One experiment that is open in the workbench: its draft, its validation, its photographs as pictures, its run."""
 
 from __future__ import annotations
 
+import math
 import threading
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from ...errors import InputError
 from ...experiment.experiment import GrainGuess
-from ...experiment.photographs import Channel, Image, read_photograph
+from ...experiment.photographs import Channel, Image, ImageSelection, read_photograph
+from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
-from ...promise import measure_photographs
-from ...run_folder import SUMMARY
+from ...out_of_date import out_of_date
+from ...prediction import measure_photographs
+from ...process.errors import InputError
+from ...recording.look.canvas import Canvas
+from ...results.manifest import MANIFEST
+from ...reviewing.reviewed_run import ReviewedRun
+from ...reviewing.session import ReviewSession
+from ...run_folder import RESULTS, SUMMARY, is_same_file, owner_of
 from ...tracking.picture_quality import PictureQuality
 from ...verdicts.log import VERDICTS
-from ..inspecting.found import Found, find_run, run_stamp
-from ..mending.mender import Mender
+from ..correcting.pose_editor import PoseEditor
+from ..inspecting.run_data import RunData, read_finished_run, read_run, run_stamp
 from ..running.job import Job
 from ..setup.circles import circles_of
 from ..setup.draft import Draft, stamp_of
 from ..setup.edits import TABLES
-from ..setup.folder import run_facts, run_folder
-from ..setup.steps import Understood, judge
+from ..setup.experiment_folders import run_folder, run_overview, valid_name
+from ..setup.journal import PLACE, Journal
+from ..setup.validation import ValidationResult, outside_walls, validate
 
+NOT_OWN = "of_another_experiment"  # below the run's folder of another experiment: nothing is there
 KEPT = 6  # photographs in memory: the one shown, two to either side, the first
 KEPT_PICTURES, SMALL_PICTURE = 32, 2_000_000  # of them as they were sent; [bytes]
 QUALITY = 90  # of JPEG
-CROP = 240  # [px] of a crop as it is sent
+BEYOND = 58  # grey level of a crop beyond the edge of the photograph
 
 
-def as_jpeg(image: Image, widest: int) -> bytes:
-    """A photograph as JPEG, no wider or higher than so many pixels."""
+class Scene(NamedTuple):
+    """The picture over which a run is drawn: the photograph, or a plain ground where there is none."""
+
+    scale: Scale
+    bounds: tuple[float, float, float, float]  # [px] left, top, right, bottom
+
+
+def encode_jpeg(image: Image, widest: int) -> bytes:
+    """Encode a photograph as JPEG, no wider or higher than so many pixels."""
     shrink = min(1.0, widest / max(image.shape))
     small = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA) if shrink < 1.0 else image
-    grey = np.clip(np.rint(small), 0, 255).astype(np.uint8)
+    return _jpeg(small)
+
+
+def _jpeg(image: NDArray[Any]) -> bytes:
+    grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
     return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
 
 
 class Project:
     """An experiment's folder under the folder that the workbench was opened on."""
 
-    def __init__(self, root: Path, folder: Path) -> None:
-        self.root, self.folder = root, folder
-        self.draft = Draft(folder)
+    def __init__(self, root: Path, folder: Path, run: Path | None = None) -> None:
+        """Open the experiment of a folder; run: folder of its results, default runs/<name> below the root."""
+        self.root, self.folder, self._run = root, folder, run
+        self.draft = Draft(folder, Journal(folder / PLACE), root=root)
         self.lock = threading.RLock()
         self.editing = threading.RLock()  # held from what an edit reads to what it writes
         self._photographs: OrderedDict[tuple[Path, int, Channel], Image] = OrderedDict()
         self._pictures: OrderedDict[tuple[Path, int, Channel, int], bytes] = OrderedDict()
         self._stamp: Any = None
-        self._understood: Understood | None = None
+        self._validation: ValidationResult | None = None
         self._job: Job | None = None
-        self._found: tuple[Any, Found | None] = (None, None)
-        self._mender: tuple[Any, Mender] | None = None
-        self._mending = threading.Lock()
+        self._run_data: tuple[Any, RunData | None] = (None, None)
+        self._finished: tuple[Any, RunData | None] = (None, None)
+        self._editor: tuple[Any, PoseEditor] | None = None
+        self._making_editor = threading.Lock()
+        self._session: tuple[Any, ReviewSession] | None = None
         self._quality: tuple[Any, PictureQuality] | None = None
         self._measuring = threading.Lock()
+        self._outdated: tuple[str, list[str]] | None = None
+        self._owner_read: tuple[Any, Path | None] | None = None
 
     @property
     def key(self) -> str:
-        """How the page calls it: the path from the root."""
+        """The experiment in requests: its path from the root."""
         return self.folder.relative_to(self.root).as_posix()
 
-    def understood(self) -> Understood:
-        """What the files say now; read again only where one has changed."""
+    def validation(self) -> ValidationResult:
+        """Validate the files; they are read again only where one has changed."""
         with self.lock:
             data = self.draft.data()
             stamp = self.draft.stamps(_tables(data)), self._pattern_stamp(data)
-            if self._understood is None or stamp != self._stamp:
-                self._stamp, self._understood = stamp, judge(self.draft)
-            return self._understood
+            if self._validation is None or stamp != self._stamp:
+                self._stamp, self._validation = stamp, validate(self.draft)
+            return self._validation
 
     def quality(self) -> PictureQuality:
-        """What the photographs are good for; measured again only where photographs, region, channel or rods change."""
-        found = self.understood()
+        """Measure the photographs; again only where photographs, region, channel or rods change."""
+        found = self.validation()
         if found.experiment is None or found.shape is None:
-            raise InputError(self.draft.file, "key photographs", "names nothing that can be looked at yet")
+            raise InputError(self.draft.file, "key photographs", "names no photograph that can be measured yet")
         section, rods = found.data.get("photographs", {}), found.rods
-        told = tuple(str(section.get(key)) for key in ("channel", "region", "follow"))
-        stamp = found.files, self._pattern_stamp(found.data), told, _size_of(rods)
-        with self._measuring:  # not the other lock: pictures are answered meanwhile
+        settings = tuple(str(section.get(key)) for key in ("channel", "region", "mask", "follow"))
+        stamp = found.files, self._pattern_stamp(found.data), settings, _size_of(rods)
+        with self._measuring:  # not the other lock: pictures are served meanwhile
             if self._quality is None or self._quality[0] != stamp:
                 self._quality = stamp, measure_photographs(found.experiment, rods)
             return self._quality[1]
 
     def photograph(self, frame: int) -> Image:
-        """One photograph, grey; those looked at last are kept."""
+        """Read one photograph, grey; those used last are kept."""
         key = self._photograph_key(frame)
         with self.lock:
             if key in self._photographs:
@@ -104,22 +130,30 @@ class Project:
                 self._photographs.popitem(last=False)
         return image
 
+    def used_photograph(self, frame: int) -> Image:
+        """Read one photograph without what lies outside its region, or under its mask."""
+        image, experiment = self.photograph(frame), self.validation().experiment
+        section = None if experiment is None else experiment.config.photographs
+        return image if section is None else ImageSelection(region=section.region, mask=section.mask).cut(image)
+
     def _photograph_key(self, frame: int) -> tuple[Path, int, Channel]:
-        """What a photograph is, as long as its file and the channel stay the same. Raises InputError."""
-        found = self.understood()
+        """A name of a photograph that changes with its file and the channel. Raises InputError."""
+        found = self.validation()
         if not 0 <= frame < len(found.files):
             raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
         file, section = found.files[frame], found.data.get("photographs", {})
-        return file, file.stat().st_mtime_ns, section.get("channel", "grey")
+        if not file.resolve().is_relative_to(self.root.resolve()):
+            raise InputError(file, "", f"lies outside of {self.root}: open the folder that holds both")
+        return file, hash(stamp_of(file)), section.get("channel", "grey")
 
     def picture(self, frame: int, widest: int) -> bytes:
-        """One photograph as JPEG, no wider or higher than so many pixels; small ones that were sent last are kept."""
+        """Encode one photograph as JPEG, no wider or higher than so many pixels; small ones sent last are kept."""
         key = *self._photograph_key(frame), widest
         with self.lock:
             if key in self._pictures:
                 self._pictures.move_to_end(key)
                 return self._pictures[key]
-        picture = as_jpeg(self.photograph(frame), widest)
+        picture = encode_jpeg(self.photograph(frame), widest)
         if len(picture) <= SMALL_PICTURE:
             with self.lock:
                 self._pictures[key] = picture
@@ -129,101 +163,209 @@ class Project:
 
     @property
     def name(self) -> str:
-        told = self.draft.data().get("name")
-        return told if isinstance(told, str) else self.folder.name
+        name = self.draft.data().get("name")
+        if isinstance(name, str) and valid_name(name) == name:  # no path leads out of runs/
+            return name
+        return valid_name(self.folder.name)
+
+    @property
+    def run_folder(self) -> Path:
+        """The folder that a run writes to."""
+        if self._run is not None:
+            return self._run
+        folder = run_folder(self.root, self.name)
+        if not folder.resolve().is_relative_to(self.root.resolve()):
+            raise InputError(folder, "", f"leads outside of {self.root}: open the folder that holds both")
+        return folder
 
     @property
     def results(self) -> Path:
-        """The folder of its run."""
-        return run_folder(self.root, self.name)
+        """The folder of its run; where another experiment has that folder, one that does not exist."""
+        folder = self.run_folder
+        owner = self._owner(folder)
+        own = owner is None or is_same_file(owner, self.draft.file) or not owner.is_file()  # moved
+        return folder if own else folder / NOT_OWN
 
-    def crop(self, frame: int, x: float, y: float, width: int) -> bytes:
-        """A square of a photograph about a place [px], shifted by parts of a pixel, as JPEG of CROP pixels."""
-        if not 4 <= width <= 4000:
-            raise InputError("crop", f"width = {width}", "is not a width that can be shown")
-        image = self.photograph(frame)
-        grown = CROP / width
-        shift = np.array([[grown, 0.0, 0.5 * CROP - grown * x], [0.0, grown, 0.5 * CROP - grown * y]])
-        square = cv2.warpAffine(image, shift, (CROP, CROP), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        grey = np.clip(np.rint(square), 0, 255).astype(np.uint8)
-        return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+    def _owner(self, folder: Path) -> Path | None:
+        """The experiment that a run's folder belongs to; read again only where that has changed."""
+        stamp = folder, stamp_of(folder / MANIFEST)
+        if self._owner_read is None or self._owner_read[0] != stamp:
+            self._owner_read = stamp, owner_of(folder)
+        return self._owner_read[1]
+
+    def crop(self, frame: int, place: tuple[float, float], width: float, shape: tuple[int, int]) -> bytes:
+        """Encode a part of a photograph as JPEG, moved by fractions of a pixel.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the photograph.
+        place : tuple of float
+            Centre of the part [px].
+        width : float
+            Width of the part [px].
+        shape : tuple of int
+            Rows and columns of the picture that is sent.
+        """
+        rows, columns = shape
+        zoom = columns / width
+        # A place is the centre of a pixel where it is a whole number.
+        matrix = np.array([
+            [zoom, 0.0, 0.5 * (columns - 1) - zoom * place[0]], [0.0, zoom, 0.5 * (rows - 1) - zoom * place[1]]
+        ])  # fmt: skip
+        return _jpeg(cv2.warpAffine(
+            self.photograph(frame), matrix, (columns, rows), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(BEYOND,),
+        ))  # fmt: skip
 
     def photograph_count(self) -> int:
-        """How many photographs there are now."""
-        return len(self.understood().files)
+        """Count the photographs that are there now."""
+        return len(self.validation().files)
+
+    def frame_count(self) -> int:
+        """Count the photographs, or, where tracks are given, the frames of the run."""
+        count = self.photograph_count()
+        data = None if count else self.run_data()
+        return count if data is None else data.stop
 
     @property
     def job(self) -> Job:
-        """Its runs, one at a time."""
+        """The runs of the experiment, one at a time."""
         with self.lock:
             if self._job is None or (self._job.results != self.results and self._job.process is None):
                 self._job = Job(self.root, self.folder, self.results)
             return self._job
 
-    def found(self) -> Found | None:
-        """What its run has found so far; read again only where something has come."""
+    def run_data(self) -> RunData | None:
+        """Read the frames of the run that are solved; again only where one was added."""
         with self.lock:
             stamp = self.results, run_stamp(self.results)
-            if self._found[0] != stamp:
-                former = self._found[1] if self._found[0] and self._found[0][0] == self.results else None
-                self._found = stamp, find_run(self.results, former)
-            return self._found[1]
+            if self._run_data[0] != stamp:
+                former = self._run_data[1] if self._run_data[0] and self._run_data[0][0] == self.results else None
+                self._run_data = stamp, read_run(self.results, former)
+            return self._run_data[1]
 
-    def mender(self, make: Callable[[], Mender]) -> Mender:
-        """What correlates its rods again; made anew where the run's rods have changed."""
-        with self._mending:  # not the other lock: pictures are answered while it is made
+    def reviewed_run(self) -> ReviewedRun:
+        """Return the finished results with their experiment; raise InputError where there are none."""
+        data, experiment = self._finished_data(), self.validation().experiment
+        if data is None or data.results is None:
+            raise InputError(self.results, "", "holds no finished results: let the run end first")
+        if experiment is None:
+            raise InputError(self.draft.file, "", "cannot be read")
+        return ReviewedRun(self.results / RESULTS, data.results, experiment, data.first)
+
+    def review_session(self) -> ReviewSession:
+        """Return the review of the finished results; a new one where the results or the experiment have changed."""
+        with self.lock:
+            stamp = self.results, run_stamp(self.results), self.draft.stamps(_tables(self.draft.data()))
+            if self._session is None or self._session[0] != stamp:
+                self._session = stamp, ReviewSession(self.reviewed_run(), self._scene(self._finished_data()).scale)
+            return self._session[1]
+
+    def _finished_data(self) -> RunData | None:
+        """The finished results, also while a later run is in progress."""
+        with self.lock:
+            data = self.run_data()
+            if data is not None and data.results is not None:
+                return data
+            stamp = stamp_of(self.results / RESULTS)
+            if self._finished[0] != stamp:
+                self._finished = stamp, read_finished_run(self.results)
+            return self._finished[1]
+
+    def scene(self) -> Scene:
+        """Return scale and size of the picture over which the run is drawn; raise InputError where there is none.
+
+        The scale contains the run's calibration of the lens. Where tracks are given the ground is plain.
+        """
+        return self._scene(self.run_data())
+
+    def _scene(self, data: RunData | None) -> Scene:
+        validation = self.validation()
+        section = validation.experiment.config.photographs if validation.experiment is not None else None
+        if section is not None and validation.shape is not None:
+            height, width = validation.shape
+            calibration = data.results.calibration if data is not None and data.results is not None else None
+            return Scene(make_scale(section, height, calibration), (-0.5, -0.5, width - 0.5, height - 0.5))
+        if not validation.tracked or data is None:
+            raise InputError(self.draft.file, "photographs", "are not there: forces cannot be drawn over them")
+        canvas = Canvas.around(data.tracks, None)
+        bounds = (canvas.left - 0.5, canvas.top - 0.5, canvas.right - 0.5, canvas.bottom - 0.5)
+        return Scene(canvas.scale, bounds)
+
+    def pose_editor(self, make: Callable[[], PoseEditor]) -> PoseEditor:
+        """Return the editor of the rods' poses; a new one where the rods of the run have changed."""
+        with self._making_editor:  # not the other lock: pictures are served while it is made
             stamp = self.results, run_stamp(self.results)[1]
-            if self._mender is None or self._mender[0] != stamp:
-                self._mender = stamp, make()
-            return self._mender[1]
+            if self._editor is None or self._editor[0] != stamp:
+                self._editor = stamp, make()
+            return self._editor[1]
 
     def given_scale(self) -> Scale:
-        """What a pixel is told to be. Raises InputError where it is not."""
-        scale = self.understood().scale
+        """Return the scale of the experiment file; raise InputError where there is none."""
+        scale = self.validation().scale
         if scale is None:
             raise InputError(self.draft.file, "key photographs.pixel_size", "is missing: set the scale first")
         return scale
 
     def stamp(self) -> str:
-        """Another text wherever anything of it has changed, whoever changed it."""
+        """Return a text that changes with every file of the experiment and its run, whoever changed it."""
         data = self.draft.data()
-        told = (self.results / name for name in (VERDICTS, SUMMARY))
-        seen = self.draft.stamps(_tables(data)), self._pattern_stamp(data), run_stamp(self.results)[1:]
-        return f"{zlib.crc32(repr((seen, [stamp_of(file) for file in told])).encode()):08x}"
+        written = [stamp_of(self.results / name) for name in (VERDICTS, SUMMARY)]
+        stamps = self.draft.stamps(_tables(data)), self._pattern_stamp(data), run_stamp(self.results)[1:]
+        return f"{zlib.crc32(repr((stamps, written)).encode()):08x}"
+
+    def out_of_date(self) -> list[str]:
+        """Return the reasons for which the results are out of date."""
+        with self.lock:
+            stamp = self.stamp()
+            if self._outdated is None or self._outdated[0] != stamp:
+                self._outdated = stamp, out_of_date(self.results)
+            return self._outdated[1]
+
+    def _run_overview(self) -> dict[str, Any] | None:
+        found = run_overview(self.results)
+        return None if found is None else found | {"out_of_date": self.out_of_date()}
 
     def close(self) -> None:
-        """Pause what runs."""
+        """Pause the run."""
         if self._job is not None:
             self._job.close()
 
-    def glance(self) -> dict[str, Any]:
-        """What the first page shows of it."""
-        told: dict[str, Any] = {"at": self.key, "name": self.folder.name, "run": None, "steps": [], "frames": 0}
+    def overview(self) -> dict[str, Any]:
+        """Describe the experiment for the first page."""
+        values: dict[str, Any] = {"at": self.key, "name": self.folder.name, "run": None, "steps": [], "frames": 0}
         try:
-            found = self.understood()
-        except InputError as error:
-            return told | {"complaint": str(error)}
-        return told | {
-            "name": self.name, "run": run_facts(self.results), "frames": len(found.files),
-            "steps": [each.mark.value for each in found.steps.values()],
-        }  # fmt: skip
+            found = self.validation()
+            return values | {
+                "name": self.name, "run": self._run_overview(), "frames": len(found.files),
+                "steps": [each.mark.value for each in found.steps.values()],
+            }  # fmt: skip
+        except (InputError, OSError, RecursionError) as error:
+            return values | {"error": str(error) or "is nested too deeply"}
 
     def describe(self) -> dict[str, Any]:
-        """All that the page shows of the set-up; places in pixels, everything else in SI units."""
-        found = self.understood()
+        """Describe the set-up for the page; places in pixels, everything else in SI units."""
+        found = self.validation()
         section = found.data.get("photographs", {})
         height, width = found.shape or (0, 0)
+        bounds: tuple[float, ...] | None = None
+        if found.tracked and self.run_data() is not None:
+            bounds = self.scene().bounds
+            width, height = math.ceil(bounds[2] - bounds[0]), math.ceil(bounds[3] - bounds[1])
         return {
             "at": self.key, "stamp": self.stamp(), "name": self.name, "folder": str(self.folder), "ready": found.ready,
-            "steps": [{"name": s.name, "mark": s.mark.value, "says": s.says} for s in found.steps.values()],
-            "others": found.others, "tracked": found.tracked, "width": width, "height": height,
-            "files": [file.name for file in found.files], "photographs": section,
+            "steps": [{"name": s.name, "mark": s.mark.value, "messages": s.messages} for s in found.steps.values()],
+            "other_messages": found.other_messages, "tracked": found.tracked, "width": width, "height": height,
+            "bounds": bounds,
+            "files": [file.name for file in found.files], "frames": self.frame_count(), "photographs": section,
             "pixel": None if found.scale is None else found.scale.mean_size,
-            "walls": _walls(found), "rods": _rods(found), "material": found.data.get("material", {}),
+            "walls": _walls(found), "rods": _rods(found),
+            "outside": outside_walls(found), "material": found.data.get("material", {}),
             "tables": _named_tables(found),
-            "undo": self.draft.done[-1].what if self.draft.done else None,
-            "redo": self.draft.undone[-1].what if self.draft.undone else None,
-            "run": run_facts(self.results),
+            "undo": None if (done := self.draft.journal.last_done()) is None else done.name,
+            "redo": None if (undone := self.draft.journal.last_undone()) is None else undone.name,
+            "run": self._run_overview(),
         }  # fmt: skip
 
     def _pattern_stamp(self, data: dict[str, Any]) -> Any:
@@ -239,46 +381,46 @@ class Project:
 
 
 def _tables(data: dict[str, Any]) -> list[str]:
-    """Names of the tables that an experiment file names, as far as it makes sense."""
+    """Names of the tables in an experiment file, valid or not."""
     names = []
-    for told in data.values():
-        if isinstance(told, dict):
-            names += [value for value in told.values() if isinstance(value, str) and value.endswith(".csv")]
+    for section in data.values():
+        if isinstance(section, dict):
+            names += [value for value in section.values() if isinstance(value, str) and value.endswith(".csv")]
     return names
 
 
-def _walls(found: Understood) -> list[dict[str, Any]]:
+def _walls(found: ValidationResult) -> list[dict[str, Any]]:
     if found.walls is None or found.scale is None:
         return []
     ends = found.scale.to_pixels(found.walls.endpoints[0])
     plates = found.data.get("walls", {})
     circles = {each.name: asdict(each) for each in circles_of(found)}
-    told = []
+    listed = []
     for name, line, pressure in zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True):
         plate = plates.get(name)
-        told.append({
+        listed.append({
             "name": name, "line": line, "circle": circles.get(name),
             "pressure": None if pressure != pressure else pressure,
             "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
         })  # fmt: skip
-    return told
+    return listed
 
 
 def _size_of(rods: GrainGuess | None) -> tuple[int, int] | None:
-    """What a measurement on some of the rods hangs on: a rod that is moved, or ten that are added, changes nothing."""
+    """Number and size of the rods, coarse: a measurement on some of them stays valid when a rod moves."""
     return None if rods is None or not len(rods.id) else (len(rods.id) // 10, round(float(np.median(rods.radius))))
 
 
-def _named_tables(found: Understood) -> dict[str, Any]:
-    """Tables from elsewhere that the experiment names, by what they are; None: no such table."""
+def _named_tables(found: ValidationResult) -> dict[str, Any]:
+    """Tables of other programs that the experiment names, by their content; None: no such table."""
     sections = {section: found.data.get(section) for section, *_ in TABLES.values()}
     return {
-        name: told.get(name) if isinstance(told := sections[section], dict) else None
+        name: given.get(name) if isinstance(given := sections[section], dict) else None
         for name, (section, *_) in TABLES.items()
     }
 
 
-def _rods(found: Understood) -> dict[str, Any] | None:
+def _rods(found: ValidationResult) -> dict[str, Any] | None:
     rods = found.rods
     if rods is None:
         return None

@@ -1,7 +1,6 @@
-"""The recording of a run as the page gets it: the viewer of the installed wheel, the file under a secret name; and as
-one HTML file to be sent to anybody.
+"""The recording of a run: served to the viewer of the installed wheel, and written as one HTML file to be sent.
 
-Nothing of it is loaded before somebody asks for the recording.
+The viewer is loaded at its first request.
 """
 
 from __future__ import annotations
@@ -16,72 +15,74 @@ from pydantic import Field
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
-from ...errors import InputError
-from ...recording.files.cards import make_card
-from ...recording.files.share import share_recording
+from ...process.errors import InputError
+from ...recording.archive.cards import make_card
+from ...recording.archive.share import share_recording
 from ...recording.look.canvas import Canvas
 from ...recording.parts import parts_of
 from ...recording.viewing.single_page import write_single_page
 from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
 from ...run_folder import LATER, RECORDING, SIDE
-from .bench import Bench
+from .endpoints import Number, Text, Whole, endpoint
 from .project import Project
-from .questions import Number, Text, Whole, question
-from .run_questions import scale_of
+from .workbench import Workbench
 
 FILES = (RECORDING, SIDE)
-PATH = "/recording/"  # what the viewer asks for, without the page's cookie: <key>/<experiment>/<file>
+PATH = "/recording/"  # of the viewer's requests, which carry no cookie: <key>/<experiment>/<file>
 
 
-@question
-def recording(bench: Bench, at: Text) -> dict[str, Any]:
-    """Where the viewer finds the recording; and how many pixels of the photograph are one of its own."""
-    opened = bench.project(at)
+@endpoint
+def recording(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Return the addresses of the recording, and the pixels of the photograph in one of its own."""
+    opened = workbench.project(at)
     files = [name for name in FILES if (opened.results / name).is_file()]
     files += [each.name for each in parts_of(opened.results / RECORDING)[1:]]
     if RECORDING not in files:
-        raise InputError(opened.results, "", "holds no recording: let the run come to its end")
+        raise InputError(opened.results, "", "holds no recording: let the run end first")
     inner = f"{quote(opened.key)}/" if opened.key != "." else ""  # a browser would leave out "./"
-    folder = f"{PATH}{bench.key}/{inner}"
+    folder = f"{PATH}{workbench.key}/{inner}"
     size = sum((opened.results / name).stat().st_size for name in files)
     return {"addresses": [folder + name for name in files], "bytes": size, "shrink": _shrink(opened)}
 
 
-@question
+@endpoint
 def share(
-    bench: Bench, at: Text, first: Whole = 0, stop: Whole | None = None,
-    scale: Annotated[Number, Field(gt=0.0, le=1.0)] = 1.0,
+    workbench: Workbench, at: Text, first: Whole = 0, stop: Whole | None = None,
+    scale: Annotated[Number, Field(gt=0.0, le=1.0)] = 1.0, although_out_of_date: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
-    """Write the HTML file that any browser opens, as `rodsight share --html` does; frames first … stop − 1."""
-    opened = bench.project(at)
+    """Write the HTML file that any browser opens, as `rodsight share --html` does, of frames first … stop − 1."""
+    opened = workbench.project(at)
     source, target = opened.results / RECORDING, opened.results / f"{opened.results.name}-share.rrd"
     if not source.is_file():
-        raise InputError(opened.results, "", "holds no recording: let the run come to its end")
+        raise InputError(opened.results, "", "holds no recording: let the run end first")
+    reasons = [] if although_out_of_date else opened.out_of_date()
+    if reasons:
+        raise InputError(source, "", f"is out of date: {'; '.join(reasons)}; run the experiment again")
     try:
         report = share_recording(source, target, first=first, stop=stop, scale=scale)
     except ValueError as error:
         raise InputError(source, "", str(error)) from None
     write_single_page([target], target.with_suffix(".html"), title=opened.name, cards=[make_card(target)])
-    return shared(bench, at) | {"frames": report.frames}
+    return shared(workbench, at) | {"frames": report.frames}
 
 
-@question
-def shared(bench: Bench, at: Text) -> dict[str, Any]:
-    """The file that is there to be sent; file None: none yet. old: the recording is newer."""
-    opened = bench.project(at)
+@endpoint
+def shared(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Describe the file that can be sent; file None: there is none. old: the recording is newer."""
+    opened = workbench.project(at)
     page, recording = _page_of(opened), opened.results / RECORDING
     if not page.is_file():
         return {"file": None, "ready": recording.is_file()}
-    told = page.stat()
-    old = recording.is_file() and recording.stat().st_mtime > told.st_mtime
-    return {"file": str(page), "name": page.name, "bytes": told.st_size, "old": old, "ready": recording.is_file()}
+    stat = page.stat()
+    old = recording.is_file() and recording.stat().st_mtime > stat.st_mtime
+    return {"file": str(page), "name": page.name, "bytes": stat.st_size, "old": old, "ready": recording.is_file()}
 
 
-def answer_shared(bench: Bench, request: Request) -> Response:
-    """The HTML file, to be kept by the browser and not opened: it is no page of ours."""
-    page = _page_of(bench.project(request.query_params.get("at", "")))
+def answer_shared(workbench: Workbench, request: Request) -> Response:
+    """Send the HTML file as a download: it must not run as a page of this server."""
+    page = _page_of(workbench.project(request.query_params.get("at", "")))
     if not page.is_file():
-        return PlainTextResponse("nothing has been written to be shared yet", 404)
+        return PlainTextResponse("no file has been written to be shared yet", 404)
     return FileResponse(page, media_type="application/octet-stream", filename=page.name)
 
 
@@ -90,14 +91,14 @@ def _page_of(opened: Project) -> Path:
 
 
 def _shrink(opened: Project) -> int:
-    found = opened.found()
-    if found is None:
+    data = opened.run_data()
+    if data is None:
         return 1
-    return Canvas.around(found.tracks, scale_of(opened), opened.understood().shape).shrink
+    return Canvas.around(data.tracks, opened.scene().scale, opened.validation().shape).shrink
 
 
 class Viewer:
-    """The wheel's web viewer, read once, when it is first asked for."""
+    """The web viewer of the installed wheel, read at its first request."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -105,11 +106,11 @@ class Viewer:
         self._packed = b""
 
     def script(self) -> bytes:
-        """As a module, which needs no script element of the page's own."""
+        """Return the script as a module, which needs no script element of the page."""
         return self._read().script + b"\nexport default wasm_bindgen;\n"
 
     def module(self, *, packed: bool) -> bytes:
-        """WebAssembly; packed: by gzip, a third of its size."""
+        """Return the WebAssembly module; packed: compressed to a third of its size."""
         module = self._read().module
         if not packed:
             return module
@@ -125,7 +126,7 @@ class Viewer:
 
 
 def answer_viewer(viewer: Viewer, request: Request) -> Response:
-    """The script, or the module."""
+    """Send the script, or the module."""
     if request.url.path.endswith(".js"):
         return Response(viewer.script(), media_type="text/javascript")
     packed = "gzip" in request.headers.get("Accept-Encoding", "")
@@ -134,13 +135,13 @@ def answer_viewer(viewer: Viewer, request: Request) -> Response:
     return Response(viewer.module(packed=packed), media_type="application/wasm", headers=headers)
 
 
-def answer_recording(bench: Bench, request: Request) -> Response:
-    """The file; whether its name is the right one, the guard has seen."""
+def answer_recording(workbench: Workbench, request: Request) -> Response:
+    """Send the file; the guard has compared the secret part of its path."""
     name = request.path_params["name"]
     if name not in FILES and not LATER.fullmatch(name):
         return PlainTextResponse("there is nothing here", 404)
     try:
-        file = bench.project(request.path_params.get("at", ".")).results / name
+        file = workbench.project(request.path_params.get("at", ".")).results / name
     except InputError as error:
         return PlainTextResponse(str(error), 422)
     if not file.is_file():

@@ -1,93 +1,72 @@
-"""The workbench's server: on 127.0.0.1, behind the same gate as the review page.
+"""The workbench's server, on 127.0.0.1 behind one gate.
 
-It serves a fixed list of names, pictures of photographs by number, and the answers to questions: no path of a request
-reaches the file system but through the list of experiments.
+It serves a fixed list of files, pictures of photographs by number, and endpoints: no path of a request reaches the file
+system except through the list of experiments.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
-import secrets
 import socket
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response, StreamingResponse
+from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp
 
-from ...errors import InputError, RunError
-from ...recording.viewing.gate import SAFE_HEADERS, Gate
-from ..inspecting.found import run_stamp
-from . import inspect_questions, mend_questions, run_questions, setup_questions  # noqa: F401  they add their questions
-from .bench import Bench
+from ...process.errors import InputError, RunError
+from ...recording.viewing.gate import Gate
+from ...reviewing.session import UnknownPair
+from ..inspecting.run_data import run_stamp
+from . import (  # noqa: F401  importing them registers their endpoints
+    correction_endpoints,
+    inspect_endpoints,
+    review_endpoints,
+    run_endpoints,
+    setup_endpoints,
+)
+from .endpoints import (
+    BadRequest,
+    CropQuery,
+    ExperimentQuery,
+    PhotographQuery,
+    ThumbnailQuery,
+    call_endpoint,
+)
+from .guard import Guard
 from .project import Project
-from .questions import BadRequest, answer
 from .recordings import PATH, Viewer, answer_recording, answer_shared, answer_viewer
+from .workbench import Workbench
 
-LARGEST_BODY = 256 * 1024  # bytes of a question
-WIDEST = 20_000  # [px] of a picture
-GLIMPSE = 480  # [px] of a picture on the first page
-NEWS = 0.4  # [s] between looks for what is new
+LARGEST_BODY = 256 * 1024  # bytes of a request
+THUMBNAIL = 480  # [px] of a picture on the first page
+POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
     ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
     ".js": "text/javascript; charset=utf-8",
 }  # fmt: skip
-HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Content-Type", "Cookie")
 
 
-class Guard:
-    """Lets through what the gate has nothing against, and gives every answer the safe headers."""
+def make_application(workbench: Workbench, gate: Gate, entry: str = "/") -> ASGIApp:
+    """Make the server's application, without a network.
 
-    def __init__(self, application: ASGIApp, gate: Gate, key: str) -> None:
-        self.application, self.gate = application, gate
-        self.named = f"{PATH}{key}/"  # what begins so may be asked for without a cookie: the viewer keeps none
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.application(scope, receive, send)
-            return
-        request = Request(scope)
-
-        async def send_safely(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                told = {name.lower() for name, _ in message["headers"]}
-                safe = {"Cache-Control": "no-store"} | SAFE_HEADERS
-                more = [(k.encode(), v.encode()) for k, v in safe.items() if k.lower().encode() not in told]
-                message = {**message, "headers": [*message["headers"], *more]}
-            await send(message)
-
-        refusal = self._refusal(request)
-        await (refusal or self.application)(scope, receive, send_safely)
-
-    def _refusal(self, request: Request) -> Response | None:
-        for name in ("host", "origin"):
-            if len(request.headers.getlist(name)) > 1:
-                return PlainTextResponse(f"{name} stands twice", 400)
-        entering = request.url.path == "/" and "token" in request.query_params
-        headers = {name: value for name in HEADERS if (value := request.headers.get(name)) is not None}
-        beginning = request.url.path[: len(self.named)].encode()
-        named = secrets.compare_digest(beginning, self.named.encode())
-        objection = self.gate.objection(headers, changes=request.method != "GET", entering=entering or named)
-        if objection is not None:
-            return PlainTextResponse(objection, 403)
-        if not entering:
-            return None
-        if not self.gate.opens(request.query_params["token"]):
-            return PlainTextResponse(f"this token is not the one that `rodsight {self.gate.command}` printed", 403)
-        return RedirectResponse("/", 303, {"Set-Cookie": self.gate.set_cookie})
-
-
-def make_application(bench: Bench, gate: Gate) -> ASGIApp:
-    """The server's whole behaviour, without a network."""
-    page = files(__name__.rsplit(".", 2)[0]) / "page"
-    assets = {file.name: file.read_bytes() for file in page.iterdir() if _kind(file.name) is not None}
-
+    Parameters
+    ----------
+    workbench : Workbench
+        The experiments.
+    gate : Gate
+        The access rules.
+    entry : str
+        Address to which the first visit is redirected.
+    """
+    assets = dict(_page_files(files(__name__.rsplit(".", 2)[0]) / "page"))
     viewer = Viewer()
 
     async def asset(request: Request) -> Response:
@@ -96,73 +75,70 @@ def make_application(bench: Bench, gate: Gate) -> ASGIApp:
             return PlainTextResponse("there is nothing here", 404)
         return Response(assets[name], headers={"Content-Type": _kind(name) or ""})
 
-    def picture(request: Request) -> Response:
-        query = request.query_params
-        return _answered(lambda: Response(
-            bench.project(query.get("at", "")).picture(_whole(query, "frame"), _whole(query, "size") or WIDEST),
-            media_type="image/jpeg",
-        ))  # fmt: skip
+    def photograph(request: Request) -> Response:
+        query = PhotographQuery.of(request)
+        return _jpeg(workbench.project(query.at).picture(query.frame, query.size))
 
-    def glimpse(request: Request) -> Response:
-        query = request.query_params
-        return _answered(lambda: Response(
-            bench.glimpse(_whole(query, "roll") if "roll" in query else None, GLIMPSE), media_type="image/jpeg",
-        ))  # fmt: skip
+    def thumbnail(request: Request) -> Response:
+        query = ThumbnailQuery.of(request)
+        return _jpeg(workbench.thumbnail(query.folder, query.suffix, THUMBNAIL))
 
     def crop(request: Request) -> Response:
-        query = request.query_params
-        return _answered(lambda: Response(
-            bench.project(query.get("at", "")).crop(
-                _whole(query, "frame"), 0.01 * _whole(query, "x"), 0.01 * _whole(query, "y"), _whole(query, "width")
-            ),
-            media_type="image/jpeg",
-        ))  # fmt: skip
+        query = CropQuery.of(request)
+        place, shape = (query.x, query.y), (query.rows, query.columns)
+        return _jpeg(workbench.project(query.at).crop(query.frame, place, query.width, shape))
 
-    async def ask(request: Request) -> Response:
-        if int(request.headers.get("Content-Length") or LARGEST_BODY + 1) > LARGEST_BODY:
-            return PlainTextResponse("a question must be short", 413)
+    async def call(request: Request) -> Response:
+        length = request.headers.get("Content-Length") or ""
+        if not length.isdecimal() or len(length) > 9 or int(length) > LARGEST_BODY:
+            return PlainTextResponse(f"a request has at most {LARGEST_BODY} bytes", 413)
         body = await request.body()
-        return await run_in_threadpool(_answered, lambda: _ask(bench, request.path_params["name"], body))
+        return await run_in_threadpool(_guarded, lambda: _call(workbench, request.path_params["name"], body))
 
-    async def events(request: Request) -> Response:
-        try:
-            opened = bench.project(request.query_params.get("at", ""))
-        except InputError as error:
-            return PlainTextResponse(str(error), 422)
-        return StreamingResponse(_news(bench, opened, request), media_type="text/event-stream")
+    def events(request: Request) -> Response:
+        opened = workbench.project(ExperimentQuery.of(request).at)
+        return StreamingResponse(_run_events(workbench, opened, request), media_type="text/event-stream")
+
+    def guarded(work: Callable[[Request], Response]) -> Callable[[Request], Response]:
+        return lambda request: _guarded(lambda: work(request))
 
     routes = [
         Route("/", asset, methods=["GET"]),
-        Route("/page/{name}", asset, methods=["GET"]),
-        Route("/photograph", picture, methods=["GET"]),
-        Route("/glimpse", glimpse, methods=["GET"]),
-        Route("/crop", crop, methods=["GET"]),
-        Route("/events", events, methods=["GET"]),
+        Route("/page/{name:path}", asset, methods=["GET"]),
+        Route("/photograph", guarded(photograph), methods=["GET"]),
+        Route("/thumbnail", guarded(thumbnail), methods=["GET"]),
+        Route("/crop", guarded(crop), methods=["GET"]),
+        Route("/events", guarded(events), methods=["GET"]),
         Route("/viewer/{name}", lambda request: answer_viewer(viewer, request), methods=["GET"]),
-        Route("/shared", lambda request: _answered(lambda: answer_shared(bench, request)), methods=["GET"]),
+        Route("/shared", guarded(lambda request: answer_shared(workbench, request)), methods=["GET"]),
         *(
-            Route(f"{PATH}{bench.key}/{place}{{name}}", lambda request: answer_recording(bench, request))
+            Route(f"{PATH}{workbench.key}/{place}{{name}}", lambda request: answer_recording(workbench, request))
             for place in ("{at:path}/", "")  # the root itself may be the experiment
         ),
-        Route("/ask/{name}", ask, methods=["POST"]),
+        Route("/api/{name}", call, methods=["POST"]),
     ]
-    return Guard(Starlette(routes=routes), gate, bench.key)
+    return Guard(Starlette(routes=routes), gate, f"{PATH}{workbench.key}/", entry)
 
 
 class WorkbenchServer:
-    """Serves one bench; port 0 takes a free one."""
+    """Serves one workbench; port 0 takes a free port."""
 
-    def __init__(self, bench: Bench, port: int = 0) -> None:
+    def __init__(self, workbench: Workbench, port: int = 0, *, command: str = "open", entry: str = "/") -> None:
+        """Bind the port; command: that prints the address; entry: address to which the first visit is redirected."""
         import uvicorn
 
-        self.bench = bench
+        self.workbench = workbench
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        self._socket.bind(("127.0.0.1", port))
-        self._socket.listen(128)  # a browser that is quicker than the server waits for it
-        self.gate = Gate(self._socket.getsockname()[1], "open")
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._socket.bind(("127.0.0.1", port))
+            self._socket.listen(128)  # a browser that is faster than the server waits
+        except BaseException:
+            self._socket.close()
+            raise
+        self.gate = Gate(self._socket.getsockname()[1], command)
         config = uvicorn.Config(
-            make_application(bench, self.gate), log_config=None, access_log=False, server_header=False,
+            make_application(workbench, self.gate, entry), log_config=None, access_log=False, server_header=False,
             lifespan="off", timeout_graceful_shutdown=1,
         )  # fmt: skip
         self._server = uvicorn.Server(config)
@@ -173,60 +149,79 @@ class WorkbenchServer:
         return self.gate.address
 
     def serve(self) -> None:
-        """Serve until shutdown is called, or until the person interrupts."""
+        """Serve until shutdown is called, or until the user interrupts."""
         self._server.run(sockets=[self._socket])
 
     def shutdown(self) -> None:
-        self.bench.closed = True
+        self.workbench.closed = True
         self._server.should_exit = True
 
     def close(self) -> None:
-        """Let go of the port, and pause what runs."""
-        self.bench.close()
+        """Release the port, and pause every run."""
+        self.workbench.close()
         self._socket.close()
 
 
-async def _news(bench: Bench, opened: Project, request: Request) -> AsyncIterator[str]:
-    """How the run stands, whenever that changes."""
+async def _run_events(workbench: Workbench, opened: Project, request: Request) -> AsyncIterator[str]:
+    """The state of the run, sent whenever it changes."""
     known: Any = None
-    while not await request.is_disconnected() and not bench.closed:
+    while not await request.is_disconnected() and not workbench.closed:
         stamp = await run_in_threadpool(
             lambda: (opened.job.version, run_stamp(opened.results), opened.photograph_count())
         )
         if stamp != known:
             known = stamp
-            told = await run_in_threadpool(lambda: answer(bench, "run_told", {"at": opened.key}))
-            yield f"data: {json.dumps(told)}\n\n"
-        await asyncio.sleep(NEWS)
+            state = await run_in_threadpool(lambda: call_endpoint(workbench, "run_state", {"at": opened.key}))
+            yield f"data: {json.dumps(state)}\n\n"
+        await asyncio.sleep(POLLING)
 
 
-def _ask(bench: Bench, name: str, body: bytes) -> Response:
+def _call(workbench: Workbench, name: str, body: bytes) -> Response:
     try:
         values = json.loads(body)
-    except (ValueError, RecursionError):  # not JSON, or deeper than anybody means
+    except (ValueError, RecursionError):  # not JSON, or nested too deeply
         raise BadRequest("this is not JSON") from None
     if not isinstance(values, dict):
-        raise BadRequest("a question has named values")
-    return JSONResponse(answer(bench, name, values))
+        raise BadRequest("a request has named values")
+    return _Json(call_endpoint(workbench, name, values))
 
 
-def _answered(work: Any) -> Response:
-    """The answer, or the sentence that says why there is none."""
+def _guarded(work: Callable[[], Response]) -> Response:
+    """The answer, or the sentence that states why there is none."""
     try:
         return work()
-    except BadRequest as error:
-        return PlainTextResponse(str(error), 400)
+    except (BadRequest, UnknownPair) as error:
+        return PlainTextResponse(_plain(str(error)), 400)
     except (InputError, RunError) as error:
-        return PlainTextResponse(str(error), 422)
+        return PlainTextResponse(_plain(str(error)), 422)
     except OSError as error:
-        return PlainTextResponse(f"{error.filename or ''} {error.strerror or error}".strip(), 500)
+        return PlainTextResponse(_plain(f"{error.filename or ''} {error.strerror or error}".strip()), 422)
 
 
-def _whole(query: Any, name: str) -> int:
-    text = query.get(name, "0")
-    if not text.isdecimal() or len(text) > 9:
-        raise BadRequest(f"{name} is not a whole number")
-    return int(text)
+class _Json(JSONResponse):
+    """An answer in which characters that are no UTF-8, as of a file's name, are replaced."""
+
+    def render(self, content: Any) -> bytes:
+        return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(errors="replace")
+
+
+def _plain(text: str) -> str:
+    return text.encode(errors="replace").decode()
+
+
+def _jpeg(content: bytes) -> Response:
+    return Response(content, media_type="image/jpeg")
+
+
+def _page_files(folder: Traversable, prefix: str = "") -> list[tuple[str, bytes]]:
+    """Names and contents of the page's files; those of inner folders are named folder/name."""
+    found = []
+    for each in folder.iterdir():
+        if each.is_dir():
+            found += _page_files(each, f"{prefix}{each.name}/")
+        elif _kind(each.name) is not None:
+            found.append((f"{prefix}{each.name}", each.read_bytes()))
+    return found
 
 
 def _kind(name: str) -> str | None:

@@ -8,21 +8,20 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import IN, STRAIGHT, circle_of
-
-from ...errors import InputError
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
 from ...experiment.walls import ARC_COLUMNS
+from ...process.errors import InputError
+from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import IN, STRAIGHT, circle_parameters
 from ...tracking.walls.round_edge import snap_to_rim
 from .draft import Draft, as_table
-from .steps import Understood
+from .validation import ValidationResult
 
 ARCS = "arcs.csv"
 RIM = 24  # points of a rod's rim that a circle around the rods must hold
 SNAP = 0.06  # of its radius, how far beside a drawn circle its edge is looked for
-FLAT = 1e-3  # a triangle lower than this share of its longest side is a line
+FLAT = 1e-3  # height of a triangle by its longest side below which it is a line
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +35,12 @@ class Circle:
     side: str = "in"  # where the packing is: in or out
 
 
-def circles_of(found: Understood) -> list[Circle]:
-    """The circular walls that are told."""
+def circles_of(found: ValidationResult) -> list[Circle]:
+    """List the circular walls of the experiment."""
     walls, scale = found.walls, found.scale
     if walls is None or scale is None:
         return []
-    centre, radius, _ = circle_of(walls.endpoints[0])
+    centre, radius, _ = circle_parameters(walls.endpoints[0])
     place = scale.to_pixels(centre)
     pixels = radius / scale.size_at(place)
     return [
@@ -50,23 +49,23 @@ def circles_of(found: Understood) -> list[Circle]:
     ]
 
 
-def set_circles(draft: Draft, found: Understood, circles: Sequence[Circle], what: str) -> None:
-    """Write the circular walls; what was told of those that go, goes. Bars stay as they are."""
+def set_circles(draft: Draft, found: ValidationResult, circles: Sequence[Circle], name: str) -> None:
+    """Write the circular walls, and delete the settings of those that are removed; bars are not changed."""
     if found.scale is None:
         raise InputError(draft.file, "key photographs.pixel_size", "is missing: set the scale before the walls")
-    told = dict(found.data.get("walls", {}))
-    gone = {each.name for each in circles_of(found)} - {each.name for each in circles}
-    told = {key: value for key, value in told.items() if key not in gone}
-    file = told.pop("arcs", ARCS)
+    section = dict(found.data.get("walls", {}))
+    removed = {each.name for each in circles_of(found)} - {each.name for each in circles}
+    section = {key: value for key, value in section.items() if key not in removed}
+    file = section.pop("arcs", ARCS)
     if circles:
-        told = {"arcs": file, **told}
-    elif "file" not in told:
-        told = {}
-    draft.set_keys(what, {"walls": told or None}, {file: arcs_table(circles, found.scale) if circles else None})
+        section = {"arcs": file, **section}
+    elif "file" not in section:
+        section = {}
+    draft.set_keys(name, {"walls": section or None}, {file: arcs_table(circles, found.scale) if circles else None})
 
 
 def arcs_table(circles: Sequence[Circle], scale: Scale) -> bytes:
-    """The table of arcs of frame 0, in metres."""
+    """Write the table of arcs of frame 0, in metres."""
     place = np.array([[each.x, each.y] for each in circles])
     world, size = scale.to_world(place), scale.size_at(place)
     rows = [
@@ -77,7 +76,7 @@ def arcs_table(circles: Sequence[Circle], scale: Scale) -> bytes:
 
 
 def circle_through(points: Array, name: str, side: str) -> Circle:
-    """The circle through three points (3, 2) [px]. Raises InputError where they lie on a line."""
+    """Return the circle through three points (3, 2) [px]; raise InputError where they lie on a line."""
     a, b, c = points
     ab, ac = b - a, c - a
     twice = float(ab[0] * ac[1] - ab[1] * ac[0])
@@ -89,11 +88,11 @@ def circle_through(points: Array, name: str, side: str) -> Circle:
     return Circle(name, float(a[0] + from_a[0]), float(a[1] + from_a[1]), float(np.linalg.norm(from_a)), side)
 
 
-def circle_around(found: Understood, name: str) -> Circle:
-    """The least circle that holds the rods of the first photograph. Raises InputError where there are too few."""
+def circle_around(found: ValidationResult, name: str) -> Circle:
+    """Return the smallest circle around the rods of the first photograph; raise InputError if they are too few."""
     rods = found.rods
     if rods is None or len(rods.id) < 8:
-        raise InputError("circle", "", "needs the rods: look for them first (step Rods), or click three points")
+        raise InputError("circle", "", "needs the rods: detect them first (step Rods), or click three points")
     angle = 2.0 * np.pi * np.arange(RIM) / RIM
     rim = np.stack([
         rods.x[:, None] + rods.radius[:, None] * np.cos(angle), rods.y[:, None] + rods.radius[:, None] * np.sin(angle)
@@ -103,14 +102,16 @@ def circle_around(found: Understood, name: str) -> Circle:
 
 
 def snapped(image: Image, circle: Circle) -> tuple[Circle, float]:
-    """A circle on the edge beside it, and how much of the edge is seen; where that is too little, as it was drawn."""
+    """Move a circle onto the edge beside it, if enough is visible; return it with the visible fraction of the edge."""
     reach = min(max(SNAP * circle.radius, 8.0), 40.0)
-    (x, y, radius), share = snap_to_rim(image, (circle.x, circle.y, circle.radius), reach, inside=circle.side == "in")
-    return replace(circle, x=x, y=y, radius=radius), share
+    (x, y, radius), fraction = snap_to_rim(
+        image, (circle.x, circle.y, circle.radius), reach, inside=circle.side == "in"
+    )
+    return replace(circle, x=x, y=y, radius=radius), fraction
 
 
 def with_circle(circles: Sequence[Circle], circle: Circle) -> list[Circle]:
-    """The circles with one more, or with the one of the same name as it is now."""
+    """Add a circle, or replace the one of the same name."""
     if any(each.name == circle.name for each in circles):
         return [circle if each.name == circle.name else each for each in circles]
     return [*circles, circle]

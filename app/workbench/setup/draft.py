@@ -1,4 +1,4 @@
-"""The files of an experiment that is being set up: read as they are, written whole, every change undone by one step."""
+"""The files of an experiment that is being set up: read as they are, written whole, every change with undo."""
 
 from __future__ import annotations
 
@@ -15,57 +15,56 @@ from typing import Any
 
 import tomli_w
 
-from ...atomic import write_atomically
-from ...errors import InputError
+from ...experiment.config.experiment_file import find_wrong_values
 from ...experiment.experiment import CONFIG_NAME
+from ...process.atomic import write_atomically
+from ...process.errors import InputError
+from .journal import Action, Contents, Journal, checksum_of
 
-Contents = dict[str, bytes | None]  # of files by name; None: there is none
-
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """What was done, and what the files were before it."""
-
-    what: str
-    before: Contents
+Stamp = tuple[str, int, int, int, int]
 
 
 @dataclass(slots=True)
 class Draft:
-    """The folder of one experiment. Nothing is kept but what can be undone."""
+    """The folder of one experiment, with the journal of its actions."""
 
     folder: Path
+    journal: Journal = field(default_factory=Journal)  # default: in memory
     lock: threading.RLock = field(default_factory=threading.RLock)
-    done: list[Change] = field(default_factory=list)
-    undone: list[Change] = field(default_factory=list)
+    root: Path | None = None  # nothing outside of it is read or written; None: the folder
+    _step: Contents | None = None  # files before the first change of a step that is not finished
 
     @property
     def file(self) -> Path:
         return self.folder / CONFIG_NAME
 
     def data(self) -> dict[str, Any]:
-        """The experiment file as it stands, valid or not; empty where there is none. Raises InputError if no TOML."""
+        """Read the experiment file, valid or not; empty where there is none. Raises InputError if it is no TOML."""
         content = self._read(CONFIG_NAME)
         try:
             return {} if content is None else tomllib.loads(content.decode("utf-8"))
         except ValueError as error:
             raise InputError(self.file, "", f"is not TOML: {error}") from None
+        except RecursionError:
+            raise InputError(self.file, "", "is nested too deeply") from None
 
-    def write(self, what: str, files: Mapping[str, bytes | None]) -> None:
-        """Write files whole, None: remove; one step of undo, called `what`."""
+    def write(self, name: str, files: Mapping[str, bytes | None]) -> None:
+        """Write whole files, None: remove; one step of undo with a name."""
         with self.lock:
-            before = {name: self._read(name) for name in files}
+            before = {file: self._read(file) for file in files}
             if before == dict(files):
                 return
-            self.done.append(Change(what, before))
-            self.undone = []
+            if self._step is None:
+                self.journal.record(name, before, files)
+            else:
+                self._step = {**before, **self._step}
             self._put(files)
 
     def with_keys(self, keys: Mapping[str, Any]) -> bytes:
-        """The experiment file with dotted keys set, None: removed; its first comment stays."""
+        """Return the experiment file with dotted keys set, None: removed; its first comment is kept."""
         data = deepcopy(self.data())
-        for name, value in keys.items():
-            *path, last = name.split(".")
+        for key, value in keys.items():
+            *path, last = key.split(".")
             place = data
             for part in path:
                 place = place.setdefault(part, {})
@@ -75,59 +74,99 @@ class Draft:
                 place[last] = value
         return (self._first_comment() + tomli_w.dumps(data)).encode()
 
-    def set_keys(self, what: str, keys: Mapping[str, Any], tables: Mapping[str, bytes | None] | None = None) -> None:
-        """Set dotted keys of the experiment file, and write tables with it."""
-        self.write(what, {**(tables or {}), CONFIG_NAME: self.with_keys(keys)})
+    def set_keys(self, name: str, keys: Mapping[str, Any], tables: Mapping[str, bytes | None] | None = None) -> None:
+        """Set dotted keys of the experiment file, and write tables with it, as one step of undo.
+
+        Raises
+        ------
+        InputError
+            A value is wrong: nothing is written.
+        """
+        content = self.with_keys(keys)
+        wrong = find_wrong_values(
+            self.file, tomllib.loads(content.decode()), [key for key in keys if keys[key] is not None]
+        )
+        if wrong:
+            raise InputError(wrong[0], "", "")
+        self.write(name, {**(tables or {}), CONFIG_NAME: content})
 
     @contextmanager
-    def one_step(self, what: str) -> Iterator[None]:
-        """Make one step of undo of all that is written meanwhile; where it fails, nothing was."""
+    def one_step(self, name: str) -> Iterator[None]:
+        """Join all changes inside the block to one step of undo; an exception reverts them."""
         with self.lock:
-            since = len(self.done)
+            if self._step is not None:  # part of a larger step
+                yield
+                return
+            self._step = {}
             try:
                 yield
             except BaseException:
-                while len(self.done) > since:
-                    self.undo()
+                self._put(self._step)
                 raise
-            changes, self.done = self.done[since:], self.done[:since]
-            if changes:
-                before = {name: content for each in reversed(changes) for name, content in each.before.items()}
-                self.done.append(Change(what, before))
+            else:
+                if self._step:
+                    self.journal.record(name, self._step, {file: self._read(file) for file in self._step})
+            finally:
+                self._step = None
 
     def undo(self) -> str | None:
-        """Take the last change back; gives what it was, None where there is none."""
-        return self._swap(self.done, self.undone)
+        """Undo the last change of files; return its name, None where there is none."""
+        return self.revert(self.journal.last_done(), back=True)
 
     def redo(self) -> str | None:
-        """Do again what was undone last."""
-        return self._swap(self.undone, self.done)
+        """Repeat the change that was undone last; return its name, None where there is none."""
+        return self.revert(self.journal.last_undone(), back=False)
 
-    def stamps(self, names: Iterable[str]) -> tuple[tuple[str, int, int], ...]:
-        """By which it is seen whether files have changed, whoever changed them."""
-        return tuple(stamp_of(self.folder / name) for name in (CONFIG_NAME, *names))
-
-    def _swap(self, source: list[Change], target: list[Change]) -> str | None:
+    def revert(self, action: Action | None, *, back: bool) -> str | None:
+        """Undo a change of files, or (back false) repeat it; raise InputError where another program changed them."""
+        if action is None:
+            return None
         with self.lock:
-            if not source:
-                return None
-            change = source.pop()
-            target.append(Change(change.what, {name: self._read(name) for name in change.before}))
-            self._put(change.before)
-            return change.what
+            expected, wanted = (action.after, action.before) if back else (action.before, action.after)
+            for name, checksum in expected.items():
+                content = self._read(name)
+                if (None if content is None else checksum_of(content)) != checksum:
+                    raise InputError(
+                        self.folder / name, "", f"was changed by another program after “{action.name}”: "
+                        f"{'undoing' if back else 'repeating'} it here would overwrite that change",
+                    )  # fmt: skip
+            self._put(self.journal.contents(wanted))
+            (self.journal.undo if back else self.journal.redo)(action)
+            return action.name
+
+    def stamps(self, names: Iterable[str]) -> tuple[Stamp, ...]:
+        """Return values that change with the files, whoever changed them."""
+        return tuple(stamp_of(self.folder / name) for name in (CONFIG_NAME, *names))
 
     def _put(self, files: Mapping[str, bytes | None]) -> None:
         for name, content in files.items():
+            place = self._inside(name, follow=False)
             if content is None:
-                (self.folder / name).unlink(missing_ok=True)
+                place.unlink(missing_ok=True)
             else:
-                write_atomically(self.folder / name, content)
+                write_atomically(place, content)
 
     def _read(self, name: str) -> bytes | None:
         try:
-            return (self.folder / name).read_bytes()
+            return self._inside(name).read_bytes()
         except FileNotFoundError:
             return None
+        except OSError as error:
+            raise InputError(self.folder / name, "", f"cannot be read ({error.strerror or error})") from None
+
+    def _inside(self, name: str, *, follow: bool = True) -> Path:
+        """Return the path of a file; raise InputError where it lies outside of the root.
+
+        follow: a link counts as the file that it leads to; a file that is replaced counts where it is.
+        """
+        file, root = self.folder / name, (self.root or self.folder).resolve()
+        try:
+            place = file.resolve() if follow else file.parent.resolve() / file.name
+        except (OSError, ValueError):  # links in a circle, or a name that no file can have
+            raise InputError(self.file, f"file {name!r}", "is no name of a file") from None
+        if not place.is_relative_to(root) or file.name in ("", ".", ".."):
+            raise InputError(self.file, f"file {name!r}", f"lies outside of {root}: the workbench does not touch it")
+        return file
 
     def _first_comment(self) -> str:
         lines = (self._read(CONFIG_NAME) or b"").decode("utf-8").splitlines(keepends=True)
@@ -136,7 +175,7 @@ class Draft:
 
 
 def as_table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    """A table as comma-separated text."""
+    """Write a table as comma-separated text."""
     stream = io.StringIO(newline="")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)
@@ -144,10 +183,13 @@ def as_table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     return stream.getvalue().encode()
 
 
-def stamp_of(file: Path) -> tuple[str, int, int]:
-    """Name, time of the last change and size of a file; −1 where there is none."""
+def stamp_of(file: Path) -> Stamp:
+    """Return name, size, number and times of a file, −1 where there is none.
+
+    An exchange with a file of the same size and time gives another number or another time of its entry.
+    """
     try:
-        told = file.stat()
+        stat = file.stat()
     except OSError:
-        return file.name, -1, -1
-    return file.name, told.st_mtime_ns, told.st_size
+        return file.name, -1, -1, -1, -1
+    return file.name, stat.st_mtime_ns, stat.st_size, stat.st_ino, stat.st_ctime_ns

@@ -1,5 +1,7 @@
-"""What may be done to an experiment that is being set up. Every edit is one step of undo; lengths in pixels of the
-photograph come from the page, files hold metres."""
+"""Edits of an experiment that is being set up, each one step of undo.
+
+The page gives lengths in pixels of the photograph, files hold metres.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.bodies.wall_shapes import STRAIGHT
-
-from ...errors import InputError
 from ...experiment.experiment import TIME_COLUMNS, GrainGuess
 from ...experiment.photographs import Image
 from ...experiment.units import Scale
 from ...experiment.walls import FORCE_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS
+from ...process.errors import InputError
+from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
-from ...tracking.walls.inner_edge import find_bars, meeting_lines, snap_to_edge
+from ...tracking.walls.inner_edge import find_bars, lines_to_corners, snap_to_edge
 from .circles import arcs_table, circles_of, renamed
 from .draft import Draft, as_table
-from .steps import Understood, judge
+from .validation import ValidationResult, validate
 
-# Of what was written elsewhere, by its key: section, file, columns, and the keys in whose place it comes.
+# Tables of other programs by their key: section, file, columns, and the keys that they replace.
 TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
     "times": ("photographs", "times.csv", TIME_COLUMNS, ("photographs.interval",)),
     "load": ("walls", "load.csv", LOAD_COLUMNS, ()),
@@ -32,11 +33,15 @@ TABLES: dict[str, tuple[str, str, Sequence[str], Sequence[str]]] = {
 }
 GRAINS, WALLS, CORRECTIONS = "grains.csv", "walls.csv", "corrections.csv"
 GRAIN_COLUMNS = ("id", "x", "y", "radius")
-AROUND = 3.0  # radii about a clicked rod in which its rim is looked for
-OVERLAP = 0.15  # share of its radius by which a rod added by hand may reach over others: clicks and fits err
-SEEN = 0.34  # share of a line's profiles that must show the edge for it to be snapped
+AROUND = 3.0  # [radii] about a clicked rod in which its rim is searched
+OVERLAP = 0.15  # [radii] that a rod added by hand may overlap others: clicks and fits have errors
+FEW = 4  # rods: fewer are no packing
+FACTORS = (10.0, 0.1, 2.0, 0.5, 1000.0, 0.001)  # by which a scale or its unit is mistaken
+CLEAR = 0.5  # fraction of an outline that is seen
+LEAST_RADIUS = 3.0  # [px] of a rod
+SEEN = 0.34  # fraction of the profiles across a line that must show the edge
 NAMES = ("bottom", "right", "top", "left")
-# Densities of what rods are made of [kg/m³], and friction of dry, clean rods as textbooks have it: to begin with.
+# Densities [kg/m³] and textbook friction coefficients of dry, clean rods: initial values.
 MATERIALS: dict[str, dict[str, float]] = {
     "aluminium": {"density": 2700.0, "friction": 0.25},
     "brass": {"density": 8500.0, "friction": 0.25},
@@ -49,62 +54,62 @@ MATERIALS: dict[str, dict[str, float]] = {
 
 
 def begin(draft: Draft, name: str, files: str) -> None:
-    """Write the experiment file of photographs that nothing else is known of."""
+    """Write the experiment file of a series of photographs."""
     draft.set_keys("new experiment", {"name": name, "photographs.files": files})
 
 
 def set_scale(draft: Draft, keys: dict[str, Any]) -> None:
-    """Set pixel_size, or distance; walls stay where they are in the picture."""
-    _set_where_walls_stay(draft, "scale", {"photographs.pixel_size": None, "photographs.distance": None, **keys})
+    """Set pixel_size, or distance; walls keep their place in the picture."""
+    _set_and_move_walls(draft, "scale", {"photographs.pixel_size": None, "photographs.distance": None, **keys})
 
 
 def set_lens(draft: Draft, lens: dict[str, float] | None) -> None:
-    """Set the lens' coefficients; walls stay where they are in the picture. Raises InputError where they are none."""
+    """Set the coefficients of the lens; walls keep their place in the picture. Raises InputError for wrong ones."""
     keys = {"photographs.lens": lens}
-    with _no_new_complaint(draft, "lens", "scale"):
-        _set_where_walls_stay(draft, "lens", keys)
+    with _no_new_message(draft, "lens", "scale"):
+        _set_and_move_walls(draft, "lens", keys)
 
 
-def set_table(draft: Draft, found: Understood, name: str, table: str | None) -> None:
-    """Write one of the TABLES from elsewhere; None: there is none. Raises InputError where it does not fit."""
+def set_table(draft: Draft, found: ValidationResult, name: str, table: str | None) -> None:
+    """Write one of TABLES; None: remove it. Raises InputError where it does not match the experiment."""
     section, file, columns, instead = TABLES[name]
     key = f"{section}.{name}"
     if table is None:
         draft.set_keys(name, {key: None})
         return
     if section == "walls" and found.walls is None:
-        raise InputError(file, "", "tells of walls, and there are none: draw the walls first")
-    told = table.removeprefix("\ufeff").splitlines()
-    missing = [each for each in columns if not told or each not in [cell.strip() for cell in told[0].split(",")]]
+        raise InputError(file, "", "has values of walls, but there are none: draw the walls first")
+    lines = table.removeprefix("\ufeff").splitlines()
+    missing = [each for each in columns if not lines or each not in [cell.strip() for cell in lines[0].split(",")]]
     if missing:
-        raise InputError(file, "", f"has no column {missing[0]}: it is a table {','.join(columns)}")
-    with _no_new_complaint(draft, name, section, file):
+        raise InputError(file, "", f"has no column {missing[0]}: the table needs {','.join(columns)}")
+    with _no_new_message(draft, name, section, file):
         draft.set_keys(name, {key: file, **dict.fromkeys(instead)}, {file: table.encode()})
 
 
 @contextmanager
-def _no_new_complaint(draft: Draft, what: str, step: str, file: str | None = None) -> Iterator[None]:
-    """One step of undo, taken back with InputError where it makes a step complain of what it did not before."""
-    before = judge(draft).steps[step].says
-    with draft.one_step(what):
+def _no_new_message(draft: Draft, name: str, step: str, file: str | None = None) -> Iterator[None]:
+    """One step of undo; it is reverted with InputError if a step gets a message that it did not have before."""
+    before = validate(draft).steps[step].messages
+    with draft.one_step(name):
         yield
-        for complaint in judge(draft).steps[step].says:
-            if complaint not in before:
-                raise InputError(file or draft.file, "", complaint)
+        for message in validate(draft).steps[step].messages:
+            if message not in before:
+                raise InputError(file or draft.file, "", message)
 
 
-def _set_where_walls_stay(draft: Draft, what: str, keys: dict[str, Any]) -> None:
-    """Set keys that say where in the world a pixel is, and tell the walls anew."""
-    before = judge(draft)
+def _set_and_move_walls(draft: Draft, name: str, keys: dict[str, Any]) -> None:
+    """Set keys that define the position of a pixel in the world, and write the walls again."""
+    before = validate(draft)
     walls, scale = before.walls, before.scale
-    with draft.one_step(what):
-        draft.set_keys(what, keys)
+    with draft.one_step(name):
+        draft.set_keys(name, keys)
         if walls is None or scale is None:
             return
-        after = judge(draft).scale
+        after = validate(draft).scale
         if after is not None:
             bars, circles = walls.sides == STRAIGHT, circles_of(before)
-            names = [name for name, bar in zip(walls.name, bars, strict=True) if bar]
+            names = [wall for wall, bar in zip(walls.name, bars, strict=True) if bar]
             ends = scale.to_pixels(walls.endpoints[0])[bars]
             if names:
                 draft.write("walls", {walls_file(before): _walls_table(names, ends, after)})
@@ -112,22 +117,28 @@ def _set_where_walls_stay(draft: Draft, what: str, keys: dict[str, Any]) -> None
                 draft.write("circles", {before.data["walls"]["arcs"]: arcs_table(circles, after)})
 
 
-def walls_file(found: Understood) -> str:
-    """Name of the walls' table."""
+def walls_file(found: ValidationResult) -> str:
+    """Return the name of the table of walls."""
     walls = found.data.get("walls", {})
     return walls.get("file", WALLS) if isinstance(walls, dict) else WALLS
 
 
-def snap_wall(image: Image, line: Array, found: Understood) -> tuple[Array, float]:
-    """A drawn line (2, 2) [px] on the edge beside it, the packing on its left; and how much of the edge is seen."""
+def snap_wall(image: Image, line: Array, found: ValidationResult) -> tuple[Array, float]:
+    """Move a drawn line (2, 2) [px] onto the edge beside it, if enough is visible.
+
+    Returns
+    -------
+    tuple
+        The line, with the packing on its left, and the visible fraction of the edge.
+    """
     line = towards_packing(line, found)
     length = float(np.linalg.norm(line[1] - line[0]))
-    snapped, share = snap_to_edge(image, line, min(max(0.03 * length, 8.0), 40.0))
-    return (snapped, share) if share >= SEEN else (line, share)
+    snapped, fraction = snap_to_edge(image, line, min(max(0.03 * length, 8.0), 40.0))
+    return (snapped, fraction) if fraction >= SEEN else (line, fraction)
 
 
-def towards_packing(line: Array, found: Understood) -> Array:
-    """The line the way round that has the packing to its left in the world."""
+def towards_packing(line: Array, found: ValidationResult) -> Array:
+    """Return the line in the direction that has the packing to its left in the world."""
     assert found.shape is not None
     if found.rods is not None:
         middle = np.array([found.rods.x.mean(), found.rods.y.mean()])
@@ -137,48 +148,52 @@ def towards_packing(line: Array, found: Understood) -> Array:
     return line if along[0] * to[1] - along[1] * to[0] < 0.0 else line[::-1].copy()  # y down
 
 
-def find_walls(image: Image, found: Understood) -> Array:
-    """The bars (w, 2, 2) [px] around the rods that are there. Raises InputError where there are too few."""
+def find_walls(image: Image, found: ValidationResult) -> Array:
+    """Find the bars (w, 2, 2) [px] around the rods; raise InputError if the rods are too few."""
     rods = found.rods
     if rods is None or len(rods.id) < 8:
-        raise InputError(GRAINS, "", "holds too few rods to find bars by: look for rods first, or draw the bars")
+        raise InputError(
+            GRAINS, "", "holds too few rods to find bars around them: detect the rods first, or draw the bars"
+        )
     lines = find_bars(rods.x, rods.y, rods.radius)
     snapped = [snap_to_edge(image, line, 0.6 * float(np.median(rods.radius))) for line in lines]
-    lines = np.array([moved if share >= SEEN else line for line, (moved, share) in zip(lines, snapped, strict=True)])
-    return meeting_lines(lines)
+    lines = np.array(
+        [moved if fraction >= SEEN else line for line, (moved, fraction) in zip(lines, snapped, strict=True)]
+    )
+    return lines_to_corners(lines)
 
 
 def names_of(lines: Array) -> tuple[str, ...]:
-    """What the bars of a frame are called, in the order in which they are found."""
+    """Return the names of the bars of a frame, in the order of find_walls."""
     return NAMES if len(lines) == len(NAMES) else tuple(f"wall{k + 1}" for k in range(len(lines)))
 
 
-def set_walls(draft: Draft, found: Understood, walls: Sequence[tuple[str, Array]], what: str) -> None:
-    """Write the walls of frame 0, named, by their ends (2, 2) [px]; what was told of those that go, goes."""
+def set_walls(draft: Draft, found: ValidationResult, walls: Sequence[tuple[str, Array]], change: str) -> None:
+    """Write the walls of frame 0 by names and ends (2, 2) [px]; settings of removed walls are deleted."""
     if found.scale is None:
         raise InputError(draft.file, "key photographs.pixel_size", "is missing: set the scale before the walls")
-    told = found.data.get("walls", {})
-    kept = {key: value for key, value in told.items() if not isinstance(value, dict)}
+    section = found.data.get("walls", {})
+    kept = {key: value for key, value in section.items() if not isinstance(value, dict)}
     names = [name for name, _ in walls]
     known = {*names, *(each.name for each in circles_of(found))}
-    plates = {key: value for key, value in told.items() if isinstance(value, dict) and key in known}
+    plates = {key: value for key, value in section.items() if isinstance(value, dict) and key in known}
     if not walls:
         rest = {key: value for key, value in {**kept, **plates}.items() if key != "file"} if "arcs" in kept else None
-        draft.set_keys(what, {"walls": rest}, {walls_file(found): None})
+        draft.set_keys(change, {"walls": rest}, {walls_file(found): None})
         return
     table = _walls_table(names, np.array([line for _, line in walls]), found.scale)
-    draft.set_keys(what, {"walls": {**kept, "file": walls_file(found), **plates}}, {walls_file(found): table})
+    draft.set_keys(change, {"walls": {**kept, "file": walls_file(found), **plates}}, {walls_file(found): table})
 
 
-def set_plate(draft: Draft, found: Understood, wall: str, told: dict[str, Any]) -> None:
-    """Set what is known of one wall: its pressure [Pa], what its ends are; None: not told."""
-    plate = {**found.data.get("walls", {}).get(wall, {}), **told}
+def set_plate(draft: Draft, found: ValidationResult, wall: str, values: dict[str, Any]) -> None:
+    """Set pressure [Pa] and ends of one wall; None: remove the key."""
+    plate = {**found.data.get("walls", {}).get(wall, {}), **values}
     plate = {key: value for key, value in plate.items() if value is not None}
     draft.set_keys(f"wall {wall}", {f"walls.{wall}": plate or None})
 
 
-def rename_wall(draft: Draft, found: Understood, wall: str, name: str) -> None:
-    """Call a wall something else."""
+def rename_wall(draft: Draft, found: ValidationResult, wall: str, name: str) -> None:
+    """Rename a wall."""
     walls, scale = found.walls, found.scale
     if walls is None or scale is None or wall not in walls.name:
         raise InputError(draft.file, f"wall {wall!r}", "is not there")
@@ -195,22 +210,57 @@ def rename_wall(draft: Draft, found: Understood, wall: str, name: str) -> None:
     draft.set_keys(f"wall {name}", {"walls": section}, {walls_file(found): table})
 
 
-def detect(image: Image, found: Understood, radii: Sequence[float]) -> Detection:
-    """The rods of the first photograph; radii [m]: the known classes, none where they are not known."""
+def detect(
+    image: Image, found: ValidationResult, radii: Sequence[float], radius_range: tuple[float, float] | None = None
+) -> Detection:
+    """Detect the rods of the first photograph.
+
+    Parameters
+    ----------
+    image : (H, W)
+        The photograph [grey].
+    found : ValidationResult
+    radii : sequence of float
+        The known classes [m]; empty: unknown.
+    radius_range : tuple of float, optional
+        Least and greatest radius [px] to look for, where the classes are unknown.
+    """
     pixel = None if found.scale is None else found.scale.mean_size
     if radii and pixel is None:
-        raise InputError("the scale", "", "is not set: radii in metres say nothing of the picture yet")
+        raise InputError("the scale", "", "is not set: radii in metres cannot be converted to pixels yet")
     classes = tuple(radius / pixel for radius in radii) if pixel is not None else ()
     try:
-        settings = DetectionSettings(classes)
+        settings = DetectionSettings(classes, radius_range)
     except ValueError as error:
+        if radius_range is not None:
+            raise InputError("--radius-range", "{:g}:{:g}".format(*radius_range), str(error)) from None
+        _compare_scales(image, classes, 0)
         raise InputError("photographs.radii", str(list(radii)), str(error)) from None
     detection = detect_grains(image, settings)
+    if detection.count < FEW and classes:
+        _compare_scales(image, classes, detection.count)
     return _within_walls(detection, found)
 
 
-def set_rods(draft: Draft, what: str, rods: GrainGuess, radii: Sequence[float] | None = None) -> None:
-    """Write the table of rods [px]; radii [m]: the classes, None: as they are told."""
+def _compare_scales(image: Image, classes: Sequence[float], count: int) -> None:
+    """Raise InputError where rods of these classes (radii in pixels) are seen at a scale that differs by a factor."""
+    for factor in FACTORS:
+        sizes = tuple(radius * factor for radius in classes)
+        if min(sizes) < LEAST_RADIUS or max(sizes) > 0.25 * min(image.shape):
+            continue
+        seen = detect_grains(image, DetectionSettings(sizes))
+        clear = int((seen.quality > CLEAR).sum())
+        if clear >= max(FEW, 3 * count):
+            word = "large" if factor > 1.0 else "small"
+            raise InputError(
+                "scale", "", f"looks {max(factor, 1.0 / factor):g} times too {word}: at this scale {count} rods of the "
+                f"known radii are seen, at {1.0 / factor:g} times it {clear}. Look at step Scale, and at the unit of "
+                "the radii.",
+            )  # fmt: skip
+
+
+def set_rods(draft: Draft, change: str, rods: GrainGuess, radii: Sequence[float] | None = None) -> None:
+    """Write the table of rods [px]; radii [m]: the classes, None: unchanged."""
     rows = zip(
         rods.id.tolist(), np.round(rods.x, 4).tolist(), np.round(rods.y, 4).tolist(),
         np.round(rods.radius, 4).tolist(), strict=True,
@@ -218,16 +268,16 @@ def set_rods(draft: Draft, what: str, rods: GrainGuess, radii: Sequence[float] |
     keys: dict[str, Any] = {"photographs.grains": GRAINS if len(rods.id) else None}
     if radii is not None:
         keys["photographs.radii"] = list(radii) or None
-    draft.set_keys(what, keys, {GRAINS: as_table(GRAIN_COLUMNS, rows) if len(rods.id) else None})
+    draft.set_keys(change, keys, {GRAINS: as_table(GRAIN_COLUMNS, rows) if len(rods.id) else None})
 
 
 def as_guess(detection: Detection) -> GrainGuess:
-    """Detected rods as the table of rods, numbered from top to bottom."""
+    """Convert detected rods to the table of rods, numbered from top to bottom."""
     return GrainGuess(np.arange(detection.count), detection.x, detection.y, detection.radius)
 
 
-def fit_rod(image: Image, found: Understood, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """Centre and radius [px] of a rod clicked at x, y: on its rim where that is seen, else as it was clicked."""
+def fit_rod(image: Image, found: ValidationResult, x: float, y: float, radius: float) -> tuple[float, float, float]:
+    """Fit centre and radius [px] of a rod clicked at x, y to its visible rim; unchanged where no rim is visible."""
     section = found.data.get("photographs", {})
     classes: list[float] = section.get("radii") or []
     largest = max([radius, *(each / found.scale.mean_size for each in classes if found.scale is not None)])
@@ -235,11 +285,11 @@ def fit_rod(image: Image, found: Understood, x: float, y: float, radius: float) 
     image = image[top : int(y + AROUND * largest) + 1, left : int(x + AROUND * largest) + 1]
     if min(image.shape) < 2:
         return x, y, radius
-    fitted = _fit_here(image, found, classes, (x - left, y - top, radius), _room_at(found.rods, x, y))
+    fitted = _fit_here(image, found, classes, (x - left, y - top, radius), _free_radius(found.rods, x, y))
     return fitted[0] + left, fitted[1] + top, fitted[2]
 
 
-def _room_at(rods: GrainGuess | None, x: float, y: float) -> float:
+def _free_radius(rods: GrainGuess | None, x: float, y: float) -> float:
     """Radius [px] of the largest circle about x, y that touches no rod."""
     if rods is None or len(rods.id) == 0:
         return np.inf
@@ -247,14 +297,18 @@ def _room_at(rods: GrainGuess | None, x: float, y: float) -> float:
 
 
 def _fit_here(
-    image: Image, found: Understood, classes: Sequence[float], circle: tuple[float, float, float], room: float
+    image: Image,
+    found: ValidationResult,
+    classes: Sequence[float],
+    circle: tuple[float, float, float],
+    free_radius: float,
 ) -> tuple[float, float, float]:
-    """The same in a part of the photograph; room: radius [px] that its neighbours leave."""
+    """Fit a rod in a part of the photograph; free_radius [px]: up to its nearest neighbour."""
     x, y, radius = circle
     if classes and found.scale is not None:
         sizes = np.array(classes) / found.scale.mean_size
-        # Of a rod that detection missed little is seen, and a circle through its neighbours' rims may be seen better.
-        sizes = sizes[sizes <= max((1.0 + OVERLAP) * room, sizes.min())]
+        # A rod that detection missed has a weak rim; a circle through the rims of its neighbours may be stronger.
+        sizes = sizes[sizes <= max((1.0 + OVERLAP) * free_radius, sizes.min())]
         tried = [refine_grains(image, np.array([x]), np.array([y]), np.array([size])) for size in sizes]
         best = max(tried, key=lambda each: float(each.quality[0]))
         if best.quality[0] > 0.0 and np.isfinite(best.sigma[0]):
@@ -267,7 +321,7 @@ def _fit_here(
 
 
 def with_rod(rods: GrainGuess | None, name: int | None, pose: tuple[float, float, float] | None) -> GrainGuess:
-    """The rods with one added (name None), moved, or taken away (pose None)."""
+    """Return the rods with one added (name None), moved, or removed (pose None)."""
     table: dict[int, tuple[float, float, float]] = {}
     if rods is not None:
         table = dict(zip(rods.id.tolist(), zip(rods.x, rods.y, rods.radius, strict=True), strict=True))
@@ -282,14 +336,14 @@ def with_rod(rods: GrainGuess | None, name: int | None, pose: tuple[float, float
 
 
 def snapped_to(radii: Sequence[float], rods: GrainGuess, scale: Scale) -> GrainGuess:
-    """The rods with the radius of the nearest class [m]."""
+    """Return the rods with the radius of the nearest class [m]."""
     sizes = np.array(sorted(radii)) / scale.mean_size
     nearest = np.abs(rods.radius[:, None] - sizes).argmin(axis=1)
     return GrainGuess(rods.id, rods.x, rods.y, sizes[nearest])
 
 
 def find_classes(radius: Array, most: int = 8) -> Array:
-    """Radii (k,) at which found ones crowd, in the same unit: gaps in their order part the classes."""
+    """Find radius classes (k,), in the unit of the radii: gaps in the sorted radii separate them."""
     ordered = np.sort(radius)
     if len(ordered) == 0:
         return ordered
@@ -299,8 +353,8 @@ def find_classes(radius: Array, most: int = 8) -> Array:
     return np.sort(np.array([np.median(each) for each in large or [ordered]]))
 
 
-def _within_walls(detection: Detection, found: Understood) -> Detection:
-    """Without the circles beyond the walls: screws and wheels of the apparatus are round, too."""
+def _within_walls(detection: Detection, found: ValidationResult) -> Detection:
+    """Drop circles beyond the walls: screws and wheels of the apparatus are round, too."""
     if found.walls is None or found.scale is None:
         return detection
     start, end = found.scale.to_pixels(found.walls.endpoints[0]).transpose(1, 0, 2)

@@ -1,4 +1,4 @@
-"""An experiment set up from flags: the same edits as on the page, in their order; nothing is left where one fails."""
+"""An experiment set up from flags, by the same edits as on the page; a failure reverts all of them."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...atomic import write_atomically
-from ...errors import InputError
-from ...experiment.photographs import Photographs, read_photograph
+from ...experiment.photographs import Channel, Image, ImageSelection, Photographs, read_photograph
+from ...experiment.plausibility import rods_cut_by_walls
+from ...process.atomic import write_atomically
+from ...process.errors import InputError
 from . import edits
 from .draft import Draft
-from .folder import as_name
-from .steps import Understood, judge
-from .understood import draw_understood
+from .experiment_folders import valid_name
+from .setup_picture import draw_setup
+from .validation import ValidationResult, first_tracks, validate
 
 PICTURE = "understood.png"
 FOUND, NONE = "auto", "none"
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What the flags say; SI units. None: not told."""
+class SetupFlags:
+    """Values of the flags, in SI units; None: not given."""
 
     photographs: str
     name: str | None = None
@@ -33,75 +34,100 @@ class Told:
     walls: str = FOUND  # auto: found around the rods; none; or a table of their ends in metres
     pressure: Mapping[str, float] = field(default_factory=dict)  # [Pa] by wall
     material: Mapping[str, Any] = field(default_factory=dict)
+    channel: Channel | None = None
+    region: tuple[int, ...] = ()  # [px] first column and row, last column and row
+    follow: str | None = None  # texture or outline
+    radius_range: tuple[float, float] | None = None  # [px] where the radii are unknown
 
 
-def initialise(folder: Path, told: Told) -> Understood:
-    """Write experiment.toml, grains.csv, walls.csv and a picture of what was understood.
+def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
+    """Write experiment.toml, grains.csv, walls.csv and a picture to check them by.
 
-    Raises InputError for what cannot be understood, and for an experiment that is there already; nothing is written
-    then.
+    Raises
+    ------
+    InputError
+        A value is wrong, or the experiment exists already; nothing is written then.
     """
     draft = Draft(folder)
     if draft.file.exists():
-        raise InputError(draft.file, "", "is there already: rodsight open changes it, or delete it")
-    photographs = Photographs.matching(folder, told.photographs)
-    name = told.name if told.name is not None else as_name(folder.resolve().name)
+        raise InputError(draft.file, "", "is there already: change it by rodsight open, or delete it")
+    photographs = Photographs.matching(folder, flags.photographs)
+    name = flags.name if flags.name is not None else valid_name(folder.resolve().name)
     with draft.one_step("new experiment"):
-        edits.begin(draft, name, told.photographs)
+        edits.begin(draft, name, flags.photographs)
         keys = {
-            "photographs.interval": told.interval, "photographs.pixel_size": told.pixel_size,
-            "photographs.radii": list(told.radii) or None,
-            **{f"material.{key}": value for key, value in told.material.items() if value is not None},
+            "photographs.interval": flags.interval, "photographs.pixel_size": flags.pixel_size,
+            "photographs.radii": list(flags.radii) or None, "photographs.channel": flags.channel,
+            "photographs.region": list(flags.region) or None, "photographs.follow": flags.follow,
+            **{f"material.{key}": value for key, value in flags.material.items() if value is not None},
         }  # fmt: skip
-        draft.set_keys("what is known", {key: value for key, value in keys.items() if value is not None})
-        found = _settle(draft, told, read_photograph(photographs.files[0]))
-        write_atomically(folder / PICTURE, draw_understood(read_photograph(photographs.files[0]), found))
+        draft.set_keys("values of the flags", {key: value for key, value in keys.items() if value is not None})
+        _without_errors(draft, "photographs")
+        selection = ImageSelection(flags.channel or "grey", flags.region or None)  # type: ignore[arg-type]
+        found, notes = _find_rods_and_walls(draft, flags, selection.cut(_first(photographs, selection)))
+        write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
+    for note in notes:
+        found.steps["walls"].add_warning(note)
     return found
 
 
-def _settle(draft: Draft, told: Told, first: Any) -> Understood:
-    """Find rods and walls, and load these."""
-    found = _sound(draft, "photographs", "scale", "material")
-    detection = edits.detect(first, found, told.radii)
+def _first(photographs: Photographs, selection: ImageSelection) -> Image:
+    return read_photograph(photographs.files[0], channel=selection.channel)
+
+
+def _find_rods_and_walls(draft: Draft, flags: SetupFlags, first: Image) -> tuple[ValidationResult, list[str]]:
+    """Find rods and walls, and set the pressures; also return sentences on walls that were left out."""
+    notes: list[str] = []
+    found = _without_errors(draft, "photographs", "scale", "material")
+    detection = edits.detect(first, found, flags.radii, flags.radius_range)
     if detection.count == 0:
-        raise InputError(found.files[0], "", "no rods were found; tell their --radii, or set them by rodsight open")
-    edits.set_rods(draft, "rods", edits.as_guess(detection), told.radii)
-    if told.walls == NONE:
-        if told.pressure:
-            raise InputError("--pressure", next(iter(told.pressure)), "loads a wall, and there are none: --walls none")
-        return judge(draft)
-    if told.walls == FOUND:
-        found = judge(draft)
+        raise InputError(found.files[0], "", "no rods were found; give their --radii, or mark them by rodsight open")
+    edits.set_rods(draft, "rods", edits.as_guess(detection), flags.radii)
+    if flags.walls == NONE:
+        if flags.pressure:
+            raise InputError("--pressure", next(iter(flags.pressure)), "loads a wall, but there are none: --walls none")
+        return validate(draft), notes
+    if flags.walls == FOUND:
+        found = validate(draft)
         lines = edits.find_walls(first, found)
         names = edits.names_of(lines)
         edits.set_walls(draft, found, list(zip(names, lines, strict=True)), "walls")
+        found = validate(draft)
+        cut = {} if found.walls is None else rods_cut_by_walls(first_tracks(found), found.walls.frames(0, 1))
+        if cut:
+            whole = [(name, line) for name, line in zip(names, lines, strict=True) if name not in cut]
+            edits.set_walls(draft, found, whole, "walls that cut through no rod")
+            notes += [
+                f"Wall {name!r} is left out, since it would cut through {count} rod{'s' if count > 1 else ''}."
+                for name, count in cut.items()
+            ]
     else:
-        source = Path(told.walls)
+        source = Path(flags.walls)
         if not source.is_file():
-            raise InputError("--walls", told.walls, "is neither auto, none nor a table frame,wall,x1,y1,x2,y2")
+            raise InputError("--walls", flags.walls, "is neither auto, none nor a table frame,wall,x1,y1,x2,y2")
         if source.resolve() != (draft.folder / edits.WALLS).resolve():
             shutil.copyfile(source, draft.folder / edits.WALLS)
         draft.set_keys("walls", {"walls.file": edits.WALLS})
-    for wall, pressure in told.pressure.items():
-        found = judge(draft)
+    for wall, pressure in flags.pressure.items():
+        found = validate(draft)
         if found.walls is not None and wall not in found.walls.name:
             there = ", ".join(found.walls.name)
             raise InputError("--pressure", f"{wall}={pressure:g}", f"there is no such wall; there are {there}")
         edits.set_plate(draft, found, wall, {"pressure": pressure})
-    return _sound(draft, *judge(draft).steps)
+    return _without_errors(draft, *validate(draft).steps), notes
 
 
-def _sound(draft: Draft, *steps: str) -> Understood:
-    """What is understood; raises InputError where something that was told is wrong, not where it is missing."""
-    found = judge(draft)
+def _without_errors(draft: Draft, *steps: str) -> ValidationResult:
+    """Validate the draft; raise InputError where a given value is wrong, not where one is missing."""
+    found = validate(draft)
     for name in steps:
-        for sentence in found.steps[name].wrong:
+        for sentence in found.steps[name].errors:
             raise InputError(draft.file, "", sentence)
     return found
 
 
 def parse_pressures(texts: Sequence[str]) -> dict[str, float]:
-    """Pressures [Pa] of walls from WALL=PASCAL. Raises InputError."""
+    """Parse pressures [Pa] of walls from WALL=PASCAL; raise InputError for other text."""
     found: dict[str, float] = {}
     for text in texts:
         wall, equals, value = text.partition("=")
@@ -114,8 +140,32 @@ def parse_pressures(texts: Sequence[str]) -> dict[str, float]:
     return found
 
 
+def parse_region(text: str | None) -> tuple[int, ...]:
+    """Parse a region from four whole numbers between commas; raise InputError for other text."""
+    try:
+        region = tuple(int(each) for each in text.split(",")) if text is not None else ()
+        if len(region) not in (0, 4):
+            raise ValueError
+    except ValueError:
+        raise InputError("--region", str(text), "is not X0,Y0,X1,Y1 in pixels, such as 100,50,3900,2700") from None
+    return region
+
+
+def parse_radius_range(text: str | None) -> tuple[float, float] | None:
+    """Parse a range of radii [px] A:B; raise InputError for other text."""
+    if text is None:
+        return None
+    try:
+        least, most = (float(each) for each in text.split(":"))
+        if not 3.0 < least < most < 1e5:
+            raise ValueError
+    except ValueError:
+        raise InputError("--radius-range", text, "is not A:B in pixels, with 3 < A < B, such as 40:60") from None
+    return least, most
+
+
 def parse_radii(text: str | None) -> tuple[float, ...]:
-    """Radii [m] from numbers between commas. Raises InputError."""
+    """Parse radii [m] from numbers between commas; raise InputError for other text."""
     try:
         radii = tuple(float(each) for each in (text or "").split(",") if each.strip())
     except ValueError:

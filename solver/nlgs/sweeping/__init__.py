@@ -1,1 +1,1 @@
-"""Sweeps as compiled loops: the law of a contact, the order of contacts, grains eight at a time."""
+"""Compiled sweeps: contact law, visiting order, and vectorised access to grain records."""

@@ -1,7 +1,4 @@
-"""The law of one contact: Signorini and Coulomb by projection, and the closed-form single contact.
-
-Scalars only; the loop over contacts (kernels) and the plain reference in the tests use the same lines.
-"""
+"""The contact law: Signorini and Coulomb conditions by projection, and the closed-form solution of a single contact."""
 
 from __future__ import annotations
 
@@ -10,9 +7,9 @@ from numba import njit
 
 @njit(inline="always")
 def project_on_cone(fn: float, ft: float, friction: float) -> tuple[float, float]:
-    """Project by components on the Coulomb cone (paper, Eq. 2): f_n ≥ 0 first, then |f_t| ≤ μ f_n.
+    """Project onto the Coulomb cone by components (paper, Eq. 2): first f_n ≥ 0, then |f_t| ≤ μ f_n.
 
-    Branch-free, since sticking and sliding contacts come in no order a processor could predict.
+    The projection is branch-free, because the sequence of sticking and sliding contacts is unpredictable.
     """
     fn = max(fn, 0.0)
     limit = friction * fn
@@ -23,10 +20,26 @@ def project_on_cone(fn: float, ft: float, friction: float) -> tuple[float, float
 def relax_contact(
     fn: float, ft: float, un: float, ut: float, inverse_wnn: float, inverse_wtt: float, friction: float
 ) -> tuple[float, float]:
-    """Solve one contact with all others frozen (paper, Eq. 1 and 2).
+    """Solve one contact with the forces of all others fixed (paper, Eq. 1 and 2).
 
-    fn, ft: present force [N]; un, ut: formal velocity under the present forces [m/s]; inverse_wnn, inverse_wtt:
-    1 / W of the diagonal local operator [N s/m]. Returns the force that brings the formal velocity to zero,
-    projected on the cone.
+    Parameters
+    ----------
+    fn, ft : float
+        Present force [N].
+    un, ut : float
+        Formal velocity under the present forces [m/s].
+    inverse_wnn, inverse_wtt : float
+        1 / W of the diagonal local operator [N s/m].
+    friction : float
+        μ.
+
+    Returns
+    -------
+    tuple of float
+        Force (f_n, f_t) [N].
+
+    Notes
+    -----
+    f_new = P(f − W⁻¹ u): the force that makes the formal velocity zero, projected onto the Coulomb cone.
     """
     return project_on_cone(fn - un * inverse_wnn, ft - ut * inverse_wtt, friction)

@@ -1,34 +1,33 @@
-"""The loop over contacts and nothing else.
+"""Kernels of the sweeps and of their residuals.
 
-A state is three arrays: body (n, 4), plate (w, 2) as in ContactProblem but under the present forces, and
+A state is three arrays: body (n, 4) and plate (w, 2) as in ContactProblem but under the present forces, and
 force (p + q, 2) [N] in visiting order.
 
-A group of contacts that share no grain is worked on in three steps: the records of its grains into a small
-workspace, one row per quantity; the law on rows, which the compiler turns into vector instructions; the records back.
-Arrays are read flat, since the compiler knows the strides of those alone, and ids as unsigned numbers, since
-a signed index is first looked at for being negative.
+A group of contacts that share no grain is relaxed in three steps: gather the records of its grains in a small
+workspace, one row per quantity; apply the contact law to rows, which the compiler vectorises; scatter the records.
+Arrays are read flat, because only then the strides are known to the compiler. Ids are unsigned, because signed indices
+are tested for negative values.
 """
 
-# ruff: noqa: E501
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from solver.nlgs.sweeping.contact_law import relax_contact
-from solver.nlgs.sweeping.grain_records import WIDTH, gather_differences, gather_records, scatter_records
-from solver.nlgs.sweeping.ordering import GROUP as L
+from .contact_law import relax_contact
+from .grain_records import WIDTH, gather_differences, gather_records, scatter_records
+from .ordering import GROUP as L
 
 THIRD = 1.0 / 3.0  # W_nn over W_tt between two solid rods
-IDS = 2 * L  # numbers in a block
-ROWS, CELL_ROWS = 4, 5  # of numbers on pairs; the fifth, which every sweep would wait for, is there in a cell alone
+IDS = 2 * L  # ids of a block
+ROWS, CELL_ROWS = 4, 5  # rows of a pair block; the fifth costs time in every sweep and exists only in a cell
 U = np.uint64
 U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def apply_forces(problem, body, plate, force):  # type: ignore[no-untyped-def]
-    """Set body and plate to the velocities under the given forces."""
+    """Set body and plate to the velocities under these forces."""
     body[:] = problem.body
     plate[:] = problem.plate
     first = len(force) - len(problem.wall)
@@ -47,27 +46,25 @@ def apply_forces(problem, body, plate, force):  # type: ignore[no-untyped-def]
     flat = body.reshape(body.size)
     for c in range(len(problem.wall)):
         i, w = U4 * U(problem.wall_body[c, 0]), problem.wall_body[c, 1]
-        _push_from_wall(
-            flat, plate, i, w, problem.wall[c, 0], problem.wall[c, 1], force[first + c, 0], force[first + c, 1]
-        )
+        _apply_wall_force(problem.wall, c, flat, plate, i, w, force[first + c, 0], force[first + c, 1])
 
 
 @njit(inline="always")
-def _push_from_wall(body, plate, i, w, nx, ny, fn, ft):  # type: ignore[no-untyped-def]
-    """Add the action of a force (or of its change) on grain and plate; the tangent is (−ny, nx)."""
-    ci = body[i + U3]
+def _apply_wall_force(wall, c, body, plate, i, w, fn, ft):  # type: ignore[no-untyped-def]
+    """Add the effect of a force, or of its change, on grain and plate; the tangent is (−ny, nx)."""
+    nx, ny, ci = wall[c, 0], wall[c, 1], body[i + U3]
     body[i] -= ci * (fn * nx - ft * ny)
     body[i + U1] -= ci * (fn * ny + ft * nx)
     body[i + U2] -= ci * (2.0 * ft)
-    plate[w, 0] += plate[w, 1] * fn
+    plate[w, 0] += plate[w, 1] * (wall[c, 6] * fn + wall[c, 7] * ft)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no-untyped-def]
     """Advance by a number of Gauss-Seidel sweeps, in place.
 
-    relaxation 1 is the paper's scheme; above it, the change of a contact's force is extrapolated before it is
-    projected, which selects another solution.
+    A relaxation of 1 is the paper's scheme. Above 1, the change of a contact's force is extrapolated before projection,
+    which selects another solution.
     """
     mu, wall_mu = problem.friction
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
@@ -92,10 +89,10 @@ def advance(problem, body, plate, force, sweeps, relaxation):  # type: ignore[no
 
 @njit(inline="always")
 def workspace(size):  # type: ignore[no-untyped-def]
-    """Room for `size` numbers on the bounds of a cache line: made here, so that the compiler knows it overlaps nothing."""
-    room = np.empty(size + 8)
-    start = (-(room.ctypes.data >> 3)) & 7
-    return room[start : start + size]
+    """Allocate `size` numbers aligned to a cache line; inlined, so that the compiler rules out aliasing."""
+    buffer = np.empty(size + 8)
+    start = (-(buffer.ctypes.data >> 3)) & 7
+    return buffer[start : start + size]
 
 
 @njit(inline="always")
@@ -118,13 +115,13 @@ def _relax_group(pair, ids, body, force, work, block, rows, relaxation, mu):  # 
         force[f + 2 * k] = new_n
         force[f + 2 * k + 1] = new_t
         dn, dt = new_n - fn, new_t - ft
-        fx, fy, turn = dn * nx - dt * ny, dn * ny + dt * nx, 2.0 * dt
+        fx, fy, torque = dn * nx - dt * ny, dn * ny + dt * nx, 2.0 * dt
         work[k] = ax - ci * fx
         work[L + k] = ay - ci * fy
-        work[2 * L + k] = aw - ci * turn
+        work[2 * L + k] = aw - ci * torque
         work[4 * L + k] = bx + cj * fx
         work[5 * L + k] = by + cj * fy
-        work[6 * L + k] = bw - cj * turn
+        work[6 * L + k] = bw - cj * torque
     for k in range(0, L, WIDTH):
         scatter_records(work, k, L, body, ids, e + k)
         scatter_records(work, 4 * L + k, L, body, ids, e + L + k)
@@ -146,26 +143,26 @@ def relax_pair(pair, ids, body, force, c, rows, relaxation, mu):  # type: ignore
     force[2 * c] = new_n
     force[2 * c + 1] = new_t
     dn, dt = new_n - fn, new_t - ft
-    fx, fy, turn = dn * nx - dt * ny, dn * ny + dt * nx, 2.0 * dt
+    fx, fy, torque = dn * nx - dt * ny, dn * ny + dt * nx, 2.0 * dt
     body[i] -= ci * fx
     body[i + U1] -= ci * fy
-    body[i + U2] -= ci * turn
+    body[i + U2] -= ci * torque
     body[j] += cj * fx
     body[j + U1] += cj * fy
-    body[j + U2] -= cj * turn
+    body[j + U2] -= cj * torque
 
 
 @njit(inline="always")
 def relax_wall(wall, wall_body, body, plate, force, row, c, relaxation, mu):  # type: ignore[no-untyped-def]
     i, w = U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
     nx, ny = wall[c, 0], wall[c, 1]
-    un = plate[w, 0] - body[i] * nx - body[i + U1] * ny + wall[c, 4]
-    ut = body[i] * ny - body[i + U1] * nx - body[i + U2] + wall[c, 5]
+    un = plate[w, 0] * wall[c, 6] - body[i] * nx - body[i + U1] * ny + wall[c, 4]
+    ut = plate[w, 0] * wall[c, 7] + body[i] * ny - body[i + U1] * nx - body[i + U2] + wall[c, 5]
     fn, ft = force[2 * row], force[2 * row + 1]
     new_n, new_t = relax_contact(fn, ft, un, ut, relaxation * wall[c, 2], relaxation * wall[c, 3], mu)
     force[2 * row] = new_n
     force[2 * row + 1] = new_t
-    _push_from_wall(body, plate, i, w, nx, ny, new_n - fn, new_t - ft)
+    _apply_wall_force(wall, c, body, plate, i, w, new_n - fn, new_t - ft)
 
 
 @njit(inline="always")
@@ -176,31 +173,30 @@ def relative_size(squares, norm):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def miss_of_wall(wall, wall_body, body, plate, force, row, c, mu):  # type: ignore[no-untyped-def]
+def wall_residual(wall, wall_body, body, plate, force, row, c, mu):  # type: ignore[no-untyped-def]
     i, w = U4 * U(wall_body[c, 0]), U(wall_body[c, 1])
     nx, ny = wall[c, 0], wall[c, 1]
-    un = plate[w, 0] - (body[i] * nx + body[i + U1] * ny) + wall[c, 4]
-    ut = (body[i] * ny - body[i + U1] * nx) - body[i + U2] + wall[c, 5]
-    return miss_of(force[2 * row], force[2 * row + 1], un, ut, wall[c, 2], wall[c, 3], mu)
+    un = plate[w, 0] * wall[c, 6] - (body[i] * nx + body[i + U1] * ny) + wall[c, 4]
+    ut = plate[w, 0] * wall[c, 7] + (body[i] * ny - body[i + U1] * nx) - body[i + U2] + wall[c, 5]
+    return contact_residual(force[2 * row], force[2 * row + 1], un, ut, wall[c, 2], wall[c, 3], mu)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def measure_state(problem, body, plate, force):  # type: ignore[no-untyped-def]
-    """Natural-map residual, and the worst unbalance over the mean f_n."""
+    """Compute the natural-map residual, and the worst force residual over the mean f_n."""
     _, norm, mean = measure_forces(force, force)
-    worst, _ = measure_unbalance(problem, body)
+    worst, _ = measure_force_residual(problem, body)
     return measure_natural_map(problem, body, plate, force, norm), worst / mean if mean > 0.0 else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def measure_forces(force, before):  # type: ignore[no-untyped-def]
-    """Greatest relative change, Euclidean norm [N], and mean f_n of bearing contacts [N].
+    """Compute the greatest relative change, the Euclidean norm [N], and the mean f_n of bearing contacts [N].
 
-    The first is the paper's ε_f, the greatest |Δf| / |f| over contacts, where a contact that loses its whole force
-    counts as 1.
+    The first is the paper's ε_f = max |Δf| / |f| over contacts; a contact that loses its whole force counts as 1.
     """
     f, old, count = force.reshape(force.size), before.reshape(before.size), len(force)
-    work = workspace(5 * L)  # squares, f_n, bearing, and the greatest change as a fraction: one of each per lane
+    work = workspace(5 * L)  # squares, f_n, bearing, and the greatest change as a fraction, per lane
     work[: 4 * L] = 0.0
     work[4 * L :] = 1.0
     for block in range((count + L - 1) // L):
@@ -212,7 +208,7 @@ def measure_forces(force, before):  # type: ignore[no-untyped-def]
             work[k] += size
             work[L + k] += fn
             work[2 * L + k] += 1.0 if fn > 0.0 else 0.0
-            # The greatest of fractions is found without dividing: a/b > c/d where a d > c b.
+            # Fractions are compared without division: a/b > c/d where a d > c b.
             change = (fn - old[c]) * (fn - old[c]) + (ft - old[c + 1]) * (ft - old[c + 1])
             size = size if size > 0.0 else change
             top, bottom = work[3 * L + k], work[4 * L + k]
@@ -230,9 +226,9 @@ def measure_forces(force, before):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-untyped-def]
-    """‖f − P(f − D⁻¹ u)‖ / ‖f‖ under the present velocities u, zero exactly at a solution; norm: ‖f‖ [N].
+    """Compute the natural-map residual ‖f − P(f − D⁻¹ u)‖ / ‖f‖ under the present velocities u; norm: ‖f‖ [N].
 
-    D is the diagonal of the local operators.
+    D is the diagonal of the local operators. The residual is zero exactly at a solution.
     """
     mu, wall_mu = problem.friction
     pair, ids = problem.pair.reshape(problem.pair.size), problem.pair_body.reshape(problem.pair_body.size)
@@ -243,25 +239,25 @@ def measure_natural_map(problem, body, plate, force, norm):  # type: ignore[no-u
     total = 0.0
     if problem.pair.shape[1] == CELL_ROWS:
         for block in range(problem.grouped // L):
-            _miss_group(pair, ids, flat, f, work, block, CELL_ROWS, mu)
+            _add_group_residuals(pair, ids, flat, f, work, block, CELL_ROWS, mu)
         for c in range(problem.grouped, first):
-            total += miss_of_pair(pair, ids, flat, f, c, CELL_ROWS, mu)
+            total += pair_residual(pair, ids, flat, f, c, CELL_ROWS, mu)
     else:
         for block in range(problem.grouped // L):
-            _miss_group(pair, ids, flat, f, work, block, ROWS, mu)
+            _add_group_residuals(pair, ids, flat, f, work, block, ROWS, mu)
         for c in range(problem.grouped, first):
-            total += miss_of_pair(pair, ids, flat, f, c, ROWS, mu)
+            total += pair_residual(pair, ids, flat, f, c, ROWS, mu)
     for k in range(L):
         total += work[3 * L + k]
     wall_total = 0.0
     for c in range(len(problem.wall)):
-        wall_total += miss_of_wall(problem.wall, problem.wall_body, flat, plate, f, first + c, c, wall_mu)
+        wall_total += wall_residual(problem.wall, problem.wall_body, flat, plate, f, first + c, c, wall_mu)
     return relative_size(total + wall_total, norm)
 
 
 @njit(inline="always")
-def _miss_group(pair, ids, body, force, work, block, rows, mu):  # type: ignore[no-untyped-def]
-    """Add a group's squares to those of its lanes."""
+def _add_group_residuals(pair, ids, body, force, work, block, rows, mu):  # type: ignore[no-untyped-def]
+    """Add the squared residuals of a group to the lanes."""
     p, e = block * rows * L, block * IDS
     for k in range(0, L, WIDTH):
         gather_differences(body, ids, e + k, e + L + k, work, k, L)
@@ -271,11 +267,11 @@ def _miss_group(pair, ids, body, force, work, block, rows, mu):  # type: ignore[
         ut = dy * nx - dx * ny - work[2 * L + k]
         if rows == CELL_ROWS:
             ut += pair[p + 4 * L + k]
-        work[3 * L + k] += miss_of(force[e + 2 * k], force[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
+        work[3 * L + k] += contact_residual(force[e + 2 * k], force[e + 2 * k + 1], un, ut, wn, THIRD * wn, mu)
 
 
 @njit(inline="always")
-def miss_of_pair(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-def]
+def pair_residual(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untyped-def]
     p, e = (c // L) * rows * L + c % L, (c // L) * IDS + c % L
     i, j = U4 * U(ids[e]), U4 * U(ids[e + L])
     nx, ny, wn = pair[p], pair[p + L], pair[p + 2 * L]
@@ -284,12 +280,12 @@ def miss_of_pair(pair, ids, body, force, c, rows, mu):  # type: ignore[no-untype
     ut = dy * nx - dx * ny - (body[i + U2] + body[j + U2])
     if rows == CELL_ROWS:
         ut += pair[p + 4 * L]
-    return miss_of(force[2 * c], force[2 * c + 1], un, ut, wn, THIRD * wn, mu)
+    return contact_residual(force[2 * c], force[2 * c + 1], un, ut, wn, THIRD * wn, mu)
 
 
 @njit(inline="always")
-def miss_of(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
-    """|f − P(f − D⁻¹ u)|² of one contact, without taking a force from itself: that would cost digits."""
+def contact_residual(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
+    """Squared residual |f − P(f − D⁻¹ u)|² of one contact, without the subtraction f − f, which would cancel digits."""
     normal = min(wn * un, fn)
     limit = mu * (fn - normal)
     tangential = min(max(wt * ut, ft - limit), ft + limit)
@@ -297,25 +293,25 @@ def miss_of(fn, ft, un, ut, wn, wt, mu):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def measure_unbalance(problem, body):  # type: ignore[no-untyped-def]
-    """Worst and mean |ΣF| [N] on a grain, from what the forces have added to its velocity."""
-    now, free, external = (
+def measure_force_residual(problem, body):  # type: ignore[no-untyped-def]
+    """Compute worst and mean |ΣF| [N] on a grain from the velocity that the forces have added to it."""
+    current, free, external = (
         body.reshape(body.size),
         problem.body.reshape(body.size),
         problem.external.reshape(problem.external.size),
     )
     count = len(body)
-    work = workspace(3 * L)  # worst, sum and number of grains: one of each per lane
+    work = workspace(3 * L)  # worst, sum and number of grains, per lane
     work[:] = 0.0
     for block in range((count + L - 1) // L):
         first, second = block * (4 * L), block * (2 * L)
         for k in range(min(L, count - block * L)):
             row, at = first + 4 * k, second + 2 * k
-            compliance = now[row + 3]
-            present = 1.0 if compliance > 0.0 else 0.0  # else the grain is lost, and its record zero
+            compliance = current[row + 3]
+            present = 1.0 if compliance > 0.0 else 0.0  # a lost grain has a zero record
             impedance = present / (compliance if compliance > 0.0 else 1.0)
-            x = external[at] + (now[row] - free[row]) * impedance
-            y = external[at + 1] + (now[row + 1] - free[row + 1]) * impedance
+            x = external[at] + (current[row] - free[row]) * impedance
+            y = external[at + 1] + (current[row + 1] - free[row + 1]) * impedance
             size = np.sqrt(x * x + y * y)
             greatest = work[k]
             work[k] = size if size > greatest else greatest

@@ -1,8 +1,8 @@
 """The order in which a sweep visits contacts.
 
-Solutions are not unique and the order selects one, so it is fixed by the geometry alone, and recorded. It is also
-what makes a sweep fast: neighbours in memory are neighbours in the packing (Morton order), and contacts come in
-groups in which no two share a body, so that a whole group can be worked on at once and still be a Gauss-Seidel sweep.
+Solutions are not unique and the order selects one of them, so it depends on the geometry alone and is recorded. It also
+makes a sweep fast: neighbours in memory are neighbours in the packing (Morton order), and contacts form groups in which
+no two share a body. A whole group is then relaxed at once, and the sweep is still a Gauss-Seidel sweep.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts
+from ...bodies.grains import Array
+from ...contacts.contacts import Contacts
 
 GROUP = 32  # contacts between grains that share no grain; four vectors of eight numbers
-WALL_GROUP = 4  # contacts with walls: a frame has no more walls to tell apart
+WALL_GROUP = 4  # contacts with walls: a frame has four walls
 
 
 class VisitingOrder(NamedTuple):
@@ -29,7 +29,7 @@ class VisitingOrder(NamedTuple):
 
 
 def order_contacts(contacts: Contacts) -> VisitingOrder:
-    """The order that contacts are visited in, those with walls last."""
+    """Order the contacts of a frame, those with walls last."""
     point, i, j = contacts.point, contacts.i, contacts.j
     pair, wall = np.flatnonzero(~contacts.with_wall), np.flatnonzero(contacts.with_wall)
     order, grouped = visiting_order(point[pair], i[pair], j[pair], GROUP)
@@ -40,10 +40,22 @@ def order_contacts(contacts: Contacts) -> VisitingOrder:
 def visiting_order(
     point: Array, i: NDArray[np.int32], j: NDArray[np.int32], size: int
 ) -> tuple[NDArray[np.int64], int]:
-    """Order contacts in groups of `size` that share no body, groups along the Morton curve.
+    """Order contacts in groups that share no body, groups along the Morton curve.
 
-    point (c, 2) [m] of the contacts; i, j (c,) their bodies. Returns a permutation (c,) and the number of contacts in
-    full groups; those after them follow in Morton order and may share bodies.
+    Parameters
+    ----------
+    point : (c, 2)
+        Positions of the contacts [m].
+    i, j : (c,)
+        Their bodies.
+    size : int
+        Contacts of a group.
+
+    Returns
+    -------
+    tuple
+        Permutation (c,) and the number of contacts in complete groups. The others follow in Morton order and may share
+        bodies.
     """
     if len(point) == 0:
         return np.empty(0, np.int64), 0
@@ -53,7 +65,7 @@ def visiting_order(
 
 
 def _morton_code(point: Array) -> NDArray[np.uint64]:
-    """Interleave the bits of the coordinates, 16 bits each."""
+    """Compute the Morton code: the interleaved bits of the coordinates, 16 bits each."""
     low = point.min(axis=0)
     extent = max(float((point.max(axis=0) - low).max()), 1e-30)
     cell = np.minimum((point - low) / extent * 65536.0, 65535.0).astype(np.uint64)
@@ -68,29 +80,29 @@ def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 @njit(cache=True)
 def _independent_groups(i, j, size):  # type: ignore[no-untyped-def]
-    """Fill groups one after the other, each with the first contacts left over that share no body with it."""
+    """Fill groups one after the other, each with the first remaining contacts that share no body with it."""
     count = len(i)
-    following = np.arange(1, count + 1)  # a linked list of the contacts left over
+    following = np.arange(1, count + 1)  # linked list of the remaining contacts
     head = 0
-    group_of = np.full(max(i.max(), j.max()) + 1, -1)  # the last group that a body was put in
+    group_of = np.full(max(i.max(), j.max()) + 1, -1)  # last group of each body
     order = np.empty(count, np.int64)
     member = np.empty(size, np.int64)
     placed = np.zeros(count, np.bool_)
     groups = 0
     while True:
-        found, before, c = 0, -1, head
+        found, predecessor, c = 0, -1, head
         while c < count and found < size:
             if group_of[i[c]] != groups and group_of[j[c]] != groups:
                 group_of[i[c]] = groups
                 group_of[j[c]] = groups
                 member[found] = c
                 found += 1
-                if before < 0:
+                if predecessor < 0:
                     head = following[c]
                 else:
-                    following[before] = following[c]
+                    following[predecessor] = following[c]
             else:
-                before = c
+                predecessor = c
             c = following[c]
         if found < size:
             break

@@ -1,1 +1,1 @@
-"""The sampler of a frame's posterior: what it reads and writes, its draws, the sweeps of a chain."""
+"""The Gibbs sampler of a frame's posterior: its data, its conditional draws, the sweeps of a chain."""

@@ -1,4 +1,4 @@
-"""One chain of the sampler: evidence without dimension, the law of each sweep, and the means over those that count."""
+"""One chain of the sampler: dimensionless evidence, the annealing schedule, and means over the kept sweeps."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.bodies.grains import Array
-from solver.posterior.frame_evidence import FrameEvidence
-from solver.posterior.sampler.kernels import run
-from solver.posterior.sampler.records import Centres, Pairs, make_room, start_state
-from solver.posterior.settings import PosteriorSettings
+from ...bodies.grains import Array
+from ..frame_evidence import FrameEvidence
+from ..posterior_settings import PosteriorSettings
+from .gibbs_sweeps import run
+from .records import SamplerGrains, SamplerPairs, initial_state, make_workspace
 
-EXACT = 1e-7  # mean diameters: what counts as without error
-EDGE = 0.01  # balance of a grain at the edge over that of one inside: pushes from outside are a mean force, not a tenth
-LEAST_SHARE = 1e-6  # nobody is so sure of a pair that gap and balance could not tell otherwise
+EXACT = 1e-7  # mean diameters: standard deviation of an error that counts as exact
+EDGE_WEIGHT = 0.01  # balance weight at the edge: unknown outside forces are of the mean force's size, not a tenth of it
+PROBABILITY_MARGIN = 1e-6  # prior probabilities stay this far from 0 and 1, so that gap and balance can overrule them
 
 
 @dataclass(frozen=True, slots=True)
-class Chain:
-    """Means over the kept sweeps of one chain, without dimension."""
+class ChainMeans:
+    """Means over the kept sweeps of one chain, dimensionless."""
 
     pair: Array  # (c, 5) of z, z f, z t, (z f)², (z t)²
     error: Array  # (m, 4) of ε, δ, δ²
@@ -27,68 +27,86 @@ class Chain:
 
 
 def run_chain(
-    pairs: Pairs, centres: Centres, laws: Array, settings: PosteriorSettings, rng: np.random.Generator
-) -> Chain:
-    """Sweep once for each of the laws, from a start without errors."""
-    state = start_state(pairs, centres, settings.stiffness)
+    pairs: SamplerPairs,
+    grains: SamplerGrains,
+    schedule: Array,
+    settings: PosteriorSettings,
+    rng: np.random.Generator,
+) -> ChainMeans:
+    """Run one sweep for each row of the schedule (sweeps, 11), from a state without errors."""
+    state = initial_state(pairs, grains, settings.compliance)
     sums = (np.zeros((len(pairs.i), 5)), np.zeros((len(state.body), 4)), np.zeros(4))
-    run(rng, pairs, centres, laws, state, make_room(pairs, centres), settings.kept, sums)
-    return Chain(*(each / settings.kept for each in sums))
+    run(rng, pairs, grains, schedule, state, make_workspace(pairs, grains), settings.kept, sums)
+    return ChainMeans(*(each / settings.kept for each in sums))
 
 
-def pairs_of(evidence: FrameEvidence) -> Pairs:
-    """The pairs as the kernels read them."""
+def make_sampler_pairs(evidence: FrameEvidence) -> SamplerPairs:
+    """Convert the pairs of a frame to lengths in mean diameters."""
     contacts = evidence.contacts
-    share = np.clip(evidence.prior, LEAST_SHARE, 1.0 - LEAST_SHARE)
-    return Pairs(
+    probability = np.clip(evidence.prior, PROBABILITY_MARGIN, 1.0 - PROBABILITY_MARGIN)
+    return SamplerPairs(
         i=contacts.i.astype(np.int64),
         j=np.where(contacts.with_wall, -1, contacts.j).astype(np.int64),
         normal=np.ascontiguousarray(contacts.normal),
         gap=contacts.gap / evidence.diameter,
-        odds=np.log(share / (1.0 - share)),
+        odds=np.log(probability / (1.0 - probability)),
         friction=np.ascontiguousarray(evidence.friction),
         group=evidence.known.group,
-        deviation=np.zeros(contacts.count)
-        if evidence.gap_deviation is None
-        else evidence.gap_deviation / evidence.diameter,
+        gap_sd=np.zeros(contacts.count) if evidence.gap_sd is None else evidence.gap_sd / evidence.diameter,
+        factor=np.ones(contacts.count) if evidence.known.factor is None else evidence.known.factor,
     )
 
 
-def centres_of(evidence: FrameEvidence) -> Centres:
-    """The grains as the kernels read them."""
+def make_sampler_grains(evidence: FrameEvidence) -> SamplerGrains:
+    """Convert the grains of a frame to lengths in mean diameters and forces in force units."""
     contacts, n = evidence.contacts, len(evidence.radius)
     rows, wall = np.arange(contacts.count), contacts.with_wall
     grain = np.concatenate([contacts.i, contacts.j[~wall]])
     order = np.argsort(grain, kind="stable")
-    return Centres(
+    return SamplerGrains(
         lever=evidence.radius / evidence.radius.mean(),
         load=evidence.known.weight / evidence.known.unit,
-        balanced=_weight_of_balance(evidence),
-        deviation=np.maximum(evidence.centre_deviation / evidence.diameter, EXACT),
-        radius_deviation=np.maximum(evidence.radius_deviation / evidence.diameter, EXACT),
+        balance_weight=_balance_weight(evidence),
+        centre_sd=np.maximum(evidence.centre_sd / evidence.diameter, EXACT),
+        radius_sd=np.maximum(evidence.radius_sd / evidence.diameter, EXACT),
         start=np.concatenate([[0], np.cumsum(np.bincount(grain, minlength=n))]).astype(np.int64),
         row=np.concatenate([rows, rows[~wall]])[order].astype(np.int64),
         group_load=evidence.known.total / evidence.known.unit,
     )
 
 
-def _weight_of_balance(evidence: FrameEvidence) -> Array:
-    """How strictly every grain is in balance (n,): 1, or 0 where nothing is known, or little at the packing's edge."""
+def _balance_weight(evidence: FrameEvidence) -> Array:
+    """Weight of every grain's force balance (n,): 1 inside, 0 where forces are missing, small at the packing's edge."""
     strict = evidence.balanced.astype(np.float64)
-    return strict if evidence.edge is None else np.where(evidence.edge, EDGE, strict)
+    return strict if evidence.edge is None else np.where(evidence.edge, EDGE_WEIGHT, strict)
 
 
-def laws_of(settings: PosteriorSettings, expected: float, *, scale_known: bool) -> Array:
-    """The law of every sweep (sweeps, 11): balance and width are tightened together, then stay."""
-    sweeps = settings.annealing + settings.settling + settings.kept
+def make_schedule(settings: PosteriorSettings, expected_count: float, *, scale_known: bool) -> Array:
+    """Build the model parameters of every sweep (sweeps, 11).
+
+    Parameters
+    ----------
+    settings : PosteriorSettings
+        Final parameters and numbers of sweeps.
+    expected_count : float
+        Sum of the prior probabilities of all pairs.
+    scale_known : bool
+        Whether a load or the grains' weight determines the scale of forces; else the mean force is held at the unit.
+
+    Notes
+    -----
+    Sweep k of n annealing sweeps uses s_k = s (s_0/s)^(1 − k/n) and b_k = b (b_0/b)^(1 − k/n); later ones use s and b.
+    """
+    sweeps = settings.annealing + settings.burn_in + settings.kept
     left = np.clip(1.0 - np.arange(sweeps) / max(settings.annealing, 1), 0.0, 1.0)
     loose = np.array([
-        max(settings.start_balance / settings.balance, 1.0), max(settings.start_width / settings.width, 1.0)
+        max(settings.start_balance_sd / settings.balance_sd, 1.0),
+        max(settings.start_gap_law_sd / settings.gap_law_sd, 1.0),
     ])  # fmt: skip
-    tightened = np.array([settings.balance, settings.width]) * loose ** left[:, None]
-    gauge = 0.0 if scale_known else settings.gauge
+    annealed = np.array([settings.balance_sd, settings.gap_law_sd]) * loose ** left[:, None]
+    mean_gauge = 0.0 if scale_known else settings.gauge
     rest = [
-        settings.shear, settings.open_gap, gauge, settings.gauge, expected,
-        settings.stiffness, settings.stiffness_sd, settings.offset_sd, settings.rarity,
+        settings.tangential_sd, settings.mean_open_gap, mean_gauge, settings.gauge, expected_count,
+        settings.compliance, settings.compliance_sd, settings.offset_sd, settings.force_rate,
     ]  # fmt: skip
-    return np.column_stack([tightened, np.tile(rest, (sweeps, 1))])
+    return np.column_stack([annealed, np.tile(rest, (sweeps, 1))])

@@ -1,4 +1,4 @@
-"""What all contacts share: overlap per force, the error of all gaps, and the scale of all forces."""
+"""Draws of the unknowns that all contacts share: overlap per force, common gap error, scale of the forces."""
 
 from __future__ import annotations
 
@@ -6,62 +6,79 @@ import math
 
 from numba import njit
 
-from solver.posterior.sampler.draws import draw_above
-from solver.posterior.sampler.records import CX, CY, DELTA, FX, FY, KNOWN, TORQUE
+from .draws import draw_above
+from .records import BALANCE_WEIGHT, CX, CY, DELTA, FX, FY, TORQUE
 
-SCALE_STEPS = 4  # of Metropolis, a sweep
+SCALE_STEPS = 4  # Metropolis steps in a sweep
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def draw_common(rng, pairs, law, room, state):  # type: ignore[no-untyped-def]
-    """Draw κ, then the offset; recompute the sums, which would else gather rounding."""
+def draw_common(rng, pairs, model, workspace, state):  # type: ignore[no-untyped-def]
+    """Draw κ, then the offset o; recompute the sums over bearing pairs, which would otherwise gather rounding.
+
+    Notes
+    -----
+    With h_0 = h + o, the gap corrected for ε and δ alone, and κ_0, σ_κ, σ_o the parameters of the priors:
+
+        κ | rest ~ N(B/A, 1/A), κ ≥ 0:  A = 1/σ_κ² + Σ z f²/b²,  B = κ_0/σ_κ² − Σ z f (h_0 − o)/b²
+        o | rest ~ N(D/C, 1/C):         C = 1/σ_o² + Σ 1/b²,     D = Σ (h_0 + z κ f − (1 − z) γ)/b²
+    """
     first, second, normal, gap = pairs.i, pairs.j, pairs.normal, pairs.gap
-    bears, fn, open_gap, body, common, told = state.bears, state.fn, state.open_gap, state.body, state.common, room.told
-    precision = heights = forces = squares = products = opened = excess = bearing = 0.0  # weighted by 1/b²
+    bearing, fn, open_gap, body, common = state.bearing, state.fn, state.open_gap, state.body, state.common
+    observation = workspace.observation
+    precision = heights = forces = squares = products = opened = excess = count = 0.0  # weighted by 1/b²
     for c in range(len(gap)):
-        i, j, nx, ny, tight = first[c], second[c], normal[c, 0], normal[c, 1], told[c, 0]
+        i, j, nx, ny, weight = first[c], second[c], normal[c, 0], normal[c, 1], observation[c, 0]
         h = gap[c] + nx * body[i, CX] + ny * body[i, CY] - body[i, DELTA]
         if j >= 0:
             h -= nx * body[j, CX] + ny * body[j, CY] + body[j, DELTA]
-        precision += tight
-        heights += tight * h
-        if bears[c]:
+        precision += weight
+        heights += weight * h
+        if bearing[c]:
             f = fn[c]
-            forces += tight * f
-            squares += tight * f * f
-            products += tight * f * h
+            forces += weight * f
+            squares += weight * f * f
+            products += weight * f * h
             excess += f - 1.0
-            bearing += 1.0
+            count += 1.0
         else:
-            opened += tight * open_gap[c]
-    common[2], common[3] = excess, bearing
-    a = 1.0 / law.stiffness_sd**2 + squares
-    b = law.stiffness_mean / law.stiffness_sd**2 - products + common[1] * forces
+            opened += weight * open_gap[c]
+    common[2], common[3] = excess, count
+    a = 1.0 / model.compliance_sd**2 + squares
+    b = model.compliance_mean / model.compliance_sd**2 - products + common[1] * forces
     root = math.sqrt(a)
     common[0] = (b / root + draw_above(rng, -b / root)) / root
-    a = 1.0 / law.offset_sd**2 + precision
+    a = 1.0 / model.offset_sd**2 + precision
     common[1] = (heights + common[0] * forces - opened) / a + rng.standard_normal() / math.sqrt(a)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def draw_scale(rng, pairs, centres, law, state):  # type: ignore[no-untyped-def]
-    """Multiply all forces and divide κ by one number: contact by contact this would take thousands of sweeps.
+def draw_scale(rng, pairs, grains, model, state):  # type: ignore[no-untyped-def]
+    """Multiply all forces by a number x and divide κ by it; contact by contact this would take thousands of sweeps.
 
-    What the number λ changes is known in closed form, a few steps of Metropolis draw its logarithm; forces and κ
-    transform with the Jacobian λ^(their count).
+    Notes
+    -----
+    The products κ f stay as they are, so that minus the logarithm of the posterior depends on x in closed form, with
+    p_i the weight of grain i, F_i and M_i the sums of the contact forces and torques on it, L_g the load of a group:
+
+        ½ x² (Σ_i w_i (|F_i|² + M_i²) + Σ_g w (Σ f)² + Σ t²/τ²) + x (Σ_i w_i F_i·p_i − Σ_g w L_g Σ f + λ Σ f)
+        + K/(2c) (x Σ f − Σ z)² + (κ/x − κ_0)²/(2 σ_κ²) − q ln x,
+
+    where q is the number of force components that are drawn less one, for κ: the Jacobian of the move. ln x is drawn
+    by SCALE_STEPS steps of random-walk Metropolis from ln x = 0 with a step of standard deviation 1/√(|q| + 1).
     """
-    bears, fn, ft, friction, common = state.bears, state.fn, state.ft, pairs.friction, state.common
-    body, load, group_sum, group_load = state.body, centres.load, state.group_sum, centres.group_load
-    w = 1.0 / law.balance**2
+    bearing, fn, ft, friction, common = state.bearing, state.fn, state.ft, pairs.friction, state.common
+    body, load, group_sum, group_load = state.body, grains.load, state.group_sum, grains.group_load
+    w = 1.0 / model.balance_sd**2
     square = cross = total = 0.0
-    moved = -1.0
+    exponent = -1.0
     for c in range(len(fn)):
-        if bears[c]:
+        if bearing[c]:
             total += fn[c]
-            square += (ft[c] / law.shear) ** 2
-            moved += 2.0 if friction[c] > 0.0 else 1.0
+            square += (ft[c] / model.tangential_sd) ** 2
+            exponent += 2.0 if friction[c] > 0.0 else 1.0
     for g in range(len(load)):
-        fx, fy, wg = body[g, FX] - load[g, 0], body[g, FY] - load[g, 1], w * body[g, KNOWN]
+        fx, fy, wg = body[g, FX] - load[g, 0], body[g, FY] - load[g, 1], w * body[g, BALANCE_WEIGHT]
         square += wg * (fx * fx + fy * fy + body[g, TORQUE] ** 2)
         cross += wg * (fx * load[g, 0] + fy * load[g, 1])
     for g in range(len(group_sum)):
@@ -69,23 +86,23 @@ def draw_scale(rng, pairs, centres, law, state):  # type: ignore[no-untyped-def]
         cross -= w * group_sum[g] * group_load[g]
     if total == 0.0:
         return
-    pull, bearing = law.gauge / len(fn), common[3]
-    step, log_scale, now = 1.0 / math.sqrt(abs(moved) + 1.0), 0.0, 0.0
+    gauge, count = model.mean_gauge / len(fn), common[3]
+    step, log_scale, now = 1.0 / math.sqrt(abs(exponent) + 1.0), 0.0, 0.0
     for k in range(SCALE_STEPS + 1):
         trial = log_scale + step * rng.standard_normal() if k > 0 else 0.0
         x = math.exp(trial)
         level = (
-            moved * trial
+            exponent * trial
             - 0.5 * square * x * x
-            - (cross + law.rarity * total) * x
-            - 0.5 * pull * (x * total - bearing) ** 2
+            - (cross + model.force_rate * total) * x
+            - 0.5 * gauge * (x * total - count) ** 2
         )
-        level -= 0.5 * ((common[0] / x - law.stiffness_mean) / law.stiffness_sd) ** 2
+        level -= 0.5 * ((common[0] / x - model.compliance_mean) / model.compliance_sd) ** 2
         if k == 0 or rng.random() < math.exp(min(level - now, 0.0)):
             log_scale, now = trial, level
     scale = math.exp(log_scale)
     common[0] /= scale
-    common[2] = scale * total - bearing
+    common[2] = scale * total - count
     for c in range(len(fn)):
         fn[c] *= scale
         ft[c] *= scale

@@ -1,10 +1,10 @@
-"""Whoever waits for kernels to be compiled is told, and nobody else."""
+"""The compilation of kernels is reported, and only then."""
 
 import numba
 import pytest
 from numba import njit
 from rodsight.cli import terminal
-from rodsight.cli.compiling import SENTENCE, hearing_of_compilation
+from rodsight.cli.compiling import COMPILATION_NOTE, count_compilations
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs compiled kernels")
 
@@ -14,22 +14,22 @@ def kernel():
 
 
 def test_kernels_are_counted_as_they_are_compiled_and_not_again():
-    compiled, heard = kernel(), []
-    with hearing_of_compilation(heard.append):
+    compiled, counts = kernel(), []
+    with count_compilations(counts.append):
         assert compiled(1) == 2
         assert compiled(2) == 3
-        assert heard == [1]
+        assert counts == [1]
         kernel()(1)
     kernel()(1)
-    assert heard == [1, 2]
+    assert counts == [1, 2]
 
 
-def test_the_bars_say_why_it_takes_so_long(capsys):
+def test_the_progress_bars_explain_the_compilation(capsys):
     with terminal.progress_bars() as progress:
         progress("solving", 0, 3)
     assert "compil" not in capsys.readouterr().err
     with terminal.progress_bars():
         kernel()(1)
-    told = " ".join(capsys.readouterr().err.split())
-    assert SENTENCE in told
-    assert "compiling" in told
+    printed = " ".join(capsys.readouterr().err.split())
+    assert COMPILATION_NOTE in printed
+    assert "compiling" in printed

@@ -1,4 +1,4 @@
-"""A bad photograph, or a frame that cannot be solved, costs that frame and says so."""
+"""A bad photograph or an unsolvable frame fails that frame only, with a message."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import h5py
 import numpy as np
 import pytest
 from rodsight.experiment.reading.tables import read_table
-from rodsight.inference import inference
+from rodsight.inference import infer_sequence
 from rodsight.run_folder import FAILURES
 
 from tests.app.experiment.tables import edit
-from tests.app.tracking.photographed import cut_walls
+from tests.app.tracking.photographed import keep_first_walls
 from tests.program import rodsight
 
 BLACK = 2
@@ -30,9 +30,9 @@ def blacken(experiment: Path, frame: int) -> None:
 
 
 @pytest.mark.screen  # seconds of photographs
-def test_a_black_photograph_costs_its_own_frame(made_photographs, tmp_path, capsys):
+def test_a_black_photograph_fails_its_own_frame(made_photographs, tmp_path, capsys):
     experiment, out = Path(shutil.copytree(made_photographs, tmp_path / "black")), tmp_path / "out"
-    cut_walls(experiment)  # followed in the photographs: not to be found there either
+    keep_first_walls(experiment)  # walls are tracked in the photographs, and lost there, too
     blacken(experiment, BLACK)
     assert rodsight("run", experiment, "--out", out, *FEW) == 0
     assert "Frame 2 failed, without forces: 0 of 30 grains are found in" in capsys.readouterr().out.replace("\n", " ")
@@ -52,37 +52,37 @@ def test_a_black_photograph_costs_its_own_frame(made_photographs, tmp_path, caps
     assert sorted(set(walls)) == [0, 1, 3]
 
 
-def test_a_frame_that_cannot_be_solved_is_told_and_its_traceback_kept(tracked, tmp_path, capsys, monkeypatch):
-    solve_sequence = inference.solve_sequence
+def test_a_frame_that_cannot_be_solved_is_reported_and_its_traceback_logged(tracked, tmp_path, capsys, monkeypatch):
+    solve_sequence = infer_sequence.solve_sequence
 
-    def stumbling(*given, observer, **told):
-        yield from solve_sequence(*given, observer=observer, **(told | {"failed": {3: "it stumbled"}}))
+    def failing(*given, observer, **options):
+        yield from solve_sequence(*given, observer=observer, **(options | {"failed": {3: "it failed"}}))
         observer(3, ZeroDivisionError("by nothing"))
 
-    monkeypatch.setattr(inference, "solve_sequence", stumbling)
+    monkeypatch.setattr(infer_sequence, "solve_sequence", failing)
     assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 0
-    told = capsys.readouterr()
-    assert "Frame 3 failed, without forces: it stumbled." in told.out
-    assert "Traceback" not in told.out + told.err
+    printed = capsys.readouterr()
+    assert "Frame 3 failed, without forces: it failed." in printed.out
+    assert "Traceback" not in printed.out + printed.err
     log = (tmp_path / "out" / FAILURES).read_text()
     assert "solving, frame 3" in log
     assert "ZeroDivisionError: by nothing" in log
 
 
-def test_a_run_of_which_no_frame_can_be_solved_fails_in_one_line(tracked, tmp_path, capsys, monkeypatch):
-    def nothing(*given):
+def test_a_run_without_a_solvable_frame_fails_in_one_line(tracked, tmp_path, capsys, monkeypatch):
+    def fail(*given):
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr("solver.sequence.frames.pose_frame", nothing)
+    monkeypatch.setattr("rodsight.solver.sequence.frames.pose_frame", fail)
     assert rodsight("run", tracked, "--out", tmp_path / "out", "--quiet") == 1
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
-    assert "no frame could be solved" in told.err
-    assert "failures.log" in told.err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert "no frame could be solved" in printed.err
+    assert "failures.log" in printed.err
 
 
-def test_bad_input_is_no_failed_frame(tracked, tmp_path, capsys):
+def test_invalid_input_is_not_a_failed_frame(tracked, tmp_path, capsys):
     edit(tracked / "times.csv", "\n2,", "\n2,-")
     assert rodsight("run", tracked, "--out", tmp_path / "out", "--quiet") == 2
     assert "times.csv" in capsys.readouterr().err

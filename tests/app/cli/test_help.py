@@ -1,4 +1,4 @@
-"""The help: grouped, with an example and units, and nothing that is meant for programmers."""
+"""The help is grouped, with examples and units, and without internals."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from rodsight.cli.command_list import GROUPS, name_of, overview, purpose
 from tests.program import rodsight
 
 COMMANDS = [command for group in GROUPS.values() for command in group]
-QUANTITIES = {  # what an option is called, and the unit that its help must tell
+QUANTITIES = {  # options, and the unit in their help
     "--pixel-size": "m", "--interval": "s", "--idle": "s", "--max-size": "MB", "--density": "kg/m³", "--length": "m",
     "--step-degrees": "°", "--pressure": "Pa",
 }  # fmt: skip
 
 
-def told(capsys: pytest.CaptureFixture, *arguments: str) -> str:
+def printed_text(capsys: pytest.CaptureFixture, *arguments: str) -> str:
     assert rodsight(*arguments) == 0
     return " ".join(re.sub(r"[│╭╰╮╯─]", " ", capsys.readouterr().out).split())
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=name_of)
-def test_every_command_explains_itself(command, capsys):
-    text = told(capsys, name_of(command), "--help")
+def test_every_command_has_help_with_an_example_and_units(command, capsys):
+    text = printed_text(capsys, name_of(command), "--help")
     assert f"Example: rodsight {name_of(command)} " in text
     assert "None" not in text
     assert "default: )" not in text
@@ -34,7 +34,7 @@ def test_every_command_explains_itself(command, capsys):
             assert f"[{unit}" in meaning[0], f"{option}: {meaning[0]}"
 
 
-def test_the_overview_names_every_command_in_a_line(capsys):
+def test_the_overview_lists_every_command_in_one_line(capsys):
     text = overview()
     for command in COMMANDS:
         assert f"  {name_of(command):<12} {purpose(command)}\n" in text
@@ -46,7 +46,7 @@ def test_the_overview_names_every_command_in_a_line(capsys):
 
 
 def test_completion_of_a_shell_is_printed(capsys):
-    assert "bash completion" in told(capsys, "--completion", "bash").lower()
+    assert "bash completion" in printed_text(capsys, "--completion", "bash").lower()
     assert rodsight("--completion", "fish") == 2
     assert "is not one of bash, zsh, tcsh" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""The commands end to end, on experiments small enough for every day."""
+"""The commands end to end on small experiments."""
 
 import json
 import subprocess
@@ -11,13 +11,13 @@ from rodsight.results.hdf5.store import load_results
 from rodsight.results.hdf5.writer import columns_of_results
 from rodsight.results.results import Results
 
-from tests.program import KEPT, TELLING, rodsight, wait_until_told
+from tests.program import KEPT, REPORTING, rodsight, wait_for_report
 
 FEW = ("--set", "solver.sweeps=50")
 
 
 def same_frames(a: Results, b: Results) -> bool:
-    """Every number that is stored of them, bit for bit."""
+    """Compare all stored numbers bit for bit."""
     one, other = columns_of_results(a), columns_of_results(b)
     return one.keys() == other.keys() and all(
         np.array_equal(values, other[path], equal_nan=values.dtype.kind == "f") for path, values in one.items()
@@ -27,9 +27,9 @@ def same_frames(a: Results, b: Results) -> bool:
 def test_a_tracked_experiment_runs_to_results_recording_and_summary(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(tracked), "--out", str(out)) == 0
-    told = capsys.readouterr().out
-    assert "Against the truth" in told
-    assert "rodsight view" in told
+    printed = capsys.readouterr().out
+    assert "Against the truth" in printed
+    assert "rodsight view" in printed
     assert sorted(file.name for file in out.iterdir() if file.is_file()) == [
         "manifest.json",
         "recording.rrd",
@@ -110,9 +110,9 @@ def test_a_killed_run_goes_on_where_it_stopped(tracked, tmp_path, capsys):
     slow = ("--set", "solver.sweeps=4000", "--set", "recording.sweeps=none")
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     assert rodsight("solve", tracked, "--out", whole, *slow) == 0
-    command = [*TELLING, "solve", str(tracked), "--out", str(cut), *slow]
+    command = [*REPORTING, "solve", str(tracked), "--out", str(cut), *slow]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
-        wait_until_told(run, KEPT, 2)
+        wait_for_report(run, KEPT, 2)
         run.kill()
     kept = cut / ".unfinished" / "solving"
     assert not (cut / "results.h5").exists(), "the run ended before it could be killed"
@@ -129,10 +129,10 @@ def test_an_interrupt_ends_with_130_and_a_hint(tracked, tmp_path, monkeypatch, c
 
     monkeypatch.setattr("rodsight.pipeline.solve", interrupt)
     assert rodsight("run", str(tracked), "--out", str(tmp_path / "out")) == 130
-    assert "goes on" in capsys.readouterr().err
+    assert "resumes" in capsys.readouterr().err
 
 
-def test_photographs_become_forces(made_photographs, tmp_path, capsys):
+def test_photographs_are_tracked_and_solved(made_photographs, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("run", str(made_photographs), "--out", str(out)) == 0
     capsys.readouterr()
@@ -152,9 +152,9 @@ def test_a_range_of_frames_is_scored_against_its_own_truth(tracked, tmp_path, ca
     assert summary["accuracy"]["r_fn"][3] > 0.8
     capsys.readouterr()
     assert rodsight("score", str(out), "--json") == 0
-    told = json.loads(capsys.readouterr().out)
-    baselines = told.pop("baselines")
-    assert told == summary["accuracy"]
+    scored = json.loads(capsys.readouterr().out)
+    baselines = scored.pop("baselines")
+    assert scored == summary["accuracy"]
     assert set(baselines) == {"r_ours", "r_static", "r_overlap", "r_uniform"}
     assert all(len(values) == 4 for values in baselines.values())
     assert baselines["r_ours"][3] > baselines["r_uniform"][3] > 0.2
@@ -183,19 +183,19 @@ def test_scoring_the_truth_against_itself_is_perfect(tracked, tmp_path, capsys):
     assert found["contact_recall"] == [1.0] * 5
 
 
-def test_check_says_what_it_found_and_writes_nothing(tracked, capsys, monkeypatch, tmp_path):
+def test_check_describes_the_input_and_writes_nothing(tracked, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert rodsight("check", str(tracked)) == 0
     assert "40 grains tracked over 5 frames, 4 walls" in capsys.readouterr().out
     assert not Path("runs").exists()
 
 
-def test_check_says_what_the_first_photographs_promise(made_photographs, capsys, monkeypatch, tmp_path):
+def test_check_predicts_the_accuracy_from_the_first_photographs(made_photographs, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert rodsight("check", made_photographs) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "grains in the first, 4 walls" in told
-    assert "First 3 photographs: noise" in told
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "grains in the first, 4 walls" in printed
+    assert "First 3 photographs: positions have a noise" in printed
     assert not list(tmp_path.iterdir())
     assert rodsight("check", made_photographs, "--no-budget") == 0
     assert "noise" not in capsys.readouterr().out
@@ -223,13 +223,13 @@ def test_imposed_walls_alone_give_forces_up_to_a_scale(tracked, tmp_path, capsys
 def test_recorded_wall_forces_are_compared_with_inferred_ones(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out)) == 0
-    told = capsys.readouterr().out
+    printed = capsys.readouterr().out
     summary = json.loads((out / "summary.json").read_text())
     if summary["settled_after"] is not None:  # they are compared over settled frames
         assert set(summary["wall_force_error"]) == {"bottom", "right", "top", "left"}
         assert max(summary["wall_force_error"].values()) < 0.5
-        assert "recorded wall forces" in told
+        assert "recorded wall forces" in printed
     with h5py.File(out / "results.h5") as store:
         recorded, inferred = store["walls/force"][()], store["statistics/wall_force"][()]
-    # The truth's own walls push back what the inferred forces push on them: same side, same order of size.
+    # Recorded and inferred wall forces have the same direction and magnitude.
     assert np.sum(recorded[3:] * inferred[3:]) > 0.8 * np.sum(recorded[3:] ** 2)

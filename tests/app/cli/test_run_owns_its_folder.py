@@ -1,4 +1,4 @@
-"""A run owns its folder: one at a time, what is there is what it says, and nothing in it names a person or a place."""
+"""A run locks its folder, validates stored files, and stores no names of persons or places."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from rodsight import pipeline
 from rodsight.experiment.reading.input_files import InputFiles
-from rodsight.lock import LOCK, Holder, holding
+from rodsight.process.lock import LOCK, Holder, hold_folder
 from rodsight.results.checkpoint import Checkpoint
 from rodsight.results.hdf5.store import load_results
 from rodsight.verdicts.log import VERDICTS, Entry, Flag, VerdictLog
@@ -22,14 +22,14 @@ from rodsight.verdicts.log import VERDICTS, Entry, Flag, VerdictLog
 from tests.program import rodsight
 
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=30", "--sweeps", "none", "--quiet")
-DEAD = 2**22 + 1  # beyond the greatest number of a process
+DEAD = 2**22 + 1  # above the greatest process id
 
 
 def lock_of(folder: Path, **changes: object) -> None:
     folder.mkdir(exist_ok=True)
     this = Holder.this()
-    told = {"process": this.process, "began": this.began, "host": this.host} | changes
-    (folder / LOCK).write_text(json.dumps(told))
+    lock = {"process": this.process, "began": this.began, "host": this.host} | changes
+    (folder / LOCK).write_text(json.dumps(lock))
 
 
 def forces(out: Path) -> np.ndarray:
@@ -38,17 +38,17 @@ def forces(out: Path) -> np.ndarray:
 
 
 class StoppedError(Exception):
-    """Stands for a kill."""
+    """Simulates a kill."""
 
 
 def cut_off(monkeypatch: pytest.MonkeyPatch, frames: int, *arguments: object) -> None:
-    """Run a command that is stopped after so many frames."""
-    save, kept = Checkpoint.save, []
+    """Run a command and stop it after a number of frames."""
+    save, saved = Checkpoint.save, []
 
     def saving(self: Checkpoint, frame: int, *values: object) -> None:
         save(self, frame, *values)
-        kept.append(frame)
-        if len(kept) == frames:
+        saved.append(frame)
+        if len(saved) == frames:
             raise StoppedError
 
     with monkeypatch.context() as patch:
@@ -62,37 +62,37 @@ def test_a_folder_in_use_is_refused_and_left_alone(tracked, tmp_path, capsys):
     lock_of(out)
     before = (out / LOCK).read_bytes()
     assert rodsight("solve", tracked, "--out", out, *FEW) == 1
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
-    assert f"process {os.getpid()} is at work in it" in told.err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert f"process {os.getpid()} works in it" in printed.err
     assert [each.name for each in out.iterdir()] == [LOCK]
     assert (out / LOCK).read_bytes() == before
 
 
-def test_a_lock_of_another_machine_is_refused_with_the_way_out(tracked, tmp_path, capsys):
+def test_a_lock_of_another_machine_is_refused_with_a_cure(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     lock_of(out, host="elsewhere")
     assert rodsight("solve", tracked, "--out", out, *FEW) == 1
-    told = capsys.readouterr().err
-    assert "on elsewhere" in told
-    assert f"delete {out / LOCK}" in told
+    printed = capsys.readouterr().err
+    assert "on elsewhere" in printed
+    assert f"delete {out / LOCK}" in printed
 
 
 @pytest.mark.parametrize("left", [{"process": DEAD}, {"began": "1"}], ids=["dead", "its number used again"])
-def test_a_lock_of_a_dead_process_is_told_and_taken_over(tmp_path, left):
+def test_a_lock_of_a_dead_process_is_reported_and_taken_over(tmp_path, left):
     lock_of(tmp_path, **left)
     notes = []
-    with holding(tmp_path, notes.append):
+    with hold_folder(tmp_path, notes.append):
         assert json.loads((tmp_path / LOCK).read_text())["process"] == os.getpid()
     assert not (tmp_path / LOCK).exists()
     assert len(notes) == 1
     assert "taken over" in notes[0]
 
 
-def test_a_torn_lock_holds_nobody(tmp_path):
+def test_an_incomplete_lock_is_ignored(tmp_path):
     (tmp_path / LOCK).write_text('{"process": 1')
-    with holding(tmp_path, pytest.fail):
+    with hold_folder(tmp_path, pytest.fail):
         pass
 
 
@@ -110,7 +110,7 @@ def test_cut_off_runs_of_different_settings_do_not_mix_frames(tracked, tmp_path,
     cut_off(monkeypatch, 2, *command)
     kept = (out / ".unfinished" / "solving" / "000001.piece").read_bytes()
     cut_off(monkeypatch, 1, *command, *other)
-    # Even a frame of the first run that comes late, beside those of the second, is not taken for one of its own.
+    # A late frame of the first run beside those of the second must not be used.
     (out / ".unfinished" / "solving" / "000001.piece").write_bytes(kept)
     assert rodsight(*command, *other) == 0
     assert np.array_equal(forces(out), forces(tmp_path / "whole"))
@@ -118,7 +118,7 @@ def test_cut_off_runs_of_different_settings_do_not_mix_frames(tracked, tmp_path,
 
 @pytest.mark.screen  # several whole runs
 @pytest.mark.parametrize("piece", ["results.h5", ".unfinished/solving/000001.piece"])
-def test_a_damaged_piece_is_made_again_and_said(tracked, tmp_path, monkeypatch, capsys, piece):
+def test_a_damaged_piece_is_reported_and_computed_again(tracked, tmp_path, monkeypatch, capsys, piece):
     out = tmp_path / "out"
     command = ("solve", tracked, "--out", out, *FEW[:-1])
     assert rodsight("solve", tracked, "--out", tmp_path / "whole", *FEW) == 0
@@ -131,9 +131,9 @@ def test_a_damaged_piece_is_made_again_and_said(tracked, tmp_path, monkeypatch, 
     (out / piece).write_bytes(content)
     capsys.readouterr()
     assert rodsight(*command) == 0
-    told = capsys.readouterr()
-    assert "damaged" in told.out
-    assert "Traceback" not in told.err
+    printed = capsys.readouterr()
+    assert "damaged" in printed.out
+    assert "Traceback" not in printed.err
     assert np.array_equal(forces(out), forces(tmp_path / "whole"))
 
 
@@ -148,32 +148,32 @@ def test_damaged_results_are_not_read(tracked, tmp_path, capsys):
 
 
 def test_a_file_that_changes_while_it_is_used_ends_the_run(tracked, tmp_path, capsys, monkeypatch):
-    read, seen = InputFiles.read, []
+    read, changed = InputFiles.read, []
 
     def changing(self: InputFiles, file: Path) -> bytes:
         content = read(self, file)
-        if file.name == "tracks.csv" and not seen:
-            seen.append(file)
+        if file.name == "tracks.csv" and not changed:
+            changed.append(file)
             file.write_bytes(content.replace(b"0.1", b"0.2", 1))
         return content
 
     monkeypatch.setattr(InputFiles, "read", changing)
     assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 1
-    told = capsys.readouterr().err
-    assert "tracks.csv: has changed while it was in use" in told
-    assert told.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert "tracks.csv: has changed while it was in use" in printed
+    assert printed.count("\n") == 1
     assert not (tmp_path / "out" / "results.h5").exists()
 
 
 @pytest.mark.screen  # several whole runs
-def test_a_verdict_given_meanwhile_is_obeyed_by_the_next_solve_only(tracked, tmp_path, monkeypatch):
+def test_a_verdict_given_during_a_run_is_used_by_the_next_run_only(tracked, tmp_path, monkeypatch):
     out = tmp_path / "out"
     command = ("solve", tracked, "--out", out, *FEW)
-    track, said = pipeline.track, []
+    track, verdicts = pipeline.track, []
 
     def tracking(run):
-        if not said:
-            said.append(VerdictLog(out / VERDICTS).append(Entry(3, "anna", flag=Flag.RESET)))
+        if not verdicts:
+            verdicts.append(VerdictLog(out / VERDICTS).append(Entry(3, "anna", flag=Flag.RESET)))
         return track(run)
 
     with monkeypatch.context() as patch:
@@ -184,11 +184,11 @@ def test_a_verdict_given_meanwhile_is_obeyed_by_the_next_solve_only(tracked, tmp
     assert load_results(out / "results.h5").frames[3].status.name != "RESET"
     assert rodsight(*command) == 0
     manifest = json.loads((out / "manifest.json").read_text())
-    assert manifest["verdicts"]["lines"] == [said[0].line]
+    assert manifest["verdicts"]["lines"] == [verdicts[0].line]
     assert load_results(out / "results.h5").frames[3].status.name == "RESET"
 
 
-def test_what_a_stopped_run_was_writing_is_removed_and_nothing_else(tracked, tmp_path):
+def test_partial_files_of_a_stopped_run_are_removed_and_no_others(tracked, tmp_path):
     out = tmp_path / "out"
     (out / ".unfinished" / "solving").mkdir(parents=True)
     left = [out / "results.h5.part", out / ".unfinished" / "solving" / "000003.piece.part"]
@@ -200,7 +200,7 @@ def test_what_a_stopped_run_was_writing_is_removed_and_nothing_else(tracked, tmp
 
 
 @pytest.mark.screen  # several whole runs
-def test_pieces_that_a_kill_left_beside_whole_results_are_removed(tracked, tmp_path, monkeypatch):
+def test_pieces_left_beside_complete_results_are_removed(tracked, tmp_path, monkeypatch):
     arguments = ("solve", tracked, "--out", tmp_path / "out", *FEW)
 
     def dying(self: Checkpoint) -> None:
@@ -215,7 +215,7 @@ def test_pieces_that_a_kill_left_beside_whole_results_are_removed(tracked, tmp_p
     assert not (tmp_path / "out" / ".unfinished").exists()
 
 
-def test_results_name_no_place_and_nobody(tracked, tmp_path, monkeypatch):
+def test_results_contain_no_names_of_persons_or_places(tracked, tmp_path, monkeypatch):
     monkeypatch.setattr(socket, "gethostname", lambda: "machine-of-somebody")
     home = Path(shutil.move(tracked, tmp_path / "of_somebody"))
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""The committed sample: what it claims to be, and what the product makes of it."""
+"""The committed sample: checksums, truth, and the accuracy of its forces."""
 
 import hashlib
 import json
@@ -14,13 +14,13 @@ from rodsight.experiment.photographs import Photographs
 from rodsight.experiment.reading.tables import read_table
 from rodsight.experiment.walls import read_walls
 from rodsight.recording.viewing.viewer import viewer_binary
-from rodsight.synthetic.speckle import SpeckleSettings, render_scene
+from rodsight.synthetic.speckle import RodScene, SpeckleSettings, render_scene
 
 from tests.golden import sample as golden
 
 SAMPLE = Path(__file__).parents[3] / "sample_data" / "shear"
 SEED = 12
-LEAST_R = 0.90  # of every frame from the fifth on, through the photographs
+LEAST_R = 0.90  # of every frame from the fifth on, from photographs
 LEAST_MEAN_R = 0.95  # over those frames
 # Sensor noise of 2 grey levels, rounding, JPEG of quality 92 (2 more): one rod in a wrong pose exceeds it.
 PICTURE_NOISE = 4.0  # [grey levels] rms
@@ -51,22 +51,24 @@ def test_photographs_are_rendered_again_from_the_truth(frame):
     height, width = photographs.shape
     scene = render_scene(
         SpeckleSettings(),
-        width=width,
-        height=height,
-        radius=grains.numbers("radius") * SpeckleSettings().pixel_size,
-        position=np.column_stack([tracks.numbers("x")[here], tracks.numbers("y")[here]]),
-        rotation=tracks.numbers("theta")[here],
-        bars=walls.endpoints[frame],
-        pattern_seed=SEED,
+        RodScene(
+            width=width,
+            height=height,
+            radius=grains.numbers("radius") * SpeckleSettings().pixel_size,
+            position=np.column_stack([tracks.numbers("x")[here], tracks.numbers("y")[here]]),
+            rotation=tracks.numbers("theta")[here],
+            bars=walls.endpoints[frame],
+            pattern_seed=SEED,
+        ),
     )
     difference = photographs[frame] - np.clip(scene, 0, 255)
     assert np.sqrt(np.mean(difference**2)) < PICTURE_NOISE
-    # Grain by grain, too: no single rod may hide in the mean.
+    # Also for every grain, since a mean can hide a single rod.
     blurred = cv2.GaussianBlur(difference**2, (0, 0), 12.0)
     assert np.sqrt(blurred.max()) < 2 * PICTURE_NOISE
 
 
-def test_the_truth_is_in_balance():
+def test_the_truth_is_in_equilibrium():
     truth = read_table(SAMPLE / "truth_contacts.csv", ("frame", "i", "j", "fn", "ft"))
     tracks = read_table(SAMPLE / "truth_tracks.csv", ("frame", "id", "x", "y"))
     walls = read_walls(load_experiment(SAMPLE), 24)
@@ -93,7 +95,7 @@ def test_the_truth_is_in_balance():
 
 
 @pytest.mark.screen
-def test_the_sample_runs_to_trustworthy_forces_and_a_sound_recording(tmp_path, capsys):
+def test_the_sample_gives_accurate_forces_and_a_valid_recording(tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["run", str(SAMPLE), "--out", str(tmp_path / "run"), "--set", golden.SETTING])
     assert stop.value.code == 0

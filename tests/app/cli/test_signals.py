@@ -1,4 +1,4 @@
-"""A command that is asked to end says so in one line, keeps what it has, and leaves nobody behind."""
+"""An interrupted command ends with one line, keeps finished frames and leaves no processes."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ import sys
 import threading
 
 import pytest
-from rodsight.signals import Stopped, answering, stopping
+from rodsight.process.signals import Stopped, signal_handler, stop_on_signals
 
-from tests.program import KEPT, RODSIGHT, ROOT, TELLING, rodsight, wait_until_told
+from tests.program import KEPT, REPORTING, RODSIGHT, ROOT, rodsight, wait_for_report
 
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20000", "--sweeps", "none", "--quiet")
 ENDS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
-# A process that is asked to end at the moment when it imports a module.
+# A process that receives a signal while it imports a module.
 WHILE_IMPORTING = """
 import os, sys
-class Asking:
+class Signalling:
     def find_spec(self, name, *where):
         if name == sys.argv[1]:
             os.kill(os.getpid(), int(sys.argv[2]))
-sys.meta_path.insert(0, Asking())
+sys.meta_path.insert(0, Signalling())
 from rodsight.cli.main import main
 main(["settings"])
 """
 
-# A process with two workers that never finish; they tell when they have begun.
+# A process with two workers that never finish and report their start.
 WITH_WORKERS = f"""
 import sys
 sys.path.insert(0, {str(ROOT)!r})
 if __name__ == "__main__":
-    from rodsight.sensitivity.execution import run_all
+    from rodsight.robustness.execution import run_all
     from tests.app.cli.test_signals import wait_for_ever
     list(run_all(wait_for_ever, None, [0, 1], workers=2))
 """
 
 
 def wait_for_ever(common: None, item: int) -> None:
-    os.write(sys.stdout.fileno(), b"begun\n")  # at once: two workers share the pipe
+    os.write(sys.stdout.fileno(), b"begun\n")  # in one write, since two workers share the pipe
     threading.Event().wait()
 
 
@@ -48,15 +48,15 @@ def wait_for_ever(common: None, item: int) -> None:
 @pytest.mark.parametrize("number", ENDS, ids=lambda number: number.name)
 def test_a_signal_ends_a_run_in_one_line_and_keeps_its_frames(tracked, tmp_path, number):
     out = tmp_path / "out"
-    command = [*TELLING, "solve", str(tracked), "--out", str(out), *FEW]
+    command = [*REPORTING, "solve", str(tracked), "--out", str(out), *FEW]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_until_told(run, KEPT, 2)
+    wait_for_report(run, KEPT, 2)
     run.send_signal(number)
-    told, said = run.communicate(timeout=60)
-    lines = [line for line in said.splitlines() if line != KEPT]
+    output, errors = run.communicate(timeout=60)
+    lines = [line for line in errors.splitlines() if line != KEPT]
     assert run.returncode == ENDS[number]
-    assert lines == ["rodsight: interrupted; the same command goes on from here"]
-    assert told == ""
+    assert lines == ["rodsight: interrupted; the same command resumes from here"]
+    assert output == ""
     assert len(list((out / ".unfinished" / "solving").glob("*.piece"))) >= 2
 
 
@@ -67,29 +67,29 @@ def test_a_signal_while_modules_are_imported_is_one_line(module, number):
     command = [sys.executable, "-c", WHILE_IMPORTING, module, str(int(number))]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (ENDS[number], "")
-    assert done.stderr == "rodsight: interrupted; the same command goes on from here\n"
+    assert done.stderr == "rodsight: interrupted; the same command resumes from here\n"
 
 
-def test_a_signal_that_was_ignored_stays_so():
-    with answering(signal.SIGHUP, signal.SIG_IGN), stopping():
+def test_an_ignored_signal_stays_ignored():
+    with signal_handler(signal.SIGHUP, signal.SIG_IGN), stop_on_signals():
         os.kill(os.getpid(), signal.SIGHUP)
 
 
-def test_a_signal_that_falls_into_a_destructor_is_not_lost():
+def test_a_signal_during_a_destructor_is_not_lost():
     class Hidden:
         def __del__(self) -> None:
             os.kill(os.getpid(), signal.SIGTERM)
-            for _ in range(1000):  # Python answers a signal between two of its steps
+            for _ in range(1000):  # Python handles signals between bytecodes
                 pass
 
     def wait_for_the_end() -> None:
-        with stopping():
+        with stop_on_signals():
             Hidden()
             threading.Event().wait(20.0)
 
-    with pytest.raises(Stopped) as told:
+    with pytest.raises(Stopped) as stopped:
         wait_for_the_end()
-    assert told.value.status == 143
+    assert stopped.value.status == 143
 
 
 @pytest.mark.screen
@@ -103,7 +103,7 @@ def test_workers_end_with_a_process_that_is_killed(tmp_path):
     run.communicate(timeout=30)  # the pipe is open until the last worker has ended
 
 
-def test_a_reader_who_has_had_enough_is_no_fault():
+def test_a_closed_pipe_is_no_error():
     run = subprocess.Popen([*RODSIGHT, "settings"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout is not None
     assert run.stderr is not None
@@ -113,7 +113,7 @@ def test_a_reader_who_has_had_enough_is_no_fault():
     run.stderr.close()
 
 
-def test_in_this_process_a_command_leaves_the_answers_to_signals_as_they_were(capsys):
+def test_a_command_restores_the_signal_handlers_of_its_process(capsys):
     before = [signal.getsignal(number) for number in ENDS]
     assert rodsight("--version") == 0
     assert [signal.getsignal(number) for number in ENDS] == before

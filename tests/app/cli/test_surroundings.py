@@ -1,4 +1,4 @@
-"""Places, languages and rights as they are found: a command does not depend on them."""
+"""Commands do not depend on paths, languages, terminals and access rights."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import sys
 from pathlib import Path
 
 import pytest
-from rodsight.kernel_cache import find_room_for_kernels
+from rodsight.process.kernel_cache import choose_kernel_cache
 
 from tests.program import RODSIGHT
 
 FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20")
-STRANGE = 'it\'s "5°" of; shear & $HOME Ω\u00a0試験'
+UNUSUAL_NAME = 'it\'s "5°" of; shear & $HOME Ω\u00a0試験'
 
 
 @pytest.mark.screen
-def test_a_bare_environment_and_a_strange_name_are_fine(tracked, tmp_path):
-    experiment = Path(shutil.move(tracked, tmp_path / STRANGE))
+def test_a_minimal_environment_and_unusual_names_are_accepted(tracked, tmp_path):
+    experiment = Path(shutil.move(tracked, tmp_path / UNUSUAL_NAME))
     bare = {
         "PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(filter(None, map(os.path.abspath, sys.path))),
         "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii", "NO_COLOR": "1",
         "COLUMNS": "40", "TERM": "dumb",
     }  # fmt: skip
-    out = tmp_path / f"{STRANGE} out"
+    out = tmp_path / f"{UNUSUAL_NAME} out"
     done = subprocess.run(
         [*RODSIGHT, "run", experiment, "--out", out, *FEW], env=bare, capture_output=True, timeout=120, cwd=tmp_path
     )
@@ -37,31 +37,27 @@ def test_a_bare_environment_and_a_strange_name_are_fine(tracked, tmp_path):
 
 
 @pytest.fixture
-def nowhere_to_write(tmp_path, monkeypatch):
-    """Neither installation nor home can be written to; the system's folder for what is temporary can."""
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+def read_only_home(tmp_path, monkeypatch):
+    """No folder can be made in the home folder, but in the system's temporary folder."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")
+    monkeypatch.delitem(sys.modules, "numba", raising=False)  # as before the compiler is imported
+    (tmp_path / "home").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    monkeypatch.setattr(os, "access", lambda *_: False)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
 
 
-def test_kernels_find_room_where_nothing_else_can_be_written_to(nowhere_to_write, tmp_path):
-    find_room_for_kernels(tmp_path / "installed")
+def test_kernels_are_cached_in_the_temporary_folder_where_the_home_folder_is_read_only(read_only_home, tmp_path):
+    choose_kernel_cache()
     folder = Path(os.environ["NUMBA_CACHE_DIR"])
-    assert folder.parent == tmp_path
+    assert folder.parent.parent == tmp_path
     assert folder.stat().st_mode & 0o077 == 0
+    assert folder.parent.stat().st_mode & 0o077 == 0
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="rights as Unix has them")
-def test_kernels_are_not_read_from_a_folder_that_others_can_write_to(nowhere_to_write, tmp_path):
-    laid_out = tmp_path / f"rodsight-kernels-{os.getuid()}"
-    laid_out.mkdir()
-    laid_out.chmod(0o777)
-    find_room_for_kernels(tmp_path / "installed")
-    assert Path(os.environ["NUMBA_CACHE_DIR"]) != laid_out
-
-
-def test_kernels_stay_where_they_are_if_they_can(tmp_path, monkeypatch):
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    find_room_for_kernels(tmp_path)
-    assert "NUMBA_CACHE_DIR" not in os.environ
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs Unix permissions")
+def test_kernels_are_not_read_from_a_folder_that_others_can_write_to(read_only_home, tmp_path):
+    writable = tmp_path / f"rodsight-{os.getuid()}"
+    writable.mkdir()
+    writable.chmod(0o777)
+    choose_kernel_cache()
+    assert Path(os.environ["NUMBA_CACHE_DIR"]).parent != writable

@@ -1,4 +1,4 @@
-"""`rodsight view --web` tells its address, serves it in the foreground, and ends when it is interrupted."""
+"""`rodsight view --web` prints its address, serves it in the foreground, and ends when interrupted."""
 
 import signal
 import subprocess
@@ -19,9 +19,9 @@ def test_the_page_is_there_until_ctrl_c_and_a_second_call_takes_another_port(tmp
         addresses = []
         for each in running:
             assert each.stdout is not None
-            told = each.stdout.readline()
-            assert "Ctrl+C" in told
-            addresses.append(told.split()[1])
+            printed = each.stdout.readline()
+            assert "Ctrl+C" in printed
+            addresses.append(printed.split()[1])
             assert each.poll() is None
             browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())  # the address gives a cookie
             with browser.open(addresses[-1], timeout=30) as page:
@@ -31,5 +31,5 @@ def test_the_page_is_there_until_ctrl_c_and_a_second_call_takes_another_port(tmp
         for each in running:
             each.send_signal(signal.SIGINT)
         for each in running:
-            each.communicate(timeout=30)  # closes what it told through
+            each.communicate(timeout=30)  # closes what it printed through
     assert [each.returncode for each in running] == [0, 0]

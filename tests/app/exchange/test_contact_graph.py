@@ -1,4 +1,4 @@
-"""The contacts of a frame as a graph, as networkx makes it and as it reads the file."""
+"""The contacts of a frame as a networkx graph and as a GraphML file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rodsight.exchange.contact_graph import make_graph, write_graphs
 networkx = pytest.importorskip("networkx")
 
 
-def test_the_file_reads_as_the_graph_that_python_gets(with_a_loss, tmp_path):
+def test_the_file_contains_the_same_graph(with_a_loss, tmp_path):
     files = write_graphs(with_a_loss, tmp_path)
     assert len(files) == len(with_a_loss.frames)
     for frame in (1, 2):
@@ -20,7 +20,7 @@ def test_the_file_reads_as_the_graph_that_python_gets(with_a_loss, tmp_path):
         }
 
 
-def test_edges_carry_the_forces_of_their_pairs(results):
+def test_edges_have_the_forces_of_their_pairs(results):
     graph, forces = make_graph(results, 2), results.frames[2]
     assert graph.number_of_nodes() == results.grains.count + results.walls.count
     assert graph.number_of_edges() == forces.contacts.count
@@ -33,7 +33,7 @@ def test_edges_carry_the_forces_of_their_pairs(results):
     assert degree.tolist() == np.bincount(both, minlength=len(names))[: results.grains.count].tolist()
 
 
-def test_a_lost_grain_has_no_place(with_a_loss):
+def test_a_lost_grain_has_no_position(with_a_loss):
     graph = make_graph(with_a_loss, 2)
     assert "x" not in graph.nodes[str(with_a_loss.tracks.id[3])]
     assert graph.graph["units"]["fn"] == "N"

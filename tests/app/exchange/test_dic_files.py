@@ -3,16 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rodsight.cli.main import main
-from rodsight.errors import InputError
 from rodsight.exchange.dic_files import read_sequence, write_sequence
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.units import Scale
+from rodsight.process.errors import InputError
 
 SCALE = Scale(1.2e-4, 4000)
 ROUNDING = 1e-9  # px
 
 
-def test_tracks_survive_the_way_there_and_back(results, tmp_path):
+def test_written_tracks_are_read_back(results, tmp_path):
     write_sequence(results.tracks, SCALE, tmp_path)
     found = read_sequence(tmp_path)
     pixels = SCALE.to_pixels(results.tracks.position)
@@ -30,13 +30,13 @@ def test_y_points_down_and_rotation_is_counter_clockwise_as_seen(results, tmp_pa
     assert np.array_equal(first[:, :2], np.rint(first[:, :2]))
     up = results.tracks.position[3, :, 1] - results.tracks.position[0, :, 1]
     assert np.allclose(later[:, 5] - first[:, 5], -up / SCALE.pixel_size, atol=ROUNDING)
-    turned = results.tracks.rotation[3] - results.tracks.rotation[0]
-    assert np.allclose(later[:, 6], turned, atol=ROUNDING)
+    rotation = results.tracks.rotation[3] - results.tracks.rotation[0]
+    assert np.allclose(later[:, 6], rotation, atol=ROUNDING)
     step = results.tracks.position[3] - results.tracks.position[2]
     assert np.allclose(later[:, 7], step[:, 0] / SCALE.pixel_size, atol=ROUNDING)
 
 
-def test_a_lost_grain_is_lost_after_the_way_back_too(with_a_loss, tmp_path):
+def test_a_lost_grain_is_read_back_as_lost(with_a_loss, tmp_path):
     write_sequence(with_a_loss.tracks, SCALE, tmp_path)
     found = read_sequence(tmp_path)
     assert np.argwhere(np.isnan(found.x)).tolist() == [[2, 3], [3, 3]]
@@ -57,7 +57,7 @@ def test_imported_files_are_an_experiment(with_a_loss, tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(arguments)
     assert end.value.code == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
 
 
 def test_configurations_are_read_and_markers_are_not_grains(tmp_path):
@@ -73,9 +73,9 @@ def test_configurations_are_read_and_markers_are_not_grains(tmp_path):
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", "how many"),
-        ("three\n", "how many"),
-        ("2\n1 2 3 4\n", "says 2 grains"),
+        ("", "is not the number of grains"),
+        ("three\n", "is not the number of grains"),
+        ("2\n1 2 3 4\n", "states 2 grains"),
         ("1\n1 2 3\n", "has 3 numbers"),
         ("1\n1 2 x 9\n", "is not 4 numbers"),
         ("1\n1 2 nan 9\n", "not finite"),
@@ -89,7 +89,7 @@ def test_damaged_files_are_named(tmp_path, text, problem):
     assert "CONF0000" in str(error.value)
 
 
-def test_files_that_do_not_belong_together_are_refused(tmp_path):
+def test_inconsistent_files_are_refused(tmp_path):
     (tmp_path / "CONF0000").write_text("1\n1 2 0 9\n")
     (tmp_path / "CONF0001").write_text("1\n1 2 0 8\n")
     with pytest.raises(InputError, match="radius 8"):

@@ -1,4 +1,4 @@
-"""What Python gives as a tree of datasets is what xarray finds in the file."""
+"""The tree of datasets in Python equals that of the file in xarray."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rodsight.results.hdf5.store import Provenance, save_results
 from tests.app.results.full_results import make_full_results
 
 
-def test_the_tree_is_that_of_the_file(tmp_path):
+def test_the_tree_equals_that_of_the_file(tmp_path):
     results = make_full_results()
     save_results(tmp_path / "results.h5", results, Provenance("", "experiment.toml", (0, None), {}))
     made = make_dataset(results)
@@ -29,7 +29,7 @@ def test_the_tree_is_that_of_the_file(tmp_path):
             assert made.coords[name].values.tolist() == stored.coords[name].values.tolist()
 
 
-def test_rows_of_contacts_tell_their_frame():
+def test_rows_of_contacts_have_their_frame():
     results = make_full_results()
     tree = make_dataset(results)
     counts = [frame.contacts.count for frame in results.frames]

@@ -1,4 +1,4 @@
-"""Files for OVITO: by the rules of its reader, and as the package itself reads them where it is installed."""
+"""Files for OVITO follow the rules of its reader, and are read by the package where it is installed."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from rodsight.exchange.ovito_files import write_ovito
 from tests.app.exchange.test_vtk_polydata import arrays
 
 
-def test_both_ends_of_every_contact_are_particles_and_lie_one_behind_the_other(with_a_loss, tmp_path):
+def test_both_ends_of_every_contact_are_consecutive_particles(with_a_loss, tmp_path):
     files = write_ovito(with_a_loss, tmp_path)
     assert len(files) == len(with_a_loss.frames)
     for frame in range(len(files)):
         particles = tmp_path / f"particles_{frame:04d}.vtp"
         points, ids = arrays(particles, "Points")["points"], arrays(particles, "PointData")["id"]
         assert len(set(ids)) == len(ids)
-        place = dict(zip(ids, points[:, :2], strict=True))
+        position = dict(zip(ids, points[:, :2], strict=True))
         contacts = tmp_path / f"contacts_{frame:04d}.vtp"
         ends = arrays(contacts, "Points")["points"].reshape(-1, 2, 3)
         data = arrays(contacts, "CellData")
         for k, (one, two) in enumerate(zip(data["id1"], data["id2"], strict=True)):
-            assert np.array_equal(ends[k, 0, :2], place[one])
-            assert np.array_equal(ends[k, 1, :2], place[two])
+            assert np.array_equal(ends[k, 0, :2], position[one])
+            assert np.array_equal(ends[k, 1, :2], position[two])
     lost = with_a_loss.tracks.id[3]
     assert lost not in arrays(tmp_path / "particles_0002.vtp", "PointData")["id"]
 
 
-def test_nothing_stands_before_the_piece_where_its_reader_looks_for_one(results, tmp_path):
+def test_the_piece_is_the_first_element(results, tmp_path):
     for file in write_ovito(results, tmp_path):
         for each in ET.parse(file).getroot().iter("DataSet"):
-            whole = ET.parse(tmp_path / str(each.get("file"))).getroot().find("PolyData")
-            assert whole is not None
-            assert whole[0].tag == "Piece"
+            part = ET.parse(tmp_path / str(each.get("file"))).getroot().find("PolyData")
+            assert part is not None
+            assert part[0].tag == "Piece"
 
 
 def test_ovito_shows_grains_and_forces(results, tmp_path):

@@ -26,7 +26,7 @@ def test_tables_read_back_with_every_digit(results, tmp_path, kind):
     assert frames.column("status").to_pylist() == [f.status.name.lower() for f in results.frames]
 
 
-def test_what_is_not_known_is_null(with_a_loss):
+def test_unknown_values_are_null(with_a_loss):
     tables = make_tables(with_a_loss)
     lost = tables["grains"].column("x").is_null().to_numpy()
     assert np.flatnonzero(lost).tolist() == [2 * 40 + 3, 3 * 40 + 3]
@@ -35,8 +35,10 @@ def test_what_is_not_known_is_null(with_a_loss):
 
 def test_walls_have_their_names_and_columns_their_units(results):
     table = make_tables(results)["contacts"]
-    wall = np.array(table.column("with_wall"))
-    assert set(np.array(table.column("j"))[wall]) <= set(results.walls.name)
+    j, wall = np.array(table.column("j")), np.array(table.column("wall").to_pylist())
+    assert set(wall[j == -1]) <= set(results.walls.name)
+    assert set(wall[j != -1]) == {""}
+    assert set(j[j != -1]) <= set(results.tracks.id.tolist())
     assert table.schema.field("fn").metadata == {b"unit": b"N", b"meaning": b"normal force, compression positive"}
     frames = make_tables(results)["frames"]
     force = np.array(frames.column("wall_force_top_y"))
@@ -44,7 +46,7 @@ def test_walls_have_their_names_and_columns_their_units(results):
     assert np.array_equal(force, [s.wall_force[top, 1] for s in results.statistics])
 
 
-def test_recorded_wall_forces_are_told_apart_from_inferred_ones():
+def test_recorded_and_inferred_wall_forces_have_different_columns():
     results = make_full_results()
     tables = make_tables(results)
     assert "force_top_x" not in tables["frames"].column_names

@@ -8,9 +8,9 @@ import pytest
 from rodsight.exchange.vtk_polydata import write_polydata
 
 
-def arrays(file: Path, place: str) -> dict[str, np.ndarray]:
-    """The arrays of a part of a file, as a reader of the format finds them."""
-    part = ET.parse(file).getroot().find(f"PolyData/Piece/{place}")
+def arrays(file: Path, element: str) -> dict[str, np.ndarray]:
+    """Read the arrays of an element of a file."""
+    part = ET.parse(file).getroot().find(f"PolyData/Piece/{element}")
     assert part is not None
     found = {}
     for each in part.findall("DataArray"):
@@ -40,16 +40,16 @@ def test_contacts_read_back_with_every_digit(results, tmp_path):
         assert np.all(along > 0.0)
 
 
-def test_tubes_of_forces_lie_in_front_of_the_spheres_of_rods_and_have_a_thickness(results, tmp_path):
-    """Glyph and Tube as the page tells: what lies within a sphere is not seen, and Tube reads numbers of points."""
+def test_tubes_of_forces_lie_in_front_of_the_spheres_of_rods_and_have_point_data(results, tmp_path):
+    """Lines within a sphere would be hidden, and the filter Tube scales by point data."""
     write_polydata(results, tmp_path)
     file = tmp_path / "contacts_0003.vtp"
-    place, fn = arrays(file, "Points")["points"], arrays(file, "PointData")["fn"]
+    position, fn = arrays(file, "Points")["points"], arrays(file, "PointData")["fn"]
     lines = arrays(file, "Lines")["connectivity"].astype(int).reshape(-1, 2)
     assert np.array_equal(fn[lines], np.repeat(results.frames[3].fn[:, None], 2, axis=1))
     grains = tmp_path / "grains_0003.vtp"
     top = arrays(grains, "Points")["points"][:, 2] + arrays(grains, "PointData")["radius"]
-    assert place[:, 2].min() >= top.max()
+    assert position[:, 2].min() >= top.max()
 
 
 def test_grains_that_are_lost_are_not_drawn(with_a_loss, tmp_path):
@@ -60,7 +60,7 @@ def test_grains_that_are_lost_are_not_drawn(with_a_loss, tmp_path):
     assert np.isfinite(arrays(tmp_path / "grains_0002.vtp", "Points")["points"]).all()
 
 
-def test_the_collections_carry_the_times_and_name_files_that_are_there(results, tmp_path):
+def test_the_collections_have_the_times_and_name_existing_files(results, tmp_path):
     for collection in write_polydata(results, tmp_path):
         rows = ET.parse(collection).getroot().findall("Collection/DataSet")
         assert [float(row.get("timestep", "nan")) for row in rows] == results.tracks.time.tolist()
@@ -68,7 +68,7 @@ def test_the_collections_carry_the_times_and_name_files_that_are_there(results, 
 
 
 def test_one_animation_shows_grains_contacts_and_walls(results, tmp_path):
-    """As ParaView reads it: pyvista is the same reader."""
+    """Read the files with pyvista, which uses ParaView's reader."""
     pyvista = pytest.importorskip("pyvista", reason="pyvista, ParaView's reader, is not installed")
     write_polydata(results, tmp_path)
     reader = pyvista.get_reader(tmp_path / "packing.pvd")

@@ -1,4 +1,4 @@
-"""Changes to the files of an experiment, as a careless hand makes them."""
+"""Edits of an experiment's files that make typical mistakes."""
 
 from __future__ import annotations
 

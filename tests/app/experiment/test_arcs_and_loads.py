@@ -1,4 +1,4 @@
-"""Circular walls and measured loads as tables tell them; every mistake is named with its row."""
+"""Circular walls and measured loads from tables; every mistake is named with its row."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.errors import InputError
 from rodsight.experiment.experiment import load_experiment
 from rodsight.experiment.walls import read_walls
+from rodsight.process.errors import InputError
+from rodsight.solver.bodies.wall_shapes import IN, OUT, STRAIGHT, circle_parameters
 from rodsight.tracks import WallTracks
 
-from solver.bodies.wall_shapes import IN, OUT, STRAIGHT, circle_of
-from tests.app.experiment.test_unknowns import edit
+from tests.app.experiment.test_unknown_inputs import edit
 
 FRAMES = 5
 HEADER = "frame,wall,x,y,radius,side"
@@ -39,15 +39,15 @@ def walls_of(folder: Path) -> WallTracks:
     return walls
 
 
-def test_circles_stand_beside_straight_walls_and_may_change(tracked) -> None:
+def test_circles_are_read_beside_straight_walls_and_may_change(tracked) -> None:
     rows = [f"{k},drum,0.1,{0.1 + 0.01 * k},{0.5 - 0.01 * k},in" for k in range(FRAMES)]
     walls = walls_of(with_arcs(tracked, *rows, "0,pin,0.1,0.1,1e-4,out"))
     assert walls.name[-2:] == ("drum", "pin")
     assert walls.sides.tolist() == [STRAIGHT] * 4 + [IN, OUT]
-    centre, radius, turn = circle_of(walls.endpoints[:, 4])
+    centre, radius, angle = circle_parameters(walls.endpoints[:, 4])
     assert centre[:, 1] == pytest.approx(0.1 + 0.01 * np.arange(FRAMES))
     assert radius == pytest.approx(0.5 - 0.01 * np.arange(FRAMES))
-    assert turn == pytest.approx(np.zeros(FRAMES))
+    assert angle == pytest.approx(np.zeros(FRAMES))
     assert (walls.endpoints[:, 5] == walls.endpoints[0, 5]).all()
     assert walls.radius is not None
     assert walls.radius[:, 4] == pytest.approx(radius)
@@ -56,7 +56,7 @@ def test_circles_stand_beside_straight_walls_and_may_change(tracked) -> None:
     assert walls.centre[2, 4] == pytest.approx([0.1, 0.12])
 
 
-def test_circles_alone_are_walls_enough_and_turn_where_a_column_says_so(tracked) -> None:
+def test_circles_suffice_as_walls_and_rotate_with_the_column_theta(tracked) -> None:
     rows = [f"{k},drum,0.1,0.1,0.5,in,{0.1 * k}" for k in range(FRAMES)]
     with_arcs(tracked, *rows, header=HEADER + ",theta")
     edit(tracked, "experiment.toml", 'file = "walls.csv"\n', "")
@@ -64,7 +64,7 @@ def test_circles_alone_are_walls_enough_and_turn_where_a_column_says_so(tracked)
     edit(tracked, "experiment.toml", "[walls.top]", "[walls.drum]")
     walls = walls_of(tracked)
     assert walls.name == ("drum",)
-    assert circle_of(walls.endpoints[:, 0])[2] == pytest.approx(0.1 * np.arange(FRAMES))
+    assert circle_parameters(walls.endpoints[:, 0])[2] == pytest.approx(0.1 * np.arange(FRAMES))
 
 
 @pytest.mark.parametrize(("row", "message"), [
@@ -78,20 +78,20 @@ def test_circles_alone_are_walls_enough_and_turn_where_a_column_says_so(tracked)
     ("0,drum,0.1,nan,0.5,in", "row 2, y = 'nan'"),
     ("0,drum,0.1,0.1,0.5,in\n1,drum,0.1,0.1,0.5,in", "frame 2: has no row of wall 'drum'"),
     ("0,drum,0.1,0.1,0.5,in\n0,drum,0.1,0.1,0.5,in", "row 3, wall = 'drum': stands twice"),
-    ("0,drum,0.1,0.1,0.5,in\n1,drum,0.1,0.1,0.5,out", "row 3, side = 'out': is another than before"),
+    ("0,drum,0.1,0.1,0.5,in\n1,drum,0.1,0.1,0.5,out", "row 3, side = 'out': differs from an earlier row"),
 ])  # fmt: skip
-def test_what_is_wrong_with_a_circle_is_named(tracked, row, message) -> None:
+def test_a_wrong_circle_is_refused_with_its_row(tracked, row, message) -> None:
     with pytest.raises(InputError, match=message):
         walls_of(with_arcs(tracked, row))
 
 
-def test_no_table_of_walls_at_all_is_refused(tracked) -> None:
+def test_walls_without_any_table_are_refused(tracked) -> None:
     edit(tracked, "experiment.toml", 'file = "walls.csv"\n', "")
     with pytest.raises(InputError, match="file is missing"):
         load_experiment(tracked)
 
 
-def test_loads_vary_in_time_and_press_as_much_on_average(tracked) -> None:
+def test_loads_vary_in_time_and_give_their_mean_pressure(tracked) -> None:
     rows = [f"{k},{wall},{force * (k + 1)}" for k in range(FRAMES) for wall, force in (("top", 100), ("right", 40))]
     walls = walls_of(with_loads(tracked, *rows))
     named = dict(zip(walls.name, range(4), strict=True))
@@ -113,7 +113,7 @@ def test_loads_vary_in_time_and_press_as_much_on_average(tracked) -> None:
     ("0,top,5\n1,top,5\n3,top,5\n4,top,5", "frame 2: has no row of wall 'top'"),
     ("0,top,5\n1,top,0\n2,top,5\n3,top,5\n4,top,5", "frame 1: has loads of 0 N alone"),
 ])  # fmt: skip
-def test_what_is_wrong_with_a_load_is_named(tracked, row, message) -> None:
+def test_a_wrong_load_is_refused_with_its_row(tracked, row, message) -> None:
     with pytest.raises(InputError, match=message):
         walls_of(with_loads(tracked, row))
 

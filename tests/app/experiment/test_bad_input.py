@@ -1,4 +1,4 @@
-"""Every mistake in the input ends in one line that names file, place and value, exit 2, and nothing written."""
+"""Every mistake in the input gives one line with file, place and value, exit status 2, and writes nothing."""
 
 from pathlib import Path
 
@@ -61,10 +61,10 @@ def cut(file: Path, rows: int) -> None:
 def test_a_mistake_is_named_in_one_line(mistake, tracked, tmp_path, capsys):
     name, spoil, named = MISTAKES[mistake]
     spoil(tracked / name)
-    told = refuse(capsys, tmp_path / "out", "run", str(tracked))
+    message = refuse(capsys, tmp_path / "out", "run", str(tracked))
     for part in named:
-        assert part in told, told
-    assert Path(name).stem.split("_")[0] in told or mistake in ("far outside", "missing table")
+        assert part in message, message
+    assert Path(name).stem.split("_")[0] in message or mistake in ("far outside", "missing table")
 
 
 @pytest.mark.parametrize(
@@ -80,16 +80,16 @@ def test_a_wrong_setting_is_named(setting, named, tracked, tmp_path, capsys):
     assert named in refuse(capsys, tmp_path / "out", "run", str(tracked), "--set", setting)
 
 
-@pytest.mark.parametrize("frames", ["3:2", "0:99", "x:y", "5"])
+@pytest.mark.parametrize("frames", ["3:2", "0:99", "x:y", "5", "0:4:0", "0:4:1:1"])
 def test_a_wrong_frame_range_is_named(frames, tracked, tmp_path, capsys):
     assert frames.split(":")[0] in refuse(capsys, tmp_path / "out", "run", str(tracked), "--frames", frames)
 
 
-def test_no_experiment_is_named(tmp_path, capsys):
+def test_a_missing_experiment_is_named(tmp_path, capsys):
     assert "no such file" in refuse(capsys, tmp_path / "out", "run", str(tmp_path / "nowhere"))
 
 
-def test_bad_input_leaves_finished_results_alone(tracked, tmp_path, capsys):
+def test_bad_input_leaves_finished_results_unchanged(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     assert rodsight("solve", str(tracked), "--out", str(out), "--quiet", "--set", "solver.sweeps=5") == 0
     before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}

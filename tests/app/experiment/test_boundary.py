@@ -1,4 +1,4 @@
-"""Boundaries that are no walls: read, found, refused where they cannot be, and named where they are missing."""
+"""Boundaries other than walls are read, found, refused where they are impossible, and reported where missing."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.experiment.boundary import bound_tracks, free_surfaces
+from rodsight.experiment.boundary import apply_boundary, free_surfaces
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.walls import read_walls
+from rodsight.solver.bodies.cell import Cell
 
-from solver.bodies.cell import Cell
 from tests.app.experiment.tables import edit, swap_row
 from tests.program import rodsight
 
@@ -26,7 +26,7 @@ def hexagonal(inner: float = -1.0, outer: float = 0.12) -> np.ndarray:
 
 
 def write(folder: Path, place: np.ndarray, bounds: str, **files: str) -> Path:
-    """An experiment of rods that do not move, bounded as told."""
+    """Write an experiment of rods at rest with the given boundary."""
     poses = [f"{k},{i},{x},{y},0" for k in range(FRAMES) for i, (x, y) in enumerate(place.tolist())]
     (folder / "tracks.csv").write_text("frame,id,x,y,theta\n" + "\n".join(poses) + "\n")
     (folder / "grains.csv").write_text("id,radius\n" + "".join(f"{i},{R}\n" for i in range(len(place))))
@@ -54,14 +54,14 @@ def bound(folder: Path):
     experiment = load_experiment(folder)
     tracks = read_tracks(experiment)
     walls = read_walls(experiment, tracks.frame_count)
-    return experiment, bound_tracks(experiment, tracks, walls), walls
+    return experiment, apply_boundary(experiment, tracks, walls), walls
 
 
-def complaint(folder: Path, capsys: pytest.CaptureFixture) -> str:
+def error_of_check(folder: Path, capsys: pytest.CaptureFixture) -> str:
     assert rodsight("check", folder) == 2
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    return told
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    return message
 
 
 def test_the_grains_of_a_table_are_the_boundary(tmp_path):
@@ -79,7 +79,7 @@ def test_the_outermost_grains_of_a_ring_are_those_of_both_rims(tmp_path):
     assert not ((distance > 0.085) & (distance < 0.12)).any()
 
 
-def test_positions_wrapped_into_the_cell_are_followed_across_its_edges(tmp_path):
+def test_positions_wrapped_into_the_cell_are_unwrapped(tmp_path):
     folder = in_cell(tmp_path)
     swap_row(folder / "tracks.csv", 2 + 36, {2: "0.13"})  # grain 0 in frame 1, one vector on
     _, tracks, walls = bound(folder)
@@ -88,11 +88,11 @@ def test_positions_wrapped_into_the_cell_are_followed_across_its_edges(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (lambda at: in_cell(at, size=0.03), "must be higher than two of the largest diameters"),
-        (lambda at: in_cell(at, more="[material]\ngravity = [0, -9.8]"), "nothing carries the weight"),
-        (lambda at: in_cell(at, more='[walls]\nfile = "walls.csv"'), "stands instead of [walls]"),
+        (lambda at: in_cell(at, more="[material]\ngravity = [0, -9.8]"), "no boundary carries the weight"),
+        (lambda at: in_cell(at, more='[walls]\nfile = "walls.csv"'), "is given instead of [walls]"),
         (lambda at: in_cell(at, more='grains = "outer"'), "give either grains or periodic"),
         (lambda at: swap_row(in_cell(at) / "cell.csv", 3, {3: "0.24", 4: "0"}), "the cell has no area"),
         (lambda at: edit(in_cell(at) / "cell.csv", "2,0.12", "3,0.12"), "frame"),
@@ -101,9 +101,9 @@ def test_positions_wrapped_into_the_cell_are_followed_across_its_edges(tmp_path)
         (lambda at: write(at, hexagonal(), '[boundary]\ngrains = "b.csv"'), "there is no such file"),
     ],
 )
-def test_what_cannot_bound_a_packing_is_refused_in_one_line(tmp_path, capsys, change, told):
+def test_an_impossible_boundary_is_refused_with_one_line(tmp_path, capsys, change, message):
     change(tmp_path)
-    assert told in complaint(tmp_path, capsys)
+    assert message in error_of_check(tmp_path, capsys)
 
 
 def floor(left: float, right: float, bottom: float) -> str:
@@ -115,17 +115,17 @@ def heap() -> np.ndarray:
     return place[(place[:, 1] > -0.01) & (place[:, 1] < 0.12 - np.abs(place[:, 0]))]
 
 
-def test_an_open_boundary_is_named_with_its_place_and_the_way_out(tmp_path):
+def test_an_open_boundary_is_reported_with_its_place_and_cure(tmp_path):
     place = hexagonal(0.05, 0.16)
     bottom = float(place[:, 1].min()) - R
     folder = write(tmp_path, place, '[walls]\nfile = "walls.csv"', walls=floor(-0.2, 0.2, bottom))
-    told = free_surfaces(*bound(folder))
-    assert any("around a hole inside" in each for each in told)
-    assert any("at the left" in each for each in told)
-    assert all('[boundary] grains = "outer"' in each for each in told)
+    warnings = free_surfaces(*bound(folder))
+    assert any("around a hole inside" in each for each in warnings)
+    assert any("at the left" in each for each in warnings)
+    assert all('[boundary] grains = "outer"' in each for each in warnings)
 
 
-def test_a_surface_that_weight_keeps_is_not_open(tmp_path):
+def test_a_free_surface_of_a_heap_is_not_reported(tmp_path):
     gravity = "\n[material]\ngravity = [0.0, -9.81]"
     folder = write(tmp_path, heap(), f'[walls]\nfile = "walls.csv"{gravity}', walls=floor(-0.3, 0.3, -R))
     assert free_surfaces(*bound(folder)) == []
@@ -133,10 +133,10 @@ def test_a_surface_that_weight_keeps_is_not_open(tmp_path):
     assert free_surfaces(*bound(folder))
 
 
-def test_outermost_grains_as_boundary_leave_nothing_open(tmp_path):
+def test_outermost_grains_as_boundary_close_the_packing(tmp_path):
     assert free_surfaces(*bound(write(tmp_path, hexagonal(0.05, 0.16), '[boundary]\ngrains = "outer"'))) == []
 
 
-def test_check_says_what_bounds_a_packing_without_walls(tmp_path, capsys):
+def test_check_reports_the_boundary_of_a_packing_without_walls(tmp_path, capsys):
     assert rodsight("check", in_cell(tmp_path)) == 0
     assert "periodic cell" in capsys.readouterr().out

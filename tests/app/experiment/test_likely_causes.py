@@ -1,4 +1,4 @@
-"""`check` refuses what cannot be, says what it looks like, and warns of what is possible but hardly meant."""
+"""`check` refuses impossible input with its likely cause, and warns of implausible input."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rodsight.errors import InputError
 from rodsight.experiment.image_header import claimed_size
 from rodsight.experiment.photographs import read_photograph
+from rodsight.process.errors import InputError
 
 from tests.app.experiment.tables import edit
 from tests.program import rodsight
@@ -51,56 +51,56 @@ WALL = ("x1", "y1", "x2", "y2")
 
 
 @pytest.mark.parametrize("cause", CAUSES)
-def test_a_certain_mistake_is_refused_with_its_likely_cause(tracked, capsys, cause):
+def test_a_mistake_is_refused_with_its_likely_cause(tracked, capsys, cause):
     CAUSES[cause](tracked)
     assert rodsight("check", tracked) == 2
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert cause in told
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert cause in message
 
 
-def test_a_pressure_of_next_to_nothing_is_doubted(tracked, capsys):
+def test_a_very_small_pressure_gives_a_warning(tracked, capsys):
     edit(tracked / "experiment.toml", "pressure = 50000.0", "pressure = 50")
     assert rodsight("check", tracked) == 0
     assert "did you mean 50e3 Pa?" in capsys.readouterr().out
 
 
-def test_an_open_side_is_told_with_the_walls_beside_it(tracked, capsys):
-    edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', "")  # it knows the wall
+def test_an_open_side_is_reported_with_the_walls_beside_it(tracked, capsys):
+    edit(tracked / "experiment.toml", 'truth = "truth_contacts.csv"', "")  # the truth refers to the wall
     file = tracked / "walls.csv"
     edit(tracked / "experiment.toml", 'forces = "wall_forces.csv"', "")
     file.write_text("\n".join(line for line in file.read_text().splitlines() if ",right," not in line) + "\n")
     assert rodsight("check", tracked) == 0
-    told = capsys.readouterr().out
-    assert "The boundary is open" in told
-    assert "'bottom'" in told
-    assert "'top'" in told
+    output = capsys.readouterr().out
+    assert "The boundary is open" in output
+    assert "'bottom'" in output
+    assert "'top'" in output
 
 
 @pytest.mark.parametrize(
     ("setting", "named"),
     [
         ("material.friction=25", "material.friction is a number > 0, ≤ 2"),
-        ("material.friction=true", "valid number"),
-        ('material.friction="0.3"', "valid number"),
+        ("material.friction=true", "material.friction is a number"),
+        ('material.friction="0.3"', "material.friction is a number"),
         ("material.density=1e308", "≤ 30000"),
         ("solver.substeps=1000000000000", "≤ 1000"),
         (f"solver.sweeps={10**40}", "≤ 1e+06"),
-        ("calibration.enabled=1", "valid boolean"),
+        ("calibration.enabled=1", "true or false"),
         ('walls.file="a\\u0000b"', "NUL"),
     ],
 )
-def test_a_setting_that_cannot_be_names_its_range(tracked, capsys, setting, named):
+def test_an_impossible_setting_is_refused_with_its_range(tracked, capsys, setting, named):
     assert rodsight("check", tracked, "--set", setting) == 2
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert setting.partition("=")[0] in told
-    assert named in told
-    assert len(told) < 500
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert setting.partition("=")[0] in message
+    assert named in message
+    assert len(message) < 500
 
 
 @pytest.mark.parametrize("table", ["grains.csv", "tracks.csv"])
-def test_a_whole_number_beyond_all_bits_is_named(tracked, capsys, table):
+def test_a_too_large_whole_number_is_named(tracked, capsys, table):
     file = tracked / table
     head, _, rest = file.read_text().partition("\n")
     cells = rest.split(",")
@@ -118,14 +118,14 @@ def test_a_truth_that_cannot_be_read_is_found_by_check(tracked, capsys, broken):
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".tiff"])
-def test_a_header_tells_the_size(tmp_path, suffix):
+def test_the_size_is_read_from_the_header(tmp_path, suffix):
     file = tmp_path / f"a{suffix}"
     cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
     assert claimed_size(file.read_bytes()) == (70, 30)
     assert claimed_size(file.read_bytes()[:10]) is None
 
 
-def test_a_small_file_that_claims_to_be_huge_is_refused_unread(tmp_path, monkeypatch):
+def test_a_small_file_that_states_a_huge_size_is_refused_undecoded(tmp_path, monkeypatch):
     file = tmp_path / "a.jpg"
     cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
     content = file.read_bytes().replace(struct.pack(">HH", 30, 70), struct.pack(">HH", 30_000, 30_000))
@@ -135,11 +135,11 @@ def test_a_small_file_that_claims_to_be_huge_is_refused_unread(tmp_path, monkeyp
         read_photograph(file)
 
 
-def test_what_libraries_say_by_themselves_stays_off_the_screen(tmp_path, capfd):
+def test_messages_of_image_libraries_are_not_shown(tmp_path, capfd):
     file = tmp_path / "a.png"
     cv2.imwrite(str(file), np.zeros((30, 70), np.uint8))
     content = file.read_bytes()
-    chunk = b"iCCP" + b"x\0\0nonsense"  # a colour profile that libpng complains of
+    chunk = b"iCCP" + b"x\0\0nonsense"  # a colour profile that makes libpng warn
     at = content.index(b"IDAT") - 4
     file.write_bytes(content[:at] + struct.pack(">I", len(chunk) - 4) + chunk + b"\0\0\0\0" + content[at:])
     assert read_photograph(file).shape == (30, 70)

@@ -1,4 +1,4 @@
-"""Photographs: order, depth, colour, and what is said of files that are not photographs."""
+"""Photographs: order, depth, colour, and errors of files that are not photographs."""
 
 from __future__ import annotations
 
@@ -10,9 +10,15 @@ from types import ModuleType, SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from rodsight.errors import InputError, RunError
-from rodsight.experiment.photographs import Look, Photographs, ReadAhead, read_photograph
+from rodsight.experiment.photographs import (
+    ImageSelection,
+    Photographs,
+    PrefetchedPhotographs,
+    in_order,
+    read_photograph,
+)
 from rodsight.experiment.reading.input_files import InputFiles
+from rodsight.process.errors import InputError, RunError
 
 ROUNDING = 1e-3  # [grey] float32 arithmetic on values up to 255
 
@@ -41,7 +47,7 @@ def test_length_shape_and_items(tmp_path: Path) -> None:
     assert photographs[0].dtype == np.float32
 
 
-def test_photographs_are_read_only_when_asked_for(tmp_path: Path) -> None:
+def test_photographs_are_read_on_access(tmp_path: Path) -> None:
     write(tmp_path, "a.png", np.zeros((4, 4), np.uint8))
     (tmp_path / "b.png").write_text("no photograph")
     photographs = Photographs.matching(tmp_path, "*.png")
@@ -50,13 +56,13 @@ def test_photographs_are_read_only_when_asked_for(tmp_path: Path) -> None:
         photographs.check()
 
 
-def test_a_whole_png_is_not_decoded_to_be_checked_and_one_that_is_not_is_named(tmp_path: Path, monkeypatch) -> None:
+def test_a_complete_png_is_checked_without_decoding_and_a_damaged_one_is_named(tmp_path: Path, monkeypatch) -> None:
     noise = np.random.default_rng(0).integers(0, 255, (64, 64), dtype=np.uint8)
     files = [write(tmp_path, f"{k}.png", noise) for k in range(3)]
     decoded = []
     monkeypatch.setattr(cv2, "imdecode", lambda *given, really=cv2.imdecode: decoded.append(1) or really(*given))
     Photographs(files).check()
-    assert len(decoded) == 1  # the first, whose size all have
+    assert len(decoded) == 1  # the first, for the size of all
     content = bytearray(files[2].read_bytes())
     content[len(content) // 2] ^= 1
     files[2].write_bytes(bytes(content))
@@ -142,8 +148,8 @@ def test_different_size_is_named(tmp_path: Path) -> None:
         photographs[1]
 
 
-def fake_rawpy(pixels: np.ndarray | None, asked: dict[str, object]) -> ModuleType:
-    """The part of rawpy that is used: red, green, blue `pixels`, or a file that it cannot read."""
+def fake_rawpy(pixels: np.ndarray | None, options: dict[str, object]) -> ModuleType:
+    """Return a stand-in for the used part of rawpy: red, green, blue `pixels`, or None for an unreadable file."""
 
     class LibRawError(Exception):
         pass
@@ -151,7 +157,7 @@ def fake_rawpy(pixels: np.ndarray | None, asked: dict[str, object]) -> ModuleTyp
     class Raw:
         def __enter__(self) -> SimpleNamespace:
             def postprocess(**choices: object) -> np.ndarray:
-                asked.update(choices)
+                options.update(choices)
                 assert pixels is not None
                 return pixels
 
@@ -172,31 +178,33 @@ def fake_rawpy(pixels: np.ndarray | None, asked: dict[str, object]) -> ModuleTyp
 
 def test_raw_files_are_developed_alike_and_to_full_depth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     red_green_blue = np.array([[[65535, 0, 0], [0, 65535, 0], [0, 0, 65535], [257, 257, 257]]], np.uint16)
-    asked: dict[str, object] = {}
-    monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(red_green_blue, asked))
+    options: dict[str, object] = {}
+    monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(red_green_blue, options))
     (tmp_path / "a.NEF").write_bytes(b"raw")
     image = read_photograph(tmp_path / "a.NEF")
     assert image[0] == pytest.approx([0.299 * 255, 0.587 * 255, 0.114 * 255, 1.0], abs=ROUNDING)
-    assert asked["output_bps"] == 16
-    assert asked["no_auto_bright"] is True
-    assert asked["user_flip"] == 0
+    assert options["output_bps"] == 16
+    assert options["no_auto_bright"] is True
+    assert options["user_flip"] == 0
 
 
-def test_a_raw_file_without_its_reader_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_raw_file_without_its_reader_names_the_package_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "rawpy", None)
     (tmp_path / "a.CR2").write_bytes(b"raw")
     with pytest.raises(InputError, match=r"a\.CR2.*rodsight\[raw\]"):
         read_photograph(tmp_path / "a.CR2")
 
 
-def test_a_raw_file_that_is_none_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreadable_raw_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rawpy", fake_rawpy(None, {}))
     (tmp_path / "a.dng").write_bytes(b"raw")
     with pytest.raises(InputError, match=r"a\.dng.*Unsupported file format"):
         read_photograph(tmp_path / "a.dng")
 
 
-def test_a_photograph_that_is_replaced_is_not_taken_for_the_one_before(tmp_path: Path) -> None:
+def test_a_photograph_that_is_replaced_during_a_run_is_refused(tmp_path: Path) -> None:
     for name in ("0.png", "1.png"):
         cv2.imwrite(str(tmp_path / name), np.full((4, 4), 7, np.uint8))
     photographs = Photographs.matching(tmp_path, "*.png")
@@ -218,15 +226,17 @@ def coloured(tmp_path) -> Path:
 
 
 @pytest.mark.parametrize(("channel", "level"), [("red", 30), ("green", 20), ("blue", 10)])
-def test_one_colour_alone_is_looked_at(coloured, channel, level):
-    image = Photographs([coloured], look=Look(channel))[0]
+def test_one_channel_is_used(coloured, channel, level):
+    image = Photographs([coloured], selection=ImageSelection(channel))[0]
     assert image[0, 0] == level
     assert image[0, 3] == 200
 
 
-def test_all_channels_come_of_one_decoding(coloured, monkeypatch):
-    alone = {name: Photographs([coloured], look=Look(name))[0] for name in ("grey", "red", "green", "blue")}
-    photographs = Photographs([coloured], look=Look("red"))
+def test_all_channels_need_one_decoding(coloured, monkeypatch):
+    alone = {
+        name: Photographs([coloured], selection=ImageSelection(name))[0] for name in ("grey", "red", "green", "blue")
+    }
+    photographs = Photographs([coloured], selection=ImageSelection("red"))
     assert photographs.shape == (6, 8)
     decoded = []
     monkeypatch.setattr(cv2, "imdecode", lambda *given, really=cv2.imdecode: decoded.append(1) or really(*given))
@@ -238,48 +248,78 @@ def test_all_channels_come_of_one_decoding(coloured, monkeypatch):
 
 def test_all_channels_of_a_grey_photograph_are_alike(tmp_path):
     file = write(tmp_path, "a.png", np.arange(12, dtype=np.uint8).reshape(3, 4))
-    together = Photographs([file], look=Look("red", (1, 0, 2, 2))).in_channels(0)
+    together = Photographs([file], selection=ImageSelection("red", (1, 0, 2, 2))).in_channels(0)
     assert all(
-        np.array_equal(each, Photographs([file], look=Look("grey", (1, 0, 2, 2)))[0]) for each in together.values()
+        np.array_equal(each, Photographs([file], selection=ImageSelection("grey", (1, 0, 2, 2)))[0])
+        for each in together.values()
     )
 
 
-def test_nothing_outside_the_region_is_seen(coloured):
-    image = Photographs([coloured], look=Look("red", (3, 1, 6, 4)))[0]
+def test_pixels_outside_the_region_are_grey(coloured):
+    image = Photographs([coloured], selection=ImageSelection("red", (3, 1, 6, 4)))[0]
     assert image.shape == (6, 8)
     assert np.all(image[1:5, 3] == 200)
-    assert np.all(image[[0, 5]] == 30)  # the middle grey of the region
+    assert np.all(image[[0, 5]] == 30)  # the median grey of the region
     assert np.all(image[:, 7] == 30)
 
 
 def test_a_region_beyond_the_photograph_is_refused(coloured):
     with pytest.raises(InputError, match=r"photographs\.region = \[0, 0, 8, 4\].*8 x 6 pixels"):
-        Photographs([coloured], look=Look("grey", (0, 0, 8, 4)))[0]
+        Photographs([coloured], selection=ImageSelection("grey", (0, 0, 8, 4)))[0]
 
 
-class Counted:
-    """Photographs that note in which order they are asked for."""
+class RecordingPhotographs:
+    """Photographs that record the order of accesses."""
 
     def __init__(self, broken: int = -1) -> None:
-        self.asked: list[int] = []
+        self.accessed: list[int] = []
         self._broken = broken
 
     def __getitem__(self, frame: int) -> np.ndarray:
-        self.asked.append(frame)
+        self.accessed.append(frame)
         if frame == self._broken:
             raise InputError("a.png", "", "is broken")
         return np.full((2, 2), float(frame), np.float32)
 
 
-def test_the_next_photograph_is_read_ahead_once_and_none_beyond_the_last():
-    photographs = Counted()
-    with ReadAhead(photographs, 4) as coming:
-        assert [float(coming[k][0, 0]) for k in range(4)] == [0.0, 1.0, 2.0, 3.0]
-    assert photographs.asked == [0, 1, 2, 3]
+def test_the_next_photograph_is_prefetched_once_and_none_beyond_the_last():
+    photographs = RecordingPhotographs()
+    with PrefetchedPhotographs(photographs, 4) as prefetched:
+        assert [float(prefetched[k][0, 0]) for k in range(4)] == [0.0, 1.0, 2.0, 3.0]
+    assert photographs.accessed == [0, 1, 2, 3]
 
 
-def test_a_broken_photograph_is_complained_of_when_it_is_asked_for():
-    with ReadAhead(Counted(broken=2), 4) as coming:
-        assert coming[1][0, 0] == 1.0
+def test_an_error_of_prefetching_is_raised_on_access():
+    with PrefetchedPhotographs(RecordingPhotographs(broken=2), 4) as prefetched:
+        assert prefetched[1][0, 0] == 1.0
         with pytest.raises(InputError, match="broken"):
-            coming[2]
+            prefetched[2]
+
+
+@pytest.mark.parametrize(
+    ("names", "first"),
+    [
+        (["DSC_9998.jpg", "DSC_9999.jpg", "DSC_0001.jpg", "DSC_0002.jpg"], "DSC_9998.jpg"),
+        (["P9991.png", "P9994.png", "P9997.png", "P0000.png", "P0003.png"], "P9991.png"),
+        (["DSC_9999.jpg", "DSC_0001.jpg"], "DSC_9999.jpg"),
+        (["x0100.png", "x9900.png", "x9950.png"], "x0100.png"), (["a001.png", "a999.png"], "a001.png"),
+        (["DSC_9999.jpg", "IMG_0001.jpg"], "DSC_9999.jpg"), (["f10.png", "f9.png"], "f9.png"),
+    ],
+)  # fmt: skip
+def test_a_camera_counter_that_wraps_goes_on(names, first):
+    ordered = [file.name for file in in_order(Path(name) for name in reversed(names))]
+    assert ordered[0] == first
+    assert ordered == (names if first == names[0] else sorted(names, reverse=True))
+
+
+def test_what_is_masked_shows_nothing(tmp_path):
+    image = np.full((40, 50), 100, np.uint8)
+    image[10:20, 10:20] = 250
+    image[30:35, 30:35] = 5
+    cv2.imwrite(str(tmp_path / "a.png"), image)
+    over = ((8.0, 8.0), (22.0, 8.0), (22.0, 22.0), (8.0, 22.0))
+    seen = Photographs([tmp_path / "a.png"], selection=ImageSelection(mask=(over, over)))[0]
+    assert seen.max() == 100.0
+    assert seen.min() == 5.0
+    both = Photographs([tmp_path / "a.png"], selection=ImageSelection(region=(0, 0, 49, 25), mask=(over,)))[0]
+    assert np.unique(both).tolist() == [100.0]

@@ -1,13 +1,13 @@
-"""Plain tables are taken apart at once, to the same cells and the same complaints as the reader of CSV finds."""
+"""The fast parser of plain tables gives the same cells and the same errors as the csv module."""
 
 from __future__ import annotations
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rodsight.errors import InputError
 from rodsight.experiment.reading import tables
 from rodsight.experiment.reading.plain_rows import split_plain
+from rodsight.process.errors import InputError
 
 ROWS = b"frame,id,x\n0,1,2.5\n0, 2 ,3\r\n1,1,-1e3\n"
 PIECES = [",", "\n", "\r\n", "\r", '"', " ", "1", "2.5", "x", "é", "\0", "\ufeff", "id", "\u2028", "\x1f"]
@@ -25,13 +25,13 @@ def read(file, *, plain):
 
 
 @given(body=st.lists(st.sampled_from(PIECES), max_size=30).map("".join), rows=st.integers(0, 3))
-def test_whatever_is_read_is_what_the_reader_of_csv_finds(body, rows, tmp_path_factory):
+def test_any_table_reads_as_by_the_csv_module(body, rows, tmp_path_factory):
     file = tmp_path_factory.getbasetemp() / "some.csv"
     file.write_bytes(("x,id,y\n" + rows * "1,2,3\n" + body).encode())
     assert read(file, plain=True) == read(file, plain=False)
 
 
-def test_plain_rows_are_taken_apart_at_once():
+def test_plain_rows_are_split_into_columns():
     found = split_plain(ROWS, ("id", "x"), ("y", "frame"))
     assert found is not None
     assert found.values == {"id": ["1", "2", "1"], "x": ["2.5", "3", "-1e3"], "frame": ["0", "0", "1"]}
@@ -43,5 +43,5 @@ def test_plain_rows_are_taken_apart_at_once():
     [b"id,x\n", b"id,x\n1,2\n\n3,4\n", b"id,x\n1,2\n3\n", b'id,x\n"1",2\n', b"id,x\r1,2\r", b"id,x\n,\n",
      b"id,id,x\n1,2,3\n", b"id,y\n1,2\n", b"id,x\n1,\xff\n", b"id,x\n1," + (1 << 17) * b"2" + b"\n"],
 )  # fmt: skip
-def test_what_is_not_plain_is_left_to_the_reader_of_csv(content):
+def test_tables_that_are_not_plain_are_left_to_the_csv_module(content):
     assert split_plain(content, ("id", "x"), ()) is None

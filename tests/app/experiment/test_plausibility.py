@@ -1,10 +1,10 @@
-"""Tracks, radii and walls that cannot belong together are told."""
+"""Tracks, radii and walls that do not fit together are reported."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.experiment.plausibility import neighbour_spacing, rods_beyond_ends
+from rodsight.experiment.plausibility import expected_rods, neighbour_spacing, rods_beyond_ends, rods_cut_by_walls
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 RADIUS = 0.01  # [m]
@@ -13,7 +13,12 @@ RADIUS = 0.01  # [m]
 def row_of_rods(count: int) -> Tracks:
     """Rods side by side on the line y = 0, the first touching x = 0."""
     x = RADIUS * (1.0 + 2.0 * np.arange(count))
-    position = np.stack([x, np.full(count, RADIUS)], axis=1)[None]
+    return tracks_at(np.stack([x, np.full(count, RADIUS)], axis=1))
+
+
+def tracks_at(place: np.ndarray) -> Tracks:
+    """Rods at these centres (n, 2) in one photograph."""
+    position, count = place[None], len(place)
     given = np.full((1, count), TrackStatus.GIVEN, np.uint8)
     zero = np.zeros((1, count))
     return Tracks(np.arange(count), np.full(count, RADIUS), np.zeros(1), position, zero, zero, zero * np.nan, given)
@@ -23,15 +28,32 @@ def floor(length: float) -> WallTracks:
     return WallTracks(("floor",), np.array([[[[0.0, 0.0], [length, 0.0]]]]), np.array([np.nan]))
 
 
-@pytest.mark.parametrize(("missing", "told"), [(0, []), (2, ["2 rods"])])
-def test_rods_beyond_a_wall_s_end_are_told(missing, told):
+@pytest.mark.parametrize(("missing", "expected"), [(0, []), (2, ["2 rods"])])
+def test_rods_beyond_the_end_of_a_wall_are_reported(missing, expected):
     found = rods_beyond_ends(row_of_rods(6), floor(2.0 * RADIUS * (6 - missing)))
-    assert [sentence[:6] for sentence in found] == told
+    assert [sentence[:6] for sentence in found] == expected
     assert all("'floor'" in sentence for sentence in found)
 
 
-def test_touching_neighbours_lie_the_sum_of_their_radii_away():
+def test_touching_neighbours_have_a_spacing_of_one():
     rods = row_of_rods(5)
     assert neighbour_spacing(rods.position[0], rods.radius) == pytest.approx(np.ones(5))
     assert neighbour_spacing(rods.position[0], 2.0 * rods.radius) == pytest.approx(np.full(5, 0.5))
     assert len(neighbour_spacing(rods.position[0, :1], rods.radius[:1])) == 0
+
+
+def test_rods_that_fill_the_area_are_counted() -> None:
+    x, y = np.meshgrid(np.arange(8.0), np.arange(8.0))
+    place = 0.02 * np.column_stack([(x + 0.5 * (y % 2)).ravel(), np.sqrt(0.75) * y.ravel()])
+    full = tracks_at(place)
+    assert expected_rods(full) == pytest.approx(64, abs=8)
+    few = tracks_at(place[np.arange(64) % 3 == 0])
+    assert expected_rods(few) > 45
+    assert expected_rods(tracks_at(place[:3])) == 3
+
+
+def test_walls_through_rods_are_named() -> None:
+    place = np.array([[0.02, 0.01], [0.05, 0.01], [0.08, 0.01]])
+    assert rods_cut_by_walls(tracks_at(place), floor(0.1)) == {}
+    low = place - [0.0, 0.009]
+    assert rods_cut_by_walls(tracks_at(low), floor(0.06)) == {"floor": 2}

@@ -1,4 +1,4 @@
-"""Raw files of cameras through the real reader: a small uncompressed DNG is made here, tag by tag, and read back."""
+"""Raw files of cameras through rawpy: a small uncompressed DNG is written tag by tag and read back."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def write_dng(file: Path, sensor: np.ndarray, orientation: int = 1) -> Path:
         (262, SHORT, 1, struct.pack("<H", 32803)),  # a colour filter array
         (271, ASCII, 5, b"Test\0"),  # maker
         (272, ASCII, 5, b"Test\0"),  # model
-        (273, LONG, 1, b"\0\0\0\0"),  # where the strip begins: filled in below
+        (273, LONG, 1, b"\0\0\0\0"),  # offset of the strip: filled in below
         (274, SHORT, 1, struct.pack("<H", orientation)),
         (277, SHORT, 1, struct.pack("<H", 1)),  # samples a pixel
         (278, LONG, 1, struct.pack("<I", height)),  # rows in the strip
@@ -72,9 +72,9 @@ def write_dng(file: Path, sensor: np.ndarray, orientation: int = 1) -> Path:
     return file
 
 
-def exposed(share: np.ndarray | float) -> np.ndarray:
-    """What the sensor counts (H, W) where `share` of the full light falls on it."""
-    light = np.broadcast_to(np.asarray(share, dtype=np.float64), (HEIGHT, WIDTH))
+def exposed(fraction: np.ndarray | float) -> np.ndarray:
+    """Return the sensor's counts (H, W) under a fraction of the full light."""
+    light = np.broadcast_to(np.asarray(fraction, dtype=np.float64), (HEIGHT, WIDTH))
     return np.rint(BLACK + light * (WHITE - BLACK)).astype(np.uint16)
 
 
@@ -86,7 +86,7 @@ def test_no_light_is_black_and_full_light_is_white(tmp_path: Path) -> None:
     assert np.abs(full[INSIDE] - 255.0).max() < ROUNDING
 
 
-def test_more_than_eight_bits_come_through(tmp_path: Path) -> None:
+def test_more_than_eight_bits_are_kept(tmp_path: Path) -> None:
     ramp = np.linspace(0.40, 0.42, WIDTH)[None, :] * np.ones((HEIGHT, 1))
     image = read_photograph(write_dng(tmp_path / "ramp.dng", exposed(ramp)))
     row = image[HEIGHT // 2, 8:-8]
@@ -95,8 +95,8 @@ def test_more_than_eight_bits_come_through(tmp_path: Path) -> None:
     assert row[-1] - row[0] < 5.0
 
 
-def test_photographs_of_one_scene_in_other_light_keep_its_ratio(tmp_path: Path) -> None:
-    """Nothing is brightened by a photograph's own content: a darker one stays darker."""
+def test_photographs_of_one_scene_in_dimmer_light_stay_dimmer(tmp_path: Path) -> None:
+    """Brightness is not adapted to a photograph's content: a darker one stays darker."""
     spots = np.where(np.add.outer(np.arange(HEIGHT) // 16, np.arange(WIDTH) // 16) % 2 == 0, 0.3, 0.6)
     bright = read_photograph(write_dng(tmp_path / "a.dng", exposed(spots)))
     dim = read_photograph(write_dng(tmp_path / "b.dng", exposed(0.5 * spots)))
@@ -107,10 +107,10 @@ def test_photographs_of_one_scene_in_other_light_keep_its_ratio(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("orientation", [1, 3, 6, 8])
-def test_a_camera_held_upright_turns_nothing(tmp_path: Path, orientation: int) -> None:
-    share = np.full((HEIGHT, WIDTH), 0.2)
-    share[: HEIGHT // 4, : WIDTH // 4] = 0.8  # top left on the sensor
-    image = read_photograph(write_dng(tmp_path / "turned.dng", exposed(share), orientation))
+def test_the_orientation_tag_is_ignored(tmp_path: Path, orientation: int) -> None:
+    light = np.full((HEIGHT, WIDTH), 0.2)
+    light[: HEIGHT // 4, : WIDTH // 4] = 0.8  # top left on the sensor
+    image = read_photograph(write_dng(tmp_path / "turned.dng", exposed(light), orientation))
     assert image.shape == (HEIGHT, WIDTH)
     assert image[HEIGHT // 8, WIDTH // 8] > image[-HEIGHT // 8, -WIDTH // 8] + 50.0
     assert image[HEIGHT // 8, WIDTH // 8] > image[HEIGHT // 8, -WIDTH // 8] + 50.0

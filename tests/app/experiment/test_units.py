@@ -1,4 +1,4 @@
-"""Pixels to metres and back, straight and through a lens, against OpenCV's own functions and by hand."""
+"""Conversion of pixels to metres and back, with and without a lens, compared with OpenCV's functions and by hand."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rodsight.errors import InputError
 from rodsight.experiment.config.experiment_file import load_config
 from rodsight.experiment.lens import BrownLens, OpenCVLens, invert
 from rodsight.experiment.scaling import make_scale
 from rodsight.experiment.units import Scale, pixel_size_between
+from rodsight.process.errors import InputError
 
 EXACT = 1e-6  # [px] Newton's method ends below it; OpenCV's iteration does at about this
 HEIGHT = 1000
@@ -61,19 +61,21 @@ def test_browns_model_is_written_from_the_photograph_to_the_undistorted_picture(
 
 @pytest.mark.parametrize("lens", [OPENCV, BROWN, None])
 @pytest.mark.parametrize("tall", [None, 2.6e-4])
-def test_there_and_back_again(points: np.ndarray, lens: OpenCVLens | BrownLens | None, tall: float | None) -> None:
+def test_conversion_to_metres_and_back_is_the_identity(
+    points: np.ndarray, lens: OpenCVLens | BrownLens | None, tall: float | None
+) -> None:
     scale = Scale(2.5e-4, HEIGHT, tall, lens)
     assert np.abs(scale.to_pixels(scale.to_world(points)) - points).max() < EXACT
 
 
-def test_lost_points_stay_lost() -> None:
+def test_points_without_position_stay_nan() -> None:
     scale = Scale(2.5e-4, HEIGHT, None, OPENCV)
     world = scale.to_world(np.array([[np.nan, np.nan], [600.0, 500.0]]))
     assert np.isnan(world[0]).all()
     assert np.isfinite(world[1]).all()
 
 
-def test_a_point_that_the_model_does_not_reach_is_nan_not_a_guess() -> None:
+def test_a_point_outside_the_range_of_the_lens_model_is_nan() -> None:
     barrel = OpenCVLens(fx=500.0, fy=500.0, cx=0.0, cy=0.0, k1=-0.5)
     # x (1 − x²/2) has its maximum .544 at x = .816: nothing is seen farther out than 272 px.
     assert np.isnan(barrel.undistort(np.array([[300.0, 0.0]]))).all()
@@ -88,12 +90,12 @@ def test_pixels_may_differ_in_width_and_height() -> None:
 
 def test_size_of_a_pixel_follows_the_lens() -> None:
     scale = Scale(1e-4, HEIGHT, None, OPENCV)
-    place = np.array([[200.0, 150.0]])
-    square = place + np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) - 0.5
+    point = np.array([[200.0, 150.0]])
+    square = point + np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) - 0.5
     x, y = scale.to_world(square).T
     area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
-    assert scale.size_at(place)[0] == pytest.approx(np.sqrt(area), rel=1e-6)
-    assert scale.size_at(place)[0] > 1.02e-4
+    assert scale.size_at(point)[0] == pytest.approx(np.sqrt(area), rel=1e-6)
+    assert scale.size_at(point)[0] > 1.02e-4
 
 
 def test_two_points_of_known_distance_give_the_pixel_size() -> None:
@@ -103,7 +105,7 @@ def test_two_points_of_known_distance_give_the_pixel_size() -> None:
     assert pixel_size_between(ends[0], ends[1], 0.25, lens) == pytest.approx(2.5e-4)
 
 
-def test_inversion_ends_when_there_is_nothing_to_invert() -> None:
+def test_inversion_of_no_points_returns_no_points() -> None:
     assert invert(lambda p: p, np.empty((0, 2))).shape == (0, 2)
 
 
@@ -111,23 +113,23 @@ PHOTOGRAPHS = 'name = "a"\n[photographs]\nfiles = "*.png"\ninterval = 1.0\n'
 
 
 @pytest.mark.parametrize(
-    ("told", "sides"),
+    ("text", "sides"),
     [
         ("pixel_size = 2e-4", (2e-4, 2e-4)),
         ("pixel_size = [2e-4, 3e-4]", (2e-4, 3e-4)),
         ("distance = { start = [0, 0], end = [300, 400], metres = 0.1 }", (2e-4, 2e-4)),
     ],
 )
-def test_the_scale_is_told_in_three_ways(tmp_path: Path, told: str, sides: tuple[float, float]) -> None:
+def test_the_scale_may_be_given_in_three_ways(tmp_path: Path, text: str, sides: tuple[float, float]) -> None:
     file = tmp_path / "experiment.toml"
-    file.write_text(PHOTOGRAPHS + told)
+    file.write_text(PHOTOGRAPHS + text)
     section = load_config(file).photographs
     assert section is not None
     assert make_scale(section, HEIGHT).sides == pytest.approx(sides)
 
 
 @pytest.mark.parametrize(
-    ("told", "lens"),
+    ("text", "lens"),
     [
         (
             "fx = 1500\nfy = 1480\ncx = 655\ncy = 490\nk1 = -0.21\np2 = 1e-4",
@@ -137,16 +139,16 @@ def test_the_scale_is_told_in_three_ways(tmp_path: Path, told: str, sides: tuple
         ("xc = 650\nyc = 500\nK1 = 1e-8\nP3 = 1e-9", BrownLens(650, 500, K1=1e-8, P3=1e-9)),
     ],
 )
-def test_both_ways_of_writing_a_lens_are_read(tmp_path: Path, told: str, lens: OpenCVLens | BrownLens) -> None:
+def test_both_lens_models_are_read(tmp_path: Path, text: str, lens: OpenCVLens | BrownLens) -> None:
     file = tmp_path / "experiment.toml"
-    file.write_text(PHOTOGRAPHS + "pixel_size = 2e-4\n[photographs.lens]\n" + told)
+    file.write_text(PHOTOGRAPHS + "pixel_size = 2e-4\n[photographs.lens]\n" + text)
     section = load_config(file).photographs
     assert section is not None
     assert make_scale(section, HEIGHT).lens == lens
 
 
 @pytest.mark.parametrize(
-    ("told", "named"),
+    ("text", "named"),
     [
         ("", ["photographs", "pixel_size", "missing"]),
         ("pixel_size = 0", ["photographs.pixel_size", "0"]),
@@ -170,9 +172,9 @@ def test_both_ways_of_writing_a_lens_are_read(tmp_path: Path, told: str, lens: O
         ("pixel_size = 1e-4\nlens = { fx = inf, cx = 1, cy = 1 }", ["photographs.lens.fx", "inf"]),
     ],
 )
-def test_a_wrong_scale_is_named(tmp_path: Path, told: str, named: list[str]) -> None:
+def test_a_wrong_scale_is_named(tmp_path: Path, text: str, named: list[str]) -> None:
     file = tmp_path / "experiment.toml"
-    file.write_text(PHOTOGRAPHS + told)
+    file.write_text(PHOTOGRAPHS + text)
     with pytest.raises(InputError) as refused:
         load_config(file)
     for part in ["experiment.toml", *named]:

@@ -1,16 +1,18 @@
-"""Figures for papers: every one is drawn, at the width of a column, and says its units."""
+"""Figures for papers: each is drawn at the width of a column, with units."""
 
+from dataclasses import replace
 from typing import get_args
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
-from rodsight.figures.gallery import FigureName, draw_figure, usual_frame, write_figures
-from rodsight.figures.page import COLOURS, WIDTHS
+from rodsight.figures.figure_style import COLOURS, WIDTHS
+from rodsight.figures.force_network import THINNEST_CORE, top_force
+from rodsight.figures.gallery import FigureName, default_frame, draw_figure, write_figures
 from rodsight.notebook.run import Run
+from rodsight.solver.frame_forces import FrameStatus
 
-from solver.sequence.frame_forces import FrameStatus
 from tests.app.recording.fake_results import make_results, make_truth
 
 
@@ -28,21 +30,21 @@ def test_every_figure_has_the_width_of_a_column_and_units(results):
             assert figure.get_size_inches()[0] * 25.4 == pytest.approx(WIDTHS[width])
     labels = [axes.get_xlabel() + axes.get_ylabel() for axes in draw_figure(results, "stress", 2).axes]
     assert all("[kPa]" in each for each in labels)
-    assert dict(matplotlib.rcParams) == before  # the user's own settings stay
+    assert dict(matplotlib.rcParams) == before  # the settings of the user are unchanged
 
 
 def test_the_network_shows_every_contact_that_bears_force_and_its_length(results):
     axes, bar = draw_figure(results, "forces", 3).axes
     assert bar.get_ylabel().endswith("[N]")
-    (lines,) = (each for each in axes.collections if isinstance(each, LineCollection))
+    lines, _cores = (each for each in axes.collections if isinstance(each, LineCollection))
     fn = results.frames[3].fn
     assert len(lines.get_segments()) == np.count_nonzero(fn > 0)
     width = np.asarray(lines.get_linewidths())
-    assert np.all(np.diff(width) >= 0)  # strong ones are drawn last
+    assert np.all(np.diff(width) >= 0)  # strong forces are drawn last
     assert any("mm" in text.get_text() for text in axes.texts)
 
 
-def test_what_cannot_be_drawn_is_said(results):
+def test_a_figure_that_cannot_be_drawn_raises(results):
     with pytest.raises(ValueError, match="no truth"):
         draw_figure(results, "truth")
     with pytest.raises(ValueError, match="forces, density"):
@@ -51,22 +53,55 @@ def test_what_cannot_be_drawn_is_said(results):
         draw_figure(results, "forces", 4)
 
 
-def test_the_usual_frame_is_the_last_settled_one(results):
+def test_the_default_frame_is_the_last_settled_one(results):
     status = [each.status for each in results.frames]
-    assert status[usual_frame(results)] is FrameStatus.SETTLED
-    assert FrameStatus.SETTLED not in status[usual_frame(results) + 1 :]
+    assert status[default_frame(results)] is FrameStatus.SETTLED
+    assert FrameStatus.SETTLED not in status[default_frame(results) + 1 :]
 
 
-def test_files_are_written_for_all_that_has_data(results, tmp_path):
+def test_files_are_written_for_all_figures_with_data(results, tmp_path):
     files = write_figures(results, tmp_path / "figures", ("pdf", "svg"))
     assert {each.name for each in files} == {
         f"{name}.{kind}" for name in get_args(FigureName) if name != "truth" for kind in ("pdf", "svg")
     }
     assert (tmp_path / "figures" / "forces.pdf").read_bytes().startswith(b"%PDF")
     text = (tmp_path / "figures" / "density.svg").read_text()
-    assert "<text" in text  # letters stay letters
+    assert "<text" in text  # texts are not converted to outlines
     assert COLOURS[0].lower() in text
 
 
 def test_a_run_gives_its_figures(results):
     assert Run(results).figure("rose", frame=1).axes[0].name == "polar"
+
+
+def test_the_network_states_time_shear_status_trust_and_the_force_of_a_line(results):
+    axes = draw_figure(results, "forces", 3).axes[0]
+    forces = results.frames[3]
+    title = axes.get_title(loc="left")
+    assert f"{results.tracks.time[3]:.4g} s" in title
+    assert forces.status.name.lower() in title
+    assert f"trust {forces.trust:.2f}" in title
+    shown = [text.get_text() for text in axes.texts]
+    assert any(text.endswith(" N") for text in shown)
+    assert any(text.endswith("mm") for text in shown)
+
+
+def test_uncertain_forces_are_hollow_and_certain_ones_are_solid(results):
+    forces = results.frames[3]
+    strong = top_force(results)
+    fn = np.where(forces.fn > 0, strong, 0.0)
+    sd = np.linspace(0.05, 1.0, len(fn)) * strong
+    frames = [replace(each, fn=fn, fn_sd=sd) if each is forces else each for each in results.frames]
+    axes = draw_figure(replace(results, frames=frames), "forces", 3, width="double").axes[0]
+    lines, cores = (each for each in axes.collections if isinstance(each, LineCollection))
+    width = float(np.asarray(lines.get_linewidths())[0])
+    of_core = dict(zip(map(_key, cores.get_segments()), np.asarray(cores.get_linewidths()), strict=True))
+    relative = [of_core.get(_key(line), 0.0) / width for line in lines.get_segments()]
+    expected = np.clip(sd[fn > 0] / strong, 0.0, 0.8)
+    assert np.sort(relative) == pytest.approx(np.sort(expected), abs=THINNEST_CORE / width)
+    third = len(relative) // 3
+    assert np.sort(relative)[-third:].min() - np.sort(relative)[:third].max() > 0.2  # distinct at a glance
+
+
+def _key(segment):
+    return tuple(np.round(segment, 9).ravel().tolist())

@@ -1,9 +1,9 @@
-"""Photographs count once they are whole, in order, and late ones are waited for."""
+"""Photographs are used when they are complete, in order, with a delay for late ones."""
 
 import cv2
 import numpy as np
 import pytest
-from rodsight.following.arrivals import LATE, STEADY, Arrivals
+from rodsight.following.arrivals import MAX_DELAY, STEADY_TIME, Arrivals
 
 
 class Clock:
@@ -27,22 +27,22 @@ PICTURE = cv2.imencode(".png", np.random.default_rng(1).integers(0, 255, (40, 50
 
 
 def settled(arrivals, clock):
-    """What is ready once everything has stayed as it is for a while."""
-    arrivals.look()
-    clock.now += 2 * STEADY
-    return [file.name for file in arrivals.look()]
+    """Return the complete files after the steady time."""
+    arrivals.complete_files()
+    clock.now += 2 * STEADY_TIME
+    return [file.name for file in arrivals.complete_files()]
 
 
-def test_a_file_counts_once_it_has_stayed_as_it_is(arrivals, tmp_path, clock):
+def test_a_file_is_used_when_it_has_not_changed_for_a_while(arrivals, tmp_path, clock):
     (tmp_path / "a1.png").write_bytes(PICTURE)
-    assert arrivals.look() == []
-    clock.now += 0.5 * STEADY
-    assert arrivals.look() == []
-    clock.now += STEADY
-    assert [file.name for file in arrivals.look()] == ["a1.png"]
+    assert arrivals.complete_files() == []
+    clock.now += 0.5 * STEADY_TIME
+    assert arrivals.complete_files() == []
+    clock.now += STEADY_TIME
+    assert [file.name for file in arrivals.complete_files()] == ["a1.png"]
 
 
-def test_half_a_file_is_waited_for_however_long_it_stays_so(arrivals, tmp_path, clock):
+def test_an_incomplete_file_is_never_used(arrivals, tmp_path, clock):
     (tmp_path / "a1.png").write_bytes(PICTURE[: len(PICTURE) // 2])
     assert settled(arrivals, clock) == []
     clock.now += 1000.0
@@ -51,24 +51,24 @@ def test_half_a_file_is_waited_for_however_long_it_stays_so(arrivals, tmp_path, 
     assert settled(arrivals, clock) == ["a1.png"]
 
 
-def test_what_comes_after_half_a_file_waits_for_it(arrivals, tmp_path, clock):
+def test_files_after_an_incomplete_one_are_held_back(arrivals, tmp_path, clock):
     (tmp_path / "a1.png").write_bytes(PICTURE)
     (tmp_path / "a2.png").write_bytes(PICTURE[:100])
     (tmp_path / "a3.png").write_bytes(PICTURE)
     assert settled(arrivals, clock) == ["a1.png"]
 
 
-def test_a_late_photograph_is_waited_for_and_then_done_without(arrivals, tmp_path, clock):
+def test_a_late_photograph_is_waited_for_and_then_skipped(arrivals, tmp_path, clock):
     for number in (8, 10, 12, 16):
         (tmp_path / f"a{number}.png").write_bytes(PICTURE)
     assert settled(arrivals, clock) == ["a8.png", "a10.png", "a12.png"]
-    clock.now += 0.5 * LATE
-    assert len(arrivals.look()) == 3
-    clock.now += LATE
-    assert len(arrivals.look()) == 4
+    clock.now += 0.5 * MAX_DELAY
+    assert len(arrivals.complete_files()) == 3
+    clock.now += MAX_DELAY
+    assert len(arrivals.complete_files()) == 4
 
 
-def test_a_late_photograph_that_comes_fills_its_gap(arrivals, tmp_path, clock):
+def test_a_late_photograph_fills_its_gap(arrivals, tmp_path, clock):
     for number in (1, 2, 4):
         (tmp_path / f"a{number}.png").write_bytes(PICTURE)
     assert settled(arrivals, clock) == ["a1.png", "a2.png"]

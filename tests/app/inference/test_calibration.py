@@ -1,4 +1,4 @@
-"""Self-calibration as a stage: what it takes for known, and what it tells a person."""
+"""Self-calibration as a stage: known quantities, corrections and their report."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ import pytest
 from rodsight.cli.summary_table import calibration_lines
 from rodsight.experiment.config.experiment_file import ExperimentFile
 from rodsight.experiment.scaling import make_scale
-from rodsight.inference.calibration import calibrate_tracks, radius_classes
-from rodsight.inference.settings import radii_are_metres
+from rodsight.inference.correction.calibration import calibrate_tracks, radius_classes
+from rodsight.inference.inference_settings import radii_are_metres
 from rodsight.results.calibration_summary import calibration_facts
+from rodsight.solver.calibration.calibrate import Calibration, calibrate
+from rodsight.solver.calibration.gaps import MeasuredSequence
+from rodsight.solver.calibration.priors import CalibrationPriors, CalibrationSettings
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
-
-from solver.calibration.calibrate import Calibration, calibrate
-from solver.calibration.gaps import MeasuredSequence
-from solver.calibration.priors import CalibrationPriors
-from solver.calibration.settings import CalibrationSettings
 
 RADIUS = 8e-3  # [m]
 
@@ -49,7 +47,7 @@ def square_lattice(*, scale: float = 0.0, noise: float = 3e-6, side: int = 7, fr
     return tracks, walls
 
 
-def test_radii_tell_the_pixel_size_unless_they_were_seen_in_the_photographs():
+def test_radii_determine_the_pixel_size_unless_they_were_measured_in_the_photographs():
     assert radii_are_metres(config())
     assert radii_are_metres(photographed(radii=[7e-3, 8e-3]))
     assert not radii_are_metres(photographed())
@@ -70,9 +68,9 @@ def test_wrong_scale_of_tracks_is_corrected_and_walls_in_metres_stay(error):
     assert found.applied
     assert abs(found.pixel_size - error) < 1e-3  # the error that known radii may share
     exact, _ = square_lattice()
-    left = 1e-4 * 2 * RADIUS * 8  # [m], over the width of the packing
-    np.testing.assert_allclose(better.position, exact.position, atol=3 * left)
-    np.testing.assert_allclose(moved.endpoints, walls.endpoints, atol=3 * left)
+    tolerance = 3e-4 * 2 * RADIUS * 8  # [m], over the width of the packing
+    np.testing.assert_allclose(better.position, exact.position, atol=tolerance)
+    np.testing.assert_allclose(moved.endpoints, walls.endpoints, atol=tolerance)
 
 
 def test_exact_tracks_pass_unchanged():
@@ -87,7 +85,7 @@ def test_exact_tracks_pass_unchanged():
     assert "as given" in " ".join(calibration_lines(calibration_facts(found, walls.name)))
 
 
-def test_pixel_size_told_to_be_exact_is_kept():
+def test_a_pixel_size_specified_as_exact_is_kept():
     tracks, walls = square_lattice(scale=5e-3)
     _, _, found = calibrate_tracks(CalibrationSettings(pixel_size=0.0), tracks, walls, 0.0)
     assert found is not None
@@ -103,7 +101,7 @@ def test_understated_noise_is_raised_even_where_nothing_is_corrected():
     assert 2.0 < float(better.sigma[0, 0] / understated.sigma[0, 0]) < 5.0
 
 
-def test_too_few_photographs_are_left_alone():
+def test_too_few_photographs_are_not_calibrated():
     tracks, walls = square_lattice(frames=2)
     better, _, found = calibrate_tracks(CalibrationSettings(), tracks, walls, 0.0)
     assert found is None
@@ -118,7 +116,7 @@ def corrected() -> Calibration:
     return found
 
 
-def test_what_was_corrected_is_said_with_its_uncertainty(corrected):
+def test_corrections_are_reported_with_their_uncertainty(corrected):
     text = "\n".join(calibration_lines(calibration_facts(corrected, ("bottom", "right", "top"))))
     assert "Pixel size: +0.5" in text
     assert "the walls stay" in text
@@ -128,13 +126,13 @@ def test_what_was_corrected_is_said_with_its_uncertainty(corrected):
     assert set(facts["wall"]) == {"bottom", "right", "top"}
 
 
-def test_a_turned_wall_is_named_in_milliradians(corrected):
-    turned = replace(corrected, wall_tilt=np.array([0.0, 1e-3, 0.0]), wall_tilt_sd=np.full(3, 1e-4))
-    text = "\n".join(calibration_lines(calibration_facts(turned, ("bottom", "right", "top"))))
-    assert "wall right turned by +1.00 ± 0.10 mrad" in text or "and turned by +1.00 ± 0.10 mrad" in text
+def test_the_rotation_of_a_wall_is_reported_in_milliradians(corrected):
+    rotated = replace(corrected, wall_tilt=np.array([0.0, 1e-3, 0.0]), wall_tilt_sd=np.full(3, 1e-4))
+    text = "\n".join(calibration_lines(calibration_facts(rotated, ("bottom", "right", "top"))))
+    assert "wall right rotated by +1.00 ± 0.10 mrad" in text or "and rotated by +1.00 ± 0.10 mrad" in text
 
 
-def test_photographs_are_laid_under_the_result_at_the_corrected_scale(corrected):
+def test_photographs_are_shown_at_the_corrected_scale(corrected):
     section = photographed().photographs
     assert section is not None
     given, better = make_scale(section, 100), make_scale(section, 100, corrected)

@@ -1,4 +1,4 @@
-"""A call of the solver with its defaults gives what a command gives where nothing is set."""
+"""The defaults of the solver are those of the command."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.walls import read_walls
-from rodsight.inference.inference import Inputs, correct_sequence
-from rodsight.inference.settings import material_of, settings_of
-
-from solver.sequence.frame_forces import FrameForces
-from solver.sequence.frames import solve_sequence
-from solver.sequence.settings import SequenceSettings
+from rodsight.inference.correction.correct_sequence import correct_sequence
+from rodsight.inference.inference_settings import material_of, settings_of
+from rodsight.inference.inputs import Inputs
+from rodsight.solver.frame_forces import FrameForces
+from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.sequence.settings import SequenceSettings
 
 FRAMES = 2
 

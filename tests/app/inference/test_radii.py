@@ -1,4 +1,4 @@
-"""Radii that scatter are found before the rest is calibrated, exact ones are not looked at."""
+"""Individual errors of radii are estimated before calibration; exact radii are only calibrated."""
 
 from __future__ import annotations
 
@@ -6,22 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference import radii
-from rodsight.inference.calibration import calibrate_tracks
-from rodsight.inference.radii import calibrate_with_radii
+from rodsight.inference.correction import radii
+from rodsight.inference.correction.calibration import calibrate_tracks
+from rodsight.inference.correction.radii import calibrate_with_radii
+from rodsight.solver.bodies.motion import Snapshot
+from rodsight.solver.bodies.packing import Packing
+from rodsight.solver.bodies.rods import RodMaterial
+from rodsight.solver.calibration.priors import CalibrationSettings
+from rodsight.solver.posterior.radius_posterior import RadiusPosterior
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
-from solver.bodies.rods import RodMaterial
-from solver.calibration.settings import CalibrationSettings
-from solver.posterior.radii import RadiusPosterior
 from tests.solver.posterior.test_sequence_evidence import lattice_sequence
 
 SETTINGS = CalibrationSettings()
-LEFT = 5e-6  # [m] of the radii that were found
+REMAINING = 5e-6  # [m] standard deviation of the estimated radii
 
 
 def lattice() -> tuple[Tracks, WallTracks]:
-    """Equal rods packed close, as tracked."""
+    """Tracks of equal rods in a lattice."""
     packing, snapshots = lattice_sequence(1e-5)
     n, f = packing.grains.count, len(snapshots)
     tracks = Tracks(
@@ -35,33 +37,54 @@ def lattice() -> tuple[Tracks, WallTracks]:
 def test_exact_radii_are_only_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(radii, "estimate_radii", None)
     tracks, walls = lattice()
-    usual, usual_walls, _ = calibrate_tracks(SETTINGS, tracks, walls, 0.0)
+    expected, expected_walls, _ = calibrate_tracks(SETTINGS, tracks, walls, 0.0)
     found, found_walls, calibration = calibrate_with_radii(RodMaterial(), SETTINGS, tracks, walls, 0.0)
-    np.testing.assert_array_equal(found.position, usual.position)
-    np.testing.assert_array_equal(found.radius, usual.radius)
-    np.testing.assert_array_equal(found_walls.endpoints, usual_walls.endpoints)
+    np.testing.assert_array_equal(found.position, expected.position)
+    np.testing.assert_array_equal(found.radius, expected.radius)
+    np.testing.assert_array_equal(found_walls.endpoints, expected_walls.endpoints)
     assert calibration is not None
     assert not calibration.applied
 
 
-def test_what_was_found_of_radii_is_in_the_tracks_and_in_the_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_estimated_radii_enter_the_tracks_and_the_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
     exact, walls = lattice()
     error = np.random.default_rng(1).normal(0.0, 1e-4, exact.grain_count)
-    left = np.random.default_rng(2).normal(0.0, 0.2 * LEFT, exact.grain_count)
+    remaining = np.random.default_rng(2).normal(0.0, 0.2 * REMAINING, exact.grain_count)
     n = exact.grain_count
-    monkeypatch.setattr(
-        radii, "estimate_radii", lambda *_: RadiusPosterior(left - error, np.full(n, LEFT), float(error.std()), False)
-    )
-    monkeypatch.setattr(radii, "radii_scatter", lambda *_: True)
-    told = replace(exact, radius=exact.radius + error)
-    found, _, calibration = calibrate_with_radii(RodMaterial(), SETTINGS, told, walls, 0.0)
+    posterior = RadiusPosterior(remaining - error, np.full(n, REMAINING), float(error.std()), False)
+    monkeypatch.setattr(radii, "estimate_radii", lambda *_: posterior)
+    monkeypatch.setattr(radii, "has_radius_errors", lambda *_: True)
+    stated = replace(exact, radius=exact.radius + error)
+    found, _, calibration = calibrate_with_radii(RodMaterial(), SETTINGS, stated, walls, 0.0)
     assert calibration is not None
     assert calibration.applied
-    assert "radii told are wrong by" in calibration.verdict
-    np.testing.assert_allclose(found.radius, exact.radius, atol=LEFT)
-    np.testing.assert_allclose(told.radius + calibration.radius, found.radius, atol=1e-12)
-    np.testing.assert_allclose(found.position, exact.position, atol=2.0 * LEFT)
-    np.testing.assert_allclose(calibration.radius_sd, LEFT)
+    assert "given radii are wrong by" in calibration.verdict
+    np.testing.assert_allclose(found.radius, exact.radius, atol=REMAINING)
+    np.testing.assert_allclose(stated.radius + calibration.radius, found.radius, atol=1e-12)
+    np.testing.assert_allclose(found.position, exact.position, atol=2.0 * REMAINING)
+    np.testing.assert_allclose(calibration.radius_sd, REMAINING)
     assert calibration.before.spread > 5.0 * calibration.after.spread
     assert found.centre_sigma is not None
-    assert found.centre_sigma.min() >= 0.9 * LEFT
+    assert found.centre_sigma.min() >= 0.9 * REMAINING
+
+
+def test_radii_are_estimated_without_the_errors_that_all_grains_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks, walls = lattice()
+    n, seen = tracks.grain_count, []
+    _, _, exact = calibrate_tracks(SETTINGS, tracks, walls, 0.0)
+    assert exact is not None
+    own = np.random.default_rng(3).normal(0.0, 1e-4, n)
+    shared = replace(exact, radius_offset=3e-5, radius=3e-5 + own, offset=np.full((n, 2), 1e-4), wall=np.full(4, 2e-5))
+
+    def estimate(packing: Packing, snapshots: list[Snapshot], _: np.random.Generator) -> RadiusPosterior:
+        seen.append((packing.grains.radius, snapshots[0].position, snapshots[0].endpoints))
+        return RadiusPosterior(np.zeros(n), np.full(n, REMAINING), REMAINING, False)
+
+    monkeypatch.setattr(radii, "calibrate_tracks", lambda *_: (tracks, walls, shared))
+    monkeypatch.setattr(radii, "has_radius_errors", lambda *_: True)
+    monkeypatch.setattr(radii, "estimate_radii", estimate)
+    calibrate_with_radii(RodMaterial(), SETTINGS, tracks, walls, 0.0)
+    [(radius, position, endpoints)] = seen
+    np.testing.assert_allclose(radius, tracks.radius + 3e-5)
+    np.testing.assert_allclose(position, tracks.position[0])
+    assert endpoints[:, :, 1].min() == pytest.approx(walls.endpoints[0, :, :, 1].min() - 2e-5)  # the bottom

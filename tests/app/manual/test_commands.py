@@ -1,7 +1,8 @@
-"""Every command that a page tells is done on a tiny experiment: twenty rods, four photographs.
+"""Every command in the pages runs on a tiny experiment: twenty rods, four photographs.
 
-The same commands on the sample itself are a slow test. What differs from what stands in the pages is in three tables
-here, each entry with its reason: LEFT_OUT, SMALLER and ADDED.
+A command that computes for seconds is a slow test if another one has all its options. A further slow test runs the
+same commands on the sample. Three tables list the differences from the pages, each with its reason: LEFT_OUT, SMALLER
+and ADDED.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pathlib import Path
 import cv2
 import pandas as pd
 import pytest
-from rodsight.recording.viewing import recording_server
+from rodsight.recording.viewing import open_viewer, recording_server
 from rodsight.synthetic.synthesis import synthesize
 
 from tests.app.exchange.foreign.test_pegs import write_frame
@@ -33,9 +34,9 @@ WRITTEN = ROOT / "tests/app/exchange/foreign/written"
 PIXEL = 2.5e-4  # m, of the tiny photographs
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 MENTIONED = re.compile(r"`rodsight\s([^`>]+\s[^`>]+)`")  # a command in a sentence
-PLACE = re.compile(r"[A-Z]{3}|…|^(share --html|export pictures)$")  # what the reader fills in, or knows from before
+PLACE = re.compile(r"[A-Z]{3}|…|^(share --html|export pictures)$")  # placeholders of the reader, and abbreviations
 
-# Commands that are not done here: their beginning, and why.
+# Commands that do not run here: their beginning, and the reason.
 LEFT_OUT = {
     "study accuracy": "simulates three packings of 1172 rods",
     "study budget": "simulates packings of hundreds of rods",
@@ -44,15 +45,16 @@ LEFT_OUT = {
     "study paper": "simulates packings of 450 rods",
     "study report": "simulates packings of 250 rods, four of each world",
     "study uncertainty": "simulates packings of 450 rods",
+    "study trust": "simulates every scenario",
     "study worlds --seeds": "simulates every world",
     "study worlds --worlds shear mu_low": "simulates packings of 450 rods",
     "study worlds --worlds mu_low": "simulates packings of 450 rods",
-    "study real": "wants photoelastic experiments, which belong to their authors",
-    "solve test": "wants a photoelastic experiment, which belongs to its authors",
+    "study real": "needs photoelastic experiments, which are not ours to share",
+    "solve test": "needs a photoelastic experiment, which is not ours to share",
 }
-# Words that stand for less here.
+# Arguments that are replaced to save time.
 SMALLER = {
-    "--idle 600": ("--idle 1", "nothing arrives any more"),
+    "--idle 600": ("--idle 1", "no photograph arrives any more"),
     "--frames 0:12": ("--frames 0:3", "there are four photographs"),
     "--frame 11": ("--frame 3", "there are four photographs"),
     "--preset small --seed": ("--preset small --grains 20 --frames 3 --seed", "250 rods take half a minute"),
@@ -61,20 +63,21 @@ SMALLER = {
     "--grains 150": ("--grains 60", "simulated anew"),
     "--ensemble 8": ("--ensemble 2", "each is solved again"),
 }
-# Options that a command gets besides, all of that name or one alone; what, and why.
+# Options added to a command, or to all commands of that name, and the reason.
 ADDED = {
-    "sensitivity": ("--workers 1", "a process of their own for so little takes longer than the work"),
-    "sensitivity my_test": ("--factors friction=0.7:1.3", "of a dozen factors each is solved several times"),
-    "sensitivity sample_data/shear": ("--factors friction=0.7:1.3", "of a dozen factors each is solved several times"),
-    "campaign": ("--no-recordings", "each is in a process of its own"),
-    "campaign sample_data/campaign.csv": ("--dry", "with --workers 2 it is done"),
+    "sensitivity": ("--workers 1", "starting a process takes longer than the work"),
+    "sensitivity my_test": ("--factors friction=0.7:1.3", "each of a dozen factors is solved several times"),
+    "sensitivity sample_data/shear": ("--factors friction=0.7:1.3", "each of a dozen factors is solved several times"),
+    "campaign": ("--no-recordings", "each starts a process of its own"),
+    "campaign sample_data/campaign.csv": ("--dry", "the form with --workers 2 runs"),
 }
-MADE_BY = {"synth": 1, "init": 1, "import": 3}  # the word that names the folder which a command makes
-DRAWN = {("export", "pictures"), ("export", "video")}  # by a viewer, without a screen
+MADE_BY = {"synth": 1, "init": 1, "import": 3}  # index of the word with the folder that a command creates
+COSTLY = ("export", "init", "run", "sensitivity", "share", "synth", "track")  # compute for seconds
+DRAWN = {("export", "pictures"), ("export", "video")}  # drawn by a viewer without a screen
 
 
-def told() -> Iterator[tuple[str, ...]]:
-    """What is typed after `rodsight`, in blocks and in sentences, once each."""
+def page_commands() -> Iterator[tuple[str, ...]]:
+    """Yield the words after `rodsight` in blocks and in sentences of the pages."""
     for text in (README, *TEXTS.values()):
         sentences = (" ".join(found.split()) for found in MENTIONED.findall(FENCED.sub("", text)))
         mentioned = (shlex.split(each) for each in sentences if not PLACE.search(each))
@@ -87,13 +90,31 @@ def left_out(command: str) -> bool:
     return any(command.startswith(each) for each in LEFT_OUT)
 
 
-TOLD = list(dict.fromkeys(told()))
-DONE = [words for words in TOLD if not left_out(shlex.join(words))]
+COMMANDS = list(dict.fromkeys(page_commands()))
+DONE = [words for words in COMMANDS if not left_out(shlex.join(words))]
+
+
+def form(words: tuple[str, ...]) -> tuple[tuple[str, ...], set[str]]:
+    """Return a command, with the format that it exports, and its options."""
+    return words[: 2 if words[0] == "export" else 1], {word for word in words if word.startswith("--")}
+
+
+def repeats(number: int) -> bool:
+    """Whether another command of DONE has all options of this one, and more of them or an earlier place."""
+    kind, options = form(DONE[number])
+    others = ((k, *form(words)) for k, words in enumerate(DONE) if words[0] in COSTLY and words[:2] not in DRAWN)
+    return any(other == kind and (options < more or (options == more and k < number)) for k, other, more in others)
+
+
+def marks(number: int) -> list[pytest.MarkDecorator]:
+    if DONE[number][:2] in DRAWN:
+        return [pytest.mark.screen]
+    return [pytest.mark.slow] if repeats(number) else []
 
 
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder in which the pages' files are: experiments, runs, what other programs wrote."""
+    """A folder with the files that the pages use: experiments, runs, files of other programs."""
     folder = tmp_path_factory.mktemp("pages")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -105,7 +126,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
             shutil.copytree(shear, folder / name)
             config = folder / name / "experiment.toml"
             config.write_text(config.read_text().replace('name = "shear"', f'name = "{name}"'))
-            for file in sorted((shear / "photos").iterdir()):  # as the pages tell: PNG, of a finer scale
+            for file in sorted((shear / "photos").iterdir()):  # as in the pages: PNG with smaller pixels
                 picture = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
                 assert picture is not None
                 finer = cv2.resize(picture, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC)
@@ -116,13 +137,13 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
             assert rodsight("run", source, "--out", f"runs/{out}", *setting) == 0
         for name in ("big", "try"):
             shutil.copytree(shear, folder / name)
-        shutil.copytree("runs/shear", "runs/campaign/shear")  # as a campaign leaves it
+        shutil.copytree("runs/shear", "runs/campaign/shear")  # as a campaign writes it
         _write_foreign_files(folder)
     return folder
 
 
 def _write_foreign_files(folder: Path) -> None:
-    """Files that the pages take in, under the names that they have there."""
+    """Write the files that the pages import, under their names in the pages."""
     tracks = pd.read_csv(folder / "sample_data/shear/truth_tracks.csv")
     named = tracks.rename(columns={"frame": "t", "id": "rod"}).assign(r=0.008)
     named[["t", "rod", "x", "y", "r"]].to_csv(folder / "spots.csv", index=False)
@@ -145,9 +166,13 @@ def _write_foreign_files(folder: Path) -> None:
 
 @pytest.fixture
 def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The command's surroundings: no screen; a browser that looks at the page once, whereupon Ctrl-C is pressed."""
+    """No screen, and a browser that loads the page once and then interrupts the command by SIGINT."""
 
-    def look_and_stop(address: str) -> bool:
+    def look_and_stop(page: str) -> bool:
+        content = Path(page.removeprefix("file://")).read_text(encoding="utf-8")
+        address = content.partition("url=")[2].partition('"')[0]
+        assert "token=" in address
+
         def look() -> None:
             browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
             with browser.open(address, timeout=30) as page:
@@ -157,11 +182,11 @@ def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         threading.Thread(target=look, daemon=True).start()
         return True
 
-    def serve_here(files: list[Path]) -> str:  # it would outlive the command
+    def serve_here(files: list[Path]) -> str:  # a server process would outlive the command
         servers.append(recording_server.RecordingServer(files))
         return servers[-1].address
 
-    def pack_quickly(data: bytes, *_: object, **__: object) -> bytes:  # the viewer, for each page anew
+    def pack_quickly(data: bytes, *_: object, **__: object) -> bytes:  # the viewer is packed again for each page
         return pack(data, 1)
 
     servers: list[recording_server.RecordingServer] = []
@@ -169,7 +194,7 @@ def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.chdir(here)
     monkeypatch.setattr(gzip, "compress", pack_quickly)
     monkeypatch.setattr(webbrowser, "open", look_and_stop)
-    monkeypatch.setattr(recording_server, "serve_apart", serve_here)
+    monkeypatch.setattr(open_viewer, "start_server_process", serve_here)
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     yield
@@ -178,30 +203,27 @@ def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def typed(words: tuple[str, ...]) -> list[str]:
-    """The command as it is done here."""
+    """Return the command with its replacements and additions."""
     line = shlex.join(words)
     for more, (less, _) in SMALLER.items():
         line = line.replace(more, less)
-    besides = [options for which, (options, _) in ADDED.items() if which in (words[0], shlex.join(words))]
-    return [*shlex.split(line), *(word for options in besides for word in options.split())]
+    added = [options for which, (options, _) in ADDED.items() if which in (words[0], shlex.join(words))]
+    return [*shlex.split(line), *(word for options in added for word in options.split())]
 
 
 @pytest.mark.usefixtures("at_work")
 @pytest.mark.parametrize(
     "words",
-    [
-        pytest.param(words, id=shlex.join(words), marks=[pytest.mark.screen] if words[:2] in DRAWN else [])
-        for words in DONE
-    ],
+    [pytest.param(words, id=shlex.join(words), marks=marks(number)) for number, words in enumerate(DONE)],
 )
-def test_it_ends_well(words, tmp_path, monkeypatch, capsys):
+def test_a_command_of_the_pages_succeeds(words, tmp_path, monkeypatch, capsys):
     made = Path(words[MADE_BY[words[0]]]) if words[0] in MADE_BY else None
     if made is not None and made.exists():
         made.rename(tmp_path / "aside")
-        if words[0] == "init":  # into the folder of the photographs
+        if words[0] == "init":  # init writes into the folder of the photographs
             shutil.copytree(tmp_path / "aside/photos", made / "photos")
     if words[0] == "view" and "--web" in words:
-        monkeypatch.setenv("DISPLAY", ":0")  # then it opens the browser by itself
+        monkeypatch.setenv("DISPLAY", ":0")  # then the command opens the browser
     try:
         status = rodsight(*typed(words))
         assert status == 0, capsys.readouterr().err
@@ -214,8 +236,8 @@ def test_it_ends_well(words, tmp_path, monkeypatch, capsys):
                 (tmp_path / "aside").rename(made)
 
 
-def test_no_exception_is_kept_that_no_page_needs():
-    lines = [shlex.join(words) for words in TOLD]
+def test_every_exception_applies_to_a_page():
+    lines = [shlex.join(words) for words in COMMANDS]
     for start in LEFT_OUT:
         assert any(line.startswith(start) for line in lines), start
     for which in ADDED:

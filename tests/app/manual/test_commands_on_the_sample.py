@@ -1,4 +1,4 @@
-"""Every command that the pages tell is done, one after the other, by somebody who starts in an empty folder."""
+"""All commands in the pages run one after the other, starting in an empty folder."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tests.program import ROOT, rodsight
 
 pytestmark = [pytest.mark.slow, pytest.mark.screen]  # minutes long; pictures are drawn
 
-SERVING = ("view", "open", "review")  # wait for a person
-MAKING = ("init", "import", "synth")  # a folder that must not be there
+SERVING = ("view", "open", "review")  # commands that wait for a person
+MAKING = ("init", "import", "synth")  # commands whose target folder must not exist
 
 
 def waits(words: list[str]) -> bool:
@@ -21,15 +21,15 @@ def waits(words: list[str]) -> bool:
     return words[0] in SERVING or "--follow" in words or "--view" in words or "photos/*.png" in words
 
 
-def test_they_all_end_well(tmp_path, monkeypatch, capsys):
+def test_all_commands_succeed(tmp_path, monkeypatch, capsys):
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data", target_is_directory=True)
     monkeypatch.chdir(tmp_path)
     assert rodsight("synth", "my_test", "--grains", 60, "--frames", 6, "--seed", 3) == 0
     assert rodsight("run", "sample_data/shear") == 0
     assert rodsight("run", "sample_data/shear", "--set", "solver.kappa=0.1", "--out", "runs/stiffer") == 0
-    told = [words for text in TEXTS.values() for words in commands(text) if words and not words[0].startswith("-")]
+    written = [words for text in TEXTS.values() for words in commands(text) if words and not words[0].startswith("-")]
     done: list[list[str]] = []
-    for words in told:
+    for words in written:
         if words in done or waits(words):
             continue
         done.append(words)

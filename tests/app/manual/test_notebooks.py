@@ -1,4 +1,4 @@
-"""The notebooks run from the first to the last cell, as somebody runs them who has the source."""
+"""The notebooks run from the first to the last cell."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rodsight.synthetic.synthesis import synthesize
 
 from tests.program import ROOT
 
-SECONDS = 600  # for a cell, kernels compiled
+SECONDS = 600  # for a cell, including the compilation of kernels
 
 NOTEBOOKS = sorted((FOLDER / "notebooks").glob("*.ipynb"))
 FIRST_FIRST = sorted(NOTEBOOKS, key=lambda file: file.stem != "from_photographs_to_forces")  # others use its run
@@ -22,7 +22,7 @@ FIRST_FIRST = sorted(NOTEBOOKS, key=lambda file: file.stem != "from_photographs_
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where they are started; what the first has run the second finds."""
+    """Working folder of the notebooks; later ones use the run of the first."""
     folder = tmp_path_factory.mktemp("notebooks")
     (folder / "sample_data").symlink_to(ROOT / "sample_data", target_is_directory=True)
     return folder
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with an experiment in the place of the sample: as many photographs as are asked for, fewer rods."""
+    """A folder with a smaller experiment instead of the sample: enough photographs, fewer rods."""
     folder = tmp_path_factory.mktemp("small")
     synthesize(folder / "sample_data" / "shear", grains=40, frames=12, seed=2)
     return folder
@@ -67,7 +67,7 @@ def test_the_cells_of_a_notebook_run_on_a_small_experiment(file, small, monkeypa
 def test_a_notebook_runs(file, folder, monkeypatch):
     nbclient = pytest.importorskip("nbclient", reason="needs the extra notebooks")
     nbformat = pytest.importorskip("nbformat", reason="needs the extra notebooks")
-    monkeypatch.setenv("PYTHONPATH", f"{ROOT / '.editable'}:{ROOT}")
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT / '.editable'}")
     book = nbformat.read(file, 4)
     began = time.perf_counter()
     nbclient.NotebookClient(book, timeout=SECONDS, resources={"metadata": {"path": str(folder)}}).execute()

@@ -1,4 +1,4 @@
-"""The pages: complete, linked, current; every command and every piece of Python in them works."""
+"""The pages are complete, linked and current; their commands and Python code work."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def blocks(text: str, kind: str) -> list[str]:
 
 
 def commands(text: str) -> list[list[str]]:
-    """What is typed after `rodsight` in the shell blocks of a page."""
+    """Return the words after `rodsight` in the shell blocks of a page."""
     found = []
     for block in blocks(text, "sh"):
         for line in block.replace("\\\n", " ").splitlines():
@@ -44,7 +44,7 @@ def commands(text: str) -> list[list[str]]:
 
 
 class Page(html.parser.HTMLParser):
-    """Where a page can be entered, and where it leads to."""
+    """The anchors and the link targets of a page."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
@@ -58,16 +58,16 @@ class Page(html.parser.HTMLParser):
         self.targets += [given[name] or "" for name in ("href", "src") if name in given]
 
 
-def test_the_site_has_the_same_pages_and_none_is_forgotten():
-    told = (ROOT / "app" / "manual" / "mkdocs.yml").read_text(encoding="utf-8").split("nav:\n")[-1]
+def test_the_site_lists_all_pages():
+    navigation = (ROOT / "app" / "manual" / "mkdocs.yml").read_text(encoding="utf-8").split("nav:\n")[-1]
     lines = []
     for group, listed in CONTENTS.items():
         lines += [f"  - {group}:", *(f'      - "{title}": {file}' for file, title in listed.items())]
-    assert told.splitlines() == lines
+    assert navigation.splitlines() == lines
     assert {file.name for file in FOLDER.glob("*.md")} == set(pages())
 
 
-def test_every_link_leads_somewhere_and_nothing_is_loaded_from_elsewhere(tmp_path):
+def test_every_link_has_a_target_and_no_page_loads_from_another_site(tmp_path):
     write_pages(tmp_path)
     found = {file.name: Page(file) for file in tmp_path.glob("*.html")}
     assert len(found) == len(pages())
@@ -95,15 +95,15 @@ def test_every_message_has_its_cure():
 @pytest.mark.parametrize(
     ("source", "text"),
     [
-        ("app/lock.py", "…: process … is at work in it; wait for it, or take another --out"),
+        ("app/process/lock.py", "…: process … works in it; wait for it, or choose another --out"),
         ("app/experiment/reading/tables.py", "stands twice in its frame"),
         ("app/experiment/config/input_sections.py", "give either interval or times"),
-        ("solver/sequence/judging/judgement.py", "the mean stress jumped by … % (> … %)"),
-        ("solver/sequence/judging/doubts.py", "photographs are …° of shear apart: take them every .25°"),
+        ("solver/assessment/status.py", "the mean stress jumped by … % (> … %)"),
+        ("solver/assessment/penalties.py", "rods that were inferred: …"),
         ("app/run_folder.py", "… is damaged or was changed: it is made again."),
     ],
 )
-def test_messages_are_found_wherever_they_are_made(source, text):
+def test_messages_are_found_in_all_forms_of_code(source, text):
     assert (source, text) in {(each.source, each.text) for each in find_messages()}
 
 
@@ -113,35 +113,35 @@ def test_generated_pages_are_current():
 
 
 @pytest.fixture
-def understood(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of commands that would have been called: their arguments are parsed, and nothing is done."""
+def called_commands(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of called commands, whose arguments are parsed without running them."""
     called: list[str] = []
 
-    def standing_in(original: command_list.Command) -> command_list.Command:
+    def stub_of(original: command_list.Command) -> command_list.Command:
         @functools.wraps(original)
-        def stand_in(*given: object, **named: object) -> int:
+        def stub(*given: object, **named: object) -> int:
             inspect.signature(original).bind(*given, **named)
             called.append(command_list.name_of(original))
             return 0
 
-        return stand_in
+        return stub
 
-    groups = {group: tuple(map(standing_in, members)) for group, members in command_list.GROUPS.items()}
+    groups = {group: tuple(map(stub_of, members)) for group, members in command_list.GROUPS.items()}
     monkeypatch.setattr(command_list, "GROUPS", groups)
     return called
 
 
 @pytest.mark.parametrize("page", [*TEXTS, "README.md"])
-def test_every_command_that_a_page_tells_is_understood(page, understood):
+def test_every_command_of_a_page_has_valid_arguments(page, called_commands):
     typed = [words for words in commands(TEXTS.get(page, README)) if words and not words[0].startswith("-")]
     for words in typed:
         assert command(*words) == 0, words
-    assert understood == [words[0] for words in typed]
+    assert called_commands == [words[0] for words in typed]
 
 
 @pytest.fixture(scope="module")
 def folder(examples: Path) -> Path:
-    """The examples, and what a campaign of one run leaves."""
+    """The examples, and the output of a campaign of one run."""
     (examples / "runs/campaign").mkdir(exist_ok=True)
     frames = rodsight.open(examples / "runs/shear").frames()
     frames.assign(run="shear").to_parquet(examples / "runs/campaign/frames.parquet")
@@ -169,16 +169,21 @@ def test_the_python_of_a_page_runs(page, folder, monkeypatch, capsys):
         ("may I believe frame 12?", "trust.md", "May I believe frame 12?"),
         ("how do I plot P(f) for my paper?", "python.md", "P(f) for a paper"),
         ("how do I run fifty experiments?", "campaigns.md", "Many experiments"),
+        ("cite", "install.md", "Cite"),
+        ("update", "install.md", "Update"),
+        ("install", "install.md", "Install"),
+        ("not round", "install.md", "Rods that are not round"),
+        ("Windows", "install.md", "Platforms: Linux, macOS, Windows"),
     ],
 )
-def test_a_question_of_a_newcomer_leads_to_its_answer(question, page, heading, capsys):
+def test_a_question_finds_the_section_with_its_answer(question, page, heading, capsys):
     found = find_sections(question)[0]
     assert (found.page, found.heading) == (page, heading)
     assert command("docs", "--find", question) == 0
     assert heading in capsys.readouterr().out.splitlines()[0]
 
 
-def test_words_that_stand_nowhere_are_said(capsys):
+def test_words_without_a_match_are_reported(capsys):
     assert command("docs", "--find", "photosynthesis") == 2
     assert "try fewer words" in capsys.readouterr().err
     assert not find_sections("how do I")

@@ -1,4 +1,4 @@
-"""The examples in the docstrings of what `import rodsight` promises, executed on a small solved experiment."""
+"""The docstring examples of the public names of `rodsight`, executed on a small solved experiment."""
 
 from __future__ import annotations
 
@@ -9,27 +9,28 @@ import inspect
 import pytest
 import rodsight
 
-NAMES = ("Run", "open", "run", "solve")
+ERRORS = ("InputError", "RunError")
+NAMES = tuple(sorted(set(rodsight.__all__) - {"__version__", *ERRORS}))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_examples_do_what_they_say(name, examples, monkeypatch):
+def test_examples_give_the_printed_output(name, examples, monkeypatch):
     monkeypatch.chdir(examples)
-    thing = getattr(rodsight, name)
-    module = importlib.import_module(thing.__module__)
-    found = doctest.DocTestFinder().find(thing, name, module=module, globs={"rodsight": rodsight})
+    documented = getattr(rodsight, name)
+    module = importlib.import_module(documented.__module__)
+    found = doctest.DocTestFinder().find(documented, name, module=module, globs={"rodsight": rodsight})
     assert sum(len(each.examples) for each in found) > 0
     runner = doctest.DocTestRunner()
-    told: list[str] = []
+    output: list[str] = []
     for each in found:
-        runner.run(each, out=told.append)
-    assert runner.summarize(verbose=False).failed == 0, "".join(told)
+        runner.run(each, out=output.append)
+    assert runner.summarize(verbose=False).failed == 0, "".join(output)
 
 
 def test_every_public_method_of_a_run_has_an_example():
-    silent = [
+    without_example = [
         name
         for name, each in inspect.getmembers(rodsight.Run)
         if inspect.isfunction(each) and not name.startswith("_") and ">>>" not in (each.__doc__ or "")
     ]
-    assert silent == ["view"]  # which opens a window
+    assert without_example == ["view"]  # it opens a window

@@ -1,4 +1,4 @@
-"""What Python gets: the promised names, runs as tables with their units, forces of arrays as the command finds them."""
+"""The Python interface: public names, tables with units, and the same forces from arrays as from the command."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def run(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> rodsight
 
 @pytest.fixture(scope="module")
 def poses(made_tracks: Path) -> pd.DataFrame:
-    """The experiment's tables as one data frame, as somebody has it who tracks with other tools."""
+    """The experiment's tables as one data frame, as from another tracking program."""
     tracks, grains, times = (pd.read_csv(made_tracks / f"{name}.csv") for name in ("tracks", "grains", "times"))
     return tracks.merge(grains, on="id").merge(times, on="frame")
 
@@ -34,17 +34,17 @@ def walls(made_tracks: Path) -> pd.DataFrame:
 
 
 def solve(poses, walls, **choices):  # type: ignore[no-untyped-def]
-    pressed = {"top": 50e3}
-    return rodsight.solve(poses, walls, pressure=pressed, settings=FEW | choices.pop("settings", {}), **choices)
+    pressure = {"top": 50e3}
+    return rodsight.solve(poses, walls, pressure=pressure, settings=FEW | choices.pop("settings", {}), **choices)
 
 
 def test_importing_loads_no_numerics():
     code = "import rodsight, sys; print([m for m in ('numpy', 'numba', 'pandas', 'h5py') if m in sys.modules])"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == "[]"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
-def test_every_promised_name_is_there_and_no_other():
+def test_public_names_exist_and_no_others():
     assert set(rodsight.__all__) <= set(dir(rodsight))
     for name in rodsight.__all__:
         assert getattr(rodsight, name) is not None
@@ -52,18 +52,18 @@ def test_every_promised_name_is_there_and_no_other():
         rodsight.solv  # noqa: B018
 
 
-def test_a_run_in_python_leaves_what_the_command_leaves(made_tracks, run, tmp_path):
+def test_a_run_in_python_writes_the_same_files_as_the_command(made_tracks, run, tmp_path):
     assert command("run", str(made_tracks), "--out", str(tmp_path / "run"), "--quiet", "--set", "solver.sweeps=50") == 0
     assert run.file is not None
     assert {file.name for file in run.file.parent.iterdir()} == {file.name for file in (tmp_path / "run").iterdir()}
     pd.testing.assert_frame_equal(run.contacts(), rodsight.open(tmp_path / "run").contacts())
 
 
-def test_results_are_not_read_before_they_are_asked_for(run):
+def test_results_are_read_on_first_access(run):
     assert "results" not in vars(rodsight.open(run.file))
 
 
-def test_tables_name_units_and_hold_what_was_stored(run):
+def test_tables_have_units_and_the_stored_values(run):
     contacts, results = run.contacts(2), run.results
     forces = results.frames[2]
     assert contacts.attrs["units"]["fn"] == "N"
@@ -72,12 +72,12 @@ def test_tables_name_units_and_hold_what_was_stored(run):
     np.testing.assert_array_equal(contacts[["x", "y"]], forces.contacts.point)
     np.testing.assert_array_equal(contacts["i"], results.tracks.id[forces.contacts.i])
     wall = forces.contacts.j[forces.contacts.with_wall] - results.grains.count
-    assert contacts["j"][forces.contacts.with_wall].tolist() == [results.walls.name[w] for w in wall]
-    wanted = {"frame", "i", "j", "x", "y", "nx", "ny", "gap", "fn", "ft", "fn_sd", "ft_sd", "state"}
-    assert wanted <= set(contacts.columns)
+    assert contacts["wall"][forces.contacts.with_wall].tolist() == [results.walls.name[w] for w in wall]
+    required = {"frame", "i", "j", "x", "y", "nx", "ny", "gap", "fn", "ft", "fn_sd", "ft_sd", "state"}
+    assert required <= set(contacts.columns)
 
 
-def test_frames_grains_and_walls_have_a_row_each(run):
+def test_frames_grains_and_walls_have_one_row_each(run):
     frames, tracks = run.frames(), run.results.tracks
     assert len(frames) == tracks.frame_count
     assert frames["status"].tolist() == [each.status.name.lower() for each in run.results.frames]
@@ -88,12 +88,12 @@ def test_frames_grains_and_walls_have_a_row_each(run):
     assert run.walls().attrs["units"]["wall_force_x"] == "N"
 
 
-def test_a_frame_that_is_not_there_is_named(run):
+def test_a_missing_frame_is_named(run):
     with pytest.raises(IndexError, match="no frame 5: frames go from 0 to 4"):
         run.contacts(5)
 
 
-def test_arrays_give_what_the_experiment_gives(run, poses, walls):
+def test_arrays_give_the_same_forces_as_the_experiment(run, poses, walls):
     solved = solve(poses, walls)
     assert solved.file is None
     pd.testing.assert_frame_equal(solved.contacts(), run.contacts())
@@ -101,14 +101,14 @@ def test_arrays_give_what_the_experiment_gives(run, poses, walls):
     pd.testing.assert_frame_equal(solve(columns, walls).contacts(), run.contacts())
 
 
-def test_settings_and_material_of_a_call_are_obeyed(run, poses, walls):
+def test_settings_and_material_of_a_call_are_used(run, poses, walls):
     other = solve(poses, walls, material={"friction": 0.4}, settings={"solver.estimator": "nlgs"})
     assert other.results.friction == 0.4
     assert not np.array_equal(other.contacts(4)["fn"].sum(), run.contacts(4)["fn"].sum())
 
 
 @pytest.mark.parametrize(
-    ("spoil", "told"),
+    ("change", "message"),
     [
         (lambda p, w: (p.drop(columns="x"), w, {}), "tracks: column x: there is no such column"),
         (
@@ -126,12 +126,12 @@ def test_settings_and_material_of_a_call_are_obeyed(run, poses, walls):
         (lambda p, w: (p.iloc[:0], w, {}), "tracks: has no rows"),
     ],
 )
-def test_a_mistake_is_named(poses, walls, spoil, told):
-    tracks, bars, choices = spoil(poses, walls)
-    with pytest.raises(rodsight.InputError, match=told):
+def test_invalid_input_is_named(poses, walls, change, message):
+    tracks, bars, choices = change(poses, walls)
+    with pytest.raises(rodsight.InputError, match=message):
         solve(tracks, bars, **choices)
 
 
-def test_a_wall_that_is_not_there_cannot_be_pressed(poses, walls):
+def test_pressure_on_an_unknown_wall_is_refused(poses, walls):
     with pytest.raises(rodsight.InputError, match="'lid': is not the name of a wall"):
         rodsight.solve(poses, walls, pressure={"lid": 1e4})

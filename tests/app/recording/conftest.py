@@ -1,4 +1,4 @@
-"""Recordings made once for many tests. The SDK warns instead of raising unless it is told to be strict."""
+"""Recordings made once for many tests. In strict mode the SDK raises errors instead of warning."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rerun as rr
 from rodsight.experiment.units import Scale
-from rodsight.recording.files.finished_run import RecordingFile, write_recording
+from rodsight.recording.files.finished_run import RecordingFile, RecordingOptions, write_recording
 from rodsight.results.results import Results, TruthContacts
 
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
@@ -35,13 +35,15 @@ def truth(results) -> TruthContacts:
 
 @pytest.fixture(scope="session")
 def recording(results, truth, tmp_path_factory) -> RecordingFile:
-    """Everything that a recording can hold."""
+    """A recording with every optional part."""
     path: Path = tmp_path_factory.mktemp("recording") / "run.rrd"
     scale = Scale(PIXEL, SHAPE[0])
-    share = np.array([0.3, 0.2, 0.1, 0.1, 0.1, 0.2])
+    fraction = np.array([0.3, 0.2, 0.1, 0.1, 0.1, 0.2])
     force = np.random.default_rng(5).random((len(results.frames), results.walls.count, 2))
     tuned = replace(
         results, radius_tuning=make_tuning(), walls=replace(results.walls, force=force),
-        frames=[replace(each, error_budget=share) for each in results.frames],
+        frames=[replace(each, error_budget=fraction) for each in results.frames],
     )  # fmt: skip
-    return write_recording(tuned, path, photograph=photograph, scale=scale, truth=truth, tolerance=1e-4)
+    return write_recording(
+        tuned, path, photograph=photograph, scale=scale, truth=truth, options=RecordingOptions(tolerance=1e-4)
+    )

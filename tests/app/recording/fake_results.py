@@ -1,4 +1,4 @@
-"""Invented results: a sheared hexagonal packing whose forces run along chains and converge over sweeps."""
+"""Synthetic results: a sheared hexagonal packing with chains of strong forces that converge over sweeps."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ from dataclasses import fields, replace
 
 import numpy as np
 from rodsight.results.results import Results, TruthContacts
+from rodsight.solver.assessment.changes import find_changes
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts, ContactState, detect_contacts
+from rodsight.solver.contacts.radius_tuning import RadiusTuning
+from rodsight.solver.frame_forces import FrameForces, FrameStatus
+from rodsight.solver.nlgs.force_memory import ForceMemory
+from rodsight.solver.nlgs.start_residuals import COLD_SWEEPS
+from rodsight.solver.nlgs.sweep_record import SweepHistory
+from rodsight.solver.statistics.balance import grain_unbalance
+from rodsight.solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
+from rodsight.solver.statistics.frame_statistics import FrameStatistics
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
-
-from solver.bodies.grains import Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, ContactState, detect_contacts
-from solver.contacts.radius_tuning import RadiusTuning
-from solver.nlgs.starts import COLD_SWEEPS
-from solver.nlgs.sweep_record import SweepHistory
-from solver.nlgs.warm_start import ForceMemory
-from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.sequence.judging.changes import find_changes
-from solver.statistics.balance import grain_unbalance
-from solver.statistics.force_statistics import FORCE_BINS, MOBILISATION_BINS
-from solver.statistics.frame_statistics import FrameStatistics
 
 RADIUS = 0.008  # [m]
 FRICTION = 0.25
@@ -38,7 +37,7 @@ def make_results(
     seed: int = 7,
     lost: tuple[int, int] | None = None,
 ) -> Results:
-    """Invent a run. recorded: the sweeps whose forces are kept (default all); lost: (grain, from this frame on)."""
+    """Make the results of a run; forces of the sweeps `recorded` are kept (default all), lost: (grain, first frame)."""
     rng = np.random.default_rng(seed)
     tracks, walls = _shear(frame_count, columns, rows, rng)
     if lost is not None:
@@ -60,19 +59,19 @@ def make_results(
 
 def contacts_at(tracks: Tracks, walls: WallTracks, grains: Grains, frame: int) -> Contacts:
     endpoints = walls.endpoints[frame]
-    still = Walls.at_rest(endpoints)
-    return detect_contacts(grains, tracks.position[frame], tracks.present[frame], still, 0.03 * RADIUS)
+    fixed = Walls.at_rest(endpoints)
+    return detect_contacts(grains, tracks.position[frame], tracks.present[frame], fixed, 0.03 * RADIUS)
 
 
 def make_tuning() -> RadiusTuning:
-    """A curve z(δR) that meets 3.5 at 12 µm."""
+    """Return a curve z(δR) that reaches 3.5 at 12 µm."""
     change = np.linspace(-1e-4, 1e-4, 21)
     number = 3.5 + 0.4 * np.tanh((change - 1.2e-5) / 4e-5)
     return RadiusTuning(change, number, number[:, None], 3.5, 1.2e-5, 3.5)
 
 
 def make_truth(results: Results, rng: np.random.Generator) -> TruthContacts:
-    """The forces of the results with 10 % of noise, on all but a few of the contacts."""
+    """Return the forces of the results with 10 % of noise, on all but a few of the contacts."""
     parts = []
     for forces in results.frames:
         kept = rng.random(forces.contacts.count) > 0.03
@@ -116,7 +115,7 @@ def _frame(
     recorded: np.ndarray,
     rng: np.random.Generator,
 ) -> FrameForces:
-    """Forces that vary smoothly over the packing and are greater along one direction: chains of a kind."""
+    """Return forces that vary smoothly over the packing and are greater along one direction."""
     number, phase = waves
     ripple = np.sin(contacts.point / RADIUS @ (0.45 * number.T) + phase + 0.05 * frame).sum(axis=1)
     along = (contacts.normal @ np.array([np.cos(2.2), np.sin(2.2)])) ** 2
@@ -146,17 +145,19 @@ def _frame(
 
 
 def _compared(forces: FrameForces, former: FrameForces | None, grains: Grains, present: np.ndarray) -> FrameForces:
-    """With what the solver says of a frame beside the one before, and with the unbalance of its grains."""
+    """Add the comparison with the frame before and the unbalance of the grains."""
     weightless = np.zeros((grains.count, 2))
     unbalance = grain_unbalance(forces.contacts, forces.fn, forces.ft, weightless, present)
     cold = 0.5 / np.sqrt(COLD_SWEEPS)
-    forces = replace(forces, grain_unbalance=unbalance, cold_residual=cold, gained_count=0.0, parted_count=0.0)
+    forces = replace(
+        forces, grain_unbalance=unbalance, cold_residual=cold, new_contact_count=0.0, lost_contact_count=0.0
+    )
     if former is None:
         return forces
     memory = ForceMemory(former.contacts.key, np.column_stack([former.fn, former.ft]))
     changes = find_changes(memory, forces.contacts, forces.fn, present)
     return replace(
-        forces, similarity=changes.similarity, gained_count=changes.gained, parted_count=changes.parted,
+        forces, similarity=changes.similarity, new_contact_count=changes.new, lost_contact_count=changes.lost,
         warm_residual=1e-3, sweeps_saved=100.0,
     )  # fmt: skip
 
@@ -184,10 +185,10 @@ def _statistics(forces: FrameForces, grain_count: int) -> FrameStatistics:
         "wall_normal_force": np.arange(4.0), "wall_tangential_force": 0.1 * np.arange(4.0),
         "contact_anisotropy": 0.2, "branch_anisotropy": 0.01, "normal_force_anisotropy": 0.3,
         "tangential_force_anisotropy": 0.05, "friction_angle_of_anisotropies": 0.25, "mobilisation": 0.5,
-        "tail_exponent": 1.2, "plateau_ratio": 1.1, "strong_share": 0.4, "strong_pressure_share": 0.75,
-        "strong_deviator_share": 0.95, "chain_count": 7, "chain_grain_share": 0.4,
+        "tail_exponent": 1.2, "plateau_ratio": 1.1, "strong_fraction": 0.4, "strong_pressure_fraction": 0.75,
+        "strong_deviator_fraction": 0.95, "chain_count": 7, "chain_grain_fraction": 0.4,
     }  # fmt: skip
-    unread = {field.name: np.nan for field in fields(FrameStatistics)}  # quantities that a recording does not show
+    unread = {field.name: np.nan for field in fields(FrameStatistics)}  # not shown by a recording
     unread |= {"fn_density": np.full(FORCE_BINS, np.nan), "ft_density": np.full(FORCE_BINS, np.nan)}
     unread |= {"mobilisation_density": np.full(MOBILISATION_BINS, np.nan), "anisotropy_direction": np.full(4, np.nan)}
     return FrameStatistics(**(unread | known))

@@ -24,7 +24,7 @@ from tests.app.recording.rows import latest, rows
 ROUNDING = 1e-9
 
 
-def test_a_run_agrees_with_itself_perfectly(results, tmp_path):
+def test_a_run_agrees_exactly_with_itself(results, tmp_path):
     found = compare_runs(results, results)
     assert [each.r_fn for each in found.agreement] == pytest.approx([1.0] * 4)
     assert [each.relative_l2 for each in found.agreement] == [0.0] * 4
@@ -36,7 +36,7 @@ def test_a_run_agrees_with_itself_perfectly(results, tmp_path):
     assert len(set(difference["LineStrips2D:colors"])) == 1
 
 
-def test_forces_twice_as_great_differ_by_themselves(results, tmp_path):
+def test_doubled_forces_differ_by_the_original_forces(results, tmp_path):
     doubled = replace(results, frames=[replace(f, fn=2.0 * f.fn, ft=2.0 * f.ft) for f in results.frames])
     found = compare_runs(doubled, results, names=("double", "single"))
     assert [each.scale for each in found.agreement] == pytest.approx([2.0] * 4)
@@ -47,7 +47,7 @@ def test_forces_twice_as_great_differ_by_themselves(results, tmp_path):
     assert "double against single" in describe(found)
 
 
-def test_other_ids_in_another_order_are_matched_by_place(results):
+def test_bodies_with_other_ids_are_matched_by_position(results):
     order = np.random.default_rng(5).permutation(results.grains.count)
     tracks = results.tracks
     moved = replace(
@@ -65,7 +65,7 @@ def test_other_ids_in_another_order_are_matched_by_place(results):
         frames.append(replace(forces, contacts=replace(forces.contacts, i=low, j=high)))
     found = compare_runs(results, replace(results, tracks=moved, frames=frames))
     assert [each.r_fn for each in found.agreement] == pytest.approx([1.0] * 4, abs=ROUNDING)
-    assert "matched by their place" in found.notes[0]
+    assert "matched by their positions" in found.notes[0]
 
 
 def test_runs_over_other_frames_are_compared_where_they_overlap(results):
@@ -87,13 +87,13 @@ def test_two_packings_are_not_compared():
         compare_runs(one, replace(other, tracks=shifted))
 
 
-def test_the_truth_of_its_own_forces_gives_the_run_s_own_friction_angle(results):
+def test_the_own_forces_as_truth_give_the_friction_angle_of_the_run(results):
     frame = np.concatenate([np.full(f.contacts.count, f.frame) for f in results.frames])
     columns = [np.concatenate([getattr(f.contacts, k) for f in results.frames]).astype(np.int64) for k in "ij"]
     columns += [np.concatenate([getattr(f, k) for f in results.frames]) for k in ("fn", "ft")]
     found = compare_with_truth(results, TruthContacts(frame.astype(np.int64), *columns), name="run")
     assert [each.r_ft for each in found.agreement] == pytest.approx([1.0] * 4)
-    from solver.statistics.stress import friction_angle, love_weber_stress
+    from rodsight.solver.statistics.stress import friction_angle, love_weber_stress
 
     first = results.frames[0]
     stress = love_weber_stress(first.contacts, first.fn, first.ft, results.tracks.position[0], 1.0, 1.0)
@@ -109,7 +109,7 @@ def test_a_truth_with_noise_differs_and_is_drawn(results, tmp_path):
         assert {row["frame"] for row in rows(tmp_path / "truth.rrd", path)} == set(range(4))
 
 
-def test_colours_say_who_has_more():
+def test_colours_show_which_field_is_greater():
     more, less, equal = difference_colours(np.array([5.0, -5.0, 0.0]), 10.0)
     assert len({more, less, equal}) == 3
     assert more >> 24 > more >> 8 & 0xFF  # warm: red above blue
@@ -127,9 +127,9 @@ def test_the_command_compares_a_run_with_its_truth_and_with_itself(tracked, tmp_
         with pytest.raises(SystemExit) as end:
             main(arguments)
         assert not end.value.code
-    told = capsys.readouterr().out
-    assert "r(f_n) mean 1.000, least 1.000" in told
-    assert "out against truth" in told
+    output = capsys.readouterr().out
+    assert "r(f_n) mean 1.000, least 1.000" in output
+    assert "out against truth" in output
     assert (tmp_path / "same.rrd").stat().st_size > 0
     with pytest.raises(SystemExit) as end:
         main(["compare", str(out)])

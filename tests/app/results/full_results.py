@@ -1,4 +1,4 @@
-"""Invented results in which every dataset of results.h5 has something to hold."""
+"""Invented results with values for every dataset of results.h5."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 from rodsight.results.results import Results
+from rodsight.solver.assessment.statistic_intervals import CONSTANT
+from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
+from rodsight.solver.boundary.bars import Bars
+from rodsight.solver.boundary.boundary_correction import Boundary
+from rodsight.solver.boundary.camera_pose import CameraPose
+from rodsight.solver.calibration.calibrate import Calibration
+from rodsight.solver.calibration.gap_statistics import GapStatistics
+from rodsight.solver.calibration.priors import CalibrationPriors
+from rodsight.solver.convex.friction_check import FrictionCheck
+from rodsight.solver.frame_forces import ERROR_PARTS, FrameForces
+from rodsight.solver.nlgs.start_residuals import COLD_SWEEPS
+from rodsight.solver.sequence.ensemble import MEMBERS
 
-from solver.bodies.wall_shapes import OUT, STRAIGHT
-from solver.boundary.bars import Bars
-from solver.boundary.boundary import Boundary
-from solver.boundary.camera_pose import CameraPose
-from solver.calibration.calibrate import Calibration
-from solver.calibration.priors import CalibrationPriors
-from solver.calibration.statistics import GapStatistics
-from solver.convex.friction_check import FrictionCheck
-from solver.nlgs.starts import COLD_SWEEPS
-from solver.sequence.ensemble import MEMBERS
-from solver.sequence.frame_forces import ERROR_PARTS, FrameForces
-from solver.sequence.judging.statistic_intervals import DEVIATION
 from tests.app.recording.fake_results import make_results, make_tuning
 
 CELL = np.array([[0.3, 0.01], [0.02, 0.4]])  # [m]
@@ -26,7 +26,7 @@ WORLD = {"columns": 4, "rows": 3, "sweeps": 6}
 
 
 def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results:
-    """A small run; every value differs from its neighbours, so that none can be taken for another."""
+    """Return a small run in which every value differs from its neighbours."""
     rng = np.random.default_rng(seed)
     results = make_results(frame_count, seed=seed, **(WORLD | options))
     f, n, w = results.tracks.frame_count, results.grains.count, results.walls.count
@@ -47,8 +47,9 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         results.walls,
         force=rng.random((f, w, 2)),
         sigma=rng.random((f, w)),
-        told=np.arange(w, dtype=np.int8) % 3 - 1,
+        end_kind=np.arange(w, dtype=np.int8) % 3 - 1,
         side=np.where(np.arange(w) == 3, OUT, STRAIGHT).astype(np.int8),
+        plate=np.where(np.arange(w) == 3, 2, -1).astype(np.int32),
         load=np.where(np.arange(w) == 1, 40.0, np.nan) * np.ones((f, 1)),
         cell=CELL + 0.01 * np.arange(4 * f).reshape(f, 2, 2),
     )
@@ -95,11 +96,11 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         member_force=rng.random((c, len(MEMBERS), 2)),
         start_difference=float(rng.random()),
         unseen_grains=int(rng.integers(1, 9)),
-        hidden_share=float(rng.random()),
+        hidden_fraction=float(rng.random()),
         similarity=float(rng.random()),
-        gained_count=float(rng.integers(1, 9)),
-        parted_count=float(rng.integers(1, 9)),
-        doubt=f"frame {frame.frame} is doubted",
+        new_contact_count=float(rng.integers(1, 9)),
+        lost_contact_count=float(rng.integers(1, 9)),
+        trust_penalties=f"frame {frame.frame} is unreliable",
         force_change=0.125 + 0.01 * frame.frame,
         strain=np.array([[0.1, 0.02], [0.02, -0.1]]) * (1 + frame.frame),
         shear=0.2 + frame.frame,
@@ -108,18 +109,20 @@ def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:
         cold_residual=rng.random(len(COLD_SWEEPS)),
         sweeps_saved=float(rng.random()),
         grain_unbalance=rng.random(frame.contacts.grain_count),
+        expected_correlation=0.75 + 0.01 * frame.frame,
+        friction=np.linspace(0.2, 0.5, c),
         bearing_probability=np.linspace(0.2, 0.8, c),
         sliding_probability=np.linspace(0.9, 0.1, c),
         overlap=0.25 + frame.frame,
-        positions_share=0.5 + 0.01 * frame.frame,
+        position_weight=0.5 + 0.01 * frame.frame,
         soft=frame.frame % 2,
         error_budget=np.linspace(0.0, 1.0, len(ERROR_PARTS)) / (1 + frame.frame),
         relative_error=0.15 + 0.01 * frame.frame,
     )
 
 
-DEVIATIONS = tuple(f"{name}_sd" for name in DEVIATION)
-# The stored file was made of draws without these.
+DEVIATIONS = tuple(f"{name}_sd" for name in CONSTANT)
+# Fields that are newer than the stored file of test_earlier_files, which was made without them.
 SINCE = ("wall_normal_force", "wall_tangential_force", *DEVIATIONS)
 
 

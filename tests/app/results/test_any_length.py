@@ -1,4 +1,4 @@
-"""A run of any length is written and gone through in the memory of a few frames, and a disk may refuse any of it."""
+"""A run of any length is written and read in the memory of a few frames, and disk errors are reported."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from rodsight.results.checkpoint import Checkpoint, flatten
 from rodsight.results.hdf5 import writer
-from rodsight.results.hdf5.lazy import Lazily, Remembered
-from rodsight.results.hdf5.refusable import created
+from rodsight.results.hdf5.file_creation import create_file
+from rodsight.results.hdf5.lazy_sequences import CachedSequence, LazySequence
 from rodsight.results.hdf5.store import Provenance, load_results, save_results
 from rodsight.results.summary import summarize
+from rodsight.solver.frame_forces import FrameForces
+from rodsight.solver.statistics.frame_statistics import FrameStatistics
 
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.frame_statistics import FrameStatistics
+from tests.app.results.differences import differences
 from tests.app.results.full_results import make_full_results
-from tests.app.results.same import differences
 
 ORIGIN = Provenance("print", "experiment.toml", (0, None), {})
 
@@ -32,13 +32,13 @@ def test_frames_of_a_checkpoint_are_stored_as_those_in_memory(tmp_path):
     checkpoint = Checkpoint(tmp_path / "solving", "fingerprint")
     for k, (forces, statistics) in enumerate(zip(full.frames, full.statistics, strict=True)):
         checkpoint.save(k, forces, statistics)
-    frames, statistics = checkpoint.lazily(len(full.frames), FrameForces, FrameStatistics)
+    frames, statistics = checkpoint.lazy_sequences(len(full.frames), FrameForces, FrameStatistics)
     save_results(tmp_path / "results.h5", replace(full, frames=frames, statistics=statistics), ORIGIN)
     assert differences(full, load_results(tmp_path / "results.h5")) == []
 
 
 def peak_of(work) -> int:
-    """Most memory that the work took [bytes], beyond what it hands back; cycles are not left lying."""
+    """Return the peak memory of a function [bytes] beyond its result, with frequent garbage collection."""
     usual = gc.get_threshold()
     gc.collect()
     gc.set_threshold(50)
@@ -53,8 +53,8 @@ def peak_of(work) -> int:
         gc.set_threshold(*usual)
 
 
-def test_twice_as_many_frames_take_no_more_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "BLOCK", 1 << 11)  # else it takes hundreds of frames until blocks are full
+def test_memory_is_independent_of_the_number_of_frames(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "BLOCK", 1 << 11)  # otherwise blocks fill after hundreds of frames
     monkeypatch.setattr(writer, "TEXTS", 8)
     few = make_full_results()
 
@@ -72,25 +72,25 @@ def test_twice_as_many_frames_take_no_more_memory(tmp_path, monkeypatch):
             **{name: getattr(tracks, name)[over] for name in ("position", "rotation", "sigma", "zncc", "status")},
             second_zncc=None, reference_frame=None,
         )  # fmt: skip
-        unknown = dict.fromkeys(("force", "sigma", "told", "load", "cell"))
+        unknown = dict.fromkeys(("force", "sigma", "end_kind", "load", "cell"))
         walls = replace(few.walls, endpoints=few.walls.endpoints[over], **unknown)
         return replace(
-            few, tracks=tracks, walls=walls, frames=Lazily(count, frame),
-            statistics=Lazily(count, lambda k: few.statistics[k % 3]), **plain,
+            few, tracks=tracks, walls=walls, frames=LazySequence(count, frame),
+            statistics=LazySequence(count, lambda k: few.statistics[k % 3]), **plain,
         )  # fmt: skip
 
-    def all_of_it(count: int) -> object:
+    def save_and_summarize(count: int) -> object:
         save_results(tmp_path / "results.h5", of(count), ORIGIN)
         return summarize(load_results(tmp_path / "results.h5"), None, {})  # a row for every frame
 
-    all_of_it(3)  # what is made once
-    some, many = peak_of(lambda: all_of_it(60)), peak_of(lambda: all_of_it(120))
-    frames = sum(array.nbytes for each in few.frames for _, array in flatten(each)) / len(few.frames) * 60
-    assert many - some < 0.5 * frames, (some, many, frames)  # kept frames would be all of it
+    save_and_summarize(3)  # caches that are filled once
+    some, many = peak_of(lambda: save_and_summarize(30)), peak_of(lambda: save_and_summarize(60))
+    frames = sum(array.nbytes for each in few.frames for _, array in flatten(each)) / len(few.frames) * 30
+    assert many - some < 0.5 * frames, (some, many, frames)  # cached frames would need all of it
 
 
 @pytest.mark.parametrize("size", [0, 300, 5000, 100_000])
-def test_a_disk_that_refuses_is_heard_with_the_name_of_the_file(tmp_path, monkeypatch, size):
+def test_a_disk_error_is_raised_with_the_name_of_the_file(tmp_path, monkeypatch, size):
     file = tmp_path / "store.h5"
     written, real = [0], io.FileIO.write
 
@@ -115,9 +115,9 @@ def test_a_disk_that_refuses_is_heard_with_the_name_of_the_file(tmp_path, monkey
 
     opened = type(file).open
     monkeypatch.setattr(type(file), "open", lambda self, *given, **named: Full(opened(self, *given, **named)))
-    with pytest.raises(OSError, match="No space left") as refused, created(file) as store:
+    with pytest.raises(OSError, match="No space left") as raised, create_file(file) as store:
         fill(store)
-    assert refused.value.filename == str(file)
+    assert raised.value.filename == str(file)
 
 
 def fill(store: h5py.File) -> None:
@@ -126,17 +126,17 @@ def fill(store: h5py.File) -> None:
         store.create_dataset(f"group/{k}", data=values, chunks=(500,), compression="gzip")
 
 
-def test_as_many_are_remembered_as_find_room():
+def test_a_cached_sequence_keeps_the_most_recent_items_within_its_capacity():
     made: list[int] = []
 
     def make(k: int) -> int:
         made.append(k)
         return k
 
-    some = Remembered(5, make, lambda _: 10, 25)
+    some = CachedSequence(5, make, lambda _: 10, 25)
     assert [some[k] for k in (0, 1, 0, 1, 2, 1, 0)] == [0, 1, 0, 1, 2, 1, 0]
     assert made == [0, 1, 2, 0]
-    some.grow(7)
+    some.extend_to(7)
     assert some[-1] == 6
     with pytest.raises(IndexError):
         some[7]

@@ -1,15 +1,15 @@
-"""Frames of an unfinished run come back bit for bit, those of an earlier version with defaults for what they lack."""
+"""Frames of an unfinished run are restored bit for bit, those of an earlier version with defaults."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.errors import RunError
+from rodsight.process.errors import RunError
 from rodsight.results.checkpoint import Checkpoint, flatten
 from rodsight.results.packed_arrays import pack, unpack
+from rodsight.solver.frame_forces import FrameForces, FrameStatus
+from rodsight.solver.statistics.frame_statistics import FrameStatistics
 
-from solver.sequence.frame_forces import FrameForces, FrameStatus
-from solver.statistics.frame_statistics import FrameStatistics
 from tests.app.results.full_results import make_full_results
 
 
@@ -20,7 +20,7 @@ def same(one: object, other: object) -> bool:
     )
 
 
-def test_a_finished_frame_comes_back_bit_for_bit(tmp_path):
+def test_a_finished_frame_is_restored_bit_for_bit(tmp_path):
     results = make_full_results()
     checkpoint = Checkpoint(tmp_path / "solving", "fingerprint")
     for k, (frame, statistics) in enumerate(zip(results.frames, results.statistics, strict=True)):
@@ -34,24 +34,24 @@ def test_a_finished_frame_comes_back_bit_for_bit(tmp_path):
         assert type(frame.sweeps) is int
 
 
-def test_another_fingerprint_finds_nothing(tmp_path):
+def test_another_fingerprint_finds_no_frames(tmp_path):
     Checkpoint(tmp_path / "solving", "one").save(0, make_full_results().frames[0])
     assert Checkpoint(tmp_path / "solving", "one").finished() == 1
     assert Checkpoint(tmp_path / "solving", "other").finished() == 0
 
 
-def test_what_an_earlier_version_did_not_keep_has_its_default(tmp_path, monkeypatch):
+def test_fields_missing_in_an_earlier_version_have_their_defaults(tmp_path, monkeypatch):
     checkpoint = Checkpoint(tmp_path / "solving", "fingerprint")
     frame = make_full_results().frames[0]
-    kept = {name: values for name, values in flatten(frame) if name not in ("hidden_share", "member_force")}
+    kept = {name: values for name, values in flatten(frame) if name not in ("hidden_fraction", "member_force")}
     monkeypatch.setattr("rodsight.results.checkpoint.flatten", lambda value: list(kept.items()))
     checkpoint.save(0, frame)
     frame = checkpoint.load(0, FrameForces)[0]
-    assert (frame.hidden_share, frame.member_force) == (0.0, None)
+    assert (frame.hidden_fraction, frame.member_force) == (0.0, None)
 
 
 @pytest.mark.parametrize("at", [3, 40, -5])
-def test_a_damaged_frame_is_done_again_with_those_after_it_and_said(tmp_path, at):
+def test_a_damaged_frame_and_later_ones_are_computed_again_with_a_note(tmp_path, at):
     notes: list[str] = []
     checkpoint = Checkpoint(tmp_path / "solving", "fingerprint", notes)
     for k in range(3):
@@ -61,12 +61,12 @@ def test_a_damaged_frame_is_done_again_with_those_after_it_and_said(tmp_path, at
     content[at] ^= 1
     file.write_bytes(content)
     assert checkpoint.finished() == 1
-    assert notes == ["Frame 1 of the unfinished solving is damaged: it is done again."]
+    assert notes == ["Frame 1 of the unfinished solving is damaged: it is computed again."]
     with pytest.raises(RunError, match=r"000001\.piece: was damaged"):
         checkpoint.load(1, FrameForces)
 
 
-def test_a_frame_of_another_run_or_place_is_none(tmp_path):
+def test_a_frame_of_another_run_or_number_is_ignored(tmp_path):
     one, other = Checkpoint(tmp_path / "one", "a"), Checkpoint(tmp_path / "other", "b")
     for checkpoint in (one, other):
         for k in range(2):
@@ -88,13 +88,13 @@ def test_a_frame_of_another_run_or_place_is_none(tmp_path):
         np.array(["wall", "é"]),
     ],
 )
-def test_an_array_comes_back_as_it_was(array):
+def test_an_array_is_restored_with_type_and_order(array):
     array = np.asarray(array)
     found = unpack(pack({"before": np.ones(3, bool), "it": array}))
     assert list(found) == ["before", "it"]
     assert (found["it"].dtype, found["it"].shape) == (array.dtype, array.shape)
     by_column = array.flags.f_contiguous and not array.flags.c_contiguous
-    assert found["it"].flags.c_contiguous is not by_column  # sums are rounded as they were
+    assert found["it"].flags.c_contiguous is not by_column  # sums round as before
     assert found["it"].tobytes() == array.tobytes()
     assert found["it"].flags.writeable
 

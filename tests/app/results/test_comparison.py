@@ -1,12 +1,12 @@
-"""Two runs are compared body by body, whatever either calls them."""
+"""Two runs are compared body by body, whatever ids either uses."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from rodsight.results.comparison import DifferentPackingError, compare_runs, compare_with_truth
+from rodsight.solver.contacts.contacts import Contacts
 
-from solver.contacts.contacts import Contacts
 from tests.app.recording.fake_results import RADIUS, make_results, make_truth
 
 
@@ -16,7 +16,7 @@ def results():
 
 
 def renamed(results, order, ids):
-    """The same run with its grains in another order (row of each in the old one), under other ids."""
+    """Return the run with its grains in another order (old row of each) and with other ids."""
     n = results.grains.count
     row = np.empty(n, np.int64)
     row[order] = np.arange(n)
@@ -47,16 +47,16 @@ def test_a_run_agrees_with_itself(results):
 
 
 @pytest.mark.parametrize("same_names", [True, False])
-def test_grains_in_another_order_are_found_again(results, same_names):
+def test_grains_in_another_order_are_matched(results, same_names):
     order = np.random.default_rng(1).permutation(results.grains.count)
     ids = results.tracks.id[order] if same_names else results.tracks.id.copy()
     comparison = compare_runs(results, renamed(results, order, ids))
     for k, frame in enumerate(comparison.second.frames):
         assert forces(frame) == expected(results, k)
-    assert any("place" in note for note in comparison.notes) != same_names
+    assert any("positions" in note for note in comparison.notes) != same_names
 
 
-def test_what_only_the_other_run_has_is_left_out_and_said(results):
+def test_contacts_of_bodies_in_one_run_only_are_left_out_with_a_note(results):
     ids = results.tracks.id.copy()
     ids[3] = 999
     comparison = compare_runs(results, renamed(results, np.arange(len(ids)), ids))
@@ -83,7 +83,7 @@ def test_runs_over_different_frames_are_compared_where_they_overlap(results):
         compare_runs(results, later, starts=(0, 9))
 
 
-def test_another_packing_is_told(results):
+def test_another_packing_is_refused(results):
     away = replace(results, tracks=replace(results.tracks, position=results.tracks.position + 1.3 * RADIUS))
     with pytest.raises(DifferentPackingError, match="not the same packing"):
         compare_runs(results, away)

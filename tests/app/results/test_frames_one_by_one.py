@@ -1,4 +1,4 @@
-"""Frames of a stored run are read when they are asked for, as they were, and take the memory of a few."""
+"""Frames of a stored run are read on access, unchanged, in the memory of a few frames."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import pytest
 from rodsight.results.hdf5.reader import StoredFrames
 from rodsight.results.hdf5.store import Provenance, load_results, save_results
 
+from tests.app.results.differences import differences
 from tests.app.results.full_results import make_full_results
-from tests.app.results.same import differences
 
 ORIGIN = Provenance("print", "experiment.toml", (0, None), {})
 FRAMES = 40
 
 
 def longer(whole):
-    """The same frames over and over."""
+    """Return the same frames repeated."""
     found = {each.name: getattr(whole, each.name) for each in fields(whole)}
     over = {name: value for name, value in found.items() if isinstance(value, np.ndarray) and len(value) == 3}
     return replace(whole, **{name: value[np.arange(FRAMES) % 3] for name, value in over.items() if name != "name"})
@@ -53,7 +53,7 @@ def stored(full, tmp_path):
     return file
 
 
-def test_every_frame_is_what_it_was(stored, full):
+def test_every_frame_reads_back_unchanged(stored, full):
     found = load_results(stored)
     assert isinstance(found.frames, StoredFrames)
     assert (
@@ -65,11 +65,11 @@ def test_every_frame_is_what_it_was(stored, full):
         found.frames[FRAMES]
 
 
-def test_frames_take_the_memory_of_a_few(stored):
+def test_reading_frames_takes_the_memory_of_a_few(stored):
     found = load_results(stored)
 
     def peak(work) -> int:
-        work()  # what is loaded and compiled once is not of the frames
+        work()  # modules and caches that are loaded once
         gc.collect()
         tracemalloc.start()
         try:
@@ -83,12 +83,12 @@ def test_frames_take_the_memory_of_a_few(stored):
     assert one_by_one < 0.5 * all_at_once
 
 
-def test_a_file_that_is_replaced_meanwhile_is_still_the_one_that_was_opened(stored, full):
+def test_a_file_that_is_replaced_meanwhile_is_read_as_it_was_opened(stored, full):
     found = load_results(stored)
     save_results(stored, replace(full, frames=[replace(each, fn=2.0 * each.fn) for each in full.frames]), ORIGIN)
     assert np.array_equal(found.frames[7].fn, full.frames[7].fn)
 
 
-def test_frames_go_to_another_process(stored, full):
+def test_frames_can_be_pickled(stored, full):
     found = pickle.loads(pickle.dumps(load_results(stored)))
     assert np.array_equal(found.frames[5].fn, full.frames[5].fn)

@@ -1,4 +1,4 @@
-"""xarray opens results.h5 with the names and labels of its dimensions, whichever engine reads it."""
+"""xarray opens results.h5 with the names and labels of its dimensions, with both of its engines."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import pytest
 import xarray
 from rodsight.results.hdf5.store import Provenance, save_results, save_tracks
 from rodsight.results.schema import entries
+from rodsight.solver.frame_forces import FrameForces
+from rodsight.solver.quantity import columns
 
-from solver.bodies.quantity import columns
-from solver.sequence.frame_forces import FrameForces
 from tests.app.results.full_results import make_full_results
 
 ORIGIN = Provenance("fingerprint", "experiment.toml", (0, None), {"walls.csv": "c3d4"})
@@ -52,9 +52,9 @@ def test_a_run_without_any_contact_opens(engine, tmp_path):
     frames = []
     for frame in results.frames:
         none = np.zeros(frame.contacts.count, bool)
-        nothing = {name: getattr(frame, name)[none] for name in columns(FrameForces, "contact")}
+        empty = {name: getattr(frame, name)[none] for name in columns(FrameForces, "contact")}
         history = replace(frame.history, fn=frame.history.fn[:, none], ft=frame.history.ft[:, none])
-        frames.append(replace(frame, contacts=frame.contacts.select(none), history=history, **nothing))
+        frames.append(replace(frame, contacts=frame.contacts.select(none), history=history, **empty))
     save_results(tmp_path / "results.h5", replace(results, frames=frames), ORIGIN)
     tree = open_tree(tmp_path / "results.h5", engine)
     assert tree["forces/fn"].shape == (0,)
@@ -62,7 +62,7 @@ def test_a_run_without_any_contact_opens(engine, tmp_path):
     assert tree["contacts/normal"].dims == ("contact", "xy")
 
 
-def test_tracks_alone_open(engine, tmp_path):
+def test_a_file_of_tracks_opens(engine, tmp_path):
     results = make_full_results()
     save_tracks(tmp_path / "tracks.h5", "fake", results.tracks, None, ORIGIN)
     tree = open_tree(tmp_path / "tracks.h5", engine)

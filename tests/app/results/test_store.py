@@ -1,4 +1,4 @@
-"""What is written to results.h5, looked at with an HDF5 reader of its own, and what is read back from it."""
+"""The content of results.h5, read directly by h5py and by load_results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rodsight.errors import InputError
+from rodsight.process.errors import InputError
 from rodsight.results.hdf5.store import (
     Provenance,
     load_results,
@@ -20,14 +20,14 @@ from rodsight.results.hdf5.store import (
     save_tracks,
 )
 from rodsight.results.results import Results
+from rodsight.solver.contacts.contacts import ContactSource, ContactState
+from rodsight.solver.frame_forces import FrameForces, FrameStatus
+from rodsight.solver.quantity import columns
+from rodsight.solver.sequence.ensemble import MEMBERS
 
-from solver.bodies.quantity import columns
-from solver.contacts.contacts import ContactSource, ContactState
-from solver.sequence.ensemble import MEMBERS
-from solver.sequence.frame_forces import FrameForces, FrameStatus
 from tests.app.recording.fake_results import make_results
+from tests.app.results.differences import differences
 from tests.app.results.full_results import make_full_results
-from tests.app.results.same import differences
 
 SUMS = {"photos/0000.jpg": "a1b2", "walls.csv": "c3d4"}
 ORIGIN = Provenance("fingerprint", "somewhere/experiment.toml", (2, 5), SUMS)
@@ -46,7 +46,7 @@ def file(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def thinned(results: Results, rng: np.random.Generator) -> Results:
-    """The same with some contacts and some kept sweeps taken out of every frame, of some frames all."""
+    """Return results without some contacts and some stored sweeps of every frame, of some frames without all."""
     frames = []
     for frame in results.frames:
         keep = rng.random(frame.contacts.count) < rng.choice([0.0, 0.5, 1.0])
@@ -70,7 +70,7 @@ def thinned(results: Results, rng: np.random.Generator) -> Results:
     rows=st.integers(2, 3),
     sweeps=st.integers(0, 5),
 )
-def test_any_results_read_back_as_they_were(tmp_path, seed, frame_count, columns, rows, sweeps):
+def test_any_results_read_back_unchanged(tmp_path, seed, frame_count, columns, rows, sweeps):
     rng = np.random.default_rng(seed)
     results = thinned(make_full_results(frame_count, seed, columns=columns, rows=rows, sweeps=sweeps), rng)
     if rng.random() < 0.5:
@@ -100,7 +100,7 @@ def test_rows_of_a_frame_lie_between_its_offsets(results, file):
 def test_every_number_of_a_frame_has_its_own_dataset(results, file):
     names = (
         "sweeps", "natural_map", "unbalance", "kappa", "correction", "old_unbalance", "trust", "frames_since_reset",
-        "start_difference", "unseen_grains", "hidden_share", "similarity", "gained_count", "parted_count",
+        "start_difference", "unseen_grains", "hidden_fraction", "similarity", "new_contact_count", "lost_contact_count",
         "warm_residual", "cold_residual", "sweeps_saved", "force_change", "strain", "shear", "shear_step",
     )  # fmt: skip
     with h5py.File(file) as store:
@@ -116,7 +116,7 @@ def test_every_number_of_a_frame_has_its_own_dataset(results, file):
             assert np.array_equal(store[f"statistics/{name}"][()], expected), name
 
 
-def test_bodies_are_stored_as_they_are(results, file):
+def test_bodies_are_stored_unchanged(results, file):
     with h5py.File(file) as store:
         for name in ("position", "rotation", "sigma", "zncc", "status", "centre_sigma", "second_zncc",
                      "reference_frame"):  # fmt: skip
@@ -182,7 +182,7 @@ def test_members_are_named_and_absent_where_a_frame_has_none(results, file, tmp_
 
 
 @pytest.mark.parametrize("size", [0, 5])
-def test_error_bars_say_where_they_come_from(results, size, tmp_path):
+def test_standard_deviations_are_stored_with_their_source(results, size, tmp_path):
     save_results(tmp_path / "results.h5", replace(results, ensemble_size=size), ORIGIN)
     assert load_results(tmp_path / "results.h5").ensemble_size == size
     with h5py.File(tmp_path / "results.h5") as store:
@@ -197,13 +197,13 @@ def test_error_bars_say_where_they_come_from(results, size, tmp_path):
      ("tracks/rotation", "rad"), ("statistics/stress", "Pa"), ("statistics/area", "m2"), ("sweeps/ft", "N"),
      ("walls/pressure", "Pa"), ("calibration/wall_tilt", "rad"), ("frames/trust", None)],
 )  # fmt: skip
-def test_units_stand_beside_the_numbers(path, unit, file):
+def test_datasets_have_their_unit_as_an_attribute(path, unit, file):
     with h5py.File(file) as store:
         assert store[path].attrs.get("unit") == unit
 
 
-@pytest.mark.parametrize("frames", [(0, None), (2, 5)])
-def test_where_a_file_comes_from_is_read_back(results, frames, tmp_path):
+@pytest.mark.parametrize("frames", [(0, None), (2, 5), (0, 9, 4)])
+def test_the_provenance_of_a_file_reads_back(results, frames, tmp_path):
     origin = replace(ORIGIN, frames=frames)
     save_results(tmp_path / "results.h5", results, origin)
     assert read_origin(tmp_path / "results.h5") == origin
@@ -214,7 +214,7 @@ def test_where_a_file_comes_from_is_read_back(results, frames, tmp_path):
         assert (store.attrs["name"], store.attrs["friction"]) == (results.name, results.friction)
 
 
-def test_what_is_no_file_of_ours_has_no_origin_and_is_refused(tmp_path):
+def test_other_files_have_no_provenance_and_are_refused(tmp_path):
     with h5py.File(tmp_path / "other.h5", "w") as store:
         store["data"] = 1.0
     (tmp_path / "text.h5").write_text("nothing")
@@ -225,7 +225,7 @@ def test_what_is_no_file_of_ours_has_no_origin_and_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("with_walls", [True, False])
-def test_tracks_alone_read_back(results, with_walls, tmp_path):
+def test_a_file_of_tracks_reads_back(results, with_walls, tmp_path):
     walls = results.walls if with_walls else None
     save_tracks(tmp_path / "tracks.h5", "fake", results.tracks, walls, ORIGIN)
     tracks, read = load_tracks(tmp_path / "tracks.h5")
@@ -235,7 +235,7 @@ def test_tracks_alone_read_back(results, with_walls, tmp_path):
         load_results(tmp_path / "tracks.h5")
 
 
-def test_great_columns_are_compressed_without_loss(tmp_path):
+def test_large_columns_are_compressed_without_loss(tmp_path):
     results = make_results(3, 12, 12, sweeps=20)
     save_results(tmp_path / "results.h5", results, ORIGIN)
     assert differences(results, load_results(tmp_path / "results.h5")) == []
@@ -246,7 +246,7 @@ def test_great_columns_are_compressed_without_loss(tmp_path):
 
 def test_columns_of_different_lengths_are_not_written(results, tmp_path):
     frames = [replace(frame) for frame in results.frames]
-    for frame in frames:  # past the shapes that the tests' runs check
+    for frame in frames:  # bypasses the shape checks of the tests
         object.__setattr__(frame, "un", frame.un[:-1])
     with pytest.raises(ValueError, match="contacts/un"):
         save_results(tmp_path / "results.h5", replace(results, frames=frames), ORIGIN)

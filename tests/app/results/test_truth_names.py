@@ -1,4 +1,4 @@
-"""Which true grain a grain of the results is: told ones by their ids, inferred ones by their place."""
+"""Matching of grains with true grains: given ones by their ids, inferred ones by their positions."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.errors import InputError
-from rodsight.results.truth import names_of_told, read_truth, true_ids, true_names
+from rodsight.process.errors import InputError
+from rodsight.results.truth import names_of_given, read_truth, true_ids, true_names
 from rodsight.tracks import Tracks, TrackStatus
 
 RADIUS = 0.008  # [m]
@@ -30,25 +30,25 @@ def tracks_of(ids: list[int], place: list[tuple[float, float]], inferred: int = 
     )  # fmt: skip
 
 
-def test_told_grains_keep_their_ids_wherever_corrections_have_put_them(poses: Path) -> None:
-    moved = [(x + 0.1, y) for x, y in list(TRUE.values())[:3]]  # each where another one should be
-    assert names_of_told(poses, tracks_of([10, 11, 12], moved), 0).tolist() == [10, 11, 12]
+def test_given_grains_keep_their_ids_at_corrected_positions(poses: Path) -> None:
+    moved = [(x + 0.1, y) for x, y in list(TRUE.values())[:3]]  # each at the position of another one
+    assert names_of_given(poses, tracks_of([10, 11, 12], moved), 0).tolist() == [10, 11, 12]
     assert true_names(poses, tracks_of([0, 1, 2], moved), 0).tolist() == [11, 12, 13]
 
 
-def test_an_inferred_rod_is_the_unseen_one_at_its_place(poses: Path) -> None:
-    told = [TRUE[10], TRUE[11], TRUE[12]]
-    inferred = [(0.403, 0.1), (0.401, 0.101), TRUE[11], (0.6, 0.1)]  # two at one place, on a told one, nowhere
-    names = names_of_told(poses, tracks_of([10, 11, 12, 14, 15, 16, 17], told + inferred, inferred=4), 0)
+def test_an_inferred_rod_gets_the_id_at_its_position(poses: Path) -> None:
+    given = [TRUE[10], TRUE[11], TRUE[12]]
+    inferred = [(0.403, 0.1), (0.401, 0.101), TRUE[11], (0.6, 0.1)]  # two at one position, on a given one, at no rod
+    names = names_of_given(poses, tracks_of([10, 11, 12, 14, 15, 16, 17], given + inferred, inferred=4), 0)
     assert names.tolist() == [10, 11, 12, 13, -1, -1, -1]
 
 
-def test_contacts_of_rods_that_nobody_saw_are_passed_over_and_unknown_ids_are_not(poses: Path, tmp_path: Path) -> None:
+def test_contacts_of_unseen_rods_are_ignored_and_unknown_ids_refused(poses: Path, tmp_path: Path) -> None:
     truth = tmp_path / "truth_contacts.csv"
     truth.write_text("frame,i,j,fn,ft\n0,10,11,5,1\n0,12,13,7,2\n0,13,top,3,0\n")
     names = np.array([10, 11, 12])
-    found = read_truth(truth, names, ("top",), first_frame=0, frame_count=1, unseen=true_ids(poses))
+    found = read_truth(truth, names, ("top",), frame_count=1, unseen=true_ids(poses))
     assert found.fn.tolist() == [5.0]
     truth.write_text("frame,i,j,fn,ft\n0,10,99,5,1\n")
     with pytest.raises(InputError, match=r"row 2, j = '99': is not the id of a grain"):
-        read_truth(truth, names, ("top",), first_frame=0, frame_count=1, unseen=true_ids(poses))
+        read_truth(truth, names, ("top",), frame_count=1, unseen=true_ids(poses))

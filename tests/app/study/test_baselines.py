@@ -1,4 +1,4 @@
-"""Baselines are compared on the run's own pairs and with its own truth."""
+"""Baselines are compared with the run on its own pairs and truth."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from rodsight.results.results import Results, TruthContacts
-from rodsight.study.baselines import BaselineAgreement, baseline_lists, score_baselines, tell_baselines
+from rodsight.study.baselines import BaselineAgreement, baseline_lists, describe_baselines, score_baselines
 
 from tests.app.recording.fake_results import make_results, make_truth
 
@@ -32,13 +32,13 @@ def test_forces_that_are_the_truth_correlate_perfectly(results: Results) -> None
     assert all(row.r_static < 0.999 for row in found)
 
 
-def test_wrong_forces_do_not(results: Results) -> None:
+def test_wrong_forces_correlate_imperfectly(results: Results) -> None:
     for row in score_baselines(results, make_truth(results, np.random.default_rng(3))):
         assert -1.0 <= row.r_ours < 0.9999
 
 
-def test_pairs_that_only_the_truth_names_count(results: Results) -> None:
-    """A truth with one strong contact more, between rods that are far apart."""
+def test_contacts_of_the_truth_alone_count(results: Results) -> None:
+    """The truth has one more strong contact, between rods that are far apart."""
     truth = own_forces(results)
     strong = 20.0 * truth.fn.max()
     more = TruthContacts(
@@ -48,7 +48,7 @@ def test_pairs_that_only_the_truth_names_count(results: Results) -> None:
     assert score_baselines(results, more)[1].r_ours < 0.5
 
 
-def test_what_does_not_exist_is_none_in_lists_and_passed_over_in_words() -> None:
+def test_missing_correlations_are_none_in_lists_and_left_out_of_sentences() -> None:
     nan = float("nan")
     rows = [BaselineAgreement(0.5, nan, 0.25, nan), BaselineAgreement(0.75, nan, nan, 0.125)]
     lists = baseline_lists(rows)
@@ -56,5 +56,5 @@ def test_what_does_not_exist_is_none_in_lists_and_passed_over_in_words() -> None
         "r_ours": [0.5, 0.75], "r_static": [None, None], "r_overlap": [0.25, None], "r_uniform": [None, 0.125],
     }  # fmt: skip
     json.dumps(lists, allow_nan=False)
-    assert "these forces 0.625; " in tell_baselines(rows)
-    assert "in balance –, pulled towards the overlaps 0.250, the same everywhere 0.125." in tell_baselines(rows)
+    assert "these forces 0.625; " in describe_baselines(rows)
+    assert "in equilibrium –, nearest to the overlaps 0.250, uniform 0.125." in describe_baselines(rows)

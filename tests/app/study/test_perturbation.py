@@ -1,4 +1,4 @@
-"""Perturbations of a test: what they leave alone, what they change, and how it is compared."""
+"""Perturbations of a test: unchanged frames, changed frames, and their comparison."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 from rodsight.cli.main import main
-from rodsight.study.worlds.perturbation import (
+from rodsight.study.scenarios.perturbation import (
     ADDED,
     FORCE_TOLERANCE,
     R_TOLERANCE,
     Perturbation,
     compare,
-    on_told_grains,
+    on_given_grains,
     perturb,
     print_perturbations,
 )
@@ -40,7 +40,7 @@ def cases() -> dict[str, Perturbation]:
     return {each.name: each for each in perturb(TRACKS, WALLS, np.random.default_rng(1))}
 
 
-def test_photographs_that_stay_are_the_same_and_know_which_they_were(cases):
+def test_remaining_photographs_are_unchanged_and_keep_their_frame_numbers(cases):
     assert cases["without the last photograph"].frame == (0, 1, 2, 3, 4)
     assert cases["without the first"].frame == (1, 2, 3, 4, 5)
     assert cases["without one in the middle"].frame == (0, 1, 2, 4, 5)
@@ -56,7 +56,7 @@ def test_photographs_that_stay_are_the_same_and_know_which_they_were(cases):
                 assert case.tracks.time[row] == TRACKS.time[k]
 
 
-def test_a_photograph_more_lies_midway_but_for_its_own_noise(cases):
+def test_an_added_photograph_lies_midway_except_for_its_noise(cases):
     more = cases["with one more"]
     midway = 0.5 * (TRACKS.position[3] + TRACKS.position[4])
     error = more.tracks.position[4] - midway
@@ -71,33 +71,33 @@ def test_positions_move_by_a_tenth_of_their_noise(cases):
     assert 0.5e-6 < moved.std() < 1.5e-6
 
 
-def test_rods_that_were_inferred_are_left_out_and_walls_keep_their_names():
-    """Five told grains, two inferred ones and two walls: 0–1, 0–6 (inferred), 3–8 (the second wall)."""
+def test_inferred_rods_are_left_out_and_walls_keep_their_numbers():
+    """Five given grains, two inferred ones and two walls: 0–1, 0–6 (inferred), 3–8 (the second wall)."""
     bodies = 9
     key = np.array([0 * bodies + 1, 0 * bodies + 6, 3 * bodies + 8])
-    told, force = on_told_grains(key, np.arange(6.0).reshape(3, 2), bodies, 2, N)
-    assert told.tolist() == [1, 3 * 7 + 6]
+    given, force = on_given_grains(key, np.arange(6.0).reshape(3, 2), bodies, 2, N)
+    assert given.tolist() == [1, 3 * 7 + 6]
     assert force.tolist() == [[0.0, 1.0], [4.0, 5.0]]
 
 
 def test_the_worst_frame_is_named_with_and_without_a_truth():
     key = np.arange(4)
     plain = [(key, np.array([[1.0, 0], [2, 0], [3, 0], [4, 0]]))] * 3
-    bent = (key, np.array([[4.0, 0], [2, 0], [3, 0], [1, 0]]))
-    case = Perturbation("bent", TRACKS, WALLS, (0, ADDED, 1, 2))
-    other = [plain[0], bent, plain[1], bent]
+    changed = (key, np.array([[4.0, 0], [2, 0], [3, 0], [1, 0]]))
+    case = Perturbation("changed", TRACKS, WALLS, (0, ADDED, 1, 2))
+    other = [plain[0], changed, plain[1], changed]
     found = compare(case, plain, other, plain)
-    assert (found.change_frame, found.fall_frame) == (2, 2)
+    assert (found.change_frame, found.decrease_frame) == (2, 2)
     assert found.change == pytest.approx(np.sqrt(18 / 30))
     assert found.mean_change == pytest.approx(found.change / 3)
-    assert found.fall > R_TOLERANCE
-    assert np.isnan(compare(case, plain, other, None).fall)
+    assert found.decrease > R_TOLERANCE
+    assert np.isnan(compare(case, plain, other, None).decrease)
     text = StringIO()
-    steady = compare(case, plain, [plain[0], bent, plain[1], plain[2]], plain)
+    steady = compare(case, plain, [plain[0], changed, plain[1], plain[2]], plain)
     print_perturbations(Console(file=text, width=140), "test", [found, steady])
     lines = text.getvalue().splitlines()
-    assert lines[2].endswith("a cliff")
-    assert lines[3].rstrip().endswith("steady")
+    assert lines[2].endswith("exceeded")
+    assert lines[3].rstrip().endswith("within")
     assert found.change > FORCE_TOLERANCE
 
 

@@ -1,4 +1,4 @@
-"""Forces that were measured twice, with faults, against those of a run and those that need no motion."""
+"""Photoelastic forces with two noisy readings, compared with a run and motion-free baselines."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rodsight.cli.main import main
+from rodsight.process.frame_range import FrameRange
 from rodsight.results.results import Results, TruthContacts
 from rodsight.study.real.real_forces import RealStudy, as_json, correlate_sides, study_real
-from rodsight.study.real.real_page import limits_of, real_page, rows_of
+from rodsight.study.real.real_page import describe_limits, real_page, rows_of
 from rodsight.synthetic.photoelastic import make_photoelastic
 
 from tests.app.recording.fake_results import make_results
@@ -24,7 +25,7 @@ def results() -> Results:
 
 @pytest.fixture(scope="module")
 def same(results: Results) -> RealStudy:
-    """A run held against its own forces."""
+    """A run compared with its own forces."""
     return study_real(results, own_forces(results), [0.7, float("nan")])
 
 
@@ -38,22 +39,22 @@ def test_forces_that_are_the_truth_agree_in_everything(same: RealStudy) -> None:
 def test_a_direction_is_compared_without_its_sense(results: Results, same: RealStudy) -> None:
     for row in same.frames:
         assert 0.0 <= row.direction < 180.0
-        assert -90.0 <= row.turned("uniform") < 90.0
-        assert abs(row.turned("ours")) < 10.0  # the truth's own has no tangential forces
+        assert -90.0 <= row.direction_error("uniform") < 90.0
+        assert abs(row.direction_error("ours")) < 10.0  # the true direction is computed without tangential forces
 
 
-def test_the_ceiling_is_as_near_to_the_truth_as_balance_allows(same: RealStudy) -> None:
+def test_the_ceiling_is_nearer_to_the_truth_than_a_baseline(same: RealStudy) -> None:
     for row in same.frames:
         assert row.ceiling.r > row.static.r
 
 
-def test_a_truth_in_any_order_and_unit_is_the_same(results: Results, same: RealStudy) -> None:
+def test_order_and_unit_of_the_truth_do_not_matter(results: Results, same: RealStudy) -> None:
     exact = own_forces(results)
     order = np.lexsort([-exact.i, exact.frame])
-    turned = TruthContacts(
+    direction_error = TruthContacts(
         exact.frame[order], exact.i[order], exact.j[order], 1e-3 * exact.fn[order], 1e-3 * exact.ft[order]
     )
-    found = study_real(results, turned, [0.7, float("nan")])
+    found = study_real(results, direction_error, [0.7, float("nan")])
     assert [row.ours.r for row in found.frames] == pytest.approx([row.ours.r for row in same.frames])
     assert [row.direction for row in found.frames] == pytest.approx([row.direction for row in same.frames])
 
@@ -63,7 +64,7 @@ def test_the_page_holds_three_pictures_and_every_row(same: RealStudy) -> None:
     assert page.count("<svg") == 3
     for row in rows_of(same):
         assert all(f"<td>{cell}</td>" in page for cell in row)
-    assert "correlate by 0.700" in limits_of(same)
+    assert "correlate by 0.700" in describe_limits(same)
     assert "http" not in page
 
 
@@ -77,15 +78,19 @@ def test_json_has_no_number_that_does_not_exist(same: RealStudy) -> None:
 def test_both_readings_are_correlated_where_there_are_two(tmp_path: Path) -> None:
     file = tmp_path / "truth.csv"
     file.write_text("frame,i,j,fn,ft,fn_i,fn_j\n3,0,1,2,0,1,3\n3,0,2,3,0,2,6\n3,1,2,3,0,3,\n4,0,1,1,0,,1\n")
-    found = correlate_sides(file, 3, 2)
+    found = correlate_sides(file, FrameRange(3), 2)
     assert found[0] == pytest.approx(1.0)
     assert np.isnan(found[1])
+    file.write_text("frame,i,j,fn,ft,fn_i,fn_j\n3,0,1,2,0,1.5,1.5\n3,0,2,3,0,2.5,2.5000000001\n")
+    assert np.isnan(correlate_sides(file, FrameRange(3), 1)[0])  # copies are no second reading
     file.write_text("frame,i,j,fn,ft\n3,0,1,2,0\n")
-    assert np.isnan(correlate_sides(file, 3, 1)[0])
+    assert np.isnan(correlate_sides(file, FrameRange(3), 1)[0])
 
 
 @pytest.mark.slow
-def test_photoelastic_discs_go_the_whole_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_photoelastic_discs_are_imported_solved_and_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     made = make_photoelastic(tmp_path / "solved", 1, grains=120)
     for arguments in (
         ["import", "pegs", tmp_path / "solved", tmp_path / "test", "--pixel-size", made.pixel_size],

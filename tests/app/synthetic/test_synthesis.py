@@ -1,4 +1,4 @@
-"""Synthetic experiments: what is written, that it is the truth, and what is refused."""
+"""Synthetic experiments: the written files agree with the truth, and wrong arguments are refused."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import cv2
 import numba
 import numpy as np
 import pytest
-from rodsight.errors import InputError
 from rodsight.experiment.units import Scale
+from rodsight.process.errors import InputError
 from rodsight.synthetic.dense_packing import RADIUS_CLASSES, choose_radii
 from rodsight.synthetic.rearrangement import choose_window
 from rodsight.synthetic.synthesis import Synthesis, synthesize
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs th
 TINY: dict[str, Any] = {"preset": "paper", "grains": 20, "frames": 3, "pixel_size": 5e-4}
 BALANCE = 5e-3  # worst grain over mean force: the simulation's own, and tables rounded to nanometres
 ROUNDING = 1e-9  # [m], of the tables
-TABLE_FORCE = 0.2  # [N], what that and the last motion make of a spring's force
+TABLE_FORCE = 0.2  # [N], error of a spring's force from rounding and the last motion
 
 
 def read_columns(path: Path) -> dict[str, list[str]]:
@@ -95,7 +95,7 @@ def test_an_experiment_with_tracks_is_described(tracked: Synthesis) -> None:
 
 @pytest.mark.parametrize("kind", ["photographed", "tracked"])
 def test_the_written_truth_is_in_balance(kind: str, request: pytest.FixtureRequest) -> None:
-    """Assembled from the tables alone, as a reader of the folder would."""
+    """Forces are assembled from the tables alone."""
     synthesis: Synthesis = request.getfixturevalue(kind)
     n = len(synthesis.truth.radius)
     position, _ = read_tracks(synthesis.folder / "truth_tracks.csv", n)
@@ -131,14 +131,14 @@ def test_the_written_truth_is_in_balance(kind: str, request: pytest.FixtureReque
     np.testing.assert_allclose(plate, 50e3 * 0.06 * (x1 - x2), rtol=BALANCE)
 
 
-def test_tracks_carry_the_noise_that_was_asked_for(tracked: Synthesis) -> None:
+def test_tracks_have_the_requested_noise(tracked: Synthesis) -> None:
     position, rotation = read_tracks(tracked.folder / "tracks.csv", 60)
     true_position, true_rotation = read_tracks(tracked.folder / "truth_tracks.csv", 60)
     np.testing.assert_allclose(true_position, tracked.truth.position, atol=ROUNDING)
     sampling = 4.0 / np.sqrt(2.0 * 180)  # four standard errors of a standard deviation of 180 values
     assert (position - true_position).std() == pytest.approx(2e-5, rel=sampling)
-    turned = (rotation - true_rotation) * tracked.truth.radius
-    assert turned.std() == pytest.approx(2e-5, rel=sampling)
+    rotation_error = (rotation - true_rotation) * tracked.truth.radius
+    assert rotation_error.std() == pytest.approx(2e-5, rel=sampling)
 
 
 def test_tracks_without_noise_are_the_truth_at_the_finest_precision(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_tracks_without_noise_are_the_truth_at_the_finest_precision(tmp_path: Pa
     assert tomllib.loads((folder / "experiment.toml").read_text())["tracks"]["precision"] == 1e-6
 
 
-def test_photographs_show_the_rods_where_the_truth_says(photographed: Synthesis) -> None:
+def test_rods_in_photographs_are_at_their_true_positions(photographed: Synthesis) -> None:
     truth = photographed.truth
     assert photographed.photograph_shape is not None
     height, width = photographed.photograph_shape
@@ -173,7 +173,7 @@ def test_photographs_show_the_rods_where_the_truth_says(photographed: Synthesis)
     assert np.all(ends.max(axis=(0, 1, 2)) < np.array([width, height]) - 5)
 
 
-def test_photographs_show_rods_turned_and_bars_moved_as_the_truth_says(tmp_path: Path) -> None:
+def test_rods_and_bars_in_photographs_move_as_the_truth(tmp_path: Path) -> None:
     made = synthesize(tmp_path / "turned", **TINY | {"frames": 2, "step_degrees": 6.0, "pixel_size": 2.5e-4})
     assert made.photograph_shape is not None
     scale = Scale(2.5e-4, made.photograph_shape[0])
@@ -182,12 +182,12 @@ def test_photographs_show_rods_turned_and_bars_moved_as_the_truth_says(tmp_path:
         for k in range(2)
     ]
     centre = scale.to_pixels(made.truth.position)
-    turn = made.truth.rotation[1]
-    row = int(np.argmax(abs(turn)))
-    assert abs(turn[row]) > 0.05  # more than a pixel at the rim
+    rotation = made.truth.rotation[1]
+    row = int(np.argmax(abs(rotation)))
+    assert abs(rotation[row]) > 0.05  # more than a pixel at the rim
 
-    def likeness(angle: float) -> float:
-        """Correlation of the rod on the second photograph with the first one's turned counter-clockwise by angle."""
+    def correlation(angle: float) -> float:
+        """Correlate the rod on the second photograph with the first, rotated counter-clockwise by angle."""
         reach = 0.7 * made.truth.radius[row] / 2.5e-4
         x, y = np.meshgrid(np.arange(-reach, reach), np.arange(-reach, reach))  # y down
         inside = np.hypot(x, y) < reach
@@ -203,8 +203,8 @@ def test_photographs_show_rods_turned_and_bars_moved_as_the_truth_says(tmp_path:
         )
         return float(np.corrcoef(first, second)[0, 1])
 
-    assert likeness(turn[row]) > 0.95
-    assert likeness(-turn[row]) < 0.9
+    assert correlation(rotation[row]) > 0.95
+    assert correlation(-rotation[row]) < 0.9
     for start, end in made.truth.endpoints[1]:
         outward = np.array([end[1] - start[1], start[0] - end[0]]) / np.linalg.norm(end - start)
         along = start + np.linspace(0.05, 0.95, 200)[:, None] * (end - start)
@@ -233,14 +233,14 @@ def test_every_depth_and_format_can_be_read(tmp_path: Path) -> None:
     assert cv2.imread(str(small / "photos" / "0000.jpg"), cv2.IMREAD_UNCHANGED) is not None
 
 
-def test_a_folder_name_that_no_experiment_may_have_is_mended(tmp_path: Path) -> None:
+def test_an_invalid_experiment_name_is_replaced(tmp_path: Path) -> None:
     folder = synthesize(tmp_path / '"x":y', photographs=False, **TINY | {"frames": 1}).folder
     assert tomllib.loads((folder / "experiment.toml").read_text())["name"] == "synthetic -x--y"
 
 
-def test_a_reversal_turns_back_half_way(tmp_path: Path) -> None:
-    course = synthesize(tmp_path / "cycle", photographs=False, reversal=True, **TINY | {"frames": 5}).truth.shear
-    np.testing.assert_allclose(np.rad2deg(course), [0.0, 0.25, 0.5, 0.25, 0.0], atol=1e-9)
+def test_a_reversal_changes_direction_half_way(tmp_path: Path) -> None:
+    shear = synthesize(tmp_path / "cycle", photographs=False, reversal=True, **TINY | {"frames": 5}).truth.shear
+    np.testing.assert_allclose(np.rad2deg(shear), [0.0, 0.25, 0.5, 0.25, 0.0], atol=1e-9)
 
 
 def test_the_small_preset_puts_a_rearrangement_among_its_photographs(tmp_path: Path) -> None:
@@ -252,7 +252,7 @@ def test_the_small_preset_puts_a_rearrangement_among_its_photographs(tmp_path: P
     np.testing.assert_array_equal(small.truth.rotation[0], 0.0)
 
 
-def test_the_window_holds_the_greatest_event_that_has_room_around_it() -> None:
+def test_the_window_holds_the_greatest_event_with_margins_around_it() -> None:
     calm = np.full(40, 0.01)
     calm[0] = np.nan
     calm[[3, 20, 39]] = 0.5, 0.3, 0.6
@@ -269,11 +269,11 @@ def test_radii_come_in_the_papers_classes() -> None:
     assert np.pi * np.sum(radius**2) == pytest.approx(0.5 * 0.6 * 0.845, rel=0.01)  # fills the paper's frame
 
 
-def test_progress_is_told(tmp_path: Path) -> None:
-    heard: list[tuple[str, int, int]] = []
-    synthesize(tmp_path / "tiny", progress=lambda *what: heard.append(what), **TINY)
+def test_progress_is_reported(tmp_path: Path) -> None:
+    steps: list[tuple[str, int, int]] = []
+    synthesize(tmp_path / "tiny", progress=lambda *step: steps.append(step), **TINY)
     stages = [("simulate", k, 3) for k in range(4)] + [("photograph", k, 3) for k in range(4)]
-    assert heard == stages
+    assert steps == stages
 
 
 def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:

@@ -1,13 +1,13 @@
-"""Rods laid one on the other, as in a box, and which of them a detection is."""
+"""Rods laid on one another, as in a box, and the match of a detection with them."""
 
 from __future__ import annotations
 
 import numpy as np
+from rodsight.solver.bodies.grains import Array
 from rodsight.synthetic.speckle import SpeckleSettings
 from rodsight.tracking.detection.detect import Detection
 from scipy.spatial import KDTree
 
-from solver.bodies.grains import Array
 from tests.app.tracking.speckled import PIXEL_SIZE, Rods
 
 CLASSES = (28.0, 32.0, 44.0)  # [px]
@@ -21,7 +21,7 @@ def lay_rods(
 ) -> Rods:
     """Lay each rod in the lowest place where it touches two: many contacts, few gaps.
 
-    With bars on the left, on the right and below; `cut`: without bars, and some beyond the border.
+    There are bars on the left, on the right and below; `cut`: no bars, and some rods beyond the border.
     """
     generator = np.random.default_rng(seed)
     left, right, floor = (0.0, float(width), height + 20.0) if cut else (60.3, width - 61.2, height - 60.6)
@@ -43,21 +43,23 @@ def lay_rods(
 
 
 def _resting_places(circles: Array, r: float, left: float, right: float, floor: float) -> Array:
-    """Where a rod of radius r may lie (p, 2) [px]: on the floor, on a rod and a side, on two rods."""
+    """Places (p, 2) [px] of a rod of radius r: on the floor, on a rod and a side, on two rods."""
     line = np.arange(left + r, right - r, 2.0)
     places = [np.column_stack([line, np.full(len(line), floor - r)])]
     x, y, radius = circles.T
     for side in (left + r, right - r):
-        room = (radius + r) ** 2 - (side - x) ** 2
-        near = room > 0
-        places.append(np.column_stack([np.full(near.sum(), side), y[near] - np.sqrt(room[near])]))
+        height_squared = (radius + r) ** 2 - (side - x) ** 2
+        reachable = height_squared > 0
+        places.append(
+            np.column_stack([np.full(reachable.sum(), side), y[reachable] - np.sqrt(height_squared[reachable])])
+        )
     a, b = np.tril_indices(len(circles), -1)
-    reach = np.hypot(x[b] - x[a], y[b] - y[a])
-    near = reach < radius[a] + radius[b] + 2 * r
-    a, b, reach = a[near], b[near], reach[near]
-    along = ((radius[a] + r) ** 2 - (radius[b] + r) ** 2 + reach**2) / (2 * reach)
+    distance = np.hypot(x[b] - x[a], y[b] - y[a])
+    reachable = distance < radius[a] + radius[b] + 2 * r
+    a, b, distance = a[reachable], b[reachable], distance[reachable]
+    along = ((radius[a] + r) ** 2 - (radius[b] + r) ** 2 + distance**2) / (2 * distance)
     across = np.sqrt(np.maximum((radius[a] + r) ** 2 - along**2, 0.0))
-    ux, uy = (x[b] - x[a]) / reach, (y[b] - y[a]) / reach
+    ux, uy = (x[b] - x[a]) / distance, (y[b] - y[a]) / distance
     for side in (-across, across):
         places.append(np.column_stack([x[a] + along * ux + side * uy, y[a] + along * uy - side * ux]))
     found = np.concatenate(places)
@@ -69,6 +71,6 @@ def _resting_places(circles: Array, r: float, left: float, right: float, floor: 
 
 
 def match(found: Detection, rods: Rods) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the detection nearest to each rod, and whether it is that rod."""
+    """Return the index of the detection nearest to each rod, and whether it is that rod."""
     distance, index = KDTree(np.stack([found.x, found.y], axis=1)).query(np.stack([rods.x, rods.y], axis=1))
     return index, distance < FOUND

@@ -1,4 +1,4 @@
-"""The small photographed experiment as the tracking stage follows it, and its walls against the true ones."""
+"""Tracking of the small photographed experiment, and the errors of its walls."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rodsight.tracks import Tracks, WallTracks
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """What the stage made of an experiment."""
+    """A tracked experiment."""
 
     out: Path
     tracks: Tracks
@@ -31,7 +31,7 @@ def track(experiment: Path, out: Path, *more: str) -> tuple[Tracks, WallTracks |
 
 
 def track_all(experiment: Path, true_walls: np.ndarray, *more: str) -> Tracked:
-    """Track an experiment, its result beside it."""
+    """Track an experiment and write the result beside it."""
     out = experiment.parent / "out"
     tracks, walls = track(experiment, out, *more)
     assert walls is not None
@@ -39,20 +39,20 @@ def track_all(experiment: Path, true_walls: np.ndarray, *more: str) -> Tracked:
 
 
 def read_walls(experiment: Path) -> np.ndarray:
-    """Ends of the walls of all frames (f, w, 2, 2) [m]."""
+    """Read the ends of the walls of all frames (f, w, 2, 2) [m]."""
     table = read_table(experiment / "walls.csv", ("frame", "x1", "y1", "x2", "y2"))
     return np.column_stack([table.numbers(name) for name in ("x1", "y1", "x2", "y2")]).reshape(-1, 4, 2, 2)
 
 
-def cut_walls(experiment: Path) -> np.ndarray:
-    """Leave the walls of frame 0 alone in their table; returns those of all frames (f, w, 2, 2) [m]."""
+def keep_first_walls(experiment: Path) -> np.ndarray:
+    """Remove all walls but those of frame 0 from the table; returns those of all frames (f, w, 2, 2) [m]."""
     file, ends = experiment / "walls.csv", read_walls(experiment)
     file.write_text("\n".join(file.read_text().splitlines()[:5]) + "\n")
     return ends
 
 
-def off_walls(found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """How far found ends lie off the true walls (f, w, 2) [m], along the normal."""
+def wall_errors(found: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Return the errors of found ends along the true walls' normals (f, w, 2) [m]."""
     along = true[:, :, 1] - true[:, :, 0]
     normal = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=-1, keepdims=True)
     return np.einsum("fwek,fwk->fwe", found - true, normal)

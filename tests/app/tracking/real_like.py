@@ -1,6 +1,6 @@
-"""Photographs as a laboratory takes them: brown rods with scratches and pencil lines, badly lit, softly focused.
+"""Synthetic photographs like those of a laboratory: brown rods with scratches and pencil lines, dim and soft.
 
-Nothing here is painted with speckle: an end face has a fine grain of its own, a few flaws, and one line.
+There is no speckle: an end face has a fine texture of its own, a few flaws, and one line.
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from rodsight.solver.bodies.grains import Array
 from scipy.ndimage import gaussian_filter
-
-from solver.bodies.grains import Array
 
 FINE = 3  # sub-pixels a side
 BROWN = np.array([0.62, 0.80, 1.0])  # blue, green, red: of a face, as OpenCV stores colours
@@ -19,30 +18,30 @@ BROWN = np.array([0.62, 0.80, 1.0])  # blue, green, red: of a face, as OpenCV st
 
 @dataclass(frozen=True, slots=True)
 class Laboratory:
-    """How dull the photograph is. Grey levels count 0 … 255."""
+    """Light, texture, blur and noise of the photograph. Grey levels are 0 … 255."""
 
     face: float = 125.0  # [grey] mean of a face
-    face_scatter: float = 0.2  # ± of one face against another
-    grain: float = 9.0  # [grey] deviation of the material's own texture
+    face_scatter: float = 0.2  # ± relative difference between faces
+    grain: float = 9.0  # [grey] standard deviation of the material's texture
     grain_size: float = 1.2  # [px] its standard deviation
     gap: float = 8.0  # [grey]
     light: float = 0.3  # ± across the picture
     blur: float = 1.1  # [px]
     noise: float = 2.0  # [grey]
-    lathe: float = 0.0  # [grey] amplitude of rings about nearly the centre, as turning leaves them
-    highlight: float = 0.0  # [grey] of a soft reflex that stays on its side while the rod turns
-    shadow: float = 0.0  # share of the light that the rim on the lower right has lost
+    lathe: float = 0.0  # [grey] amplitude of nearly concentric turning marks
+    highlight: float = 0.0  # [grey] of a soft reflex that stays on its side while the rod rotates
+    shadow: float = 0.0  # fraction of the light that the rim on the lower right has lost
     jpeg: int = 0  # quality; 0: not compressed
 
 
 def brown_photograph(
-    laboratory: Laboratory, width: int, height: int, x: Array, y: Array, radius: Array, turn: Array, *,
+    laboratory: Laboratory, width: int, height: int, x: Array, y: Array, radius: Array, rotation: Array, *,
     pattern_seed: int, noise_seed: int,
 ) -> np.ndarray:  # fmt: skip
     """The photograph (height, width, 3) uint8 of n rods; turn (n,) [rad] from x towards y (down)."""
     fine = np.full((height * FINE, width * FINE), laboratory.gap, np.float32)
     for k in range(len(x)):
-        _draw(fine, laboratory, x[k], y[k], radius[k], turn[k], np.random.default_rng([pattern_seed, k]))
+        _draw(fine, laboratory, x[k], y[k], radius[k], rotation[k], np.random.default_rng([pattern_seed, k]))
     # Sub-pixel s of pixel p lies at p + (s − 1)/3.
     grey = gaussian_filter(fine, laboratory.blur * FINE)
     grey = grey.reshape(height, FINE, width, FINE).mean(axis=(1, 3))
@@ -57,9 +56,9 @@ def brown_photograph(
 
 
 def _draw(
-    fine: np.ndarray, laboratory: Laboratory, x: float, y: float, r: float, turn: float, paint: np.random.Generator
+    fine: np.ndarray, laboratory: Laboratory, x: float, y: float, r: float, rotation: float, paint: np.random.Generator
 ) -> None:
-    """One rod: its texture lies on a fixed grid of its own and is looked up where each sub-pixel falls on it."""
+    """Draw one rod: its texture lies on its own fixed grid and is interpolated at each sub-pixel."""
     side = int(np.ceil(r * FINE)) + 3
     size = 2 * side + 1
     texture = gaussian_filter(paint.standard_normal((size, size)), laboratory.grain_size * FINE)
@@ -89,8 +88,8 @@ def _draw(
     if len(rows) == 0 or len(columns) == 0:
         return
     dy, dx = np.meshgrid(rows - cy, columns - cx, indexing="ij")
-    bu = np.cos(turn) * dx + np.sin(turn) * dy + side
-    bv = -np.sin(turn) * dx + np.cos(turn) * dy + side
+    bu = np.cos(rotation) * dx + np.sin(rotation) * dy + side
+    bv = -np.sin(rotation) * dx + np.cos(rotation) * dy + side
     iu, iv = np.clip(bu.astype(int), 0, size - 2), np.clip(bv.astype(int), 0, size - 2)
     fu, fv = bu - iu, bv - iv
     value = (
@@ -98,12 +97,12 @@ def _draw(
         + fv * ((1 - fu) * skin[iv + 1, iu] + fu * skin[iv + 1, iu + 1])
     )  # fmt: skip
     distance = np.hypot(dx, dy)
-    # The light does not turn with the rod.
+    # The light does not rotate with the rod.
     reflex = (dx + 0.3 * r * FINE) ** 2 + (dy + 0.35 * r * FINE) ** 2
     value = value + laboratory.highlight * np.exp(-reflex / (2.0 * (0.25 * r * FINE) ** 2))
     lower_right = np.clip((dx + dy) / np.sqrt(2.0) / np.maximum(distance, 1.0), 0.0, 1.0)
     depth = np.maximum(r - distance / FINE, 0.0)  # [px] inside the rim
     value = value * (1.0 - laboratory.shadow * lower_right * np.exp(-depth / 2.0))
-    share = np.clip(r * FINE - distance + 0.5, 0.0, 1.0)
-    part = fine[np.ix_(rows, columns)]
-    fine[np.ix_(rows, columns)] = (1 - share) * part + share * value
+    coverage = np.clip(r * FINE - distance + 0.5, 0.0, 1.0)
+    region = fine[np.ix_(rows, columns)]
+    fine[np.ix_(rows, columns)] = (1 - coverage) * region + coverage * value

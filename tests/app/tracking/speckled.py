@@ -1,4 +1,4 @@
-"""A few painted rods on a grid, whose poses in pixels are exactly known."""
+"""Speckled rods on a grid, whose poses in pixels are known exactly."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from rodsight.experiment.units import Scale
-from rodsight.synthetic.speckle import SpeckleSettings, render_photograph
-
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
+from rodsight.synthetic.speckle import RodScene, SpeckleSettings, render_photograph
 
 PIXEL_SIZE = 2.5e-4  # [m]
 
@@ -33,13 +32,15 @@ class Rods:
         scale = Scale(self.settings.pixel_size, self.height)
         return render_photograph(
             self.settings,
-            width=self.width,
-            height=self.height,
-            radius=self.radius * self.settings.pixel_size,
-            position=scale.to_world(np.stack([x, y], axis=1)),
-            rotation=scale.angle_to_world(rotation),
-            bars=self.bars,
-            pattern_seed=pattern_seed,
+            RodScene(
+                width=self.width,
+                height=self.height,
+                radius=self.radius * self.settings.pixel_size,
+                position=scale.to_world(np.stack([x, y], axis=1)),
+                rotation=scale.angle_to_world(rotation),
+                bars=self.bars,
+                pattern_seed=pattern_seed,
+            ),
             noise_seed=noise_seed,
         )
 
@@ -49,19 +50,19 @@ class Rods:
     def moved(
         self, dx: Array | float, dy: Array | float, rotation: Array | float, *, noise_seed: int = 2
     ) -> np.ndarray:
-        turn = np.broadcast_to(np.asarray(rotation, dtype=np.float64), self.x.shape)
-        return self.photograph(self.x + dx, self.y + dy, turn, noise_seed=noise_seed).astype(np.float32)
+        angle = np.broadcast_to(np.asarray(rotation, dtype=np.float64), self.x.shape)
+        return self.photograph(self.x + dx, self.y + dy, angle, noise_seed=noise_seed).astype(np.float32)
 
 
 def grid_of_rods(
     columns: int, rows: int, *, radius: float, pitch: float, margin: float, seed: int = 0, **settings: object
 ) -> Rods:
-    """columns × rows rods of one radius [px], each at a random part of a pixel off its place."""
+    """Place columns × rows rods of one radius [px], each displaced by a random fraction of a pixel."""
     generator = np.random.default_rng(seed)
     column, row = np.meshgrid(np.arange(columns), np.arange(rows))
     x = margin + pitch * column.ravel() + generator.uniform(-0.5, 0.5, columns * rows)
     y = margin + pitch * row.ravel() + generator.uniform(-0.5, 0.5, columns * rows)
     width = int(np.ceil(2 * margin + pitch * (columns - 1)))
     height = int(np.ceil(2 * margin + pitch * (rows - 1)))
-    given = {"pixel_size": PIXEL_SIZE, "noise": 2.5, **settings}
-    return Rods(width, height, x, y, np.full(len(x), radius), SpeckleSettings(**given))  # type: ignore[arg-type]
+    settings_given = {"pixel_size": PIXEL_SIZE, "noise": 2.5, **settings}
+    return Rods(width, height, x, y, np.full(len(x), radius), SpeckleSettings(**settings_given))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What is said of photographs before anything is followed in them, each fault on pictures that have it."""
+"""Quality of photographs before tracking: measurements, and each fault on photographs that have it."""
 
 from __future__ import annotations
 
@@ -13,55 +13,55 @@ from rodsight.tracking.picture_quality import PictureQuality, measure_pictures
 from rodsight.tracking.tracker import Tracker
 
 NOISE = 3.0  # [grey]
-GRAIN = 5.0  # [px]
+SPECKLE = 5.0  # [px]
 
 
-def pattern(grain: float, seed: int = 0, side: int = 480) -> np.ndarray:
+def speckle_pattern(speckle: float, seed: int = 0, side: int = 480) -> np.ndarray:
     """Gaussian noise smoothed to a pattern of grains so wide (full width at half maximum of its autocorrelation)."""
     white = np.random.default_rng(seed).standard_normal((side, side))
-    length = grain / (2.0 * np.sqrt(2.0 * np.log(2.0)))
+    length = speckle / (2.0 * np.sqrt(2.0 * np.log(2.0)))
     smooth = cv2.GaussianBlur(white, (0, 0), length / np.sqrt(2.0))
     return 120.0 + 35.0 * smooth / smooth.std()
 
 
-def taken(picture: np.ndarray, seed: int, noise: float = NOISE) -> np.ndarray:
+def add_noise(picture: np.ndarray, seed: int, noise: float = NOISE) -> np.ndarray:
     noisy = picture + noise * np.random.default_rng(100 + seed).standard_normal(picture.shape)
     return np.clip(np.rint(noisy), 0, 255).astype(np.float32)
 
 
-def series(change: Callable[[np.ndarray, int], np.ndarray] = lambda picture, _: picture) -> list[np.ndarray]:
-    picture = pattern(GRAIN)
-    return [taken(change(picture, k), k) for k in range(5)]
+def photograph_series(change: Callable[[np.ndarray, int], np.ndarray] = lambda picture, _: picture) -> list[np.ndarray]:
+    picture = speckle_pattern(SPECKLE)
+    return [add_noise(change(picture, k), k) for k in range(5)]
 
 
-def said(quality: PictureQuality) -> str:
+def faults_of(quality: PictureQuality) -> str:
     return " ".join(quality.faults())
 
 
-def test_good_photographs_are_measured_and_blamed_for_nothing():
-    quality = measure_pictures(series())
+def test_good_photographs_are_measured_and_have_no_faults():
+    quality = measure_pictures(photograph_series())
     assert quality.faults() == []
     assert quality.noise == pytest.approx(NOISE, rel=0.15)
-    assert quality.speckle[0] == pytest.approx(GRAIN, rel=0.15)
+    assert quality.speckle[0] == pytest.approx(SPECKLE, rel=0.15)
     assert quality.contrast[0] == pytest.approx(35.0, rel=0.15)
     assert "5." in quality.facts()[1]
     assert f"{quality.sigma:.2g} px" in quality.facts()[1]
 
 
-def test_the_stated_sigma_is_what_tracking_scatters_by():
+def test_the_expected_sigma_is_the_tracking_error():
     centre = np.stack(np.meshgrid(np.arange(60.0, 421.0, 60.0), np.arange(60.0, 421.0, 60.0)), axis=-1).reshape(-1, 2)
-    radius, picture = np.full(len(centre), 24.0), pattern(GRAIN)
-    first = taken(picture, 0, 6.0)
-    tracker = Tracker(first, _found(centre, radius))
+    radius, picture = np.full(len(centre), 24.0), speckle_pattern(SPECKLE)
+    first = add_noise(picture, 0, 6.0)
+    tracker = Tracker(first, _detection(centre, radius))
     error = []
     for k in range(1, 7):
-        pose = tracker.follow(taken(picture, k, 6.0), [tracker.first()])
+        pose = tracker.follow(add_noise(picture, k, 6.0), [tracker.first()])
         error.append(np.stack([pose.x, pose.y], axis=1) - centre)
-    spread = float(np.sqrt(np.mean(np.square(error))))
-    assert measure_pictures([first], centre, radius).sigma == pytest.approx(spread, rel=0.2)
+    error_sd = float(np.sqrt(np.mean(np.square(error))))
+    assert measure_pictures([first], centre, radius).sigma == pytest.approx(error_sd, rel=0.2)
 
 
-def _found(centre: np.ndarray, radius: np.ndarray):
+def _detection(centre: np.ndarray, radius: np.ndarray):
     n = len(radius)
     return Detection(centre[:, 0], centre[:, 1], radius, np.full(n, 0.01), np.ones(n))
 
@@ -72,34 +72,34 @@ def _found(centre: np.ndarray, radius: np.ndarray):
         (lambda p, k: p * (1.0 - 0.1 * k), "light changes by -40% until photograph 4"),
         (lambda p, k: p if k != 2 else 12.0 + 0.02 * p, "Photograph 2 has"),
         (lambda p, k: p if k != 3 else cv2.GaussianBlur(p, (0, 0), 2.5), "Photograph 3 is blurred"),
-        (lambda p, k: p + 110.0, "white as can be"),
-        (lambda p, _: 120.0 + 0.1 * (p - 120.0), "Hardly any pattern"),
+        (lambda p, k: p + 110.0, "are saturated"),
+        (lambda p, _: 120.0 + 0.1 * (p - 120.0), "hardly any pattern"),
     ],
 )
 def test_each_fault_is_named(change, words):
-    assert words in said(measure_pictures(series(change)))
+    assert words in faults_of(measure_pictures(photograph_series(change)))
 
 
-def test_discs_that_are_followed_by_their_rims_need_no_pattern():
-    plain = series(lambda p, k: (120.0 + 0.1 * (p - 120.0)) * (1.0 - 0.1 * k))
+def test_discs_tracked_by_their_rims_need_no_pattern():
+    plain = photograph_series(lambda p, k: (120.0 + 0.1 * (p - 120.0)) * (1.0 - 0.1 * k))
     quality = measure_pictures(plain, patterned=False)
     assert len(quality.facts()) == 1
-    assert "light changes" in said(quality)
-    assert "pattern" not in said(quality)
+    assert "light changes" in faults_of(quality)
+    assert "pattern" not in faults_of(quality)
 
 
 def test_too_fine_and_too_wide_a_pattern_is_named():
-    assert "finer than" in said(measure_pictures([taken(pattern(1.8), 0)]))
+    assert "finer than" in faults_of(measure_pictures([add_noise(speckle_pattern(1.8), 0)]))
     centre, radius = np.array([[100.0, 100.0], [300.0, 300.0]]), np.full(2, 24.0)
-    assert "so wide" in said(measure_pictures([taken(pattern(30.0), 0)], centre, radius))
-    assert said(measure_pictures([taken(pattern(6.0), 0)], centre, radius)) == ""
+    assert "so wide" in faults_of(measure_pictures([add_noise(speckle_pattern(30.0), 0)], centre, radius))
+    assert faults_of(measure_pictures([add_noise(speckle_pattern(6.0), 0)], centre, radius)) == ""
 
 
-def test_much_noise_is_coarse():
-    assert "is coarse" in said(measure_pictures([taken(pattern(GRAIN), 0, 40.0)]))
+def test_much_noise_is_named():
+    assert "is coarse" in faults_of(measure_pictures([add_noise(speckle_pattern(SPECKLE), 0, 40.0)]))
 
 
-def test_noise_is_seen_where_most_of_the_photograph_is_one_grey():
-    picture = taken(pattern(GRAIN), 0)
+def test_noise_is_estimated_where_most_of_the_photograph_is_one_grey():
+    picture = add_noise(speckle_pattern(SPECKLE), 0)
     picture[:, :300] = 90.0  # beyond a region, or black as can be
     assert image_noise(picture) == pytest.approx(NOISE, rel=0.2)

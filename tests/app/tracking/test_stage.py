@@ -1,4 +1,4 @@
-"""The tracking stage as a user meets it: tables that can be edited, walls followed, a lens, and a page to look at."""
+"""The tracking stage through the command line: editable tables, tracked walls, lens correction, and the report."""
 
 from __future__ import annotations
 
@@ -14,42 +14,42 @@ from rodsight.experiment.reading.tables import read_table
 from rodsight.tracks import Tracks, TrackStatus
 
 from tests.app.experiment.tables import edit
-from tests.app.tracking.photographed import Tracked, cut_walls, off_walls, track
+from tests.app.tracking.photographed import Tracked, keep_first_walls, track, wall_errors
 from tests.program import refuse
 
-SEEN_ALLOWED = 0.1 * 2.5e-4  # [m] rms, a tenth of a pixel: what outlines are exact to
+OUTLINE_ALLOWED = 0.1 * 2.5e-4  # [m] rms, a tenth of a pixel: what outlines are exact to
 WALL_ALLOWED = 5e-6  # [m] along the normal
 LENS = OpenCVLens(fx=900.0, fy=900.0, cx=260.0, cy=300.0, k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4)
 LENS_TABLE = "lens = { fx = 900, cx = 260, cy = 300, k1 = -0.12, k2 = 0.03, p1 = 4e-4, p2 = -3e-4 }\n"
 
 
-def test_walls_of_the_first_photograph_are_enough(followed: Tracked) -> None:
-    assert np.abs(off_walls(followed.walls.endpoints, followed.true_walls)).max() < WALL_ALLOWED
+def test_walls_of_the_first_photograph_suffice(followed: Tracked) -> None:
+    assert np.abs(wall_errors(followed.walls.endpoints, followed.true_walls)).max() < WALL_ALLOWED
     table = read_table(followed.out / "tracked_walls.csv", ("frame", "wall", "x1", "y1", "x2", "y2", "sigma1"))
     assert len(table) == followed.true_walls.shape[0] * 4
 
 
-def test_rows_of_later_frames_are_kept_when_walls_are_followed(partly_told: Tracked) -> None:
-    walls, top = partly_told.walls, partly_told.walls.name.index("top")
-    assert walls.endpoints[2, top] == pytest.approx(partly_told.true_walls[2, top])
+def test_rows_of_later_frames_are_kept_when_walls_are_followed(partly_given: Tracked) -> None:
+    walls, top = partly_given.walls, partly_given.walls.name.index("top")
+    assert walls.endpoints[2, top] == pytest.approx(partly_given.true_walls[2, top])
 
 
 def test_a_wall_without_marks_is_named(photographed: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    top = cut_walls(photographed)[0, 2]
+    top = keep_first_walls(photographed)[0, 2]
     for file in (photographed / "photos").iterdir():
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         image[: int(image.shape[0] - top[:, 1].min() / 2.5e-4) - 1] = 90
         cv2.imwrite(str(file), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
     with pytest.raises(SystemExit) as stop:
         main(["track", str(photographed), "--out", str(tmp_path / "out"), "--quiet"])
-    told = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert stop.value.code == 2
-    assert "walls.csv" in told
-    assert "'top'" in told
-    assert "patches of texture" in told
+    assert "walls.csv" in message
+    assert "'top'" in message
+    assert "patches of texture" in message
 
 
-def test_found_grains_can_be_edited_and_given_back(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
+def test_detected_grains_can_be_edited_and_used(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     first = plain.tracks
     with (plain.out / "detections.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -79,7 +79,7 @@ def test_corrections_are_honoured(plain: Tracked, photographed: Path, tmp_path: 
     assert tracks.rotation[1, 7] == pytest.approx(0.25)
     height = cv2.imread(str(next((photographed / "photos").iterdir())), 0).shape[0]
     assert tracks.position[1, 7] == pytest.approx([200.5 * 2.5e-4, (height - 1 - 210.25) * 2.5e-4])
-    # Afterwards both are found again where they are.
+    # In the next frame both are found again at their true places.
     assert np.abs(tracks.position[3] - first.position[3]).max() < 1e-6
 
 
@@ -99,18 +99,18 @@ def test_a_wrong_correction_is_named(
 ) -> None:
     (photographed / "corrections.csv").write_text(table)
     edit(photographed / "experiment.toml", "interval =", 'corrections = "corrections.csv"\ninterval =')
-    told = refuse(capsys, tmp_path / "out", "track", str(photographed))
+    message = refuse(capsys, tmp_path / "out", "track", str(photographed))
     for part in ["corrections.csv", *named]:
-        assert part in told
+        assert part in message
 
 
 @pytest.mark.screen  # many seconds of photographs
-def test_a_lens_is_taken_out_of_the_tracks(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
+def test_lens_distortion_is_removed_from_the_tracks(plain: Tracked, photographed: Path, tmp_path: Path) -> None:
     straight = plain.tracks.frames(0, 2)
     for file in sorted((photographed / "photos").iterdir()):
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         row, column = np.mgrid[: image.shape[0], : image.shape[1]].astype(np.float64)
-        # The bent picture shows at every pixel what the straight one has at the undistorted place.
+        # Every pixel of the distorted photograph shows the straight one at the undistorted place.
         source = LENS.undistort(np.stack([column, row], axis=-1)).astype(np.float32)
         bent = cv2.remap(image, source[..., 0], source[..., 1], cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REPLICATE)
         file.unlink()
@@ -118,16 +118,16 @@ def test_a_lens_is_taken_out_of_the_tracks(plain: Tracked, photographed: Path, t
     edit(photographed / "experiment.toml", "photos/*.jpg", "photos/*.png")
     ignored, _ = track(photographed, tmp_path / "ignored", "--frames", "0:2")
     edit(photographed / "experiment.toml", "interval =", LENS_TABLE + "interval =")
-    seen, _ = track(photographed, tmp_path / "seen", "--frames", "0:2")
+    corrected, _ = track(photographed, tmp_path / "seen", "--frames", "0:2")
 
     def error(tracks: Tracks) -> float:
         near = np.argmin(np.linalg.norm(tracks.position[0][None] - straight.position[0][:, None], axis=2), axis=1)
         assert tracks.grain_count == straight.grain_count
         return float(np.sqrt(np.nanmean((tracks.position[:, near] - straight.position) ** 2)))
 
-    # Outlines are ellipses here by a part of a per cent, which moves a measured centre by tenths of a pixel at most.
-    assert error(seen) < SEEN_ALLOWED
-    assert error(ignored) > 4 * SEEN_ALLOWED
+    # Outlines are ellipses by a fraction of a per cent, which displaces a centre by tenths of a pixel at most.
+    assert error(corrected) < OUTLINE_ALLOWED
+    assert error(ignored) > 4 * OUTLINE_ALLOWED
 
 
 def test_the_report_is_one_page_with_its_pictures_in_it(plain: Tracked) -> None:
@@ -137,7 +137,7 @@ def test_the_report_is_one_page_with_its_pictures_in_it(plain: Tracked) -> None:
     assert "http://" not in page.replace("http://www.w3.org", "")
     assert "https://" not in page
     for heading in (
-        "What was detected",
+        "Detected grains and walls",
         "Correlation over time",
         "Residual maps",
         "The worst grains",
@@ -162,13 +162,13 @@ def test_a_report_of_tables_is_refused(tracked: Path, tmp_path: Path, capsys: py
 def test_a_wrong_setting_of_tracking_is_named(
     photographed: Path, tmp_path: Path, capsys: pytest.CaptureFixture, setting: str, named: list[str]
 ) -> None:
-    told = refuse(capsys, tmp_path / "out", "track", str(photographed), "--set", setting)
+    message = refuse(capsys, tmp_path / "out", "track", str(photographed), "--set", setting)
     for part in ["experiment.toml", *named]:
-        assert part in told
+        assert part in message
 
 
 def test_walls_are_not_followed_without_photographs(
     tracked: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    told = refuse(capsys, tmp_path / "out", "track", str(tracked), "--set", "walls.track=true")
-    assert "walls.track = true" in told
+    message = refuse(capsys, tmp_path / "out", "track", str(tracked), "--set", "walls.track=true")
+    assert "walls.track = true" in message

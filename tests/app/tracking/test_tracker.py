@@ -1,4 +1,4 @@
-"""Following grains: how exactly, how far, and what is said when it fails."""
+"""Tracking of grains: accuracy, range, and the status of failures."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ BIAS_ALLOWED = 0.005  # [px], the aim for a method without pull towards whole or
 RMS_ALLOWED = 0.015  # [px]
 ROTATION_ALLOWED = 1e-3  # [rad]
 OCCLUDED_RMS_ALLOWED = 0.03  # [px] with 30 % of every patch covered
-WRONG = 0.5  # [px] off: another place, not an inexact one
+WRONG = 0.5  # [px] error of a wrong place, as distinct from an inaccurate one
 
 
 @pytest.fixture(scope="module")
 def rods() -> Rods:
-    return grid_of_rods(6, 6, radius=PATCH_RADIUS / TrackingSettings().patch_share, pitch=49.0, margin=90.0)
+    return grid_of_rods(6, 6, radius=PATCH_RADIUS / TrackingSettings().patch_fraction, pitch=49.0, margin=90.0)
 
 
 @pytest.fixture(scope="module")
@@ -72,25 +72,25 @@ def test_sigma_covers_the_error(rods: Rods, tracker: Tracker) -> None:
 
 
 def test_rotation_counts_from_x_towards_y(rods: Rods, tracker: Tracker) -> None:
-    turn = np.linspace(-0.3, 0.3, rods.count)
-    poses = tracker.follow(rods.moved(0.0, 0.0, turn), [tracker.first()])
-    assert np.sqrt(np.mean((poses.rotation - turn) ** 2)) < ROTATION_ALLOWED
+    rotation = np.linspace(-0.3, 0.3, rods.count)
+    poses = tracker.follow(rods.moved(0.0, 0.0, rotation), [tracker.first()])
+    assert np.sqrt(np.mean((poses.rotation - rotation) ** 2)) < ROTATION_ALLOWED
 
 
-def test_rotation_continues_beyond_half_a_turn(rods: Rods, tracker: Tracker) -> None:
+def test_rotation_continues_beyond_half_a_revolution(rods: Rods, tracker: Tracker) -> None:
     history = [tracker.first()]
-    for turn in (1.2, 2.4, 3.6, 4.8):
-        history.append(tracker.follow(rods.moved(0.0, 0.0, turn), history[-2:]))
-        assert np.abs(history[-1].rotation - turn).max() < 5 * ROTATION_ALLOWED
+    for rotation in (1.2, 2.4, 3.6, 4.8):
+        history.append(tracker.follow(rods.moved(0.0, 0.0, rotation), history[-2:]))
+        assert np.abs(history[-1].rotation - rotation).max() < 5 * ROTATION_ALLOWED
 
 
 @pytest.mark.parametrize(("dx", "dy"), [(40.0, 0.0), (-28.3, 28.3)])
 def test_jump_of_forty_pixels_with_sixty_degrees_loses_none(rods: Rods, tracker: Tracker, dx: float, dy: float) -> None:
-    turn = np.deg2rad(60.0) * np.where(np.arange(rods.count) % 2, 1.0, -1.0)
-    poses = tracker.follow(rods.moved(dx, dy, turn), [tracker.first()])
+    rotation = np.deg2rad(60.0) * np.where(np.arange(rods.count) % 2, 1.0, -1.0)
+    poses = tracker.follow(rods.moved(dx, dy, rotation), [tracker.first()])
     assert poses.has_pose.all()
     assert np.abs(errors(poses, rods, dx, dy)).max() < 0.05
-    assert np.abs(poses.rotation - turn).max() < 5 * ROTATION_ALLOWED
+    assert np.abs(poses.rotation - rotation).max() < 5 * ROTATION_ALLOWED
     assert (poses.status == TrackStatus.RESCUED).mean() > 0.5
 
 
@@ -105,7 +105,7 @@ def test_thirty_per_cent_covered_is_still_followed(rods: Rods, tracker: Tracker,
     assert np.sqrt((error**2).mean()) < OCCLUDED_RMS_ALLOWED
 
 
-def test_half_covered_gives_no_silent_wrong_pose(rods: Rods, tracker: Tracker) -> None:
+def test_half_covered_gives_no_unflagged_wrong_pose(rods: Rods, tracker: Tracker) -> None:
     image = rods.moved(12.0, 5.0, 0.4)
     cover(image, rods.x + 12.0, rods.y + 5.0, 0.5, 255.0)
     poses = tracker.follow(image, [tracker.first()])
@@ -117,8 +117,8 @@ def test_half_covered_gives_no_silent_wrong_pose(rods: Rods, tracker: Tracker) -
 def test_foreign_photograph_loses_every_grain(rods: Rods, tracker: Tracker, other: str) -> None:
     image = np.full((rods.height, rods.width), 100.0, np.float32)
     if other == "other paint":
-        still = np.zeros(rods.count)
-        image = rods.photograph(rods.x, rods.y, still, noise_seed=4, pattern_seed=77).astype(np.float32)
+        unmoved = np.zeros(rods.count)
+        image = rods.photograph(rods.x, rods.y, unmoved, noise_seed=4, pattern_seed=77).astype(np.float32)
     poses = tracker.follow(image, [tracker.first()])
     assert (poses.status == TrackStatus.LOST).all()
     assert not np.isfinite(poses.x).any()
@@ -126,9 +126,9 @@ def test_foreign_photograph_loses_every_grain(rods: Rods, tracker: Tracker, othe
 
 def test_lost_grains_are_found_again(rods: Rods, tracker: Tracker) -> None:
     first = tracker.first()
-    hidden = rods.moved(2.0, 0.0, 0.1)
-    cover(hidden, rods.x[:5] + 2.0, rods.y[:5], 1.0, 20.0)
-    second = tracker.follow(hidden, [first])
+    covered = rods.moved(2.0, 0.0, 0.1)
+    cover(covered, rods.x[:5] + 2.0, rods.y[:5], 1.0, 20.0)
+    second = tracker.follow(covered, [first])
     assert (second.status[:5] == TrackStatus.LOST).all()
     third = tracker.follow(rods.moved(4.0, 1.0, 0.2), [first, second])
     assert third.has_pose.all()
@@ -168,9 +168,9 @@ def test_sixteen_bits_are_used_to_the_full() -> None:
     assert rms[16] < 0.3 * rms[8]
 
 
-def test_number_of_workers_changes_nothing(rods: Rods) -> None:
-    turn = np.where(np.arange(rods.count) % 3, 0.1, 1.0)
-    image = rods.moved(3.0, 20.0, turn)
+def test_results_do_not_depend_on_the_number_of_workers(rods: Rods) -> None:
+    rotation = np.where(np.arange(rods.count) % 3, 0.1, 1.0)
+    image = rods.moved(3.0, 20.0, rotation)
     cover(image, rods.x[:9] + 3.0, rods.y[:9] + 20.0, 0.3, 255.0)
     found = []
     for workers in (1, 2):
@@ -181,7 +181,7 @@ def test_number_of_workers_changes_nothing(rods: Rods) -> None:
             assert getattr(found[0], name).tobytes() == getattr(other, name).tobytes()
 
 
-def test_resuming_from_stored_poses_changes_nothing(rods: Rods, tracker: Tracker) -> None:
+def test_resuming_from_stored_poses_is_bit_identical(rods: Rods, tracker: Tracker) -> None:
     history = [tracker.first()]
     images = [rods.moved(2.0 * k, -1.0 * k, 0.05 * k, noise_seed=20 + k) for k in (1, 2, 3)]
     for image in images:
@@ -201,12 +201,12 @@ def test_photograph_of_another_size_is_refused(rods: Rods, tracker: Tracker) -> 
         tracker.follow(rods.reference()[:-1], [tracker.first()])
 
 
-def cover(image: np.ndarray, x: np.ndarray, y: np.ndarray, share: float, grey: float) -> None:
-    """Cover a cap of every patch, from a side that differs from grain to grain, with one grey."""
+def cover(image: np.ndarray, x: np.ndarray, y: np.ndarray, fraction: float, grey: float) -> None:
+    """Cover a cap of every patch with one grey, on a side that differs from grain to grain."""
     angle = np.linspace(0.0, 2 * np.pi, 1001)
-    # Share of a unit disc beyond a chord at distance cos(half the angle it subtends).
+    # Fraction of a unit disc beyond a chord at distance cos(half the angle it subtends).
     cap = (angle - np.sin(angle)) / (2 * np.pi)
-    chord = PATCH_RADIUS * np.cos(0.5 * np.interp(share, cap, angle))
+    chord = PATCH_RADIUS * np.cos(0.5 * np.interp(fraction, cap, angle))
     row, column = np.mgrid[: image.shape[0], : image.shape[1]]
     for k in range(len(x)):
         dx, dy = column - x[k], row - y[k]

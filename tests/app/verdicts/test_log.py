@@ -1,16 +1,17 @@
-"""The log of verdicts: appended, never rewritten, safe against tabs, programs and crashes."""
+"""The log of verdicts: appended, never rewritten, safe against several tabs, programs and crashes."""
 
 import json
 import multiprocessing
 import threading
 
 import pytest
-from rodsight.errors import InputError
-from rodsight.verdicts.decisions import Bodies, decide, fingerprint
+from rodsight.process.errors import InputError
+from rodsight.process.frame_range import FrameRange
+from rodsight.verdicts.decisions import BodyNames, decide, fingerprint
 from rodsight.verdicts.log import Entry, Flag, Origin, Verdict, VerdictLog
 from rodsight.verdicts.table import export_verdicts, import_verdicts
 
-BODIES = Bodies((1, 2, 3, 7), ("top", "12"))
+BODIES = BodyNames((1, 2, 3, 7), ("top", "12"))
 
 
 def contact(frame=0, a=1, b=2, reviewer="anna", verdict=Verdict.CONTACT, **more):
@@ -22,7 +23,7 @@ def log(tmp_path):
     return VerdictLog(tmp_path / "verdicts.jsonl")
 
 
-def test_a_line_holds_all_that_was_said(log):
+def test_a_line_holds_the_whole_verdict(log):
     log.append(contact(frame=4, b="top", seconds=1.25, origin=Origin.CLICK, blind=True))
     line = json.loads(log.file.read_text())
     assert (line["frame"], line["a"], line["b"], line["verdict"]) == (4, 1, "top", "contact")
@@ -31,7 +32,7 @@ def test_a_line_holds_all_that_was_said(log):
     assert {"version", "line"} <= set(line)
 
 
-def test_nothing_is_ever_rewritten(log):
+def test_lines_are_only_appended(log):
     log.append(contact())
     before = log.file.read_bytes()
     log.append(contact(verdict=Verdict.NO_CONTACT))
@@ -41,14 +42,14 @@ def test_nothing_is_ever_rewritten(log):
     assert len(log.file.read_text().splitlines()) == 4
 
 
-def test_the_last_word_counts_from_either_side(log):
+def test_the_latest_verdict_counts_in_either_order_of_the_pair(log):
     log.append(contact(a=1, b=2))
     log.append(contact(a=2, b=1, verdict=Verdict.NO_CONTACT))
-    (said,) = log.last_words()
-    assert said.verdict is Verdict.NO_CONTACT
+    (entry,) = log.latest_entries()
+    assert entry.verdict is Verdict.NO_CONTACT
 
 
-def test_undo_takes_back_one_line_of_its_own_reviewer(log):
+def test_undo_reverts_one_line_of_its_own_reviewer(log):
     log.append(contact())
     log.append(contact(verdict=Verdict.UNSURE))
     log.append(contact(reviewer="ben"))
@@ -58,7 +59,7 @@ def test_undo_takes_back_one_line_of_its_own_reviewer(log):
     assert [entry.reviewer for entry in log.entries()] == ["ben"]
 
 
-def test_another_tab_is_heard_at_the_next_reading(log):
+def test_lines_of_another_tab_appear_at_the_next_access(log):
     other = VerdictLog(log.file)
     log.append(contact())
     assert len(other.entries()) == 1
@@ -66,16 +67,16 @@ def test_another_tab_is_heard_at_the_next_reading(log):
     assert len(log.entries()) == 2
 
 
-@pytest.mark.parametrize("torn", [b'{"frame": 1, "a": 1, "b"', b"\x00\x00\x00", "{“".encode()[:3]])
-def test_a_line_torn_by_a_crash_costs_itself_only(log, torn):
+@pytest.mark.parametrize("fragment", [b'{"frame": 1, "a": 1, "b"', b"\x00\x00\x00", "{“".encode()[:3]])
+def test_a_line_cut_by_a_crash_loses_no_other_line(log, fragment):
     log.append(contact())
     with log.file.open("ab") as stream:
-        stream.write(torn)
+        stream.write(fragment)
     fresh = VerdictLog(log.file)
     assert len(fresh.entries()) == 1
     fresh.append(contact(b=3))
     assert [entry.b for entry in VerdictLog(log.file).entries()] == [2, 3]
-    assert fresh.torn == 1
+    assert fresh.damaged_lines == 1
 
 
 def _write_many(file, name):
@@ -84,7 +85,7 @@ def _write_many(file, name):
         log.append(contact(frame=number, reviewer=name))
 
 
-def test_programs_that_write_at_once_mix_no_lines(log):
+def test_programs_that_write_at_the_same_time_do_not_mix_lines(log):
     start = multiprocessing.get_context("spawn")
     writers = [start.Process(target=_write_many, args=(log.file, f"reviewer {n}")) for n in range(3)]
     for writer in writers:
@@ -95,7 +96,7 @@ def test_programs_that_write_at_once_mix_no_lines(log):
     for each in [*writers, *threads]:
         each.join()
     assert len(log.entries()) == 6 * 40
-    assert log.torn == 0
+    assert log.damaged_lines == 0
 
 
 @pytest.mark.parametrize(
@@ -107,9 +108,9 @@ def test_a_wrong_value_is_named_with_its_line(log, change, named):
     line = json.loads(log.file.read_text()) | change
     with log.file.open("a") as stream:
         stream.write(json.dumps(line) + "\n")
-    with pytest.raises(InputError, match="line 2") as told:
+    with pytest.raises(InputError, match="line 2") as raised:
         VerdictLog(log.file).entries()
-    assert named in str(told.value)
+    assert named in str(raised.value)
 
 
 def test_the_majority_decides_and_a_tie_does_not(log):
@@ -119,7 +120,7 @@ def test_the_majority_decides_and_a_tie_does_not(log):
     log.append(contact(b=3, reviewer="ben", verdict=Verdict.NO_CONTACT))
     log.append(contact(b="top", verdict=Verdict.UNSURE))
     log.append(contact(b=7, verdict=Verdict.NO_CONTACT))
-    found = decide(log, BODIES, first_frame=0, frame_count=1)
+    found = decide(log, BODIES, frames=FrameRange(0), frame_count=1)
     assert found.contact == {(0, BODIES.key(0, 1))}
     assert found.no_contact == {(0, BODIES.key(0, 3))}
     assert found.disputed == {(0, BODIES.key(0, 2)), (0, BODIES.key(0, 4))}
@@ -127,12 +128,12 @@ def test_the_majority_decides_and_a_tie_does_not(log):
 
 def test_frames_count_from_the_first_of_the_run(log):
     log.append(contact(frame=7))
-    found = decide(log, BODIES, first_frame=5, frame_count=3)
+    found = decide(log, BODIES, frames=FrameRange(5), frame_count=3)
     assert found.contact == {(2, BODIES.key(0, 1))}
-    assert decide(log, BODIES, first_frame=8, frame_count=3).unknown == 1
+    assert decide(log, BODIES, frames=FrameRange(8), frame_count=3).unknown == 1
 
 
-def test_the_fingerprint_forgets_how_it_came_about(log):
+def test_the_fingerprint_depends_on_the_latest_verdicts_only(log):
     assert fingerprint(log) == ""
     log.append(contact(b=3, verdict=Verdict.UNSURE))
     assert fingerprint(log) == ""
@@ -144,23 +145,23 @@ def test_the_fingerprint_forgets_how_it_came_about(log):
     assert fingerprint(log) == first
 
 
-def test_verdicts_survive_the_way_out_and_in(log, tmp_path):
+def test_exported_verdicts_import_unchanged(log, tmp_path):
     log.append(contact(frame=1, a=3, b="12", verdict=Verdict.NO_CONTACT, seconds=2.5))
     log.append(contact(frame=0, a=7, b=2))
     assert export_verdicts(log, tmp_path / "out.csv") == 2
     again = VerdictLog(tmp_path / "again.jsonl")
-    assert import_verdicts(again, tmp_path / "out.csv", BODIES, "x", first_frame=0, frame_count=2) == 2
-    before = {(e.subject, e.verdict, e.reviewer, e.seconds, e.time) for e in log.last_words()}
-    assert {(e.subject, e.verdict, e.reviewer, e.seconds, e.time) for e in again.last_words()} == before
+    assert len(import_verdicts(again, tmp_path / "out.csv", BODIES, "x", first_frame=0, frame_count=2)) == 2
+    before = {(e.subject, e.verdict, e.reviewer, e.seconds, e.time) for e in log.latest_entries()}
+    assert {(e.subject, e.verdict, e.reviewer, e.seconds, e.time) for e in again.latest_entries()} == before
 
 
-def test_a_plain_list_of_contacts_counts_and_a_complete_one_says_no_to_the_rest(log, tmp_path):
+def test_a_complete_list_of_contacts_rejects_all_other_candidates(log, tmp_path):
     file = tmp_path / "list.csv"
     file.write_text("frame,i,j\n0,2,1\n0,3,top\n")
     pairs = {0: [(0, 1), (1, 2), (2, 4)], 1: [(0, 1)]}
-    assert import_verdicts(log, file, BODIES, "ben", first_frame=0, frame_count=2, candidates=pairs) == 3
-    said = {entry.subject[1:]: entry.verdict for entry in log.last_words()}
-    assert said == {(1, 2): Verdict.CONTACT, (3, "top"): Verdict.CONTACT, (2, 3): Verdict.NO_CONTACT}
+    assert len(import_verdicts(log, file, BODIES, "ben", first_frame=0, frame_count=2, candidates=pairs)) == 3
+    verdicts = {entry.subject[1:]: entry.verdict for entry in log.latest_entries()}
+    assert verdicts == {(1, 2): Verdict.CONTACT, (3, "top"): Verdict.CONTACT, (2, 3): Verdict.NO_CONTACT}
 
 
 @pytest.mark.parametrize(
@@ -176,7 +177,7 @@ def test_a_plain_list_of_contacts_counts_and_a_complete_one_says_no_to_the_rest(
 def test_a_wrong_row_is_named_and_nothing_is_written(log, tmp_path, row, named):
     file = tmp_path / "list.csv"
     file.write_text(f"frame,i,j\n0,2,1\n{row}\n")
-    with pytest.raises(InputError, match="row 3") as told:
+    with pytest.raises(InputError, match="row 3") as raised:
         import_verdicts(log, file, BODIES, "ben", first_frame=0, frame_count=2)
-    assert named in str(told.value)
+    assert named in str(raised.value)
     assert not log.file.exists()

@@ -1,13 +1,15 @@
-"""A workbench on a folder of photographs, asked without a network."""
+"""A workbench on a folder of photographs, requested without a network."""
 
 import shutil
 from pathlib import Path
 
 import pytest
 from rodsight.recording.viewing.gate import Gate
-from rodsight.workbench.service.bench import Bench
 from rodsight.workbench.service.server import make_application
+from rodsight.workbench.service.workbench import Workbench
 from starlette.testclient import TestClient
+
+from tests.app.workbench.spoiled_tracks import spoil
 
 PORT = 4711
 HOST = f"http://127.0.0.1:{PORT}"
@@ -16,24 +18,24 @@ HOST = f"http://127.0.0.1:{PORT}"
 class Visitor:
     """The page's half of the conversation."""
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench, self.gate = bench, Gate(PORT, "open")
-        self.client = TestClient(make_application(bench, self.gate), base_url=HOST, follow_redirects=False)
+    def __init__(self, workbench: Workbench) -> None:
+        self.workbench, self.gate = workbench, Gate(PORT, "open")
+        self.client = TestClient(make_application(workbench, self.gate), base_url=HOST, follow_redirects=False)
 
     def enter(self) -> "Visitor":
         assert self.client.get("/", params={"token": self.gate.token}).status_code == 303
         return self
 
-    def post(self, question: str, values: dict, **headers: str):
-        return self.client.post(f"/ask/{question}", json=values, headers={"Origin": HOST, **headers})
+    def post(self, endpoint: str, values: dict, **headers: str):
+        return self.client.post(f"/api/{endpoint}", json=values, headers={"Origin": HOST, **headers})
 
-    def ask(self, question: str, **values):
-        answer = self.post(question, values)
+    def request(self, endpoint: str, **values):
+        answer = self.post(endpoint, values)
         assert answer.status_code == 200, answer.text
         return answer.json()
 
-    def refused(self, question: str, **values) -> str:
-        answer = self.post(question, values)
+    def refused(self, endpoint: str, **values) -> str:
+        answer = self.post(endpoint, values)
         assert answer.status_code == 422, (answer.status_code, answer.text)
         return answer.text
 
@@ -50,4 +52,19 @@ def photographs_only(made_photographs: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def visitor(photographs_only: Path) -> Visitor:
-    return Visitor(Bench(photographs_only)).enter()
+    return Visitor(Workbench(photographs_only)).enter()
+
+
+@pytest.fixture(scope="session")
+def spoiled_once(made_photographs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an experiment, mine, and its spoiled tracks; not to be written to."""
+    root = tmp_path_factory.mktemp("spoiled")
+    shutil.copytree(made_photographs, root / "mine")
+    spoil(root)
+    return root
+
+
+@pytest.fixture
+def spoiled(spoiled_once: Path, tmp_path: Path) -> Path:
+    """A copy of it that a test may change."""
+    return Path(shutil.copytree(spoiled_once, tmp_path, dirs_exist_ok=True))

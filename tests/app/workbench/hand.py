@@ -1,4 +1,4 @@
-"""How a person's hand and eyes are played on the workbench's page."""
+"""Actions of a user on the workbench's page."""
 
 import threading
 from collections.abc import Iterator
@@ -6,14 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from playwright.sync_api import Page
-from rodsight.workbench.service.bench import Bench
 from rodsight.workbench.service.server import WorkbenchServer
+from rodsight.workbench.service.workbench import Workbench
 
 
 @contextmanager
 def opened(page: Page, folder: Path) -> Iterator[Page]:
     """The workbench of a folder in a page; no script of it may fail."""
-    server = WorkbenchServer(Bench(folder))
+    server = WorkbenchServer(Workbench(folder))
     thread = threading.Thread(target=server.serve, daemon=True)
     thread.start()
     page.set_viewport_size({"width": 1280, "height": 720})
@@ -29,9 +29,9 @@ def opened(page: Page, folder: Path) -> Iterator[Page]:
 
 
 def idle(tab: Page) -> None:
-    """Wait until the page has done what it was told, and the photograph has the size that the new step leaves it."""
-    tab.wait_for_function("() => globalThis.bench && bench.done > 0")
-    tab.evaluate("bench.busy.then(() => null)")
+    """Wait until the page has finished its actions, and the photograph has its size in the new step."""
+    tab.wait_for_function("() => globalThis.workbench && workbench.done > 0")
+    tab.evaluate("workbench.busy.then(() => null)")
     tab.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn(null))))")
 
 
@@ -49,7 +49,7 @@ def fill(tab: Page, field: str, text: str) -> None:
 def on_screen(tab: Page, place: tuple[float, float]) -> tuple[float, float]:
     """Where a pixel of the photograph is on the page."""
     x, y = tab.evaluate(
-        """(p) => { const box = bench.stage.canvas.getBoundingClientRect(), s = bench.stage.toScreen(p);
+        """(p) => { const box = workbench.stage.canvas.getBoundingClientRect(), s = workbench.stage.toScreen(p);
         return [s[0] + box.left, s[1] + box.top]; }""",
         list(place),
     )

@@ -1,4 +1,4 @@
-"""From a camera's folder to judged forces by mouse and keyboard alone, as somebody new would; every step is told.
+"""From a camera's folder to judged forces by mouse and keyboard alone, as a new user works; every step is logged.
 
 python -m tests.app.workbench.journey DIR     # pictures of every step, and what they took
 """
@@ -43,10 +43,10 @@ class Journey:
 
     def step(self, name: str, work: Callable[[], str | None]) -> None:
         since = time.monotonic()
-        told = work()
+        note = work()
         idle(self.tab)
         self.log.append(f"{time.monotonic() - self.began:6.1f} s  {time.monotonic() - since:5.1f} s  {name}"
-                        + (f": {told}" if told else ""))  # fmt: skip
+                        + (f": {note}" if note else ""))  # fmt: skip
         print(self.log[-1], flush=True)
         if self.pictures is not None:
             self.tab.wait_for_timeout(300)
@@ -73,7 +73,7 @@ class Journey:
     def look_at(self, place: tuple[float, float]) -> None:
         """Wheel in over a place, until a pixel of the photograph is large."""
         self.tab.mouse.move(*self.at(place))
-        while self.tab.evaluate("bench.stage.view.k") < NEAR:
+        while self.tab.evaluate("workbench.stage.view.k") < NEAR:
             self.tab.mouse.wheel(0, -300)
             self.tab.evaluate("new Promise((drawn) => requestAnimationFrame(() => drawn(null)))")
 
@@ -86,21 +86,21 @@ class Journey:
 
 
 def travel(journey: Journey) -> None:
-    """All of it; `finish` says how good it is."""
+    """The whole journey."""
     tab = journey.tab
     journey.step("the folder", lambda: None)
     journey.step("photographs", lambda: begin(journey))
     journey.step("scale", lambda: measure(journey))
     journey.step("walls", lambda: draw_bars(journey))
     journey.step("rods", lambda: find_rods(journey))
-    journey.step("rods mended", lambda: mend_rods(journey))
-    journey.step("material", lambda: tell_material(journey))
+    journey.step("rods corrected", lambda: correct_rods(journey))
+    journey.step("material", lambda: set_material(journey))
     journey.step("run", lambda: run(journey))
     journey.step("a lost rod", lambda: pick_lost(journey))
     journey.step("dragged to its place", lambda: drag_lost(journey))
     journey.step("kept", lambda: keep(journey))
     journey.step("run again", lambda: run(journey))
-    journey.step("mended", lambda: go(tab, "mend"))
+    journey.step("corrected", lambda: go(tab, "correct"))
     journey.step("a contact", lambda: look_at_contact(journey))
     journey.step("a verdict", lambda: judge(journey))
     journey.step("run with the verdict", lambda: run(journey))
@@ -121,11 +121,11 @@ def measure(journey: Journey) -> str:
     journey.drag((start[0] + 2.0, start[1] + 4.0), (end[0] - 2.0, end[1] + 4.0))
     for k, mark in enumerate((start, end)):
         journey.look_at(mark)
-        now = tab.evaluate(f"bench.step.drawn()[{k}]")
+        now = tab.evaluate(f"workbench.step.drawn()[{k}]")
         journey.drag(tuple(now), (mark[0], mark[1] + 4.0))
         journey.whole()
     fill(tab, "distance", f"{1e3 * RULER:g}")
-    found = tab.evaluate("bench.project.pixel")
+    found = tab.evaluate("workbench.project.pixel")
     return f"{1e3 * found:.5f} mm a pixel, {100.0 * (found / PIXEL - 1.0):+.3f} %"
 
 
@@ -139,7 +139,7 @@ def draw_bars(journey: Journey) -> str:
         start, end = line[0] + 14.0 * along + beside, line[1] - 14.0 * along + beside
         journey.drag(tuple(start.tolist()), tuple(end.tolist()))
     fill(tab, "pressure-top", "50")
-    return f"{', '.join(tab.evaluate('bench.project.walls.map((w) => w.name)'))}: {journey.mark('walls')}"
+    return f"{', '.join(tab.evaluate('workbench.project.walls.map((w) => w.name)'))}: {journey.mark('walls')}"
 
 
 def find_rods(journey: Journey) -> str:
@@ -149,13 +149,13 @@ def find_rods(journey: Journey) -> str:
     tab.click("#detect")
     idle(tab)
     missed, false = compare(journey)
-    return f"{tab.evaluate('bench.project.rods.id.length')} found, {len(missed)} missed, {len(false)} that are none"
+    return f"{tab.evaluate('workbench.project.rods.id.length')} found, {len(missed)} missed, {len(false)} that are none"
 
 
 def compare(journey: Journey) -> tuple[list[int], list[int]]:
     """Rods that are not found where they are, and rows of found ones that are none, or not as large."""
     made, tab = journey.made, journey.tab
-    rods = tab.evaluate("bench.project.rods")
+    rods = tab.evaluate("workbench.project.rods")
     found = np.column_stack([rods["x"], rods["y"], rods["r"]])
     true = np.column_stack([made.poses[0, :, :2], made.radius])
     off = np.hypot(*(true[:, None, :2] - found[None, :, :2]).transpose(2, 0, 1))
@@ -163,11 +163,11 @@ def compare(journey: Journey) -> tuple[list[int], list[int]]:
     return np.flatnonzero(~same.any(axis=1)).tolist(), np.flatnonzero(~same.any(axis=0)).tolist()
 
 
-def mend_rods(journey: Journey) -> str:
+def correct_rods(journey: Journey) -> str:
     """Wrong ones are chosen and deleted, missed ones clicked in their middle."""
     tab, made = journey.tab, journey.made
     missed, false = compare(journey)
-    rods = tab.evaluate("bench.project.rods")
+    rods = tab.evaluate("workbench.project.rods")
     for row in false:
         journey.click((rods["x"][row], rods["y"][row]))
         tab.keyboard.press("Delete")
@@ -179,7 +179,7 @@ def mend_rods(journey: Journey) -> str:
     return f"{len(false)} deleted, {len(missed)} added"
 
 
-def tell_material(journey: Journey) -> str:
+def set_material(journey: Journey) -> str:
     tab = journey.tab
     go(tab, "material")
     tab.get_by_role("button", name="aluminium").click()
@@ -201,30 +201,30 @@ def run(journey: Journey) -> str:
 
 
 def pick_lost(journey: Journey) -> str:
-    """To the photograph in which the rod is lost, by the key that finds doubts."""
+    """To the photograph in which the rod is lost, by the key for uncertain rods."""
     tab = journey.tab
-    go(tab, "mend")
-    expect(tab.locator("#next-doubtful")).to_be_visible()
+    go(tab, "correct")
+    expect(tab.locator("#next-uncertain")).to_be_visible()
     name = row_of(journey)
     lost = tracks_of(journey).present[:, name]
-    told = f"lost in {np.flatnonzero(~lost).tolist()}"
+    note = f"lost in {np.flatnonzero(~lost).tolist()}"
     for _ in range(40):
-        if tab.evaluate("[bench.frame, bench.step.chosen()]") == [HIDDEN, name]:
+        if tab.evaluate("[workbench.frame, workbench.step.chosen()]") == [HIDDEN, name]:
             break
         tab.keyboard.press("n")
         idle(tab)
-    assert tab.evaluate("bench.frame") == HIDDEN, told
-    return told
+    assert tab.evaluate("workbench.frame") == HIDDEN, note
+    return note
 
 
 def drag_lost(journey: Journey) -> str:
-    """To where it is seen, by hand: the lit face tells little."""
+    """To where it is seen, by hand: the face is overexposed."""
     tab, made = journey.tab, journey.made
-    ghost = tab.evaluate("bench.step.ghost()")
+    ghost = tab.evaluate("workbench.step.ghost()")
     x, y, _ = made.poses[HIDDEN, made.hidden]
     journey.drag((ghost[0], ghost[1]), (float(x) + 1.0, float(y) - 1.0))
     expect(tab.locator("#keep")).to_be_enabled()
-    return tab.locator("#mending").inner_text().replace("\n", " ")[:160]
+    return tab.locator("#correction").inner_text().replace("\n", " ")[:160]
 
 
 def keep(journey: Journey) -> str:
@@ -235,22 +235,20 @@ def keep(journey: Journey) -> str:
 
 def look_at_contact(journey: Journey) -> str:
     tab = journey.tab
-    go(tab, "inspect")
+    go(tab, "review")
     tab.wait_for_selector("#next")
     for _ in range(3):
-        tab.keyboard.press("ArrowLeft")
+        tab.keyboard.press("[")
     idle(tab)
-    tab.locator("#panel .list button").first.click()
-    idle(tab)
-    return tab.locator("#card b").first.inner_text()
+    return tab.locator("#bodies").inner_text()
 
 
 def judge(journey: Journey) -> str:
     tab = journey.tab
-    tab.fill("#who", "Anna")
+    tab.fill("#reviewer", "Anna")
     tab.keyboard.press("Enter")
     idle(tab)
-    pair, journey.judged = tab.evaluate("bench.step.chosen()"), tab.evaluate("bench.frame")
+    pair, journey.judged = tab.evaluate("review.pair"), tab.evaluate("workbench.frame")
     tab.locator("#canvas").focus()
     tab.keyboard.press("n")
     idle(tab)
@@ -259,11 +257,11 @@ def judge(journey: Journey) -> str:
 
 def see_change(journey: Journey) -> str:
     tab = journey.tab
-    go(tab, "inspect")
+    go(tab, "review")
     tab.wait_for_selector("#next")
     tab.locator("#judged button").first.click()
     idle(tab)
-    assert tab.evaluate("bench.frame") == journey.judged
+    assert tab.evaluate("workbench.frame") == journey.judged
     expect(tab.locator("#before-after")).to_be_visible()
     return tab.locator("#before-after").inner_text().replace("\n", " ")
 
@@ -280,7 +278,7 @@ def tracks_of(journey: Journey):
 
 def names_of(journey: Journey) -> np.ndarray:
     """The truth's id of every rod of the run, by where it is on the first photograph; −1: none."""
-    rods = journey.tab.evaluate("bench.project.rods")
+    rods = journey.tab.evaluate("workbench.project.rods")
     place, true = np.column_stack([rods["x"], rods["y"]]), journey.made.poses[0, :, :2]
     off = np.hypot(*(place[:, None] - true[None]).transpose(2, 0, 1))
     names = dict(zip(rods["id"], np.where(off.min(axis=1) < CLOSE, off.argmin(axis=1), -1).tolist(), strict=True))
@@ -296,7 +294,7 @@ def journey_r(journey: Journey) -> np.ndarray:
     """r(f_n) of every frame against the truth."""
     results = results_of(journey)
     truth = read_truth(
-        journey.made.truth / "truth_contacts.csv", names_of(journey), results.walls.name, first_frame=0,
+        journey.made.truth / "truth_contacts.csv", names_of(journey), results.walls.name,
         frame_count=len(results.frames),
     )  # fmt: skip
     return correlations(score(results, truth))

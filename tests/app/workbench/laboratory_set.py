@@ -1,4 +1,4 @@
-"""Photographs as a laboratory brings them: names that tell nothing, 16 bits, bolts around the box, a ruler, two rods
+"""Photographs as a laboratory brings them: names without meaning, 16 bits, bolts around the box, a ruler, two rods
 that are hard to see, and a reflection that hides one rod in some photographs. The truth is kept elsewhere."""
 
 from __future__ import annotations

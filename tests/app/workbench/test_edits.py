@@ -19,7 +19,7 @@ def disc():
     return (40.0 + 160.0 * np.clip(LARGE + 0.5 - np.hypot(column - MIDDLE, row - MIDDLE), 0.0, 1.0)).astype(np.float32)
 
 
-def told(*rods: tuple[float, float, float]):
+def validated(*rods: tuple[float, float, float]):
     columns = np.array(rods, dtype=np.float64).reshape(-1, 3).T
     return SimpleNamespace(
         data={"photographs": {"radii": CLASSES}},
@@ -29,12 +29,12 @@ def told(*rods: tuple[float, float, float]):
 
 
 def test_a_rod_has_the_radius_whose_rim_is_seen(disc):
-    x, y, radius = fit_rod(disc, told(), MIDDLE + 1.0, MIDDLE - 1.0, SMALL)  # type: ignore[arg-type]
+    x, y, radius = fit_rod(disc, validated(), MIDDLE + 1.0, MIDDLE - 1.0, SMALL)  # type: ignore[arg-type]
     assert (x, y, radius) == pytest.approx((MIDDLE, MIDDLE, LARGE), abs=0.1)
 
 
 @pytest.mark.parametrize(("gap", "expected"), [(SMALL, SMALL), (LARGE - 2.0, LARGE)])
 def test_a_rod_that_is_added_leaves_its_neighbours_room(disc, gap, expected):
     """What is seen farther out is the rim of something else."""
-    found = told((MIDDLE + gap + 30.0, MIDDLE, 30.0))
+    found = validated((MIDDLE + gap + 30.0, MIDDLE, 30.0))
     assert fit_rod(disc, found, MIDDLE, MIDDLE, LARGE)[2] == pytest.approx(expected, abs=0.1)  # type: ignore[arg-type]

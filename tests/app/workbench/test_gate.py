@@ -1,9 +1,9 @@
-"""Strangers get nothing from the workbench, and every answer carries the safe headers."""
+"""Requests without the cookie get nothing from the workbench; every answer carries the safe headers."""
 
 import os
 
 import pytest
-from rodsight.workbench.service.bench import Bench
+from rodsight.workbench.service.workbench import Workbench
 from rodsight.workbench.setup.draft import Draft
 from starlette.testclient import TestClient
 
@@ -11,13 +11,13 @@ from .conftest import HOST, Visitor
 
 
 @pytest.fixture
-def stranger(tmp_path):
-    return Visitor(Bench(tmp_path))
+def outsider(tmp_path):
+    return Visitor(Workbench(tmp_path))
 
 
 @pytest.fixture
-def stranger_to():
-    """Somebody without a cookie at the doors of a visitor's server."""
+def outside_client():
+    """A client of the same server without a cookie."""
     return lambda visitor: TestClient(visitor.client.app, base_url=HOST)
 
 
@@ -32,16 +32,16 @@ def stranger_to():
         "/recording/guess/mine/recording.rrd",
     ],
 )
-def test_without_the_cookie_nothing_is_served(stranger, path):
-    assert stranger.client.get(path).status_code == 403
+def test_without_the_cookie_nothing_is_served(outsider, path):
+    assert outsider.client.get(path).status_code == 403
 
 
-def test_the_token_opens_once_it_is_right(stranger):
-    assert stranger.client.get("/", params={"token": "guess"}).status_code == 403
-    cookie = stranger.client.get("/", params={"token": stranger.gate.token}).headers["Set-Cookie"]
+def test_the_token_opens_once_it_is_right(outsider):
+    assert outsider.client.get("/", params={"token": "guess"}).status_code == 403
+    cookie = outsider.client.get("/", params={"token": outsider.gate.token}).headers["Set-Cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
-    assert stranger.client.get("/").status_code == 200
+    assert outsider.client.get("/").status_code == 200
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_the_token_opens_once_it_is_right(stranger):
     [{"Origin": "http://evil.example"}, {"Host": "evil.example"}, {"Sec-Fetch-Site": "cross-site"},
      {"Content-Type": "text/plain"}],
 )  # fmt: skip
-def test_a_page_elsewhere_may_ask_nothing(visitor, headers):
+def test_requests_of_another_page_are_refused(visitor, headers):
     assert visitor.post("home", {}, **headers).status_code == 403
 
 
@@ -61,8 +61,8 @@ def test_a_header_that_stands_twice_is_refused(visitor, name):
     assert "twice" in answer.text
 
 
-def test_a_question_needs_an_origin(visitor):
-    assert visitor.client.post("/ask/home", json={}).status_code == 403
+def test_a_request_needs_an_origin(visitor):
+    assert visitor.client.post("/api/home", json={}).status_code == 403
 
 
 def test_every_answer_carries_the_policy(visitor):
@@ -76,39 +76,42 @@ def test_every_answer_carries_the_policy(visitor):
 def test_the_root_itself_may_be_the_experiment(photographs_only):
     folder = photographs_only / "my photographs"
     Draft(folder).set_keys("all", {"name": "mine", "photographs.files": "pictures/*.jpg"})
-    visitor = Visitor(Bench(folder)).enter()
+    visitor = Visitor(Workbench(folder)).enter()
     (folder / "runs" / "mine").mkdir(parents=True)
     (folder / "runs" / "mine" / "recording.rrd").write_bytes(b"what was recorded")
-    (address,) = visitor.ask("recording", at=".")["addresses"]
-    assert "/./" not in address  # a browser asks without it
+    (address,) = visitor.request("recording", at=".")["addresses"]
+    assert "/./" not in address  # a browser requests it without
     assert visitor.client.get(address).content == b"what was recorded"
 
 
-def test_a_recording_is_given_under_its_secret_name_alone(visitor, stranger_to, photographs_only):
-    at = visitor.ask("begin", roll=0, name="mine")["at"]
+def test_a_recording_is_given_under_its_secret_name_alone(visitor, outside_client, photographs_only):
+    at = visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")["at"]
     assert "no recording" in visitor.refused("recording", at=at)
     run = photographs_only / "runs" / "mine"
     run.mkdir(parents=True)
     (run / "recording.rrd").write_bytes(b"what was recorded")
-    told = visitor.ask("recording", at=at)
-    (address,) = told["addresses"]
-    assert visitor.bench.key in address
-    answer = stranger_to(visitor).get(address)  # as the viewer asks: without the page's cookie
+    described = visitor.request("recording", at=at)
+    (address,) = described["addresses"]
+    assert visitor.workbench.key in address
+    answer = outside_client(visitor).get(address)  # the viewer's request carries no cookie
     assert answer.content == b"what was recorded"
     assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
-    wrong = "A" if visitor.bench.key[0] != "A" else "B"
+    wrong = "A" if visitor.workbench.key[0] != "A" else "B"
     assert (
-        stranger_to(visitor).get(address.replace(visitor.bench.key, wrong + visitor.bench.key[1:])).status_code == 403
+        outside_client(visitor)
+        .get(address.replace(visitor.workbench.key, wrong + visitor.workbench.key[1:]))
+        .status_code
+        == 403
     )
-    assert stranger_to(visitor).get(address, headers={"Host": "evil.example"}).status_code == 403
-    assert stranger_to(visitor).get(address.replace("recording.rrd", "tracks.h5")).status_code == 404
+    assert outside_client(visitor).get(address, headers={"Host": "evil.example"}).status_code == 403
+    assert outside_client(visitor).get(address.replace("recording.rrd", "tracks.h5")).status_code == 404
     above = address.replace("/my%20photographs/", "/..%2f../")
-    assert stranger_to(visitor).get(above).status_code in (404, 422)
+    assert outside_client(visitor).get(above).status_code in (404, 422)
 
 
-def test_what_is_shared_is_told_and_kept_by_the_browser(visitor, photographs_only):
-    at = visitor.ask("begin", roll=0, name="mine")["at"]
-    assert visitor.ask("shared", at=at) == {"file": None, "ready": False}
+def test_the_shared_file_is_described_and_downloaded(visitor, photographs_only):
+    at = visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")["at"]
+    assert visitor.request("shared", at=at) == {"file": None, "ready": False}
     assert "no recording" in visitor.refused("share", at=at)
     assert visitor.client.get("/shared", params={"at": at}).status_code == 404
     run = photographs_only / "runs" / "mine"
@@ -117,10 +120,10 @@ def test_what_is_shared_is_told_and_kept_by_the_browser(visitor, photographs_onl
     page.write_text("a page with the viewer in it")
     recording.write_bytes(b"")
     os.utime(recording, (1e9, 1e9))
-    told = visitor.ask("shared", at=at)
-    assert (told["file"], told["bytes"], told["old"]) == (str(page), page.stat().st_size, False)
+    described = visitor.request("shared", at=at)
+    assert (described["file"], described["bytes"], described["old"]) == (str(page), page.stat().st_size, False)
     os.utime(page, (5e8, 5e8))
-    assert visitor.ask("shared", at=at)["old"]
+    assert visitor.request("shared", at=at)["old"]
     answer = visitor.client.get("/shared", params={"at": at})
     assert answer.headers["Content-Disposition"].startswith("attachment")
     assert answer.text == "a page with the viewer in it"
@@ -147,30 +150,30 @@ def test_an_experiment_beside_the_folder_is_none(tmp_path):
     for name in ("opened", "beside"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "experiment.toml").write_text('name = "x"\n')
-    visitor = Visitor(Bench(tmp_path / "opened")).enter()
+    visitor = Visitor(Workbench(tmp_path / "opened")).enter()
     assert visitor.post("project", {"at": "."}).status_code == 200
     assert "is no experiment" in visitor.refused("project", at="../beside")
 
 
 @pytest.mark.parametrize(
-    ("question", "values"),
-    [("nothing", {}), ("project", {}), ("project", {"at": 3}), ("begin", {"roll": -1, "name": "x"}),
-     ("home", {"bench": 1}), ("set_scale", {"at": ".", "pixel_size": "1e-4"})],
+    ("endpoint", "values"),
+    [("nothing", {}), ("project", {}), ("project", {"at": 3}), ("begin", {"series": -1, "name": "x"}),
+     ("home", {"workbench": 1}), ("set_scale", {"at": ".", "pixel_size": "1e-4"})],
 )  # fmt: skip
-def test_a_malformed_question_is_refused(visitor, question, values):
-    assert visitor.post(question, values).status_code == 400
+def test_a_malformed_request_is_refused(visitor, endpoint, values):
+    assert visitor.post(endpoint, values).status_code == 400
 
 
 @pytest.mark.parametrize("body", ["[" * 90_000, '{"at": ' * 9000, "9" * 5000, '{"at": ' + "9" * 5000 + "}", "\x00", ""])
-def test_what_is_no_question_is_refused(tmp_path, body):
-    visitor = Visitor(Bench(tmp_path)).enter()
+def test_a_body_that_is_no_object_is_refused(tmp_path, body):
+    visitor = Visitor(Workbench(tmp_path)).enter()
     headers = {"Origin": HOST, "Content-Type": "application/json"}
-    assert visitor.client.post("/ask/home", content=body.encode(), headers=headers).status_code == 400
+    assert visitor.client.post("/api/home", content=body.encode(), headers=headers).status_code == 400
 
 
-def test_a_long_question_is_refused(visitor):
+def test_a_long_request_is_refused(visitor):
     body = b'{"at": "' + b"x" * 300_000 + b'"}'
     answer = visitor.client.post(
-        "/ask/home", content=body, headers={"Origin": HOST, "Content-Type": "application/json"}
+        "/api/home", content=body, headers={"Origin": HOST, "Content-Type": "application/json"}
     )
     assert answer.status_code == 413

@@ -13,17 +13,19 @@ def folder(photographs_only):
     return photographs_only / "my photographs"
 
 
-def test_what_is_wrong_is_told_in_one_line_and_leaves_nothing(folder, capsys):
+def test_a_wrong_value_gives_one_line_and_leaves_nothing(folder, capsys):
     flags = ("--photographs", "pictures/*.jpg", "--interval", "30", "--pixel-size", "2.5e-4")
     for wrong, named in (
         (("--pixel-size", "-1"), "pixel_size"), (("--photographs", "none/*.jpg"), "no file matches"),
         (("--friction", "slippery"), "material.friction"), (("--pressure", "top"), "WALL=PASCAL"),
         (("--radii", "7mm"), "--radii"), (("--interval", "0"), "interval"),
+        (("--region", "1,2,3"), "--region"), (("--radius-range", "60:40"), "--radius-range"),
+        (("--region", "30,30,20,20"), "region value"),
     ):  # fmt: skip
         assert rodsight("init", folder, *flags, *wrong) == 2, wrong
-        told = capsys.readouterr().err
-        assert named in told
-        assert told.count("\n") == 1
+        message = capsys.readouterr().err
+        assert named in message
+        assert message.count("\n") == 1
         assert [each.name for each in folder.iterdir()] == ["pictures"], wrong
 
 
@@ -36,7 +38,7 @@ def test_an_experiment_that_is_there_is_not_overwritten(folder, capsys):
 
 
 @pytest.mark.screen
-def test_flags_make_an_experiment_and_a_picture_of_what_was_understood(folder, made_photographs):
+def test_flags_make_an_experiment_and_a_picture(folder, made_photographs):
     section = load_experiment(made_photographs).config.photographs
     radii = ",".join(str(radius) for radius in section.radii)
     status = rodsight(
@@ -51,3 +53,49 @@ def test_flags_make_an_experiment_and_a_picture_of_what_was_understood(folder, m
     picture = cv2.imread(str(folder / "understood.png"))
     colourful = np.ptp(picture.astype(int), axis=2) > 60
     assert colourful.mean() > 0.01
+
+
+def discs(folder, columns: int = 6, rows: int = 5, radius: float = 24.0) -> None:
+    """Three photographs of discs that stand out in the red channel only, in a hexagonal packing."""
+    y, x = np.mgrid[: int(2 * radius * rows + 40), : int(2 * radius * (columns + 1) + 40)]
+    red = np.full(x.shape, 40.0)
+    for row in range(rows):
+        for column in range(columns):
+            at = 20 + radius * (1 + 2 * column + row % 2), 20 + radius * (1 + row * np.sqrt(3.0))
+            depth = radius - 1.5 - np.hypot(x - at[0], y - at[1])
+            red = np.maximum(red, 40.0 + 160.0 * np.clip(depth + 0.5, 0.0, 1.0))
+    picture = np.stack([np.full(x.shape, 90.0), np.full(x.shape, 90.0), red], axis=2)
+    noise = np.random.default_rng(0).normal(0.0, 2.0, picture.shape)
+    (folder / "shots").mkdir(parents=True)
+    for k in range(3):
+        cv2.imwrite(str(folder / f"shots/{k}.png"), np.clip(picture + noise, 0, 255).astype(np.uint8))
+
+
+def test_channel_region_outline_and_range_of_radii_are_used(tmp_path, capsys):
+    discs(tmp_path)
+    flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--quiet")
+    region = "0,0,330,279"
+    assert rodsight(
+        "init", tmp_path, *flags, "--channel", "red", "--region", region, "--follow", "outline",
+        "--radius-range", "18:30", "--walls", "none",
+    ) == 0  # fmt: skip
+    section = load_experiment(tmp_path).config.photographs
+    assert (section.channel, section.follow, section.region) == ("red", "outline", (0, 0, 330, 279))
+    rows = (tmp_path / "grains.csv").read_text().splitlines()[1:]
+    assert 26 <= len(rows) <= 30
+    assert {round(float(row.split(",")[3])) for row in rows} <= {21, 22, 23}
+
+
+def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, monkeypatch):
+    discs(tmp_path)
+    lines = np.array([
+        [[20.0, 262.0], [340.0, 262.0]], [[334.0, 262.0], [334.0, 18.0]], [[334.0, 18.0], [20.0, 18.0]],
+        [[20.0, 18.0], [150.0, 262.0]],
+    ])  # fmt: skip
+    monkeypatch.setattr("rodsight.workbench.setup.edits.find_walls", lambda *_: lines)
+    flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--channel", "red")
+    assert rodsight("init", tmp_path, *flags, "--radius-range", "18:30") == 0
+    printed = capsys.readouterr().out.replace("\n", " ")
+    assert "'left' is left out, since it would cut through" in printed
+    assert "left" not in (tmp_path / "walls.csv").read_text()
+    assert "bottom" in (tmp_path / "walls.csv").read_text()

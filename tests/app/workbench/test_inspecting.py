@@ -1,15 +1,18 @@
-"""Stored numbers are shown as they are stored, and verdicts go to the log that the solver obeys."""
+"""Stored numbers are shown as they are stored, and verdicts go to the log that the solver applies."""
 
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rodsight.process.frame_range import FrameRange
+from rodsight.recording.look.colours import FORCE_RAMP
+from rodsight.recording.look.force_style import THICKEST, THINNEST, ForceRange
 from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
-from rodsight.verdicts.decisions import Bodies, decide
+from rodsight.verdicts.decisions import BodyNames, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
-from rodsight.workbench.inspecting.found import run_stamp
+from rodsight.workbench.inspecting.run_data import run_stamp
 
 from tests.golden.stored import unpack
 
@@ -21,187 +24,196 @@ SHOWN = FIRST + FRAME  # the photograph of that frame
 @pytest.fixture
 def solved(visitor, photographs_only):
     """A visitor, where the experiment is, its results and their folder."""
-    at = visitor.ask("begin", roll=0, name="mine")["at"]
-    visitor.ask("set_photographs", at=at, interval=30.0)
-    visitor.ask("set_scale", at=at, pixel_size=2.5e-4)
+    at = visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")["at"]
+    visitor.request("set_photographs", at=at, interval=30.0)
+    visitor.request("set_scale", at=at, pixel_size=2.5e-4)
     folder = photographs_only / "runs" / "mine"
     folder.mkdir(parents=True)
     return visitor, at, load_results(unpack(2, folder)), folder
 
 
+def view(**values):
+    return {"reviewer": "anna", "frame": SHOWN, **values}
+
+
+def judge(visitor, at, pair, verdict, reviewer="anna"):
+    named = {"frame": SHOWN, "i": pair["i"], "j": pair["j"]}
+    visitor.request("judge", at=at, view=view(reviewer=reviewer), pair=named, verdict=verdict, seconds=2.5)
+
+
 def test_the_network_of_a_frame_is_what_is_stored(solved):
     visitor, at, results, _ = solved
-    told = visitor.ask("network", at=at, frame=SHOWN)
+    answer = visitor.request("network", at=at, frame=SHOWN)
     forces = results.frames[FRAME]
-    np.testing.assert_allclose(told["fn"], forces.fn, rtol=1e-4)
-    np.testing.assert_allclose(np.array(told["ft"]), forces.ft, rtol=1e-4, atol=1e-9)
-    assert told["status"] == forces.status.name.lower()
-    assert told["i"] == results.tracks.id[forces.contacts.i].tolist()
+    np.testing.assert_allclose(answer["fn"], forces.fn, rtol=1e-4)
+    np.testing.assert_allclose(np.array(answer["ft"]), forces.ft, rtol=1e-4, atol=1e-9)
+    assert answer["status"] == forces.status.name.lower()
+    assert answer["i"] == results.tracks.id[forces.contacts.i].tolist()
     wall = forces.contacts.with_wall.nonzero()[0][0]
-    assert told["j"][wall] == results.walls.name[forces.contacts.j[wall] - results.grains.count]
-    x1, y1, x2, y2 = told["line"][0]
+    assert answer["j"][wall] == results.walls.name[forces.contacts.j[wall] - results.grains.count]
+    x1, y1, x2, y2 = answer["line"][0]
     length = 2.5e-4 * np.hypot(x2 - x1, y2 - y1)
     pair = forces.contacts.i[0], forces.contacts.j[0]
     assert length == pytest.approx(results.grains.radius[list(pair)].sum(), rel=0.02)  # the calibrated pixel
 
 
-def test_frames_are_told_with_their_status_and_what_is_lost(solved):
+def test_frames_have_their_status_and_lost_rods(solved):
     visitor, at, results, _ = solved
-    told = visitor.ask("run_told", at=at)["frames"]
-    assert (told["first"], told["count"]) == (FIRST, FIRST + len(results.frames))
-    assert told["status"] == [None] * FIRST + [frame.status.name.lower() for frame in results.frames]
-    assert not told["provisional"]
+    answer = visitor.request("run_state", at=at)["frames"]
+    assert (answer["first"], answer["count"]) == (FIRST, FIRST + len(results.frames))
+    assert answer["status"] == [None] * FIRST + [frame.status.name.lower() for frame in results.frames]
+    assert not answer["provisional"]
 
 
-def test_a_pair_is_told_over_all_frames(solved):
+def test_a_pair_is_described_in_all_frames(solved):
     visitor, at, results, _ = solved
     contacts = results.frames[FRAME].contacts
     i, j = (int(results.tracks.id[row]) for row in (contacts.i[0], contacts.j[0]))
-    told = visitor.ask("pair", at=at, i=i, j=j)
-    assert told["gap"][SHOWN] == pytest.approx(contacts.gap[0], rel=1e-3, abs=1e-9)
-    assert told["fn"][SHOWN] == pytest.approx(results.frames[FRAME].fn[0], rel=1e-4)
-    assert len(told["gap_sd"]) == FIRST + len(results.frames)
+    answer = visitor.request("pair", at=at, i=i, j=j)
+    assert answer["gap"][SHOWN] == pytest.approx(contacts.gap[0], rel=1e-3, abs=1e-9)
+    assert answer["fn"][SHOWN] == pytest.approx(results.frames[FRAME].fn[0], rel=1e-4)
+    assert len(answer["gap_sd"]) == FIRST + len(results.frames)
     assert visitor.post("pair", {"at": at, "i": i, "j": "nowhere"}).status_code == 400
 
 
-def test_those_pairs_come_first_on_which_most_hangs(solved):
+def test_pairs_are_ordered_by_influence_times_ambiguity(solved):
     visitor, at, _, _ = solved
-    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"]
-    stake = [each["stake"] for each in told]
-    assert stake == sorted(stake, reverse=True)
-    first = told[0]
-    doubt = 1.0 - abs(2.0 * first["probability"] - 1.0)
+    answer = visitor.request("candidate_pairs", at=at, view=view())["pairs"]
+    priority = [each["priority"] for each in answer]
+    assert priority == sorted(priority, reverse=True)
+    first = answer[0]
+    ambiguity = 1.0 - abs(2.0 * first["probability"] - 1.0)
     if first["fn"] is not None:
-        assert first["stake"] == pytest.approx(doubt * first["fn"], rel=1e-3)
+        assert first["priority"] == pytest.approx(ambiguity * first["fn"], rel=1e-3)
 
 
-def test_a_verdict_reaches_the_solver_and_is_taken_back(solved):
+def test_a_verdict_reaches_the_solver_and_is_undone(solved):
     visitor, at, results, folder = solved
-    first = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"][0]
+    first = visitor.request("candidate_pairs", at=at, view=view())["pairs"][0]
     i, j = first["i"], first["j"]
-    visitor.ask("judge", at=at, frame=SHOWN, i=j, j=i, verdict="no contact", reviewer=" anna ", seconds=2.5)
-    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")
-    assert told["judged"] == 1
-    assert [(each["i"], each["j"]) for each in told["pairs"] if each["verdict"] == "no contact"] == [(i, j)]
-    bodies = Bodies.of(results.tracks, results.walls)
+    judge(visitor, at, {"i": j, "j": i}, "no contact", " anna ")
+    answer = visitor.request("candidate_pairs", at=at, view=view())
+    assert answer["judged"] == 1
+    assert [(each["i"], each["j"]) for each in answer["pairs"] if each["verdict"] == "no contact"] == [(i, j)]
+    bodies = BodyNames.of(results.tracks, results.walls)
     log = VerdictLog(folder / VERDICTS)
     origin = read_origin(folder / RESULTS)
     assert origin is not None
     first_frame = origin.frames[0]
-    decided = decide(log, bodies, first_frame=first_frame, frame_count=len(results.frames)).for_solver()
+    decided = decide(log, bodies, frames=FrameRange(first_frame), frame_count=len(results.frames)).for_solver()
     rows = bodies.rows()
     assert decided[FRAME].forbidden.tolist() == [bodies.key(*sorted((rows[i], rows[j])))]
-    assert visitor.ask("unjudge", at=at, reviewer="anna")["undone"] == "no contact"
-    assert visitor.ask("unjudge", at=at, reviewer="anna")["undone"] is None
-    decided = decide(log, bodies, first_frame=first_frame, frame_count=len(results.frames))
+    assert visitor.request("undo_verdict", at=at, view=view())["undone"] == "no contact"
+    assert visitor.request("undo_verdict", at=at, view=view())["undone"] is None
+    decided = decide(log, bodies, frames=FrameRange(first_frame), frame_count=len(results.frames))
     assert decided.count == 0
 
 
-def test_what_is_no_pair_cannot_be_judged(solved):
+def test_an_unknown_pair_cannot_be_judged(solved):
     visitor, at, results, folder = solved
     name = int(results.tracks.id[0])
     other = int(results.tracks.id[1])
     for i, j, verdict in ((name, name, "contact"), (name, 10**6, "contact"), (name, other, "maybe")):
-        values = {"at": at, "frame": SHOWN, "i": i, "j": j, "verdict": verdict, "reviewer": "anna"}
+        values = {"at": at, "view": view(), "pair": {"frame": SHOWN, "i": i, "j": j}, "verdict": verdict}
         assert visitor.post("judge", values).status_code == 400
     assert not (folder / VERDICTS).exists()
 
 
 def test_a_crop_is_a_picture(solved):
     visitor, at, _, _ = solved
-    answer = visitor.client.get("/crop", params={"at": at, "frame": 1, "x": 12050, "y": 13000, "width": 60})
+    answer = visitor.client.get("/crop", params={"at": at, "frame": 1, "x": 120.5, "y": 130.0, "width": 60})
     assert answer.headers["Content-Type"] == "image/jpeg"
-    assert visitor.client.get("/crop", params={"at": at, "frame": 1, "x": 1, "y": 1, "width": 1}).status_code == 422
+    assert visitor.client.get("/crop", params={"at": at, "frame": 1, "x": 1, "y": 1, "width": 1}).status_code == 400
 
 
 def test_forces_without_a_contact_differ_and_nothing_is_written(solved):
     visitor, at, results, folder = solved
     before = sorted(file.name for file in folder.iterdir())
-    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"]
-    pair = max((each for each in told if each["fn"]), key=lambda each: each["fn"])
-    answer = visitor.ask("without", at=at, frame=SHOWN, i=pair["i"], j=pair["j"])
+    answer = visitor.request("candidate_pairs", at=at, view=view())["pairs"]
+    pair = max((each for each in answer if each["fn"]), key=lambda each: each["fn"])
+    answer = visitor.request("without_contact", at=at, frame=SHOWN, i=pair["i"], j=pair["j"])
     assert min(answer["fn"]) >= 0.0 or min(answer["fn"]) == min(results.frames[FRAME].fn)
     gone = np.flatnonzero(np.array(answer["fn"]) == 0.0)
     assert len(gone) >= 1
     assert sorted(file.name for file in folder.iterdir()) == before
-    assert "no contact" in visitor.refused("without", at=at, frame=SHOWN, i=pair["i"], j=pair["i"])
+    assert "no contact" in visitor.refused("without_contact", at=at, frame=SHOWN, i=pair["i"], j=pair["i"])
 
 
-def test_eyes_are_compared_with_one_another_and_with_the_program(solved):
+def test_reviewers_are_compared_with_each_other_and_with_the_detector(solved):
     visitor, at, _, _ = solved
-    assert visitor.ask("agreement", at=at) == {
-        "frames": [], "total": None, "precision": None, "recall": None, "disputed": [], "judges": [],
+    assert visitor.request("agreement", at=at) == {
+        "frames": [], "total": None, "precision": None, "recall": None, "threshold": None, "disputed": [],
+        "kappas": [],
     }  # fmt: skip
-    told = visitor.ask("candidates", at=at, frame=SHOWN, reviewer="anna")["pairs"]
-    seen = [each for each in told if each["detected"]]
-    unseen = [each for each in told if not each["detected"]]
+    answer = visitor.request("candidate_pairs", at=at, view=view())["pairs"]
+    detected = [each for each in answer if each["detected"]]
+    undetected = [each for each in answer if not each["detected"]]
 
-    def say(who, pair, verdict):
-        visitor.ask("judge", at=at, frame=SHOWN, i=pair["i"], j=pair["j"], verdict=verdict, reviewer=who)
+    def give(who, pair, verdict):
+        judge(visitor, at, pair, verdict, who)
 
-    for pair in seen[:4]:
-        say("anna", pair, "contact")
-        say("ben", pair, "contact" if pair is not seen[0] else "no contact")
-    say("anna", unseen[0], "no contact")
-    say("ben", unseen[0], "no contact")
-    told = visitor.ask("agreement", at=at)
-    (row,) = told["frames"]
+    for pair in detected[:4]:
+        give("anna", pair, "contact")
+        give("ben", pair, "contact" if pair is not detected[0] else "no contact")
+    give("anna", undetected[0], "no contact")
+    give("ben", undetected[0], "no contact")
+    answer = visitor.request("agreement", at=at)
+    (row,) = answer["frames"]
     assert row["frame"] == SHOWN
-    assert (row["hits"], row["false"], row["missed"], row["rejected"]) == (3, 0, 0, 1)  # a draw is nobody's word
-    assert told["precision"] is None  # five pairs say too little
-    judges = {(each["first"], each["second"]): each for each in told["judges"]}
+    assert (row["hits"], row["false"], row["missed"], row["rejected"]) == (3, 0, 0, 1)  # a draw counts for neither
+    assert answer["precision"] is None  # five pairs are too few
+    judges = {(each["first"], each["second"]): each for each in answer["kappas"]}
     both = judges["anna", "ben"]
     assert (both["count"], both["observed"]) == (5, 0.8)
     assert both["kappa"] == pytest.approx((0.8 - (0.8 * 0.6 + 0.2 * 0.4)) / (1.0 - (0.8 * 0.6 + 0.2 * 0.4)), rel=1e-4)
     assert judges["anna", "detector"]["observed"] == 1.0
-    (pair,) = told["disputed"]
-    assert (pair["i"], pair["j"]) == (seen[0]["i"], seen[0]["j"])
-    assert pair["said"] == {"anna": "contact", "ben": "no contact"}
+    (pair,) = answer["disputed"]
+    assert (pair["i"], pair["j"]) == (detected[0]["i"], detected[0]["j"])
+    assert pair["verdicts"] == {"anna": "contact", "ben": "no contact"}
 
 
 def test_a_run_of_some_photographs_is_shown_over_those(solved):
     visitor, at, results, _ = solved
-    told = visitor.ask("network", at=at, frame=FIRST)
-    assert told["frame"] == FIRST
-    np.testing.assert_allclose(told["fn"], results.frames[0].fn, rtol=1e-4)
+    answer = visitor.request("network", at=at, frame=FIRST)
+    assert answer["frame"] == FIRST
+    np.testing.assert_allclose(answer["fn"], results.frames[0].fn, rtol=1e-4)
     for photograph in (FIRST - 1, FIRST + len(results.frames)):
         assert f"photograph {photograph}" in visitor.refused("network", at=at, frame=photograph)
-        assert "photograph" in visitor.refused("candidates", at=at, frame=photograph, reviewer="anna")
-    i, j = told["i"][0], told["j"][0]
-    past = visitor.ask("pair", at=at, i=i, j=j)
-    assert past["point"][: FIRST + 1] == [None] * FIRST + [pytest.approx(told["point"][0], abs=0.02)]
-    rod = visitor.ask("rod", at=at, id=i)
+        assert visitor.post("candidate_pairs", {"at": at, "view": view(frame=photograph)}).status_code == 400
+    i, j = answer["i"][0], answer["j"][0]
+    past = visitor.request("pair", at=at, i=i, j=j)
+    assert past["point"][: FIRST + 1] == [None] * FIRST + [pytest.approx(answer["point"][0], abs=0.02)]
+    rod = visitor.request("rod", at=at, id=i)
     assert {len(rod[key]) for key in ("zncc", "sigma", "rotation", "status", "unbalance")} == {len(past["fn"])}
 
 
-def test_what_was_said_keeps_the_force_that_it_was_said_of(solved):
+def test_a_verdict_keeps_the_force_before_it(solved):
     visitor, at, _, folder = solved
-    pair = next(each for each in visitor.ask("candidates", at=at, frame=SHOWN, reviewer="")["pairs"] if each["fn"])
-    visitor.ask("judge", at=at, frame=SHOWN, i=pair["i"], j=pair["j"], verdict="no contact", reviewer="anna")
-    told = visitor.ask("judged", at=at, reviewer="anna")
-    (word,) = told["pairs"]
-    assert told["waiting"] == 1
-    assert (word["frame"], word["i"], word["j"], word["obeyed"]) == (SHOWN, pair["i"], pair["j"], False)
+    pair = next(each for each in visitor.request("candidate_pairs", at=at, view=view())["pairs"] if each["fn"])
+    judge(visitor, at, pair, "no contact")
+    answer = visitor.request("reviewed_pairs", at=at, reviewer="anna")
+    (word,) = answer["pairs"]
+    assert answer["waiting"] == 1
+    assert (word["frame"], word["i"], word["j"], word["applied"]) == (SHOWN, pair["i"], pair["j"], False)
     assert word["before"]["fn"] == word["now"]["fn"] == pair["fn"]
-    assert visitor.ask("judged", at=at, reviewer="ben") == {"pairs": [], "waiting": 0}
-    os.utime(folder / RESULTS, (4e9, 4e9))  # a run after it that did not obey
-    assert visitor.ask("judged", at=at, reviewer="anna")["waiting"] == 1
-    forgotten = [each for each in visitor.ask("candidates", at=at, frame=SHOWN, reviewer="")["pairs"] if not each["fn"]]
-    visitor.ask("judge", at=at, frame=SHOWN, i=forgotten[0]["i"], j=forgotten[0]["j"], verdict="no contact",
-                reviewer="anna")  # fmt: skip
-    words = visitor.ask("judged", at=at, reviewer="anna")["pairs"]
-    assert [each["obeyed"] for each in words] == [True, False]  # it carries nothing, as was said
-    visitor.ask("unjudge", at=at, reviewer="anna")
-    assert len(visitor.ask("judged", at=at, reviewer="anna")["pairs"]) == 1
+    assert visitor.request("reviewed_pairs", at=at, reviewer="ben") == {"pairs": [], "waiting": 0}
+    os.utime(folder / RESULTS, (4e9, 4e9))  # a later run that did not apply it
+    assert visitor.request("reviewed_pairs", at=at, reviewer="anna")["waiting"] == 1
+    without_force = [each for each in visitor.request("candidate_pairs", at=at, view=view())["pairs"] if not each["fn"]]
+    judge(visitor, at, without_force[0], "no contact")
+    words = visitor.request("reviewed_pairs", at=at, reviewer="anna")["pairs"]
+    assert [each["applied"] for each in words] == [True, False]  # it carries no force, as the verdict demands
+    visitor.request("undo_verdict", at=at, view=view())
+    assert len(visitor.request("reviewed_pairs", at=at, reviewer="anna")["pairs"]) == 1
 
 
-def test_nobody_is_called_by_the_account_of_a_machine(visitor, monkeypatch):
+def test_accounts_of_machines_name_no_reviewer(visitor, monkeypatch):
     for account, name in (("root", ""), ("anna", "anna")):
         monkeypatch.setattr("getpass.getuser", lambda account=account: account)
-        assert visitor.ask("reviewer")["name"] == name
+        assert visitor.request("reviewer")["name"] == name
 
 
-def test_a_run_that_takes_its_pieces_away_meanwhile_is_no_error(solved, monkeypatch):
+def test_a_run_that_removes_its_pieces_meanwhile_is_no_error(solved, monkeypatch):
     visitor, at, results, folder = solved
     pieces = folder / UNFINISHED / "solving"
     pieces.mkdir(parents=True)
@@ -215,19 +227,71 @@ def test_a_run_that_takes_its_pieces_away_meanwhile_is_no_error(solved, monkeypa
     monkeypatch.setattr(os, "scandir", gone)
     monkeypatch.setattr(os, "listdir", gone)
     assert run_stamp(folder)[0] == 0
-    assert visitor.ask("run_told", at=at)["frames"]["count"] == FIRST + len(results.frames)
+    assert visitor.request("run_state", at=at)["frames"]["count"] == FIRST + len(results.frames)
 
 
-def test_rods_of_a_run_of_some_photographs_are_mended_in_those(solved):
+def test_rods_of_a_run_of_some_photographs_are_corrected_in_those(solved):
     visitor, at, results, folder = solved
     origin = read_origin(folder / RESULTS)
     assert origin is not None
     save_tracks(folder / TRACKS, "mine", results.tracks, results.walls, origin)
-    told = visitor.ask("poses", at=at, frame=SHOWN)
+    answer = visitor.request("poses", at=at, frame=SHOWN)
     present = results.tracks.present
-    assert told["rods"]["id"] == results.tracks.id[present[FRAME]].tolist()
-    assert told["lost_count"] == [0] * FIRST + (~present).sum(axis=1).tolist()
+    assert answer["rods"]["id"] == results.tracks.id[present[FRAME]].tolist()
+    assert answer["lost_count"] == [0] * FIRST + (~present).sum(axis=1).tolist()
     assert "not tracked" in visitor.refused("poses", at=at, frame=FIRST - 1)
     name = int(results.tracks.id[0])
     assert "step Rods" in visitor.refused("mark_lost", at=at, frame=FIRST, id=name)
     assert "is not there" in visitor.refused("mark_lost", at=at, frame=FIRST - 1, id=name)
+
+
+def test_undo_takes_back_the_last_action_whatever_it_was(solved):
+    visitor, at, _, folder = solved
+    first, second = visitor.request("candidate_pairs", at=at, view=view())["pairs"][:2]
+    before = visitor.request("project", at=at)["photographs"]["interval"]
+    judge(visitor, at, first, "no contact")
+    visitor.request("set_photographs", at=at, interval=77.0)
+    judge(visitor, at, second, "contact")
+
+    def verdicts():
+        return [str(entry.verdict) for _, entry in VerdictLog(folder / VERDICTS).verdicts()]
+
+    answer = visitor.request("undo", at=at)
+    assert {answer["verdict"]["i"], answer["verdict"]["j"]} == {second["i"], second["j"]}
+    assert verdicts() == ["no contact"]
+    assert visitor.request("undo", at=at)["photographs"]["interval"] == before
+    assert verdicts() == ["no contact"]
+    answer = visitor.request("undo", at=at)
+    assert "no contact" in answer["undone"]
+    assert verdicts() == []
+    visitor.request("redo", at=at)
+    assert verdicts() == ["no contact"]
+    assert visitor.request("redo", at=at)["photographs"]["interval"] == 77.0
+    assert visitor.request("redo", at=at)["redone"].endswith(": contact")
+    assert sorted(verdicts()) == ["contact", "no contact"]
+    visitor.request("undo", at=at)
+    assert verdicts() == ["no contact"]
+
+
+def test_forces_have_the_colours_and_the_range_of_the_recording(solved):
+    visitor, at, results, _ = solved
+    recorded = ForceRange.of(results.frames)
+    for frame in range(FIRST, FIRST + len(results.frames)):  # the same in every frame
+        given = visitor.request("network", at=at, frame=frame)["range"]
+        assert given["top"] == pytest.approx(recorded.top, rel=1e-6)
+        assert given["weak"] == pytest.approx(recorded.weak, rel=1e-6)
+    look = visitor.request("force_look")
+    assert look["ramps"]["force"][-1] == f"#{bytes(FORCE_RAMP[-1, :3].tolist()).hex()}"
+    assert (look["thinnest"], look["thickest"]) == (2.0 * THINNEST, 2.0 * THICKEST)
+
+
+def test_a_duplicate_has_its_own_name_and_no_run(visitor):
+    at = visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")["at"]
+    visitor.request("set_photographs", at=at, interval=30.0)
+    first, second = (visitor.request("duplicate", at=at) for _ in range(2))
+    assert (first["at"], first["name"]) == ("my photographs copy", "my photographs copy")
+    assert second["name"] == "my photographs copy 2"
+    assert first["photographs"] == visitor.request("project", at=at)["photographs"]
+    assert (first["undo"], first["run"]) == (None, None)
+    visitor.request("set_photographs", at=first["at"], interval=31.0)
+    assert visitor.request("project", at=at)["photographs"]["interval"] == 30.0

@@ -9,7 +9,7 @@ from tests.app.workbench.laboratory_set import HIDDEN, PIXEL, STILL, make_labora
 
 pytestmark = [pytest.mark.screen, pytest.mark.slow]
 LONGEST = 600.0  # [s]
-RIGHT = 0.5  # [px] of the mended rod beside where its neighbours say that it is
+RIGHT = 0.5  # [px] of the corrected rod from the place that its neighbours predict
 WANTED = 0.97
 
 

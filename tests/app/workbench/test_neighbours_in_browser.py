@@ -17,7 +17,7 @@ from rodsight.workbench.setup.edits import GRAIN_COLUMNS
 from tests.app.workbench.hand import fill, go, idle, on_screen, opened
 
 pytestmark = pytest.mark.screen
-DELAY = 1.0  # [s] that a slow machine takes for a question
+DELAY = 1.0  # [s] that a slow machine takes for a request
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def enter(tab: Page, step: str) -> None:
 
 
 def rods(tab: Page) -> list[int]:
-    return tab.evaluate("bench.project.rods.id")
+    return tab.evaluate("workbench.project.rods.id")
 
 
 def written(root: Path) -> list[int]:
@@ -47,7 +47,7 @@ def written(root: Path) -> list[int]:
 
 
 def choose(tab: Page, row: int) -> None:
-    place = tab.evaluate(f"[bench.project.rods.x[{row}], bench.project.rods.y[{row}]]")
+    place = tab.evaluate(f"[workbench.project.rods.x[{row}], workbench.project.rods.y[{row}]]")
     tab.mouse.click(*on_screen(tab, tuple(place)))
 
 
@@ -61,7 +61,7 @@ def test_two_windows_show_the_same_and_lose_no_edit(page: Page, begun: Path):
             enter(tab, "rods")
         choose(first, 3)
         first.keyboard.press("Delete")
-        second.wait_for_function("() => bench.project.rods.id.length === 29")
+        second.wait_for_function("() => workbench.project.rods.id.length === 29")
         assert rods(second) == written(begun)
         for tab, row in ((first, 5), (second, 6)):  # both at once: neither knows of the other's
             choose(tab, row)
@@ -69,12 +69,12 @@ def test_two_windows_show_the_same_and_lose_no_edit(page: Page, begun: Path):
         for tab in (first, second):
             tab.evaluate("dispatchEvent(new KeyboardEvent('keydown', { key: 'Delete' }))")
         for tab in (first, second):
-            tab.wait_for_function("() => bench.project.rods.id.length === 27")
+            tab.wait_for_function("() => workbench.project.rods.id.length === 27")
         assert rods(first) == rods(second) == written(begun)
         assert not gone & set(written(begun))
         second.keyboard.press("Control+z")  # the last edit is taken back, whoever made it
         for tab in (first, second):
-            tab.wait_for_function("() => bench.project.rods.id.length === 28")
+            tab.wait_for_function("() => workbench.project.rods.id.length === 28")
 
 
 @pytest.mark.slow
@@ -83,40 +83,40 @@ def test_what_is_typed_is_not_lost_to_another_window(page: Page, begun: Path):
         enter(tab, "photographs")
         tab.locator("#field-interval").press_sequentially("5")
         Draft(begun / "my photographs").set_keys("elsewhere", {"photographs.channel": "red"})
-        tab.wait_for_function("(looks) => bench.looks > looks + 1", arg=tab.evaluate("bench.looks"))
+        tab.wait_for_function("(looks) => workbench.looks > looks + 1", arg=tab.evaluate("workbench.looks"))
         assert tab.input_value("#field-interval") == "530"
         tab.keyboard.press("Enter")
         idle(tab)
         tab.locator("#canvas").focus()
-        tab.wait_for_function("() => bench.project.photographs.channel === 'red'")
-        assert str(tab.evaluate("bench.project.photographs.interval")) == "530"
+        tab.wait_for_function("() => workbench.project.photographs.channel === 'red'")
+        assert str(tab.evaluate("workbench.project.photographs.interval")) == "530"
 
 
 @pytest.fixture
 def slow(page: Page) -> list[str]:
-    """Every question takes a second; gives the names of those that were asked."""
-    asked: list[str] = []
+    """Every request takes a second; returns the names of the endpoints."""
+    requested: list[str] = []
 
     def late(route: Route) -> None:
-        asked.append(route.request.url.rsplit("/", 1)[-1])
+        requested.append(route.request.url.rsplit("/", 1)[-1])
         time.sleep(DELAY)
         route.continue_()
 
-    page.route("**/ask/**", late)
-    return asked
+    page.route("**/api/**", late)
+    return requested
 
 
 @pytest.mark.slow
 def test_on_a_slow_machine_nothing_is_done_twice_and_no_press_is_lost(page: Page, begun: Path, slow: list[str]):
     with opened(page, begun) as tab:
         enter(tab, "rods")
-        before, x = rods(tab), tab.evaluate("bench.project.rods.x[4]")
+        before, x = rods(tab), tab.evaluate("workbench.project.rods.x[4]")
         choose(tab, 4)
         for _ in range(3):  # quicker than the answers
             tab.keyboard.press("Shift+ArrowRight")
-        expect(tab.locator("#busy")).to_be_visible()  # it says that it is at it
+        expect(tab.locator("#busy")).to_be_visible()  # it shows that it is busy
         idle(tab)
-        assert tab.evaluate("bench.project.rods.x[4]") == pytest.approx(x + 0.75, abs=0.01)
+        assert tab.evaluate("workbench.project.rods.x[4]") == pytest.approx(x + 0.75, abs=0.01)
         assert slow.count("move_rod") == 3
         for key in ("Delete", "Delete"):
             tab.keyboard.press(key)
@@ -129,7 +129,7 @@ def test_on_a_slow_machine_nothing_is_done_twice_and_no_press_is_lost(page: Page
         idle(tab)
         assert slow.count("set_material") == 1
         fill(tab, "density", "8400")
-        assert tab.evaluate("bench.project.material.density") == 8400.0
+        assert tab.evaluate("workbench.project.material.density") == 8400.0
 
 
 HOSTILE = """<!doctype html><script>
@@ -141,7 +141,7 @@ const element = (tag, values) => new Promise((done) => {
   document.body.append(one); setTimeout(() => done("silent"), 3000);
 });
 addEventListener("load", async () => {
-  const body = JSON.stringify({ at: "my photographs", interval: 666 }), where = `${target}/ask/set_photographs`;
+  const body = JSON.stringify({ at: "my photographs", interval: 666 }), where = `${target}/api/set_photographs`;
   for (const type of ["text/plain", "application/json"]) for (const mode of ["no-cors", "cors"])
     await tried(`${type} ${mode}`, async () => (await fetch(where, { method: "POST", mode, credentials: "include", headers: { "Content-Type": type }, body })).status || "opaque");
   await tried("read", async () => (await fetch(`${target}/page/app.js`, { credentials: "include" })).text());
@@ -181,9 +181,9 @@ def test_a_hostile_page_in_the_next_tab_reads_and_changes_nothing(page: Page, be
     before = file.read_bytes()
     with opened(page, begun) as tab, served(evil) as port:
         enter(tab, "rods")
-        asked = []
+        requested = []
         other = tab.context.new_page()  # the same browser: it has the workbench's cookie
-        other.on("response", lambda answer: asked.append((answer.status, answer.request.method, answer.url)))
+        other.on("response", lambda answer: requested.append((answer.status, answer.request.method, answer.url)))
         origin = tab.evaluate("location.origin")
         other.goto(f"http://{host}:{port}/page.html?target={origin}")
         other.wait_for_function("() => globalThis.got")
@@ -191,8 +191,8 @@ def test_a_hostile_page_in_the_next_tab_reads_and_changes_nothing(page: Page, be
         assert got["picture"] == got["script"] == got["read"] == "refused", got
         assert {got[f"{kind} cors"] for kind in ("text/plain", "application/json")} == {"refused"}
         assert got["framed"]
-        posted = [status for status, method, url in asked if method == "POST" and url.startswith(origin)]
+        posted = [status for status, method, url in requested if method == "POST" and url.startswith(origin)]
         assert posted
-        assert set(posted) == {403}  # forms and questions arrived, and were refused
+        assert set(posted) == {403}  # forms and requests arrived, and were refused
         assert file.read_bytes() == before
         assert len(rods(tab)) == 30

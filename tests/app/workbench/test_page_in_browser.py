@@ -37,25 +37,25 @@ def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
     expect(tab.locator("#quality")).to_contain_text("px wide")
     go(tab, "scale")
     drag(tab, (100.0, 200.0), (300.0, 200.0))
-    length = tab.evaluate("(() => { const d = bench.project.photographs.distance; return d ?? null; })()")
+    length = tab.evaluate("(() => { const d = workbench.project.photographs.distance; return d ?? null; })()")
     assert length is None  # a length without metres is nothing yet
     fill(tab, "distance", str(200.0 * truth.photographs.pixel_size * 1e3))
-    assert tab.evaluate("bench.project.pixel") == pytest.approx(truth.photographs.pixel_size, rel=0.01)
+    assert tab.evaluate("workbench.project.pixel") == pytest.approx(truth.photographs.pixel_size, rel=0.01)
     tab.get_by_role("button", name="The number").click()
     fill(tab, "pixel-size", str(truth.photographs.pixel_size * 1e3))
     go(tab, "rods")
     tab.fill("#field-radii", ", ".join(str(radius * 1e3) for radius in truth.photographs.radii))
     tab.click("#detect")
     idle(tab)
-    assert tab.evaluate("bench.project.rods.id.length") == 30
-    x, y = tab.evaluate("[bench.project.rods.x[3], bench.project.rods.y[3]]")
+    assert tab.evaluate("workbench.project.rods.id.length") == 30
+    x, y = tab.evaluate("[workbench.project.rods.x[3], workbench.project.rods.y[3]]")
     tab.mouse.click(*on_screen(tab, (x, y)))
     tab.keyboard.press("Delete")
     idle(tab)
-    assert tab.evaluate("bench.project.rods.id.length") == 29
+    assert tab.evaluate("workbench.project.rods.id.length") == 29
     tab.keyboard.press("Control+z")
     idle(tab)
-    assert tab.evaluate("bench.project.rods.id.length") == 30
+    assert tab.evaluate("workbench.project.rods.id.length") == 30
     go(tab, "walls")
     tab.click("#find-walls")
     idle(tab)
@@ -69,7 +69,7 @@ def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
     tab.click("#run")
     expect(tab.locator("#run-state")).to_have_text("finished", timeout=240_000)
     idle(tab)
-    assert tab.evaluate("bench.project.run.frames") == 4
+    assert tab.evaluate("workbench.project.run.frames") == 4
     assert (photographs_only / "runs" / "my photographs" / "results.h5").is_file()
     judge_by_key(tab, photographs_only / "runs" / "my photographs")
     go(tab, "share")
@@ -81,15 +81,13 @@ def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
 
 
 def judge_by_key(tab: Page, run: Path) -> None:
-    go(tab, "inspect")
-    tab.wait_for_function("() => document.querySelector('#next') !== null")
-    tab.keyboard.press("ArrowRight")
+    go(tab, "review")
+    tab.wait_for_selector("#next")
+    tab.keyboard.press("]")
     idle(tab)
-    tab.keyboard.press("Space")
-    tab.wait_for_selector("#card")
     tab.keyboard.press("c")
     idle(tab)
-    if not log_of(run):  # a machine's account is nobody's name: the page asks
+    if not log_of(run):  # the account of a machine is no name: the page requests one
         tab.keyboard.type("anna")
         tab.keyboard.press("Enter")
         tab.locator("#canvas").focus()
@@ -102,6 +100,7 @@ def judge_by_key(tab: Page, run: Path) -> None:
     tab.keyboard.press("z")
     idle(tab)
     assert log_of(run) == ["contact"]
+    go(tab, "inspect")
     show_the_recording(tab)
 
 
@@ -110,9 +109,9 @@ def log_of(run: Path) -> list[str]:
 
 
 def show_the_recording(tab: Page) -> None:
-    frame = tab.evaluate("bench.frame")
+    frame = tab.evaluate("workbench.frame")
     tab.keyboard.press("v")
-    tab.wait_for_function("(frame) => bench.recording?.opened && bench.recording.heard === frame", arg=frame)
+    tab.wait_for_function("(frame) => workbench.recording?.opened && workbench.recording.reported === frame", arg=frame)
     click_in_the_viewer(tab)
     tab.click("#step-photographs")
     idle(tab)
@@ -120,17 +119,17 @@ def show_the_recording(tab: Page) -> None:
 
 
 def click_in_the_viewer(tab: Page) -> None:
-    """Somewhere in the network of the recording: the card beside it is that of what was clicked."""
+    """Click the network of the recording: the card is that of the clicked contact."""
     tab.keyboard.press("Escape")
     tab.evaluate("""() => {
-        const told = bench.recording.told, clicked = told.clicked;
+        const listener = workbench.recording.listener, clicked = listener.clicked;
         globalThis.clicks = [];
-        told.clicked = (...what) => { clicks.push(what); clicked(...what); };
+        listener.clicked = (...what) => { clicks.push(what); clicked(...what); };
     }""")
     box = tab.locator("#viewer").bounding_box()
     assert box is not None
-    left, heard = box["x"] + 0.28 * box["width"], []
-    for top in box["y"] + box["height"] * np.linspace(0.25, 0.75, 11):  # where nothing is drawn, nothing is told
+    left, reported = box["x"] + 0.28 * box["width"], []
+    for top in box["y"] + box["height"] * np.linspace(0.25, 0.75, 11):  # a click on empty ground reports nothing
         before = tab.evaluate("clicks.length")
         tab.mouse.move(left - 3, top - 3)
         tab.mouse.move(left, top)
@@ -138,31 +137,31 @@ def click_in_the_viewer(tab: Page) -> None:
         tab.mouse.click(left, top)
         tab.wait_for_timeout(WATCHED)
         if tab.evaluate("clicks.length") > before:
-            heard.append((top, *tab.evaluate("clicks.at(-1).slice(0, 2)")))
-        if len(heard) == 3:
+            reported.append((top, *tab.evaluate("clicks.at(-1).slice(0, 2)")))
+        if len(reported) == 3:
             break
-    screen, x, y = np.transpose(heard)
+    screen, x, y = np.transpose(reported)
     steps = np.diff(y) / np.diff(screen)  # straight down on the screen is straight down on the photograph
     assert np.ptp(x) < 2.0
     assert (steps > 0.0).all()
     assert np.ptp(steps) < 0.05 * steps.mean()
-    said = tab.locator("#card .fact").first.text_content() or ""
-    rods = np.reshape(tab.evaluate("bench.step.rodsOfFrame()"), (-1, 3))
-    names = tab.evaluate("bench.step.names()")
+    title = tab.locator("#card .fact").first.text_content() or ""
+    rods = np.reshape(tab.evaluate("workbench.step.rodsOfFrame()"), (-1, 3))
+    names = tab.evaluate("workbench.step.names()")
     near = np.hypot(rods[:, 0] - x[-1], rods[:, 1] - y[-1]) < 1.4 * rods[:, 2]
-    assert any(str(names[k]) in re.findall(r"\d+", said) for k in np.flatnonzero(near)), said
+    assert any(str(names[k]) in re.findall(r"\d+", title) for k in np.flatnonzero(near)), title
 
 
 def test_what_is_missing_is_a_click_away(tab):
     tab.get_by_text("Set up an experiment from these").click()
     idle(tab)
-    for step in ("mend", "inspect", "share"):
+    for step in ("correct", "inspect", "review", "share"):
         go(tab, step)
         tab.get_by_role("button", name="To the run").click()
         idle(tab)
     expect(tab.locator("#lacks button b")).to_have_text(["Photographs", "Scale", "Walls"])
     tab.locator("#lacks button").nth(1).click()
-    expect(tab.locator("#panel h2")).to_have_text("Scale")
+    expect(tab.locator("#panel h1")).to_have_text("Scale")
 
 
 def test_the_sample_is_a_click_away(tab, photographs_only):
@@ -170,7 +169,7 @@ def test_the_sample_is_a_click_away(tab, photographs_only):
     idle(tab)
     assert (photographs_only / "shear" / "experiment.toml").is_file()
     assert mark(tab, "scale") == "good"
-    assert tab.evaluate("bench.project.files.length") == 24
+    assert tab.evaluate("workbench.project.files.length") == 24
     tab.keyboard.press("3")
-    assert tab.evaluate("bench.project.walls.length") == 4
-    expect(tab.locator("#panel h2")).to_have_text("Walls")
+    assert tab.evaluate("workbench.project.walls.length") == 4
+    expect(tab.locator("#panel h1")).to_have_text("Walls")

@@ -21,21 +21,21 @@ def test_units_lens_and_tables(page: Page, photographs_only: Path, tmp_path_fact
         tab.select_option("#unit-length", "cm")
         tab.get_by_role("button", name="The number").click()
         fill(tab, "pixel-size", "0.025")
-        assert tab.evaluate("bench.project.pixel") == pytest.approx(2.5e-4, rel=1e-9)
+        assert tab.evaluate("workbench.project.pixel") == pytest.approx(2.5e-4, rel=1e-9)
         expect(tab.locator("#panel .big")).to_have_text("0.025 cm")
         tab.select_option("#lens-model", "brown")
         for name, value in (("xc", "160"), ("yc", "200"), ("K2", "1e-14")):
             tab.fill(f"#lens-{name}", value)
             tab.keyboard.press("Enter")
             idle(tab)
-        assert tab.evaluate("bench.project.photographs.lens") == {"xc": 160, "yc": 200, "K2": 1e-14}
+        assert tab.evaluate("workbench.project.photographs.lens") == {"xc": 160, "yc": 200, "K2": 1e-14}
         go(tab, "walls")
         tab.keyboard.press("s")  # as it is drawn
         drag(tab, (20.0, 380.0), (300.0, 384.0))
         tab.select_option("#unit-pressure", "MPa")
-        name = tab.evaluate("bench.project.walls[0].name")
+        name = tab.evaluate("workbench.project.walls[0].name")
         fill(tab, f"pressure-{name}", "0.05")
-        assert tab.evaluate("bench.project.walls[0].pressure") == pytest.approx(5e4)
+        assert tab.evaluate("workbench.project.walls[0].pressure") == pytest.approx(5e4)
         forces = tmp_path_factory.mktemp("sensors") / "sensors of monday.csv"
         forces.write_text("frame,wall,fx,fy\n" + "".join(f"{k},{name},1.0,{k}.5\n" for k in range(4)))
         tab.set_input_files("#table-forces", forces)
@@ -43,5 +43,5 @@ def test_units_lens_and_tables(page: Page, photographs_only: Path, tmp_path_fact
         tab.reload()
         idle(tab)
         go(tab, "scale")
-        expect(tab.locator("#panel .big")).to_have_text("0.025 cm")  # what was chosen stays
+        expect(tab.locator("#panel .big")).to_have_text("0.025 cm")  # the choice is kept
     assert (folder / "wall_forces.csv").read_text() == forces.read_text()

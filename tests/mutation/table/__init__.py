@@ -2,6 +2,7 @@
 
 from tests.mutation.mutant import Mutant
 from tests.mutation.table import (
+    assessment,
     baselines,
     bodies,
     calibration,
@@ -11,10 +12,14 @@ from tests.mutation.table import (
     detection,
     exchange,
     factor,
+    inference,
+    mixture,
     nlgs,
+    posterior,
     results,
     sequence,
     statistics,
+    tracking,
     workbench,
 )
 
@@ -26,14 +31,19 @@ MUTANTS: tuple[Mutant, ...] = tuple(
         contacts,
         detection,
         calibration,
+        posterior,
+        mixture,
+        assessment,
         nlgs,
         convex,
         statistics,
         sequence,
+        inference,
         dem,
         results,
         baselines,
         exchange,
+        tracking,
         workbench,
     )
     for mutant in part.MUTANTS

@@ -2,20 +2,25 @@
 
 from tests.mutation.mutant import mutants_of
 
-KERNELS = "tests/reference/test_dem.py"
+REFERENCE = "tests/reference/test_dem.py"
+PERIODIC = "tests/reference/test_periodic_dem.py"
 
 MUTANTS = [
     *mutants_of(
-        "solver/dem/periodic_kernels.py",
-        "tests/reference/test_periodic_dem.py",
-        ("stretch * dx + shear * dy", "shear * dy"),
-        ("pairs.image[p, 1] * cell[1, 1]", "pairs.image[p, 1] * cell[0, 1]"),
-        ("work / (2.0 * area * servo.length)", "work / (area * servo.length)"),
-        ("x + dt * (stretch * x + shear * y)\n            cell[row, 1]", "x\n            cell[row, 1]"),
+        "solver/dem/boundaries.py",
+        PERIODIC,
+        ("work / (2.0 * area * boundary.servo[LENGTH])", "work / (area * boundary.servo[LENGTH])"),
+        ("x + dt * (stretch * x + shear * y)", "x"),
     ),
     *mutants_of(
-        "solver/dem/kernels.py",
-        KERNELS,
+        "solver/dem/time_step.py",
+        PERIODIC,
+        ("stretch * dx + shear * dy", "shear * dy"),
+        ("pairs.image[p, 1] * cell[BY]", "pairs.image[p, 1] * cell[AY]"),
+    ),
+    *mutants_of(
+        "solver/dem/contact_law.py",
+        REFERENCE,
         ("fn = law.normal_stiffness * overlap - damping * un", "fn = law.normal_stiffness * overlap + damping * un"),
         ("if fn < 0.0:  # a dashpot does not pull", "if fn < -1e30:"),
         (
@@ -24,31 +29,33 @@ MUTANTS = [
         ),
         ("ft = spring - law.tangential_damping * damping * ut", "ft = spring"),
         ("        ft = limit\n        spring = limit", "        ft = limit"),
-        (
-            "- radius[i] * state[i, OMEGA] - radius[j] * state[j, OMEGA]",
-            "- radius[i] * state[i, OMEGA] + radius[j] * state[j, OMEGA]",
-        ),
         ("force[j, 2] -= radius[j] * ft", "force[j, 2] += radius[j] * ft"),
-        ("law.wall_friction, law", "law.friction, law"),
-        ("+ height * shear_rate / cosine**2", "+ height * shear_rate"),
-        ("2.0 * a * force[k, 2]", "a * force[k, 2]"),
-        ("keep * state[k, VX] + a * force[k, 0] + dt * law.gravity_x", "keep * state[k, VX] + a * force[k, 0]"),
+        ("moment = spring - law.tangential_damping * damping * rolling", "moment = spring"),
+    ),
+    *mutants_of(
+        "solver/dem/boundaries.py",
+        REFERENCE,
+        ("+ state[HEIGHT] * drive[SHEAR_RATE] / cosine**2", "+ state[HEIGHT] * drive[SHEAR_RATE]"),
         (
             "(push - plate[LOAD] - plate[PLATE_DAMPING] * velocity)",
             "(push - plate[LOAD])",
         ),
+        ("arm * rate * cosine + state[WIDTH_RATE]", "arm * rate * cosine - state[WIDTH_RATE]"),
+    ),
+    *mutants_of(
+        "solver/dem/time_step.py",
+        REFERENCE,
+        (
+            "- radius[i] * state[i, OMEGA] - radius[j] * state[j, OMEGA]",
+            "- radius[i] * state[i, OMEGA] + radius[j] * state[j, OMEGA]",
+        ),
+        ("law.wall_friction, law", "law.friction, law"),
+        ("2.0 * a * force[k, 2]", "a * force[k, 2]"),
+        ("keep * state[k, VX] + a * force[k, 0] + dt * law.gravity_x", "keep * state[k, VX] + a * force[k, 0]"),
         ("BASE_ARM = 2.0 / 3.0", "BASE_ARM = 1.0"),
-        ("moment = roll - law.tangential_damping * damping * turning", "moment = roll"),
-        (
-            "            if wall == RIGHT:\n                wx += spread",
-            "            if wall == RIGHT:\n                wx -= spread",
-        ),
         ("            base[k, 0] = fx\n", ""),
-        ("travel += dt * (grain_speed + max(grain_speed, wall_speed))", "travel += dt * grain_speed"),
-        (
-            "        if wall == TOP:\n            plate_force += fn",
-            "        if wall == RIGHT:\n            plate_force += fn",
-        ),
+        ("approach = grain_speed + max(grain_speed, wall_speed)", "approach = grain_speed"),
+        ("(TOP, RIGHT) if boundary.kind == FRAME", "(RIGHT, RIGHT) if boundary.kind == FRAME"),
     ),
     *mutants_of(
         "solver/dem/simulation.py",
@@ -59,12 +66,16 @@ MUTANTS = [
             "resultant = np.linalg.norm(self._bodies.force[:, :2] + gravity, axis=1)",
             "resultant = np.linalg.norm(self._bodies.force[:, :2], axis=1)",
         ),
-        ("getattr(new, name)[row] = getattr(old, name)[old_row]", "getattr(new, name)[row] = 0.0"),
+        ("getattr(pairs, name)[row] = getattr(former, name)[former_row]", "getattr(pairs, name)[row] = 0.0"),
         (
             "pressure * self.settings.length)))",
             "self.settings.length)))",
         ),
-        ("start[row] = walls.fn[walls.j == wall].sum()", "start[row] = 0.0"),
         ("self._bodies.state[~self.touching, 3:] = 0.0", "self._bodies.state[self.touching, 3:] *= 1.0"),
+    ),
+    *mutants_of(
+        "solver/dem/shear_cell.py",
+        "tests/solver/dem",
+        ("start[row] = self._force_on(wall)", "start[row] = 0.0"),
     ),
 ]

@@ -1,4 +1,4 @@
-"""Other programs' files: which way y counts, which side of a contact tells, on which side of a wall rods lie."""
+"""Files of other programs: direction of y, readings of a contact by disc, side of a wall where rods lie."""
 
 from tests.mutation.mutant import mutants_of
 
@@ -11,8 +11,8 @@ MUTANTS = [
         "app/exchange/foreign/observations.py",
         TABLE,
         ("        angle = -angle", "        angle = +angle"),
-        ("floor - place[:, 1]]", "place[:, 1] - floor]"),
-        ("smooth = np.unwrap(column[told])", "smooth = column[told]"),
+        ("floor - points[:, 1]]", "points[:, 1] - floor]"),
+        ("smooth = np.unwrap(column[known])", "smooth = column[known]"),
     ),
     *mutants_of(
         "app/exchange/foreign/proposed_walls.py",
@@ -22,7 +22,7 @@ MUTANTS = [
     *mutants_of(
         "app/exchange/foreign/pegs.py",
         PEGS,
-        ("both[int(teller != low)]", "both[int(teller == low)]"),
+        ("both[int(disc != low)]", "both[int(disc == low)]"),
         ("float(mean[0]), -float(mean[1])", "float(mean[0]), float(mean[1])"),
     ),
     *mutants_of(

@@ -16,7 +16,7 @@ MUTANTS = [
         "tests/solver/factor/test_cholesky.py",
         ("elif total > 0.0:", "elif total != 0.0:"),
         ("blocks[d + a * lanes + b] = 0.0", "pass"),
-        ("total += blocks[d + a * lanes + m] * right[x + m]", "total += blocks[d + m * lanes + a] * right[x + m]"),
+        ("total += blocks[d + a * lanes + m] * rhs[x + m]", "total += blocks[d + m * lanes + a] * rhs[x + m]"),
     ),
     *mutants_of(
         "solver/factor/blocks.py",
@@ -26,7 +26,7 @@ MUTANTS = [
             "column = subtract_product(builder, column, of_row[b], of_column[m][m])",
         ),
         ("for m in range(1, b + 1):", "for m in range(1, b):"),
-        ("there = subtract_product(builder, there,", "there = add_product(builder, there,"),
+        ("vector = subtract_product(builder, vector,", "vector = add_product(builder, vector,"),
         ("builder.fsub(builder.load(place), total(", "builder.fadd(builder.load(place), total("),
     ),
     *mutants_of(
@@ -39,6 +39,6 @@ MUTANTS = [
         "tests/solver/factor/test_inverse.py",
         ("_subtract_transposed_product(inverse, u, inverse, e * area, unit, t, block)", "pass"),
         ("for m in range(max(a, b), size):", "for m in range(size - 1, size):"),
-        ("where[row[p]] = -1", "pass"),
+        ("row_offset[row[p]] = -1", "pass"),
     ),
 ]

@@ -1,11 +1,11 @@
-"""results.h5, what is compared in it and what an interruption leaves."""
+"""Mutants of results.h5, of comparisons and of checkpoints."""
 
 from tests.mutation.mutant import mutants_of
 
 STORE = "tests/app/results/test_store.py"
 READER = (
-    "tests/app/results/test_store.py", "tests/app/results/test_earlier_files.py", "tests/app/results/test_strangers.py",
-    "tests/app/results/test_frames_one_by_one.py",
+    "tests/app/results/test_store.py", "tests/app/results/test_earlier_files.py",
+    "tests/app/results/test_untrusted_files.py", "tests/app/results/test_frames_one_by_one.py",
 )  # fmt: skip
 COMPARISON = "tests/app/results/test_comparison.py"
 
@@ -21,7 +21,7 @@ MUTANTS = [
     *mutants_of(
         "app/results/hdf5/writer.py",
         STORE,
-        ("self._waiting, self._count = [rows[count:].copy()], len(rows) - count", "self._waiting, self._count = [], 0"),
+        ("self._pending, self._count = [rows[count:].copy()], len(rows) - count", "self._pending, self._count = [], 0"),
         ("self._written += count", "self._written = count"),
         ('dataset.attrs["unit"] = dataset.attrs["units"] = quantity.unit', 'dataset.attrs["unit"] = ""'),
         (
@@ -37,9 +37,9 @@ MUTANTS = [
         ("slice(int(edges[k]), int(edges[k + 1]))", "slice(int(edges[k]), int(edges[k + 1]) - 1)"),
         ("if not isinstance(link, h5py.HardLink):", "if False:"),
         ("if dataset.external or dataset.is_virtual:", "if False:"),
-        ("while len(self._kept) > MOST_KEPT:", "while False:"),
+        ("while len(self._kept) > CACHED_FRAMES:", "while False:"),
         ("np.cumsum(np.diff(kept) * np.diff(contact))", "np.cumsum(np.diff(kept) + np.diff(contact))"),
-        ("renumbered[values == number] = ours[named[number]]", "renumbered[values == number] = number"),
+        ("converted[values == number] = own[named[number]]", "converted[values == number] = number"),
         ("if entry.quantity.essential:", "if False:"),
         ("if dataset.shape != shape:", "if len(dataset.shape) != len(shape):"),
         ("if values[0] != 0 or np.any(np.diff(values) < 0):", "if values[0] != 0:"),
@@ -51,10 +51,9 @@ MUTANTS = [
     *mutants_of(
         "app/results/hdf5/store.py",
         READER,
-        ("(first, -1 if stop is None else stop)", "(first, first if stop is None else stop)"),
         ("not 1 <= found <= SCHEMA_VERSION", "not 1 <= found"),
         ('store.attrs["friction"] = results.friction', 'store.attrs["friction"] = 0.0'),
-        ("int(stop) if stop >= 0 else None", "int(stop)"),
+        ("stop if stop >= 0 else None, *step", "stop, *step"),
     ),
     *mutants_of(
         "app/results/comparison.py",
@@ -62,7 +61,7 @@ MUTANTS = [
         ("np.minimum(i, j)[known], np.maximum(i, j)[known]", "i[known], j[known]"),
         ("rows[a.tracks.id[rows] != b.tracks.id] = -1", "pass"),
         ("forces = b.frames[k - offset]", "forces = b.frames[k - first]"),
-        ("CLOSE = 0.5  # of a radius: two", "CLOSE = 50.0  # of a radius: two"),
+        ("CLOSE = 0.5  # radii: two", "CLOSE = 50.0  # radii: two"),
     ),
     *mutants_of(
         "app/results/checkpoint.py",

@@ -1,4 +1,4 @@
-"""What forces say, whoever found them."""
+"""Statistics of forces."""
 
 from tests.mutation.mutant import mutants_of
 
@@ -6,26 +6,27 @@ STATISTICS = "tests/solver/statistics"
 
 MUTANTS = [
     *mutants_of(
-        "solver/mixture/mixing.py",
-        "tests/solver/mixture",
-        ("force, factor = force / factor, 1.0", "force, factor = force, factor"),
-    ),
-    *mutants_of(
         "solver/statistics/balance.py",
         STATISTICS,
         ("np.subtract.at(sums, i, force.ravel())", "np.add.at(sums, i, force.ravel())"),
         ("sums = np.tile(weight[:, axis], len(start))", "sums = np.tile(0.0 * weight[:, axis], len(start))"),
         ("fn * normal[:, axis] + ft * tangent[:, axis]", "fn * normal[:, axis] - ft * tangent[:, axis]"),
-        ("unbalances(contacts, fn, ft, weight)[present].max", "unbalances(contacts, fn, ft, weight).max"),
+        ("resultant_norms(contacts, fn, ft, weight)[present].max", "resultant_norms(contacts, fn, ft, weight).max"),
     ),
     *mutants_of(
-        "solver/statistics/removal.py",
+        "solver/statistics/contact_removal.py",
         STATISTICS,
         ("matrix[at[body], 2, m, 1] = -grains.radius[body]", "matrix[at[body], 2, m, 1] = grains.radius[body] * sign"),
         ("= tried_n - fn, tried_t - ft", "= 0.0, 0.0"),
-        ("wanted = matrix @ found.ravel() + lost", "wanted = matrix @ found.ravel()"),
+        ("resultant = matrix @ given.ravel() + removed", "resultant = matrix @ given.ravel()"),
         ("friction * along if ft >= 0.0 else -friction * along", "friction * along"),
         ("free[row] = False", "free[row] = True"),
+        ("given, friction[rows], TOLERANCE", "given, friction[: len(rows)], TOLERANCE"),
+        ("fn + friction * abs(ft)) / (1.0 + friction * friction)", "fn + friction * abs(ft)) / (1.0 + friction)"),
+        (
+            "(int(contacts.i[contact]), -1.0), (int(contacts.j[contact]), 1.0)",
+            "(int(contacts.i[contact]), 1.0), (int(contacts.j[contact]), 1.0)",
+        ),
     ),
     *mutants_of(
         "solver/statistics/stress.py",
@@ -52,7 +53,7 @@ MUTANTS = [
         STATISTICS,
         ("strong = fn > weighted_mean(fn, weight)", "strong = fn > np.median(fn)"),
         ("FORCE_EDGES, weights=weight)", "FORCE_EDGES)"),
-        ("counts[-1] += weight @ slides", "pass"),
+        ("counts[-1] += weight @ sliding", "pass"),
         ("return Estimate(1.0 / scale,", "return Estimate(scale,"),
         ("force[weak] < 0.5 * mean", "force[weak] < 0.6 * mean"),
         ("np.abs(ft) / np.where(held, limit, 1.0), 1.0)", "np.abs(ft) / np.where(held, limit, 1.0), 0.0)"),
@@ -62,45 +63,54 @@ MUTANTS = [
         STATISTICS,
         ("(major > major[present].mean())", "(major > major.mean())"),
         ("np.deg2rad(45.0)", "np.deg2rad(60.0)"),
-        ("passed = links.min(axis=1) > 0", "passed = links.max(axis=1) > 0"),
+        ("on_chain = links.min(axis=1) > 0", "on_chain = links.max(axis=1) > 0"),
         ("-force[pair], contacts.point[pair] - centre", "force[pair], contacts.point[pair] - centre"),
     ),
     *mutants_of(
         "solver/statistics/frame_statistics.py",
         STATISTICS,
-        ("bearing = fn > 0\n    carried", "bearing = fn >= 0\n    carried"),
+        ("bearing = fn > 0\n    normal", "bearing = fn >= 0\n    normal"),
         ("pressure=0.5 * float(np.trace(stress))", "pressure=float(np.trace(stress))"),
-        ("sliding_fraction=weighted_mean(slides, weight)", "sliding_fraction=float(slides.mean())"),
-        ("surely, counted, weight=likely.bears)", "surely, counted)"),
-        ("contact_fabric(contacts.normal[between], likely.bears[between])", "contact_fabric(contacts.normal[bearing])"),
+        ("sliding_fraction=weighted_mean(sliding, weight)", "sliding_fraction=float(sliding.mean())"),
+        ("probably_bearing, counted, weight=probabilities.bearing)", "probably_bearing, counted)"),
+        (
+            "contact_fabric(contacts.normal[between], probabilities.bearing[between])",
+            "contact_fabric(contacts.normal[bearing])",
+        ),
         ("between = bearing & ~contacts.with_wall", "between = bearing"),
-        ("mean_fn=weighted_mean(carried, weight)", "mean_fn=float(carried.mean())"),
+        ("mean_fn=weighted_mean(normal, weight)", "mean_fn=float(normal.mean())"),
     ),
     *mutants_of(
         "solver/statistics/bearing.py",
         STATISTICS,
         ("LEAST_TOUCH, 1.0)", "1.0, 1.0)"),
-        ("np.where(bearing, logistic(np.where(np.isnan(touch), alone, told)), 0.0)", "logistic(told)"),
+        (
+            "np.where(bearing, logistic(np.where(np.isnan(touch), without_touch, with_touch)), 0.0)",
+            "logistic(with_touch)",
+        ),
     ),
     *mutants_of(
         "solver/statistics/sliding.py",
         STATISTICS,
-        ("(np.abs(ft) >= ON_THE_CONE", "(ft >= ON_THE_CONE"),
+        ("(np.abs(ft) >= ON_CONE", "(ft >= ON_CONE"),
         ("[on[convex], on[~convex]]", "[on, on]"),
         ("used = np.minimum(mobilised, 1.0)", "used = mobilised"),
-        ("slip = np.maximum(signs.slip, 0.0)", "slip = signs.slip"),
-        ("much * _saturating(slip, MUCH)", "0.0 * _saturating(slip, MUCH)"),
-        ("borne * signs.borne + heavy)", "borne * signs.borne)"),
-        ("odds + heavy +", "odds +"),
-        ("np.where(slides > EVEN,", "np.where(slides > 0.0,"),
-        ("* (told / friction) **", "* (friction / told) **"),
-        ("(of_soft if signs.soft else of_hard)", "of_hard"),
+        ("slip = np.maximum(evidence.slip, 0.0)", "slip = evidence.slip"),
+        ("slides_far * _saturating(slip, LARGE_SLIDING_SD)", "0.0 * _saturating(slip, LARGE_SLIDING_SD)"),
+        ("mean * evidence.mobilised_friction + weight)", "mean * evidence.mobilised_friction)"),
+        ("odds + weight +", "odds +"),
+        ("np.where(sliding > EVEN,", "np.where(sliding > 0.0,"),
+        ("* (given / friction) **", "* (friction / given) **"),
+        ("(of_soft if evidence.soft else of_hard)", "of_hard"),
     ),
     *mutants_of(
         "solver/statistics/agreement.py",
         STATISTICS,
         ("hit / len(key) if len(key)", "hit / len(bearing) if len(key)"),
-        ("float(np.linalg.norm(ours - true)) / size", "float(np.linalg.norm(ours - true)) / np.linalg.norm(ours)"),
-        ("float(ours[:, 0].sum()) / total", "total / float(ours[:, 0].sum())"),
+        (
+            "float(np.linalg.norm(inferred - true)) / size",
+            "float(np.linalg.norm(inferred - true)) / np.linalg.norm(inferred)",
+        ),
+        ("float(inferred[:, 0].sum()) / total", "total / float(inferred[:, 0].sum())"),
     ),
 ]

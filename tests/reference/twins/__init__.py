@@ -1,1 +1,1 @@
-"""The plain twins: loops and arithmetic from the equations, as slow as they need to be."""
+"""Plain implementations of the compiled kernels, from the equations, without regard to speed."""

@@ -1,12 +1,11 @@
-"""One circle measured in plain numpy, as `app/tracking/detection/circle_kernels.py` measures many."""
+"""One circle measured in plain numpy, twin of `app/tracking/detection/circle_kernels.py`."""
 
 from __future__ import annotations
 
 import numpy as np
 from rodsight.experiment.photographs import Image
+from rodsight.solver.bodies.grains import Array
 from rodsight.tracking.detection.edges import fit_circle, trace_outline
-
-from solver.bodies.grains import Array
 
 
 def measured(coefficients: Image, dark: Image, contrast: Image, rough: Array, rules: Array) -> list[float]:
@@ -26,7 +25,7 @@ def measured(coefficients: Image, dark: Image, contrast: Image, rough: Array, ru
         return none
     angle, distance = outline.angle[seen], outline.distance[seen]
     weight = np.minimum(outline.strength[seen] / (0.3 * local), 1.0) ** 2
-    circle = fit_circle(x, y, radius + shift, angle, distance, weight, radius_scatter=scatter, scale_least=0.1)
+    circle = fit_circle(x, y, radius + shift, angle, distance, weight, radius_sd=scatter, min_scale=0.1)
     moved = np.hypot(circle.x - x, circle.y - y) + abs(circle.radius - radius - shift)
     if not moved < 2.5 * window:
         return none

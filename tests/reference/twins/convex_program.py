@@ -1,4 +1,4 @@
-"""The convex program as Clarabel solves it, an interior point for any cones that knows nothing of grains."""
+"""The convex program solved by Clarabel, a general interior-point solver for cones."""
 
 # clarabel is compiled and ships no types.
 # pyright: reportAttributeAccessIssue=false
@@ -7,21 +7,22 @@ from __future__ import annotations
 
 import clarabel
 import numpy as np
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.convex.interior_point_kernels import Program
 from scipy import sparse
-
-from solver.bodies.grains import Array
-from solver.convex.interior_point_kernels import Program
 
 TOLERANCE = 1e-9
 
 
-def solve_plainly(matrix: sparse.csr_matrix, load: Array, program: Program, tolerance: float = TOLERANCE) -> Array:
-    """Forces (c, 2) in units of force; H (m, 2c) and b (m,) as in `Balance`. The unbalance is a variable of its own."""
+def solve_with_clarabel(
+    matrix: sparse.csr_matrix, load: Array, program: Program, tolerance: float = TOLERANCE
+) -> Array:
+    """Forces (c, 2) in units of force; H (m, 2c), b (m,) as in `Balance`. The force residual is a separate variable."""
     c, m = len(program.friction), len(load)
-    quadratic = sparse.diags_array(np.concatenate([np.full(2 * c, program.pull), np.full(m, program.price)]))
-    linear = np.concatenate([(program.cost - program.pull * program.centre).T.ravel(), np.zeros(m)])
+    quadratic = sparse.diags_array(np.repeat([program.proximal_weight, program.equilibrium_weight], [2 * c, m]))
+    linear = np.concatenate([(program.cost - program.proximal_weight * program.centre).T.ravel(), np.zeros(m)])
     mu, one = sparse.diags_array(program.friction), sparse.eye_array(c)
-    # Without friction the two edges of a cone say nothing of the sign of f_n: it has a row of its own.
+    # Without friction the two edges of a cone do not bound f_n, so f_n ≥ 0 has a row of its own.
     cones = sparse.block_array([[-mu, one], [-mu, -one], [-one, None]])
     constraints = sparse.block_array([[matrix, -sparse.eye_array(m)], [cones, None]])
     options = clarabel.DefaultSettings()

@@ -1,12 +1,12 @@
-"""Correlation of one patch with whole arrays: its tables, its fits and the exhaustive search."""
+"""Correlation of one patch with arrays: tables, fits and the exhaustive search."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from rodsight.solver.bodies.grains import Array
 
-from solver.bodies.grains import Array
 from tests.reference.twins.splines import values
 
 
@@ -52,18 +52,18 @@ def read(coefficients: Array, patch: PlainPatch, pose: Array, degree: int) -> Ar
 
 
 def compose(pose: Array, step: Array, reach: float) -> Array:
-    """W ∘ W(step)⁻¹, the step cut to a pixel and a half at the centre or the rim."""
+    """W ∘ W(step)⁻¹, the step limited to 1.5 pixels at the centre or the rim."""
     longest = max(np.hypot(step[0], step[1]), reach * abs(step[2]))
     step = step * min(1.0, 1.5 / longest) if longest > 0 else step
     angle = pose[2] - step[2]
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return np.array([*(pose[:2] - turn @ step[:2]), angle])
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return np.array([*(pose[:2] - rotation @ step[:2]), angle])
 
 
 def fit_plainly(
     coefficients: Array, patch: PlainPatch, reach: float, pose: Array, *, tolerance: float = 1e-3, limit: int = 60
 ) -> tuple[Array, float, float, float, float]:
-    """Gauss-Newton to the end: pose, and at it ZNCC, residual variance, gain and offset."""
+    """Converged Gauss-Newton fit: pose, ZNCC, residual variance, gain and offset."""
     for _ in range(limit):
         g = read(coefficients, patch, pose, 5)
         gain = float(g @ patch.f)
@@ -100,17 +100,17 @@ def search_plainly(
     origin: tuple[float, float],
     reach: float,
     places: list[tuple[int, int]],
-    turns: Array,
+    angles: Array,
     *,
     parts: bool,
 ) -> Array:
-    """ZNCC (turns, places): of the whole disc or, `parts`, of its best half over √2 where that is more."""  # fmt: skip
+    """ZNCC (angles, places) of the disc or, with `parts`, of its best half over √2 if greater."""  # fmt: skip
     disc = [(x, y) for x, y in pixels_within(0.0, 0.0, reach)]
     dx, dy = np.array(disc).T
     quarter = np.array([(0 if x >= 0 else 1) if y >= 0 else (2 if x < 0 else 3) for x, y in disc])
-    scores = np.empty((len(turns), len(places)))
-    for k, turn in enumerate(turns):
-        c, s = np.cos(turn), np.sin(turn)
+    scores = np.empty((len(angles), len(places)))
+    for k, angle in enumerate(angles):
+        c, s = np.cos(angle), np.sin(angle)
         template = values(reference, origin[0] + c * dx + s * dy, origin[1] - s * dx + c * dy, 3)
         for m, (px, py) in enumerate(places):
             there = image[py + dy, px + dx].astype(np.float64)
@@ -122,26 +122,26 @@ def search_plainly(
 
 
 def _zncc(a: Array, b: Array) -> float:
-    """0 where there is less than a grey level of contrast."""
+    """ZNCC of two arrays; 0 below one grey level of contrast."""
     if np.sum((b - b.mean()) ** 2) <= len(b):
         return 0.0
     return float(np.corrcoef(a, b)[0, 1])
 
 
 def best_places(
-    scores: Array, places: list[tuple[int, int]], turns: Array, sectors: int, spacing: float, count: int
+    scores: Array, places: list[tuple[int, int]], angles: Array, sectors: int, spacing: float, count: int
 ) -> list[tuple[float, float, float, float]]:
-    """The highest local maxima (x, y, turn, score) that are distinct in place or turn."""
+    """The highest local maxima (x, y, angle, score) that are distinct in place or angle."""
     maxima = []
     at = {place: m for m, place in enumerate(places)}
     for sector in range(sectors):
-        own = [k for k in range(len(turns)) if k * sectors // len(turns) == sector]
+        own = [k for k in range(len(angles)) if k * sectors // len(angles) == sector]
         peak = scores[own].max(axis=0)
         best = np.array(own)[scores[own].argmax(axis=0)]
         for (x, y), m in at.items():
             around = [at[x + a, y + b] for a in (-1, 0, 1) for b in (-1, 0, 1) if (x + a, y + b) in at]
             if peak[m] > 0.0 and peak[m] >= max(peak[n] for n in around):
-                maxima.append((float(x), float(y), float(turns[best[m]]), float(peak[m])))
+                maxima.append((float(x), float(y), float(angles[best[m]]), float(peak[m])))
     taken: list[tuple[float, float, float, float]] = []
     for each in sorted(maxima, key=lambda one: -one[3]):
         close = [np.hypot(each[0] - t[0], each[1] - t[1]) < spacing and _alike(each[2], t[2]) for t in taken]

@@ -1,13 +1,12 @@
-"""The discrete-element step, body by body, with vectors and the frame's geometry written out."""
+"""The discrete-element step, body by body, with vectors and explicit frame geometry."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from solver.bodies.grains import Array
-from solver.dem.kernels import Law
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.dem.contact_law import Law
 
 SIDES = ("bottom", "right", "top", "left")
 
@@ -29,11 +28,12 @@ class PlainCell:
     rise: float  # [m/s]
     width: float  # [m]
     plate_mass: float  # [kg]
-    load: float | None  # [N]; None: the plate is held
+    load: float | None  # [N]; None: fixed plate
     plate_damping: float  # [N s/m]
     spread: float  # [m/s] of the right side, outwards
     side: tuple[float, float, float] | None  # mass [kg], load [N], damping [N s/m] of the right side; None: driven
     base_limit: Array  # (n,) [N]
+    roughness: Array  # (n,) factor of the friction between grains
     law: Law
     pairs: list[tuple[int, int]]
     wall_pairs: list[tuple[int, int]]
@@ -42,10 +42,10 @@ class PlainCell:
     roll: dict[tuple[str, int, int], float] = field(default_factory=dict)
     held: dict[int, Array] = field(default_factory=dict)  # elastic friction of the base, by grain
     contact: dict[tuple[str, int, int], tuple[float, float]] = field(default_factory=dict)
-    seen: set[str] = field(default_factory=set)  # branches taken
+    seen: set[str] = field(default_factory=set)  # branches reached
 
     def step(self, rate: float, rise: float = 0.0, spread: float = 0.0) -> float:
-        """Take one step at a shear rate [rad/s]; how much two bodies may have approached in it [m].
+        """Advance one step at a shear rate [rad/s]; return the greatest possible approach of two bodies in it [m].
 
         rise, spread [m/s]: velocities of the plate and of the right side where no load moves them.
         """
@@ -70,8 +70,8 @@ class PlainCell:
             self._touch("pair", i, j, normal, distance - self.radius[i] - self.radius[j], self.velocity[j])
         push, side_push = 0.0, 0.0
         for i, w in self.wall_pairs:
-            outward, distance, velocity, turn = self._wall(w, self.position[i], rate)
-            self._touch("wall", i, w, outward, distance - self.radius[i], velocity, turn)
+            outward, distance, velocity, wall_spin = self._wall(w, self.position[i], rate)
+            self._touch("wall", i, w, outward, distance - self.radius[i], velocity, wall_spin)
             push += self.contact["wall", i, w][0] if SIDES[w] == "top" else 0.0
             side_push += self.contact["wall", i, w][0] if SIDES[w] == "right" else 0.0
         for k in range(len(self.mass)):
@@ -89,7 +89,7 @@ class PlainCell:
         return dt * (fastest + max(fastest, wall_speed))
 
     def _rub(self, k: int) -> None:
-        """Friction of the base on grain k: a spring and a dashpot against sliding, another against turning."""
+        """Friction of the base on grain k: a spring and a dashpot against sliding, another against rotation."""
         law, limit = self.law, self.base_limit[k]
         if limit == 0.0:
             self.seen.add("no base")
@@ -104,14 +104,14 @@ class PlainCell:
         else:
             self.seen.add("base sticks")
         if abs(total[2]) > 2.0 / 3.0 * limit:
-            self.seen.add("base turns " + ("forth" if total[2] > 0 else "back"))
+            self.seen.add("base rotates " + ("forth" if total[2] > 0 else "back"))
             total[2] = elastic[2] = np.sign(total[2]) * 2.0 / 3.0 * limit
         self.held[k] = elastic
         self.force[k] += total[:2]
         self.torque[k] += self.radius[k] * total[2]
 
     def _wall(self, w: int, place: Array, rate: float) -> tuple[Array, float, Array, float]:
-        """Outward normal, distance of a place [m], the wall's velocity there [m/s] and its spin [rad/s]."""
+        """Outward normal, distance of a place [m], velocity of the wall there [m/s] and its spin [rad/s]."""
         along = np.array([np.sin(self.shear), np.cos(self.shear)])  # the sides, upwards
         if SIDES[w] == "bottom":
             return np.array([0.0, -1.0]), place[1], np.zeros(2), 0.0
@@ -120,16 +120,18 @@ class PlainCell:
             return np.array([0.0, 1.0]), self.height - place[1], np.array([speed, self.rise]), 0.0
         foot = np.array([self.width if SIDES[w] == "right" else 0.0, 0.0])
         outward = np.array([along[1], -along[0]]) * (1.0 if SIDES[w] == "right" else -1.0)
-        arm = float((place - foot) @ along)  # of the turn about the foot, clockwise
+        arm = float((place - foot) @ along)  # of the rotation about the foot, clockwise
         velocity = arm * rate * np.array([along[1], -along[0]])
         if SIDES[w] == "right":
             velocity = velocity + np.array([self.spread, 0.0])
         return outward, float((foot - place) @ outward), velocity, -rate
 
-    def _touch(self, kind: str, i: int, j: int, normal: Array, gap: float, velocity: Array, turn: float = 0.0) -> None:
+    def _touch(
+        self, kind: str, i: int, j: int, normal: Array, gap: float, velocity: Array, wall_spin: float = 0.0
+    ) -> None:
         """Spring, dashpot and friction of one contact; velocity [m/s] is that of the other body's centre or surface.
 
-        turn [rad/s]: spin of a wall.
+        wall_spin [rad/s]: spin of a wall.
         """
         key, law = (kind, i, j), self.law
         if gap >= 0.0:
@@ -147,7 +149,8 @@ class PlainCell:
             self.seen.add(f"{kind} torn")
         spring = self.spring.get(key, 0.0) - law.tangential_stiffness * ut * law.time_step
         ft = spring - law.tangential_damping * damping * ut
-        limit = (law.friction if kind == "pair" else law.wall_friction) * fn
+        rough = 0.5 * (self.roughness[i] + self.roughness[j]) if kind == "pair" else 1.0
+        limit = rough * (law.friction if kind == "pair" else law.wall_friction) * fn
         if abs(ft) > limit:
             self.seen.add(f"{kind} slides {'forth' if ft > 0 else 'back'}")
             ft = spring = limit if ft > 0.0 else -limit
@@ -155,6 +158,7 @@ class PlainCell:
             self.seen.add(f"{kind} sticks")
         if kind == "wall":
             self.seen.add(SIDES[j])
+        pressed, fn = fn, fn - law.adhesion
         self.spring[key], self.contact[key] = spring, (fn, ft)
         force = fn * normal + ft * tangent
         self.force[i] -= force
@@ -163,10 +167,10 @@ class PlainCell:
             self.force[j] += force
             self.torque[j] -= self.radius[j] * ft
         arm = self.radius[i] * (self.radius[j] / (self.radius[i] + self.radius[j]) if kind == "pair" else 1.0)
-        turning = arm * ((self.spin[j] if kind == "pair" else turn) - self.spin[i])
-        elastic = self.roll.get(key, 0.0) - law.tangential_stiffness * turning * law.time_step
-        moment = elastic - law.tangential_damping * damping * turning
-        most = law.rolling_friction * fn
+        rotational_slip = arm * ((self.spin[j] if kind == "pair" else wall_spin) - self.spin[i])
+        elastic = self.roll.get(key, 0.0) - law.tangential_stiffness * rotational_slip * law.time_step
+        moment = elastic - law.tangential_damping * damping * rotational_slip
+        most = law.rolling_friction * pressed
         if abs(moment) > most:
             self.seen.add(f"{kind} rolls {'forth' if moment > 0 else 'back'}")
             moment = elastic = most if moment > 0.0 else -most

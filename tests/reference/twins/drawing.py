@@ -1,10 +1,9 @@
-"""What the loops that draw a photograph put on its sub-pixels, with whole arrays."""
+"""Drawing of rods and bars on sub-pixels, with arrays."""
 
 from __future__ import annotations
 
 import numpy as np
-
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
 
 FINE = 3  # sub-pixels per pixel
 EDGE = 1.8  # [sub-pixel] half the width of a soft edge
@@ -24,7 +23,7 @@ def _grid(shape: tuple[int, int]) -> tuple[Array, Array]:
 
 
 def _paint(shape: tuple[int, int], dots: Array) -> Array:
-    """What dots (x, y, radius, strength) in sub-pixels leave of an unpainted 1."""
+    """Brightness factor of painted dots (x, y, radius, strength) in sub-pixels; 1 where unpainted."""
     x, y = _grid(shape)
     left = np.ones(shape)
     for dx, dy, radius, strength in dots:
@@ -34,11 +33,11 @@ def _paint(shape: tuple[int, int], dots: Array) -> Array:
 
 
 def rod(
-    shape: tuple[int, int], x: float, y: float, radius: float, turn: float, dots: Array, white: float, black: float,
+    shape: tuple[int, int], x: float, y: float, radius: float, angle: float, dots: Array, white: float, black: float,
     rim_shading: float, tilt: Array, rim_width: float,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Glow and share of a rod on a tile."""
-    c, s = np.cos(turn), np.sin(turn)
+    """Brightness and coverage of a rod on a tile."""
+    c, s = np.cos(angle), np.sin(angle)
     placed = np.array([
         (x + FINE * (c * a - s * b), y - FINE * (s * a + c * b), FINE * r, strength) for a, b, r, strength in dots
     ])  # fmt: skip
@@ -58,7 +57,7 @@ def bar(
     shape: tuple[int, int], x: float, y: float, along: Array, length: float, thickness: float, dots: Array,
     metal: float, black: float,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Glow and share of a bar on a tile, its body to the right of `along` (y goes down)."""
+    """Brightness and coverage of a bar on a tile, its body to the right of `along` (y goes down)."""
     inward = np.array([-along[1], along[0]])
     placed = np.array([
         (*(np.array([x, y]) + FINE * (a * along + b * inward)), FINE * r, strength) for a, b, r, strength in dots

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from rodsight.solver.bodies.grains import Array
 from scipy.special import ndtr
-
-from solver.bodies.grains import Array
 
 
 def weighted_median(value: Array, weight: Array) -> float:
-    """The least value with half the weight at or below it."""
+    """The smallest value with half the weight at or below it."""
     for each in sorted(set(value.tolist())):
         if weight[value <= each].sum() >= 0.5 * weight.sum():
             return each
@@ -17,13 +16,13 @@ def weighted_median(value: Array, weight: Array) -> float:
 
 
 def circle_step(
-    angle: Array, distance: Array, weight: Array, radius: float, shift: Array, scatter: float, scale_least: float
+    angle: Array, distance: Array, weight: Array, radius: float, shift: Array, scatter: float, min_scale: float
 ) -> tuple[Array, Array, Array]:
     """One Tukey-weighted step of centre and radius (3,) from a shift of them, residuals and weights (p,)."""
     point = distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1) - shift[:2]
     length = np.linalg.norm(point, axis=1)
     residual = length - radius - shift[2]
-    scale = max(weighted_median(np.abs(residual), weight) / 0.6745, scale_least)
+    scale = max(weighted_median(np.abs(residual), weight) / 0.6745, min_scale)
     w = weight * np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
     design = np.column_stack([point / length[:, None], np.ones(len(angle))])
     prior = (scale / scatter) ** 2 * 8.0
@@ -49,16 +48,16 @@ def rim_misfit(
     step: float,
     level: float,
 ) -> Array:
-    """Residuals of edge, level and slope, and of what paint lets the slope be; `level` is that of the last round."""
+    """Residuals of edge, level and slope, and of the slope bound of the paint; `level`: of the previous iteration."""
     edge, a, c = values
     pull = 3.0 / (scatter * max(level, 1.0)) / np.sqrt(step)
     return np.append(ray - dark - rim(r, edge, a, c, width), -pull * (c - expected * a))
 
 
 def steepest(ray: Array, first: float, radius: float, window: float, narrow: bool) -> tuple[float, float, float]:
-    """Edge, slope and level beyond it of one ray sampled in quarters of a pixel; NaN and 0 where there is none."""
+    """Edge, slope and level beyond it of one ray sampled in quarters of a pixel; NaN and 0 without an edge."""
     r = first + 0.25 * np.arange(len(ray))
-    slope = (ray[:-4] - ray[4:]) * 1.0  # over a pixel
+    slope = (ray[:-4] - ray[4:]) * 1.0  # per pixel
     where = r[2:-2]
     top = int(np.argmax(np.where(np.abs(where - radius) <= window, slope, -np.inf)))
     top = min(max(top, 1), len(slope) - 2)
@@ -71,7 +70,7 @@ def steepest(ray: Array, first: float, radius: float, window: float, narrow: boo
 
 
 def apart(x: Array, y: Array, radius: Array, allowed: float) -> list[int]:
-    """The circles that overlap none of those before them that remain."""
+    """Keep the circles that overlap no kept circle before them."""
     kept: list[int] = []
     for k in range(len(x)):
         away = [np.hypot(x[k] - x[m], y[k] - y[m]) for m in kept]
@@ -82,7 +81,7 @@ def apart(x: Array, y: Array, radius: Array, allowed: float) -> list[int]:
 
 
 def sandwich_variance(score: Array, weight: Array, inverse: Array, scale: float, scatter: float) -> float:
-    """Variance of a component of the centre: H⁻¹ SᵀS H⁻¹ over the stretches that weigh anything, and the prior's."""
+    """Variance of a component of the centre: H⁻¹ SᵀS H⁻¹ over the stretches with weight, plus that of the prior."""
     used = score[weight > 0.0]
     spread = inverse @ (used.T @ used) @ inverse * len(used) / max(len(used) - 3, 1)
     prior = np.diag([0.0, 0.0, (scale / scatter) ** 2 * 8.0])

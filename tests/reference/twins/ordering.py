@@ -1,12 +1,12 @@
-"""The visiting order, with lists and strings of bits."""
+"""The visiting order, computed with lists and strings of bits."""
 
 from __future__ import annotations
 
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
 
 
 def plain_order(point: Array, i: Array, j: Array, size: int) -> tuple[list[int], int]:
-    """Contacts (c,) in groups of `size` that share no body, along the Morton curve; and how many are in full groups."""
+    """Contacts (c,) in groups of `size` that share no body, along the Morton curve; number in complete groups."""
     low = [min(p[k] for p in point) for k in range(2)]
     extent = max(max(p[k] for p in point) - low[k] for k in range(2))
 
@@ -15,16 +15,16 @@ def plain_order(point: Array, i: Array, j: Array, size: int) -> tuple[list[int],
         x, y = (f"{cell:016b}" for cell in cells)
         return "".join(b + a for a, b in zip(x, y, strict=True))  # y is the more significant of a pair of bits
 
-    left = sorted(range(len(point)), key=lambda c: (morton(c), c))
+    remaining = sorted(range(len(point)), key=lambda c: (morton(c), c))
     order: list[int] = []
     while True:
         group: list[int] = []
         bodies: set[int] = set()
-        for c in left:
+        for c in remaining:
             if len(group) < size and not {int(i[c]), int(j[c])} & bodies:
                 group.append(c)
                 bodies |= {int(i[c]), int(j[c])}
         if len(group) < size:
-            return order + left, len(order)
+            return order + remaining, len(order)
         order += group
-        left = [c for c in left if c not in group]
+        remaining = [c for c in remaining if c not in group]

@@ -1,17 +1,17 @@
-"""One packing that takes every branch of the solver's kernels, shared by the comparisons with them."""
+"""One packing that reaches every branch of the solver's kernels, used by all comparisons."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from solver.bodies.cell import Cell
-from solver.bodies.grains import Array, GrainMotion, Grains
-from solver.bodies.packing import Material
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts
-from solver.nlgs.problem import ContactProblem, assemble
+from rodsight.solver.bodies.cell import Cell
+from rodsight.solver.bodies.grains import Array, GrainMotion, Grains
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts, detect_contacts
+from rodsight.solver.nlgs.problem import ContactProblem, assemble
 
 COLUMNS, ROWS = 13, 12
 PITCH = 0.0161  # [m]
@@ -20,7 +20,7 @@ LOST = (0, 30, 77, 140)
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """All that `assemble` takes."""
+    """The arguments of `assemble`."""
 
     grains: Grains
     motion: GrainMotion
@@ -37,7 +37,7 @@ class Case:
 
 
 def make_case(seed: int = 7, *, with_boundary: bool = False) -> Case:
-    """A disordered packing between walls that move, turn and press.
+    """A disordered packing between walls that move, rotate and carry loads.
 
     with_boundary: some grains are boundary, and contacts reach across a cell that deforms, as if there were one, too.
 
@@ -57,8 +57,13 @@ def make_case(seed: int = 7, *, with_boundary: bool = False) -> Case:
     motion = GrainMotion(position, velocity, spin, present)
     corner = np.array([[0.0, 0.0], [COLUMNS, 0.0], [COLUMNS, ROWS], [0.0, ROWS]]) * PITCH
     endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
-    # Every wall moves along itself, across itself and turns.
-    walls = Walls(endpoints, rng.normal(0, 3e-5, (4, 2, 2)), np.array([np.nan, np.nan, 50.0, np.nan]))
+    # Every wall moves tangentially and normally, and rotates. A disc in place of a lost grain is fixed to the plate.
+    disc = np.array([[[4.5 * PITCH - 0.008, 2.5 * PITCH], [4.5 * PITCH + 0.008, 2.5 * PITCH]]])
+    velocity_of_walls = np.concatenate([rng.normal(0, 3e-5, (4, 2, 2)), np.full((1, 2, 2), 2e-5)])
+    walls = Walls(
+        np.concatenate([endpoints, disc]), velocity_of_walls, np.array([np.nan, np.nan, 50.0, np.nan, np.nan]),
+        np.array([STRAIGHT, STRAIGHT, STRAIGHT, STRAIGHT, OUT], np.int8), plate=np.array([-1, -1, -1, -1, 2], np.int32),
+    )  # fmt: skip
     contacts = detect_contacts(grains, position, present, walls, 3e-4)
     closing = np.where(rng.random(contacts.count) < 0.3, rng.uniform(0, 3e-5, contacts.count), 0.0)
     material = Material(0.3, 0.15, 0.1, (0.7, -9.81))
@@ -77,7 +82,7 @@ def _bounded(case: Case, rng: np.random.Generator) -> Case:
 
 
 def make_guess(case: Case, seed: int = 3) -> Array:
-    """Forces (c, 2) [N] to start from: bearing, sliding and open contacts."""
+    """Initial forces (c, 2) [N] of bearing, sliding and open contacts."""
     rng = np.random.default_rng(seed)
     fn = np.maximum(rng.normal(1.0, 1.0, case.contacts.count), 0.0)
     return np.column_stack([fn, rng.uniform(-0.15, 0.15, len(fn)) * fn])

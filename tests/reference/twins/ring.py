@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-
-from solver.bodies.grains import Array
-from solver.dem.kernels import Bodies, Law, Pairs
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.dem.contact_law import Law
+from rodsight.solver.dem.time_step import DemBodies, DemPairs
 
 
 def plain_circle_forces(
-    bodies: Bodies, pairs: Pairs, law: Law, circles: Array, drive: Array
+    bodies: DemBodies, pairs: DemPairs, law: Law, circles: Array, drive: Array
 ) -> tuple[Array, Array, float]:
-    """Forces and torques on the grains (n, 3), f_n, f_t and spring of every pair (p, 3), and the push on the ring."""
+    """Forces and torques on the grains (n, 3), f_n, f_t and spring of every pair (p, 3), and the force on the ring."""
     ring, rate, core, *centre, _ = circles
     force, found, push = np.zeros((len(bodies.mass), 3)), [], 0.0
     for i, wall, damping, spring in zip(pairs.i, pairs.j, pairs.damping, pairs.spring, strict=True):

@@ -1,11 +1,10 @@
-"""B-splines from their definition, and pictures read with them."""
+"""B-splines from their definition, and interpolation of pictures."""
 
 from __future__ import annotations
 
 import numpy as np
+from rodsight.solver.bodies.grains import Array
 from scipy.interpolate import BSpline
-
-from solver.bodies.grains import Array
 
 
 def basis(degree: int, distance: Array | float, derivative: int = 0) -> Array:
@@ -17,12 +16,12 @@ def basis(degree: int, distance: Array | float, derivative: int = 0) -> Array:
 
 
 def value(coefficients: Array, x: float, y: float, degree: int, derivative: tuple[int, int] = (0, 0)) -> float:
-    """Σ c[l, k] β(x − k) β(y − l); derivative: how often along x and y."""
+    """Σ c[l, k] β(x − k) β(y − l); derivative: orders along x and y."""
     return float(values(coefficients, np.array([x]), np.array([y]), degree, derivative)[0])
 
 
 def values(coefficients: Array, x: Array, y: Array, degree: int, derivative: tuple[int, int] = (0, 0)) -> Array:
-    """The same at points x, y (p,), over the whole support; what lies beyond the picture counts as nothing."""
+    """Values at points x, y (p,), over the whole support; zero beyond the picture."""
     reach = (degree + 1) // 2
     near = np.arange(-reach, reach + 2)
     column, row = np.floor(x).astype(int)[:, None] + near, np.floor(y).astype(int)[:, None] + near

@@ -1,12 +1,11 @@
-"""The hidden Markov smoother of the gaps, one pair at a time, with dense matrices and the constants written out."""
+"""The hidden Markov smoother of the gaps, one pair at a time, with dense matrices and constants written out."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
 
 
 def plain_smooth(gap: Array, sigma: Array, scale: Array, overlap: float) -> tuple[Array, Array, Array]:
@@ -53,7 +52,7 @@ def _transition(states: list[float], width: list[float], scale: float) -> Array:
 
 
 def _likelihood(measured: float, sigma: float, states: list[float]) -> Array:
-    """Of a measured gap in every state; an outlier beyond the states or far below zero says no more than their ends."""
+    """Likelihood of a measured gap in every state; outliers are clipped to the range of the states."""
     if math.isnan(measured):
         return np.ones(49)
     measured = min(max(measured, -5.0 * sigma), states[-1])
@@ -63,7 +62,7 @@ def _likelihood(measured: float, sigma: float, states: list[float]) -> Array:
 def _true_gap(
     share: Array, states: list[float], width: list[float], measured: float, sigma: float, overlap: float
 ) -> tuple[float, float]:
-    """Every state is a normal law about its gap, of its own width and that of the overlaps, met by the measurement."""
+    """Combine each state, a normal distribution with its own width and that of the overlaps, with the measurement."""
     laws = []
     for g, w in zip(states, width, strict=True):
         spread = overlap**2 + w**2 / 12.0

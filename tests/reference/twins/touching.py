@@ -1,16 +1,15 @@
-"""Densities of touching and of open gaps by whole arrays; `solver.posterior.touching_kernels` has them one by one."""
+"""Densities of touching and of open gaps by arrays; `solver.posterior.touching_kernels` computes them one by one."""
 
 from __future__ import annotations
 
 import numpy as np
+from rodsight.solver.bodies.grains import Array
 from scipy.special import ndtr
 
-from solver.bodies.grains import Array
 
-
-def densities(gap: Array, mean: Array, room: Array, s: float, share: Array) -> tuple[Array, Array]:
-    """Of touching and of open gaps (f, c) [m] about means (c,) [m] with rooms (c,) [m] above; share (f,)."""
+def densities(gap: Array, mean: Array, open_range: Array, s: float, fraction: Array) -> tuple[Array, Array]:
+    """Densities of touching and open gaps (f, c) [m]; mean, open_range (c,) [m] above it; fraction (f,)."""
     rest = gap - mean
-    touching = share[:, None] * np.exp(-0.5 * (rest / s) ** 2) / (s * np.sqrt(2.0 * np.pi))
-    opened = (1.0 - share[:, None]) * (ndtr(rest / s) - ndtr((rest - room) / s)) / np.maximum(room, s)
+    touching = fraction[:, None] * np.exp(-0.5 * (rest / s) ** 2) / (s * np.sqrt(2.0 * np.pi))
+    opened = (1.0 - fraction[:, None]) * (ndtr(rest / s) - ndtr((rest - open_range) / s)) / np.maximum(open_range, s)
     return touching, opened

@@ -1,8 +1,7 @@
 import numpy as np
-
-from solver.bodies.grains import Grains
-from solver.bodies.holes import find_holes
-from solver.bodies.walls import Walls
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.holes import find_holes
+from rodsight.solver.bodies.walls import Walls
 
 R = 0.01
 HOLE = 44  # a grain in the middle of the lattice
@@ -20,12 +19,12 @@ def lattice(radius: np.ndarray | None = None) -> tuple[Grains, np.ndarray, Walls
     return grains, position, Walls(endpoints, np.zeros((4, 2, 2)), np.full(4, np.nan))
 
 
-def test_a_whole_packing_has_no_holes():
+def test_complete_packing_has_no_holes():
     grains, position, walls = lattice()
     assert len(find_holes(grains, position, np.ones(81, bool), walls)) == 0
 
 
-def test_an_unseen_grain_leaves_a_hole_where_it_was():
+def test_missing_grain_leaves_a_hole_at_its_position():
     grains, position, walls = lattice()
     present = np.arange(81) != HOLE
     position = np.where(present[:, None], position, np.nan)
@@ -34,9 +33,9 @@ def test_an_unseen_grain_leaves_a_hole_where_it_was():
     np.testing.assert_allclose(found[0], lattice()[1][HOLE], atol=EXACT)
 
 
-def test_gaps_between_great_grains_are_no_holes():
+def test_pores_between_large_grains_are_no_holes():
     radius = np.full(81, R)
-    radius[0] = 0.4 * R  # a rod that would fit into natural gaps
+    radius[0] = 0.4 * R  # a rod that fits into the pores
     grains, position, walls = lattice(radius)
     assert len(find_holes(grains, position, np.ones(81, bool), walls)) == 0
 
@@ -46,8 +45,8 @@ def test_too_few_grains_have_no_holes():
     assert len(find_holes(grains, position, np.arange(81) < 3, walls)) == 0
 
 
-def test_a_hole_is_told_once_however_wide_it_is():
-    """Two neighbours are gone: their places make one wide hole or two, but no two of them lie on one another."""
+def test_wide_hole_has_no_overlapping_centres():
+    """Two neighbours are missing: the centres of their holes are at least a radius apart."""
     grains, position, walls = lattice()
     present = ~np.isin(np.arange(81), [HOLE, HOLE + 1])
     found = find_holes(grains, np.where(present[:, None], position, np.nan), present, walls)
@@ -55,20 +54,20 @@ def test_a_hole_is_told_once_however_wide_it_is():
     assert np.hypot(*(found[0] - found[1])) >= 0.97 * R
 
 
-def test_a_hole_too_narrow_for_the_smallest_rod_is_none():
-    """A seat for a rod of .8 R."""
+def test_hole_smaller_than_the_smallest_rod_is_ignored():
+    """The hole fits a rod of 0.8 R."""
     radius = np.full(81, R)
     grains, position, walls = lattice(radius)
     position = position.copy()
     around = np.argsort(np.hypot(*(position - position[HOLE]).T))[1:7]
     present = np.arange(81) != HOLE
-    toward = position[around] - position[HOLE]
-    position[around] -= 0.2 * R * toward / np.hypot(*toward.T)[:, None]
+    inward = position[around] - position[HOLE]
+    position[around] -= 0.2 * R * inward / np.hypot(*inward.T)[:, None]
     assert len(find_holes(grains, np.where(present[:, None], position, np.nan), present, walls)) == 0
 
 
-def test_a_rod_as_large_as_its_neighbours_fits_a_natural_measure():
-    """Where small rods are among great ones, what a great one leaves is a hole, too."""
+def test_missing_large_rod_among_small_ones_leaves_a_hole():
+    """Among small and large rods, a missing large one leaves a hole, too."""
     radius = np.where(np.arange(81) == 0, 0.7 * R, R)
     grains, position, walls = lattice(radius)
     present = np.arange(81) != HOLE

@@ -1,14 +1,14 @@
-"""Poses become motions, and motions places in between."""
+"""Motion from measured positions, and positions within an interval."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import GrainMotion, Grains
+from rodsight.solver.bodies.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.bodies.walls import Walls
 
-from solver.bodies.grains import GrainMotion, Grains
-from solver.bodies.motion import FrameMotion, LastSeen, Snapshot, motion_from, motion_to, no_motion, shear_over
-from solver.bodies.packing import Material, Packing
-from solver.bodies.walls import Walls
 from tests.packings import LENGTH, box, rods
 
 WALLS = box(0.1, 0.05).endpoints
@@ -23,22 +23,22 @@ def snapshot(time, moved=(0.0, 0.0), turned=0.0, present=None, walls=WALLS, sigm
 def seen(*snapshots):
     known = LastSeen.never(len(START))
     for each in snapshots:
-        known = known.renewed(each)
+        known = known.updated(each)
     return known
 
 
-def test_velocities_are_displacements_over_the_time_between():
+def test_velocity_is_displacement_over_interval():
     first = snapshot(10.0)
     walls = WALLS + np.array([0.004, -0.002])
     motion = motion_to(snapshot(12.0, (0.002, -0.006), 0.1, walls=walls), seen(first), 10.0, first.endpoints)
     assert motion.interval == 2.0
-    assert motion.spans
+    assert motion.ends_here
     assert motion.grains.velocity == pytest.approx(np.tile([0.001, -0.003], (5, 1)))
     assert motion.grains.spin == pytest.approx(np.full(5, 0.05))
     assert motion.wall_velocity == pytest.approx(np.broadcast_to([0.002, -0.001], (4, 2, 2)))
 
 
-def test_a_grain_seen_again_moves_with_its_mean_velocity_since():
+def test_grain_seen_again_has_its_mean_velocity_since_then():
     first, lost = snapshot(0.0), snapshot(1.0, (1e-3, 0.0), present=[1, 1, 0, 1, 1])
     motion = motion_to(snapshot(2.0, (4e-3, 0.0), 0.2), seen(first, lost), 1.0, WALLS)
     assert motion.grains.velocity[2, 0] == pytest.approx(2e-3)
@@ -47,7 +47,7 @@ def test_a_grain_seen_again_moves_with_its_mean_velocity_since():
     assert motion.grains.spin[0] == pytest.approx(0.2)
 
 
-def test_a_grain_never_seen_before_moves_like_the_mean_of_its_neighbours():
+def test_grain_seen_for_the_first_time_has_the_mean_velocity_of_its_neighbours():
     first = snapshot(0.0, present=[1, 1, 1, 1, 0])
     moved = np.array([[0.0, 1e-3], [0.0, 2e-3], [0.0, 3e-3], [0.0, 6e-3], [0.0, 0.0]])
     motion = motion_to(replace(snapshot(1.0), position=START + moved), seen(first), 0.0, WALLS)
@@ -66,10 +66,10 @@ def test_between_photographs_everything_moves_evenly():
         assert there.velocity == pytest.approx(np.broadcast_to([0.0, 2e-3], (4, 2, 2)))
 
 
-def test_the_first_frame_takes_the_motion_that_follows_and_has_no_instants_before_it():
+def test_first_frame_has_the_following_motion_and_no_earlier_instants():
     following = snapshot(2.0, (2e-3, 0.0), 0.4, present=[1, 1, 1, 0, 1], walls=WALLS + 2e-3)
     motion = motion_from(snapshot(0.0), following)
-    assert not motion.spans
+    assert not motion.ends_here
     assert motion.grains.velocity[:3] == pytest.approx(np.tile([1e-3, 0.0], (3, 1)))
     assert motion.grains.velocity[3].tolist() == [0.0, 0.0]  # it is lost afterwards
     assert motion.grains.spin.tolist() == pytest.approx([0.2, 0.2, 0.2, 0.0, 0.2])
@@ -79,7 +79,7 @@ def test_the_first_frame_takes_the_motion_that_follows_and_has_no_instants_befor
     assert np.array_equal(walls.endpoints, WALLS)
 
 
-def test_who_appears_only_in_the_following_frame_does_not_move_the_first():
+def test_grain_seen_only_in_the_second_frame_has_zero_velocity_in_the_first():
     motion = motion_from(snapshot(0.0, present=[1, 1, 1, 1, 0]), snapshot(1.0, (1e-3, 0.0)))
     assert motion.grains.velocity[4].tolist() == [0.0, 0.0]
 
@@ -92,18 +92,18 @@ def frame_motion(velocity, sigma, present=None):
     )
 
 
-def test_the_typical_velocity_is_the_rms_of_the_grains_that_are_there():
+def test_velocity_rms_is_over_present_grains():
     motion = frame_motion([[3.0, 4.0], [0.0, 0.0], [70.0, 0.0]], 1e-6, np.array([True, True, False]))
     assert motion.velocity_rms == pytest.approx(np.sqrt(12.5))
 
 
-def test_the_typical_velocity_is_never_below_what_noise_makes():
+def test_velocity_rms_is_at_least_that_of_the_noise():
     assert frame_motion([[1e-9, 0.0]], 1e-6).velocity_rms == pytest.approx(5e-7)
     assert no_motion(snapshot(0.0, sigma=0.0)).velocity_rms > 0.0
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0])
-def test_time_goes_forward(wrong):
+def test_times_must_increase(wrong):
     with pytest.raises(ValueError, match="not after"):
         motion_to(snapshot(wrong), seen(snapshot(0.0)), 0.0, WALLS)
     with pytest.raises(ValueError, match="not after"):
@@ -118,20 +118,20 @@ def test_shear_is_the_difference_of_the_principal_strains():
     assert shear_over(turn) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_rods_weigh_what_their_section_and_length_say():
+def test_mass_is_density_times_section_times_length():
     grains = Grains.of_rods(np.array([0.01, 0.02]), density=1000.0, length=0.5)
     assert grains.mass == pytest.approx([0.05 * np.pi, 0.2 * np.pi])
     assert grains.inertia == pytest.approx(0.5 * grains.mass * np.array([1e-4, 4e-4]))
     assert grains.weight((1.0, -9.81)) == pytest.approx(np.outer([0.05 * np.pi, 0.2 * np.pi], [1.0, -9.81]))
 
 
-def test_a_wall_faces_away_from_the_packing_on_its_left():
+def test_outward_normal_points_away_from_the_packing():
     walls = box(0.1, 0.05)
     assert walls.outward == pytest.approx(np.array([[0, -1], [1, 0], [0, 1], [-1, 0]]))
     assert walls.length == pytest.approx([0.1, 0.05, 0.1, 0.05])
 
 
-def test_a_wall_that_turns_moves_in_proportion_to_the_way_along_it():
+def test_velocity_of_a_rotating_wall_is_linear_along_it():
     velocity = np.zeros((4, 2, 2))
     velocity[0] = [[0.0, 1.0], [0.5, 3.0]]
     walls = Walls(WALLS, velocity, np.full(4, np.nan))
@@ -139,7 +139,7 @@ def test_a_wall_that_turns_moves_in_proportion_to_the_way_along_it():
     assert at == pytest.approx(np.array([[0.0, 1.0], [0.125, 1.5], [0.5, 3.0]]))
 
 
-def test_a_plate_carries_its_pressure_times_its_face():
+def test_load_is_pressure_times_face():
     packing = Packing(rods(0.01), LENGTH, Material(0.3, 0.3), np.array([np.nan, np.nan, 5e4, np.nan]))
     assert packing.load(WALLS) == pytest.approx([np.nan, np.nan, 5e4 * 0.1 * LENGTH, np.nan], nan_ok=True)
     walls = packing.walls(WALLS)

@@ -1,4 +1,4 @@
-"""Rods along the walls of a box that shears and dilates; the corners where its bars meet are what a person marks."""
+"""Corrections of the boundary, on rods along the walls of a box that shears and dilates, marked by its corners."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from solver.boundary.bars import find_bars
-from solver.boundary.boundary import BoundarySettings, mend_boundary
-from solver.boundary.camera_pose import find_camera_pose
-from solver.boundary.continuation import continue_walls, lengthen
-from solver.calibration.gaps import MeasuredSequence
+from rodsight.solver.boundary.bars import find_wall_bars
+from rodsight.solver.boundary.boundary_correction import BoundarySettings, correct_boundary
+from rodsight.solver.boundary.camera_pose import find_camera_pose
+from rodsight.solver.boundary.continuation import continue_walls, extend_walls
+from rodsight.solver.calibration.gaps import MeasuredSequence
 
 pytestmark = pytest.mark.unit
 
 RADIUS, FRAMES, SIDE, NOISE = 8e-3, 8, 0.4, 5e-6
-NOT_TOLD, BAR, CORNER = np.full(4, -1, np.int8), np.zeros(4, np.int8), np.ones(4, np.int8)
+UNSPECIFIED, BAR, CORNER = np.full(4, -1, np.int8), np.zeros(4, np.int8), np.ones(4, np.int8)
 
 
 def sheared_box(*, rolling: float = 0.6, seed: int = 0) -> tuple[MeasuredSequence, np.ndarray]:
-    """Rods that touch the walls, a share of which rolls with its wall while the others slide; and the true bars.
+    """Make rods at the walls, a fraction of which rolls with its wall while the others slide; and the true bars.
 
     The side bars are hinged at their lower ends and stay as long as they are; the lid is lifted as the box shears.
     """
@@ -34,7 +33,7 @@ def sheared_box(*, rolling: float = 0.6, seed: int = 0) -> tuple[MeasuredSequenc
         np.stack([low, right], 1), np.stack([right, right + SIDE * along], 1),
         np.stack([lid + right, lid], 1), np.stack([SIDE * along, low], 1),
     ], axis=1)  # fmt: skip
-    place, turn = [], []
+    place, rotation = [], []
     for w in range(4):
         unit = (bars[:, w, 1] - bars[:, w, 0]) / SIDE
         inward = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
@@ -42,16 +41,21 @@ def sheared_box(*, rolling: float = 0.6, seed: int = 0) -> tuple[MeasuredSequenc
         for s in np.linspace(0.1, 0.9, 14) * SIDE:
             slide = np.zeros(FRAMES) if rng.random() < rolling else 2e-4 * rng.normal(size=FRAMES).cumsum()
             place.append(bars[:, w, 0] + (s + slide)[:, None] * unit + RADIUS * inward)
-            turn.append(angle - angle[0])
+            rotation.append(angle - angle[0])
     position = np.stack(place, axis=1) + NOISE * rng.normal(size=(FRAMES, len(place), 2))
     shape = position.shape[:2]
     return MeasuredSequence(
-        np.full(shape[1], RADIUS), position, np.stack(turn, axis=1), np.ones(shape, bool), bars, np.full(shape, NOISE)
+        np.full(shape[1], RADIUS),
+        position,
+        np.stack(rotation, axis=1),
+        np.ones(shape, bool),
+        bars,
+        np.full(shape, NOISE),
     ), bars
 
 
 def at_corners(sequence: MeasuredSequence) -> MeasuredSequence:
-    """The same with the side walls told by the corners where they meet floor and lid."""
+    """Give the side walls by the corners where they meet floor and lid."""
     ends = sequence.endpoints.copy()
     ends[:, 1, 1], ends[:, 3, 0] = ends[:, 2, 0], ends[:, 2, 1]
     return replace(sequence, endpoints=ends)
@@ -62,50 +66,75 @@ def speed_along(ends: np.ndarray, w: int) -> np.ndarray:
     return np.einsum("fk,fk->f", np.diff(ends[:, w, 0], axis=0), unit)
 
 
-def test_corners_are_found_by_their_stretching_and_give_the_motion_of_the_bars() -> None:
+def test_corners_are_found_by_stretching_and_replaced_by_points_of_the_bars() -> None:
     sequence, bars = sheared_box()
-    told = at_corners(sequence)
-    found, points = find_bars(told, NOISE, NOT_TOLD)
+    cornered = at_corners(sequence)
+    found, points = find_wall_bars(cornered, NOISE, UNSPECIFIED)
     assert found.corner.tolist() == [False, True, False, True]
-    assert np.abs(speed_along(told.endpoints, 3) - speed_along(bars, 3)).max() > 5e-4
+    assert np.abs(speed_along(cornered.endpoints, 3) - speed_along(bars, 3)).max() > 5e-4
     for w in (1, 3):
-        assert speed_along(points, w) == pytest.approx(speed_along(bars, w), abs=1e-6)  # told: 5e-4
+        assert speed_along(points, w) == pytest.approx(speed_along(bars, w), abs=1e-6)  # of the corners: 5e-4
         length = np.linalg.norm(points[:, w, 1] - points[:, w, 0], axis=1)
         assert np.ptp(length) < 1e-12  # rigid
-    assert found.share[[1, 3]].tolist() == [0.0, 1.0]  # hinged below: at end 0 of the right wall, end 1 of the left
+    assert found.end_fraction[[1, 3]].tolist() == [
+        0.0,
+        1.0,
+    ]  # hinged below: end 0 on the right, end 1 on the left
     assert np.abs(found.slip[1:, 1]) == pytest.approx(0.5 * np.diff(np.linalg.norm(
-        told.endpoints[:, 1, 1] - told.endpoints[:, 1, 0], axis=1)))  # fmt: skip
+        cornered.endpoints[:, 1, 1] - cornered.endpoints[:, 1, 0], axis=1)))  # fmt: skip
 
 
-def test_what_the_user_tells_of_the_ends_is_obeyed() -> None:
-    sequence, _ = sheared_box()
-    told = at_corners(sequence)
-    assert not find_bars(told, NOISE, BAR)[0].corner.any()
-    assert find_bars(told, NOISE, CORNER)[0].corner.all()
-    assert np.array_equal(find_bars(told, NOISE, BAR)[1], told.endpoints)
-
-
-def test_bars_stay_as_they_were_told() -> None:
+@pytest.mark.parametrize("factor", [0.98, 0.975, 1.02])
+def test_hinges_are_found_with_radii_that_share_an_error(factor) -> None:
     sequence, bars = sheared_box()
-    found, points = find_bars(sequence, NOISE, NOT_TOLD)
+    cornered = replace(at_corners(sequence), radius=factor * sequence.radius)
+    found, points = find_wall_bars(cornered, NOISE, UNSPECIFIED)
+    assert found.end_fraction[[1, 3]].tolist() == [0.0, 1.0]
+    assert speed_along(points, 3) == pytest.approx(speed_along(bars, 3), abs=1e-6)
+
+
+def test_a_hinge_that_no_rod_shows_is_reported_as_unknown() -> None:
+    sequence, _ = sheared_box()
+    cornered = at_corners(sequence)
+    inside = np.abs(sequence.position[0] - 0.5 * SIDE).max(axis=1) < 0.5 * SIDE - 2.0 * RADIUS
+    far = replace(cornered, present=cornered.present & inside)
+    found, points = find_wall_bars(far, NOISE, UNSPECIFIED)
+    assert np.isnan(found.end_fraction[[1, 3]]).all()
+    assert not found.slip.any()
+    assert np.ptp(np.linalg.norm(points[:, 3, 1] - points[:, 3, 0], axis=1)) < 1e-12
+    _, boundary = correct_boundary(far, NOISE, UNSPECIFIED, BoundarySettings(camera=False))
+    assert any("hinge is unknown" in each for each in boundary.describe(("floor", "right", "lid", "left")))
+
+
+def test_specified_kind_of_ends_is_used() -> None:
+    sequence, _ = sheared_box()
+    cornered = at_corners(sequence)
+    assert not find_wall_bars(cornered, NOISE, BAR)[0].corner.any()
+    assert find_wall_bars(cornered, NOISE, CORNER)[0].corner.all()
+    assert np.array_equal(find_wall_bars(cornered, NOISE, BAR)[1], cornered.endpoints)
+
+
+def test_rigid_bars_are_not_changed() -> None:
+    sequence, bars = sheared_box()
+    found, points = find_wall_bars(sequence, NOISE, UNSPECIFIED)
     assert not found.corner.any()
     assert np.array_equal(points, bars)
     assert not found.slip.any()
 
 
-def test_a_wall_told_too_short_goes_on_to_the_last_rod_but_not_past_the_next_wall() -> None:
+def test_short_wall_is_extended_to_the_last_rod_but_not_past_the_next_wall() -> None:
     sequence, bars = sheared_box()
     short = bars.copy()
     short[:, 3, 0] += 0.3 * (bars[:, 3, 1] - bars[:, 3, 0])  # the left wall's upper end, hanging 12 cm too low
-    beyond = continue_walls(replace(sequence, endpoints=short))
-    assert 0.08 < beyond[3, 0] <= 0.3 * SIDE + 8e-3  # the lid is that much higher at the end
-    assert np.count_nonzero(beyond) == 1
-    longer = lengthen(short, beyond)
-    assert np.linalg.norm(longer[:, 3, 1] - longer[:, 3, 0], axis=1) == pytest.approx(0.7 * SIDE + beyond[3, 0])
+    extension = continue_walls(replace(sequence, endpoints=short))
+    assert 0.08 < extension[3, 0] <= 0.3 * SIDE + 8e-3  # the lid is that much higher at the end
+    assert np.count_nonzero(extension) == 1
+    longer = extend_walls(short, extension)
+    assert np.linalg.norm(longer[:, 3, 1] - longer[:, 3, 0], axis=1) == pytest.approx(0.7 * SIDE + extension[3, 0])
     assert not continue_walls(sequence).any()
 
 
-def test_a_rod_beyond_the_end_that_does_not_bear_leaves_a_wall_as_it_is() -> None:
+def test_rod_off_the_line_does_not_extend_a_wall() -> None:
     sequence, bars = sheared_box()
     past = np.array([SIDE + 2 * RADIUS, 1.5 * RADIUS])  # half a radius off the floor's line
     position = np.concatenate([sequence.position, np.tile(past, (FRAMES, 1, 1))], axis=1)
@@ -119,28 +148,28 @@ def test_a_rod_beyond_the_end_that_does_not_bear_leaves_a_wall_as_it_is() -> Non
     assert continue_walls(floor)[0, 1] == pytest.approx(3 * RADIUS)
 
 
-def test_the_camera_is_followed_to_a_few_micrometres_and_left_alone_where_it_stood_still() -> None:
+def test_camera_motion_is_found_to_a_few_micrometres_and_none_at_rest() -> None:
     sequence, _ = sheared_box(seed=1)
     rng = np.random.default_rng(2)
     shift = rng.uniform(-6e-5, 6e-5, (FRAMES, 2))
-    turn = rng.normal(0, 1e-4, FRAMES)
+    rotation = rng.normal(0, 1e-4, FRAMES)
     middle = sequence.position.mean(axis=(0, 1))
     place = sequence.position - middle
-    spun = turn[:, None, None] * np.stack([-place[..., 1], place[..., 0]], axis=2)
-    moved = replace(sequence, position=sequence.position + shift[:, None] + spun)
+    rotated = rotation[:, None, None] * np.stack([-place[..., 1], place[..., 0]], axis=2)
+    moved = replace(sequence, position=sequence.position + shift[:, None] + rotated)
     pose = find_camera_pose(moved)
     assert pose.applied
-    assert np.abs(pose.turn - (turn - turn.mean())).max() < 2e-5
+    assert np.abs(pose.rotation - (rotation - rotation.mean())).max() < 2e-5
     left = pose.correct(moved.position) - sequence.position
-    left -= left.mean(axis=0)  # what all photographs share is where the walls are
+    left -= left.mean(axis=0)  # a common pose is an error of the walls
     assert np.sqrt(np.mean(left**2)) < 4e-6
-    still = find_camera_pose(sequence)
-    assert not still.applied
-    assert still.evidence < 3.0
-    assert np.array_equal(still.correct(sequence.position), sequence.position)
+    resting = find_camera_pose(sequence)
+    assert not resting.applied
+    assert resting.evidence < 3.0
+    assert np.array_equal(resting.correct(sequence.position), sequence.position)
 
 
-def test_too_few_rods_at_the_walls_tell_no_pose() -> None:
+def test_too_few_rods_at_the_walls_give_no_pose() -> None:
     sequence, _ = sheared_box()
     few = MeasuredSequence(
         sequence.radius[:5], sequence.position[:, :5], sequence.rotation[:, :5], sequence.present[:, :5],
@@ -150,16 +179,18 @@ def test_too_few_rods_at_the_walls_tell_no_pose() -> None:
     assert np.isnan(find_camera_pose(few).evidence)
 
 
-def test_all_of_it_together_is_said_in_words() -> None:
+def test_all_corrections_are_described() -> None:
     sequence, bars = sheared_box(seed=3)
-    told = at_corners(sequence)
-    shifted = replace(told, position=told.position + np.random.default_rng(4).uniform(-6e-5, 6e-5, (FRAMES, 1, 2)))
-    mended, boundary = mend_boundary(shifted, NOISE, NOT_TOLD, BoundarySettings())
-    assert speed_along(mended.endpoints, 3) == pytest.approx(speed_along(bars, 3), abs=1e-6)
-    said = " ".join(boundary.describe(("floor", "right", "lid", "left")))
-    assert "'right' are corners" in said
-    assert "'left' are corners" in said
-    assert "camera moves" in said
-    kept, none = mend_boundary(shifted, NOISE, BAR, BoundarySettings(camera=False, continued=False))
+    cornered = at_corners(sequence)
+    shifted = replace(
+        cornered, position=cornered.position + np.random.default_rng(4).uniform(-6e-5, 6e-5, (FRAMES, 1, 2))
+    )
+    corrected, boundary = correct_boundary(shifted, NOISE, UNSPECIFIED, BoundarySettings())
+    assert speed_along(corrected.endpoints, 3) == pytest.approx(speed_along(bars, 3), abs=1e-6)
+    sentences = " ".join(boundary.describe(("floor", "right", "lid", "left")))
+    assert "'right' are corners" in sentences
+    assert "'left' are corners" in sentences
+    assert "camera moves" in sentences
+    kept, none = correct_boundary(shifted, NOISE, BAR, BoundarySettings(camera=False, continued=False))
     assert np.array_equal(kept.position, shifted.position)
     assert none.describe(("floor", "right", "lid", "left")) == []

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from solver.calibration.calibrate import calibrate
-from solver.calibration.equations import GapEquations, move_walls, rotate_offsets
-from solver.calibration.gaps import MeasuredSequence, find_gap_rows
-from solver.calibration.priors import CalibrationPriors
-from solver.calibration.weights import contact_width
+from rodsight.solver.calibration.calibrate import calibrate
+from rodsight.solver.calibration.equations import GapEquations, move_walls, rotate_offsets
+from rodsight.solver.calibration.gaps import MeasuredSequence, find_gap_rows
+from rodsight.solver.calibration.priors import CalibrationPriors
+from rodsight.solver.calibration.weights import contact_width
 
 RADIUS = 8e-3  # [m]
 SPACING = 2.2 * RADIUS  # between the discs of a row: they never touch each other
@@ -20,7 +19,7 @@ PRIORS = CalibrationPriors(centre=50e-6, radius=10e-6, wall=50e-6)
 
 
 def slide_rows(rng: np.random.Generator, *, frames: int = 30, rows: int = 6, columns: int = 7) -> MeasuredSequence:
-    """Rows of discs, each carried by the row below, sliding at its own speed; the discs turn as they like."""
+    """Rows of discs, each carried by the row below, sliding at its own speed; the discs rotate at random."""
     slip = rng.uniform(0.5, 1.0, rows) * SPACING / frames * rng.choice([-1.5, 1.5], rows)
     start = rng.uniform(0.0, SPACING, rows)
     column = np.arange(columns) * SPACING
@@ -52,7 +51,7 @@ def falsify(
     wall: np.ndarray | float = 0.0,
     tilt: np.ndarray | float = 0.0,
 ) -> MeasuredSequence:
-    """Make the measurement that these corrections turn into the truth."""
+    """Make the measurement whose true corrections are these."""
     offset = np.broadcast_to(offset, (true.grain_count, 2))
     wall, tilt = np.broadcast_to(wall, true.wall_count), np.broadcast_to(tilt, true.wall_count)
     return replace(
@@ -111,7 +110,7 @@ def test_derivatives_match_finite_differences(true, rng):
     rows = find_gap_rows(true, 0.05 * RADIUS)
     rows = rows.select(np.sort(rng.choice(rows.count, 200, replace=False)))
     unknowns = rng.normal(0.0, 50e-6, equations.layout.count)
-    unknowns[equations.layout.wall_tilt] = 0.0  # a tilted wall's normal turns: seen in the second order alone
+    unknowns[equations.layout.wall_tilt] = 0.0  # a tilted wall's normal rotates: an effect of second order
     direction = rng.normal(0.0, 1.0, equations.layout.count)
     step = 1e-6  # truncation ~ step² / RADIUS, rounding ~ 1e-16 / step: both far below the tolerance
     ahead = equations.measure(rows, unknowns + step * direction).gap
@@ -136,9 +135,9 @@ def test_centre_and_radius_errors_are_found(true, rng, noise):
     assert result.applied
     assert rms(result.offset - offset) < 0.25 * rms(offset)
     assert rms(result.radius - radius) < rms(radius)
-    # Without noise one pair taken for a contact outweighs standard deviations of nanometres.
-    honest = (0.3, 1.5) if noise else (0.0, np.inf)  # true errors over standard deviations
-    assert honest[0] < rms((result.offset - offset) / result.offset_sd) < honest[1]
+    # Without noise one wrong contact exceeds standard deviations of nanometres.
+    calibrated = (0.3, 1.5) if noise else (0.0, np.inf)  # true errors over standard deviations
+    assert calibrated[0] < rms((result.offset - offset) / result.offset_sd) < calibrated[1]
     assert result.after.width < 0.2 * result.before.width
 
 
@@ -148,14 +147,14 @@ def test_corrected_sequence_has_narrow_gaps(true, rng):
     touching = find_gap_rows(true, ROUNDING)
     for sequence, least, most in ((measured, 40e-6, 150e-6), (corrected, 0.0, 5e-6)):
         equations = GapEquations(sequence)
-        spread = rms(equations.measure(touching, np.zeros(equations.layout.count)).gap)
-        assert least < spread < most
+        gap_rms = rms(equations.measure(touching, np.zeros(equations.layout.count)).gap)
+        assert least < gap_rms < most
     np.testing.assert_array_equal(corrected.rotation, measured.rotation)
 
 
 @pytest.mark.parametrize("noise", [0.0, 10e-6])
 @pytest.mark.parametrize("priors", [None, PRIORS])
-def test_exact_input_is_left_alone(true, rng, noise, priors):
+def test_exact_input_is_not_corrected(true, rng, noise, priors):
     measured = add_noise(true, noise, rng)
     result = calibrate(measured, priors, rng=rng)
     assert not result.applied
@@ -164,7 +163,7 @@ def test_exact_input_is_left_alone(true, rng, noise, priors):
     np.testing.assert_array_equal(result.correct(measured).radius, measured.radius)
 
 
-def test_elastic_overlaps_are_not_taken_for_errors(true, rng):
+def test_elastic_overlaps_are_not_corrected(true, rng):
     softened = replace(true, radius=true.radius + 2.5e-6)  # every contact overlaps by 5 µm
     result = calibrate(add_noise(softened, 3e-6, rng), PRIORS, rng=rng, typical_overlap=5e-6)
     assert not result.applied
@@ -175,11 +174,11 @@ def test_shifted_wall_is_found_and_named(true, rng):
     result = calibrate(add_noise(falsify(true, wall=wall), 3e-6, rng), PRIORS, rng=rng)
     assert result.applied
     assert "walls" in result.verdict
-    np.testing.assert_allclose(result.wall, wall, atol=4e-6)  # noise over 7 grains × 30 frames, robustly cut
-    assert rms(result.offset) < 1e-6  # centres were right and stay so
+    np.testing.assert_allclose(result.wall, wall, atol=4e-6)  # noise over 7 grains × 30 frames, robustly weighted
+    assert rms(result.offset) < 1e-6  # centres were exact and stay so
 
 
-def test_turned_wall_is_found_and_named(true, rng):
+def test_rotated_wall_is_found_and_named(true, rng):
     tilt = np.array([1e-3, -2e-4])
     measured = add_noise(falsify(true, tilt=tilt, wall=np.array([0.0, 30e-6])), 3e-6, rng)
     result = calibrate(measured, replace(PRIORS, wall_tilt=5e-4), rng=rng)
@@ -193,7 +192,7 @@ def test_turned_wall_is_found_and_named(true, rng):
     np.testing.assert_allclose(ends, true.endpoints, atol=beside)
 
 
-def test_without_a_prior_walls_are_not_turned(true, rng):
+def test_without_a_prior_walls_are_not_rotated(true, rng):
     result = calibrate(falsify(true, wall=60e-6), PRIORS, rng=rng)
     np.testing.assert_array_equal(result.wall_tilt, [0.0, 0.0])
     np.testing.assert_array_equal(result.wall_tilt_sd, [0.0, 0.0])
@@ -208,7 +207,7 @@ def test_radius_error_of_a_class_is_found(true, rng):
     assert "radius classes" in result.verdict
 
 
-def test_lost_grains_take_no_part(true, rng):
+def test_lost_grains_are_ignored(true, rng):
     offset = rng.normal(0, 50e-6, (true.grain_count, 2))
     measured = falsify(true, offset=offset)
     present = rng.random(measured.present.shape) > 0.1
@@ -234,22 +233,22 @@ def test_one_photograph_leaves_most_to_the_prior(rng):
     assert np.all(result.offset_sd <= result.priors.centre)
 
 
-def test_corrections_beyond_the_prior_are_said(true, rng):
+def test_corrections_beyond_the_prior_are_reported(true, rng):
     measured = falsify(true, offset=rng.normal(0, 100e-6, (true.grain_count, 2)))
     result = calibrate(measured, replace(PRIORS, centre=10e-6), rng=rng)
     assert "wider than the prior" in result.verdict
     assert "wider than the prior" not in calibrate(measured, replace(PRIORS, centre=100e-6), rng=rng).verdict
 
 
-def test_offsets_turn_with_the_world(true, rng):
+def test_offsets_rotate_with_the_frame_of_reference(true, rng):
     offset = rng.normal(0, 50e-6, (true.grain_count, 2))
     measured = falsify(true, offset=offset)
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    turned = replace(measured, position=measured.position @ turn.T, endpoints=measured.endpoints @ turn.T)
+    rotation = np.array([[0.6, -0.8], [0.8, 0.6]])
+    rotated = replace(measured, position=measured.position @ rotation.T, endpoints=measured.endpoints @ rotation.T)
     one = calibrate(measured, PRIORS, rng=np.random.default_rng(1))
-    two = calibrate(turned, PRIORS, rng=np.random.default_rng(1))
-    # The widths of the priors come from random draws that do not turn along.
-    np.testing.assert_allclose(two.offset, one.offset @ turn.T, atol=3e-6)
+    two = calibrate(rotated, PRIORS, rng=np.random.default_rng(1))
+    # The priors follow from random draws that do not rotate.
+    np.testing.assert_allclose(two.offset, one.offset @ rotation.T, atol=3e-6)
 
 
 def test_same_generator_gives_the_same_bits(true, rng):
@@ -259,7 +258,7 @@ def test_same_generator_gives_the_same_bits(true, rng):
     np.testing.assert_array_equal(one.offset_sd, two.offset_sd)
 
 
-def test_grains_that_meet_nobody_are_left_alone(rng):
+def test_grains_without_neighbours_are_not_corrected(rng):
     grid = np.stack(np.meshgrid(np.arange(3.0), np.arange(3.0)), axis=-1).reshape(-1, 2)
     shape = (2, 9)
     sequence = MeasuredSequence(
@@ -272,7 +271,7 @@ def test_grains_that_meet_nobody_are_left_alone(rng):
         np.testing.assert_array_equal(result.offset, np.zeros((9, 2)))
 
 
-def test_impossible_input_is_refused(true, rng):
+def test_invalid_input_is_rejected(true, rng):
     with pytest.raises(ValueError, match="negative"):
         CalibrationPriors(-1e-6, 0.0)
     with pytest.raises(ValueError, match="not a number"):
@@ -285,23 +284,23 @@ def test_impossible_input_is_refused(true, rng):
         calibrate(true, PRIORS, rng=rng, radius_class=np.zeros(3, int))
 
 
-def test_wrong_tracks_do_not_spoil_the_rest(true, rng):
+def test_wrong_tracks_do_not_affect_the_others(true, rng):
     offset = rng.normal(0, 50e-6, (true.grain_count, 2))
     measured = add_noise(falsify(true, offset=offset), 3e-6, rng)
     wrong = rng.random(measured.present.shape) < 0.01
-    astray = measured.position + np.where(wrong[..., None], rng.normal(0, 500e-6, measured.position.shape), 0.0)
-    result = calibrate(replace(measured, position=astray), PRIORS, rng=rng)
+    displaced = measured.position + np.where(wrong[..., None], rng.normal(0, 500e-6, measured.position.shape), 0.0)
+    result = calibrate(replace(measured, position=displaced), PRIORS, rng=rng)
     assert rms(result.offset - offset) < 0.3 * rms(offset)
     assert result.after.impossible > 0.0
 
 
-def test_understated_noise_is_noticed(true, rng):
+def test_understated_noise_is_reported(true, rng):
     offset = rng.normal(0, 50e-6, (true.grain_count, 2))
     measured = add_noise(falsify(true, offset=offset), 10e-6, rng)
     understated = replace(measured, sigma=measured.sigma / 4)
     result = calibrate(understated, PRIORS, rng=rng)
     assert 2.0 < result.noise_factor < 5.0
-    assert "as much as stated" in result.verdict
-    honest = calibrate(measured, PRIORS, rng=rng)
-    assert honest.noise_factor < 1.2
-    assert "as much as stated" not in honest.verdict
+    assert "times the stated noise" in result.verdict
+    stated = calibrate(measured, PRIORS, rng=rng)
+    assert stated.noise_factor < 1.2
+    assert "times the stated noise" not in stated.verdict

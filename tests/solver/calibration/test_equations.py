@@ -1,14 +1,13 @@
-"""The geometry of constant errors, and how gaps are judged by it."""
+"""Geometry of constant errors, and statistics of gaps."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from solver.calibration.calibrate import Calibration
-from solver.calibration.equations import bulge, move_walls, rotate_offsets
-from solver.calibration.gaps import MeasuredSequence
-from solver.calibration.statistics import gap_statistics, width_gain
+from rodsight.solver.calibration.calibrate import Calibration
+from rodsight.solver.calibration.equations import move_walls, radial_distortion, rotate_offsets
+from rodsight.solver.calibration.gap_statistics import gap_statistics, width_gain
+from rodsight.solver.calibration.gaps import MeasuredSequence
 
 
 def sequence(position, rotation=None, present=None):
@@ -22,14 +21,14 @@ def sequence(position, rotation=None, present=None):
     )  # fmt: skip
 
 
-def test_distortion_grows_with_the_third_power_and_is_one_at_the_corner():
+def test_radial_distortion_is_cubic_and_one_at_the_corner():
     place = np.array([[[0.1, 0.1], [0.05, 0.05], [0.0, 0.0], [-0.05, 0.0]]])
-    found = bulge(sequence(place))[0]
+    found = radial_distortion(sequence(place))[0]
     out = np.full(2, np.sqrt(0.5))
     assert found == pytest.approx(np.array([out, out / 8.0, [0.0, 0.0], [-(0.05**3) / 0.02**1.5, 0.0]]))
 
 
-def test_offsets_turn_with_their_grains_from_where_they_were_first_seen():
+def test_offsets_rotate_with_their_grains_from_their_first_frame():
     rotation = np.array([[0.3, 9.0], [0.3 + np.pi / 2, 0.2], [0.3 + np.pi, 0.2 + np.pi / 2]])
     present = np.array([[True, False], [True, True], [True, True]])
     found = rotate_offsets(sequence(np.zeros((3, 2, 2)), rotation, present), np.array([[1.0, 2.0], [0.0, 1.0]]))
@@ -37,11 +36,11 @@ def test_offsets_turn_with_their_grains_from_where_they_were_first_seen():
     assert found[:, 1] == pytest.approx(np.array([[0.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]))
 
 
-def test_walls_move_outward_and_turn_counter_clockwise_about_their_middles():
+def test_walls_move_outward_and_rotate_counter_clockwise_about_their_middles():
     floor = np.array([[[[0.0, 0.0], [2.0, 0.0]]]])  # the packing lies above
     assert move_walls(floor, np.array([0.1]), np.zeros(1))[0, 0] == pytest.approx(np.array([[0.0, -0.1], [2.0, -0.1]]))
-    turned = move_walls(floor, np.zeros(1), np.array([0.01]))[0, 0]
-    assert turned == pytest.approx(np.array([[0.0, -0.01], [2.0, 0.01]]))
+    rotated = move_walls(floor, np.zeros(1), np.array([0.01]))[0, 0]
+    assert rotated == pytest.approx(np.array([[0.0, -0.01], [2.0, 0.01]]))
 
 
 def fit(gap_before, gap_after, noise=1e-5):
@@ -52,16 +51,16 @@ def fit(gap_before, gap_after, noise=1e-5):
     )
 
 
-def test_only_overlaps_deeper_than_four_deviations_of_noise_are_impossible():
+def test_only_overlaps_deeper_than_four_standard_deviations_are_impossible():
     gap = np.array([-1e-6, -2e-5, -3.9e-5, -4.1e-5, 5e-5])
     assert gap_statistics(gap, fit(gap, gap)).impossible == pytest.approx(1 / 4)
 
 
-def test_the_gain_is_the_share_by_which_gaps_got_narrower():
+def test_gain_is_the_relative_narrowing_of_the_gaps():
     before = np.linspace(-3e-5, 3e-5, 99)
     assert width_gain(fit(before, 0.25 * before)) == pytest.approx(0.75)
 
 
-def test_a_position_is_as_uncertain_as_its_noise_and_what_calibration_left():
+def test_position_sd_combines_noise_and_remaining_errors():
     known = SimpleNamespace(noise_factor=1.5, gap_sd=4e-6)
     assert Calibration.position_sd(known, 1e-5) == pytest.approx(np.hypot(1.5e-5, 4e-6 / np.sqrt(2.0)))

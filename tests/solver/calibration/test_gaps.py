@@ -1,32 +1,31 @@
 import tracemalloc
 
 import numpy as np
-
-from solver.calibration.gaps import MeasuredSequence, find_gap_rows
+from rodsight.solver.calibration.gaps import MeasuredSequence, find_gap_rows
 
 SIDE, PITCH, R = 40, 0.02, 0.009
 MEMORY = 5e6  # [B]; all pairs of these grains would take fifty
 
 
 def square_of_grains() -> MeasuredSequence:
-    """Grains of a square lattice that stand apart, one corner of it against two walls."""
+    """Make a square lattice of grains that do not touch, one corner of it at two walls."""
     n = SIDE**2
     position = PITCH * np.stack(np.divmod(np.arange(n), SIDE), axis=1) + R
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * (SIDE * PITCH + R)
     endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)[None]
-    still = np.zeros((1, n))
-    return MeasuredSequence(np.full(n, R), position[None], still, still == 0.0, endpoints, still + 1e-5)
+    zero = np.zeros((1, n))
+    return MeasuredSequence(np.full(n, R), position[None], zero, zero == 0.0, endpoints, zero + 1e-5)
 
 
-def test_where_only_walls_are_asked_for_no_pair_of_grains_is_listed():
+def test_wall_reach_alone_lists_no_pair_of_grains():
     sequence = square_of_grains()
     tracemalloc.start()
     rows = find_gap_rows(sequence, -np.inf, wall_reach=1e-3)
-    most = tracemalloc.get_traced_memory()[1]
+    peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert rows.count == 2 * SIDE
     assert np.all(rows.j >= sequence.grain_count)
-    assert most < MEMORY
+    assert peak < MEMORY
 
 
 def test_pairs_within_reach_are_those_of_neighbours():

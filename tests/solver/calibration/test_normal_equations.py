@@ -1,11 +1,10 @@
-"""Gaps' normal equations against full matrices."""
+"""Normal equations of gaps against dense matrices."""
 
 import numpy as np
 import pytest
-
-from solver.bodies.grains import Array
-from solver.calibration.derivatives import Derivatives
-from solver.calibration.normal_equations import Couplings, NormalEquations
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.calibration.derivatives import Derivatives
+from rodsight.solver.calibration.normal_equations import Couplings, NormalEquations
 
 GRAINS, SHARED, ROWS = 12, 3, 90
 ROUNDING = 1e-9
@@ -18,7 +17,7 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture
 def derivatives(rng: np.random.Generator) -> Derivatives:
-    """Rows of pairs in either order of elimination, some of a grain with a wall; one names a shared unknown twice."""
+    """Rows of pairs in either order of elimination, some at a wall; one has the same shared unknown twice."""
     first = rng.integers(0, GRAINS - 1, ROWS)
     second = np.minimum(first + rng.integers(1, 4, ROWS), GRAINS - 1)
     wall = rng.random(ROWS) < 0.2
@@ -41,14 +40,14 @@ def full(d: Derivatives) -> Array:
     return matrix
 
 
-def test_products_are_those_of_the_full_matrix(derivatives: Derivatives, rng: np.random.Generator) -> None:
+def test_products_match_the_dense_matrix(derivatives: Derivatives, rng: np.random.Generator) -> None:
     x, v = rng.normal(0.0, 1.0, derivatives.unknown_count), rng.normal(0.0, 1.0, ROWS)
     np.testing.assert_allclose(derivatives.times(x), full(derivatives) @ x, atol=ROUNDING)
     np.testing.assert_allclose(derivatives.transposed_times(v), full(derivatives).T @ v, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("held", ["nothing", "radii", "centres and one that is shared", "all grains"])
-def test_solutions_are_those_of_the_full_equations_and_zero_where_held(
+def test_solutions_match_the_dense_equations_and_are_zero_where_held(
     derivatives: Derivatives, rng: np.random.Generator, held: str
 ) -> None:
     penalty, n = rng.uniform(0.5, 2.0, derivatives.unknown_count), GRAINS
@@ -60,14 +59,14 @@ def test_solutions_are_those_of_the_full_equations_and_zero_where_held(
         penalty[part] = np.inf
     free, precision = np.isfinite(penalty), rng.uniform(0.5, 3.0, ROWS)
     couplings = Couplings.of(n, derivatives.first, derivatives.second)
-    normal = NormalEquations(derivatives.of_unknowns(free), couplings, precision, penalty)
+    normal = NormalEquations(derivatives.restrict_to(free), couplings, precision, penalty)
     matrix, right = full(derivatives)[:, free], rng.normal(0.0, 1.0, derivatives.unknown_count)
     expected = np.zeros(len(free))
     expected[free] = np.linalg.solve(matrix.T @ (precision[:, None] * matrix) + np.diag(penalty[free]), right[free])
     np.testing.assert_allclose(normal.solve(right), expected, atol=ROUNDING)
 
 
-def test_some_of_the_rows_have_the_same_couplings(derivatives: Derivatives, rng: np.random.Generator) -> None:
+def test_selected_rows_keep_their_couplings(derivatives: Derivatives, rng: np.random.Generator) -> None:
     some = np.flatnonzero(rng.random(ROWS) < 0.5)
     couplings = Couplings.of(GRAINS, derivatives.first, derivatives.second)
     penalty, right = np.ones(derivatives.unknown_count), rng.normal(0.0, 1.0, derivatives.unknown_count)

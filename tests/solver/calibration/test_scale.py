@@ -6,22 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from solver.calibration.calibrate import calibrate
-from solver.calibration.gaps import MeasuredSequence
-from solver.calibration.priors import CalibrationPriors
-from solver.calibration.scale import ScaleErrors, find_scale
+from rodsight.solver.calibration.calibrate import calibrate
+from rodsight.solver.calibration.gaps import MeasuredSequence
+from rodsight.solver.calibration.priors import CalibrationPriors
+from rodsight.solver.calibration.scale import ScaleErrors, find_scale
 
 RADII = np.array([7e-3, 8e-3, 11e-3])  # [m]
 FIELD = 0.05  # [m] side of the square that a pair has for itself
 PRIORS = CalibrationPriors(centre=0.0, radius=0.0, pixel_size=5e-3, radius_class=8e-6)
-FEW_MICROMETRES = 3e-6  # [m] of a mean diameter: the tail of open gaps draws the pile aside by about as much
+FEW_MICROMETRES = 3e-6  # [m] of a mean diameter: about the shift of the peak by the tail of open gaps
 
 
 def scatter_pairs(
     rng: np.random.Generator, *, pairs: int = 300, touching: float = 0.6, noise: float = 10e-6, frames: int = 4
 ) -> tuple[MeasuredSequence, np.ndarray]:
-    """Pairs of discs, each far from all others; most touch, the others are up to 1 mm apart. With their classes."""
+    """Make isolated pairs of discs, most of them touching, others up to 1 mm apart; and the classes."""
     classes = rng.integers(0, len(RADII), (pairs, 2))
     radius = RADII[classes]
     gap = np.where(rng.random(pairs) < touching, 0.0, rng.uniform(0.0, 1e-3, pairs))
@@ -48,7 +47,7 @@ def rng() -> np.random.Generator:
 
 @pytest.mark.parametrize("error", [-1e-2, -3e-3, 3e-3, 1e-2])
 @pytest.mark.parametrize("noise", [3e-6, 40e-6])
-def test_pixel_size_is_found_whichever_way_it_is_wrong(rng, error, noise):
+def test_pixel_size_error_of_either_sign_is_found(rng, error, noise):
     true, classes = scatter_pairs(rng, noise=noise)
     measured = replace(true, position=true.position / (1.0 + error))
     found = find_scale(measured, PRIORS, 0.0, classes)
@@ -57,12 +56,12 @@ def test_pixel_size_is_found_whichever_way_it_is_wrong(rng, error, noise):
     assert found.pixel_size_sd < 2e-3
     corrected = found.correct(measured, classes)
     left = np.linalg.norm(corrected.position - true.position, axis=2) / np.linalg.norm(true.position, axis=2)
-    # What the radii of all classes may share by their prior, 0.1 %, is never told from a pixel size.
+    # An error of all classes within their prior, 0.1 %, cannot be separated from the pixel size.
     assert left.max() < 2e-3
 
 
 @pytest.mark.parametrize("noise", [0.0, 10e-6, 40e-6, 100e-6])
-def test_exact_scale_is_left_alone(rng, noise):
+def test_exact_scale_is_not_corrected(rng, noise):
     true, classes = scatter_pairs(rng, noise=noise)
     found = find_scale(true, PRIORS, 0.0, classes)
     assert not found.found
@@ -71,7 +70,7 @@ def test_exact_scale_is_left_alone(rng, noise):
     assert found.correct(true, classes) is true
 
 
-def test_elastic_overlap_is_not_taken_for_a_scale(rng):
+def test_elastic_overlap_is_not_a_scale_error(rng):
     true, classes = scatter_pairs(rng)
     overlap = 5e-6
     softened = replace(true, radius=true.radius + 0.5 * overlap)
@@ -80,7 +79,7 @@ def test_elastic_overlap_is_not_taken_for_a_scale(rng):
 
 @pytest.mark.parametrize("error", [-80e-6, 80e-6])
 @pytest.mark.parametrize("wrong", [0, 1, 2])
-def test_one_mistaken_class_is_told_from_the_pixel_size(rng, error, wrong):
+def test_one_wrong_class_is_separated_from_the_pixel_size(rng, error, wrong):
     true, classes = scatter_pairs(rng)
     measured = replace(true, radius=true.radius - np.where(classes == wrong, error, 0.0))
     found = find_scale(measured, PRIORS, 0.0, classes)
@@ -92,7 +91,7 @@ def test_one_mistaken_class_is_told_from_the_pixel_size(rng, error, wrong):
 
 
 @pytest.mark.parametrize("follow", [True, False])
-def test_walls_are_scaled_only_if_they_were_measured_alike(rng, follow):
+def test_walls_are_scaled_only_if_measured_with_the_same_pixel_size(rng, follow):
     true, classes = scatter_pairs(rng)
     lowest = (true.position[..., 1] - true.radius).min()
     highest = (true.position[..., 1] + true.radius).max()
@@ -115,7 +114,7 @@ def test_without_touching_pairs_the_prior_stays(rng):
     np.testing.assert_array_equal(found.radius_class, np.zeros(3))
 
 
-def test_what_is_known_exactly_is_not_corrected(rng):
+def test_exact_quantities_are_not_corrected(rng):
     true, classes = scatter_pairs(rng)
     measured = replace(true, position=true.position / 1.005)
     assert not find_scale(measured, replace(PRIORS, pixel_size=0.0, radius_class=0.0), 0.0, classes).found
@@ -125,17 +124,17 @@ def test_what_is_known_exactly_is_not_corrected(rng):
 
 
 @pytest.mark.parametrize("offset", [-3e-4, 3e-4])
-def test_an_error_that_all_radii_share_is_told_from_the_pixel_size(rng, offset):
+def test_common_radius_error_is_separated_from_the_pixel_size(rng, offset):
     true, classes = scatter_pairs(rng, noise=5e-6)
     measured = replace(true, radius=true.radius - offset)
     found = find_scale(measured, replace(PRIORS, radius_offset=4e-5), 0.0, classes)
-    assert found.told_apart
+    assert found.separable
     assert abs(found.radius_offset - offset) < 3 * np.hypot(found.radius_offset_sd, FEW_MICROMETRES)
     assert abs(found.pixel_size) < 3 * found.pixel_size_sd
     assert found.correct(measured, classes).radius == pytest.approx(true.radius, abs=5e-6)
 
 
-def test_rods_of_one_size_cannot_tell_it_which_is_said(rng):
+def test_rods_of_one_size_cannot_separate_them(rng):
     true, _ = scatter_pairs(rng, noise=5e-6)
     middle = true.position.reshape(4, -1, 2, 2).mean(axis=2, keepdims=True)
     away = true.position.reshape(4, -1, 2, 2) - middle
@@ -145,10 +144,10 @@ def test_rods_of_one_size_cannot_tell_it_which_is_said(rng):
     measured = replace(true, radius=np.full_like(true.radius, 8e-3 - 3e-5), position=same.reshape(true.position.shape))
     found = find_scale(measured, replace(PRIORS, radius_offset=4e-5), 0.0, None)
     assert found.found
-    assert not found.told_apart
+    assert not found.separable
 
 
-def test_calibration_tells_and_applies_the_pixel_size(rng):
+def test_calibration_reports_and_applies_the_pixel_size(rng):
     true, classes = scatter_pairs(rng, noise=5e-6)
     measured = replace(true, position=true.position / 1.005)
     result = calibrate(measured, PRIORS, rng=rng, radius_class=classes)

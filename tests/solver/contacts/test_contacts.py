@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
 
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
 from tests.packings import box, rods
 
 ROUNDING = 1e-15  # [m]
@@ -20,7 +20,7 @@ def test_pairs_below_the_threshold_are_found_and_measured():
     assert contacts.point[0] == pytest.approx([0.02 + 0.007 + 5e-5, 0.03])
 
 
-def test_the_normal_on_a_wall_points_out_of_the_packing():
+def test_normal_on_a_wall_points_out_of_the_packing():
     position = np.array([[0.05, 0.008], [0.092, 0.05], [0.05, 0.092], [0.008, 0.05]])
     contacts = detect_contacts(rods(*[0.008] * 4), position, np.ones(4, bool), box(0.1, 0.1), 1e-6)
     assert contacts.j.tolist() == [4, 5, 6, 7]
@@ -28,21 +28,21 @@ def test_the_normal_on_a_wall_points_out_of_the_packing():
     assert contacts.gap == pytest.approx(np.zeros(4), abs=ROUNDING)
 
 
-def test_a_wall_is_met_only_beside_its_segment():
+def test_wall_has_contacts_only_beside_its_segment():
     wall = Walls(np.array([[[0.0, 0.0], [0.1, 0.0]]]), np.zeros((1, 2, 2)), np.array([np.nan]))
     position = np.array([[0.05, 0.008], [0.2, 0.008]])
     contacts = detect_contacts(rods(0.008, 0.008), position, np.ones(2, bool), wall, 1e-6)
     assert contacts.i.tolist() == [0]
 
 
-def test_lost_grains_take_no_part():
+def test_absent_grains_have_no_contacts():
     position = np.array([[0.05, 0.008], [np.nan, np.nan], [0.066, 0.008]])
     present = np.array([True, False, True])
     contacts = detect_contacts(rods(*[0.008] * 3), position, present, box(0.2, 0.2), 1e-6)
     assert [(int(i), int(j)) for i, j in zip(contacts.i, contacts.j, strict=True)] == [(0, 2), (0, 3), (2, 3)]
 
 
-def test_contacts_come_in_the_order_of_their_keys():
+def test_contacts_are_ordered_by_key():
     rng = np.random.default_rng(0)
     position = rng.uniform(0.0, 0.2, (60, 2))
     contacts = detect_contacts(rods(*[0.01] * 60), position, np.ones(60, bool), box(0.2, 0.2), 1e-3)
@@ -50,12 +50,12 @@ def test_contacts_come_in_the_order_of_their_keys():
     assert np.all(np.diff(contacts.key) > 0)
 
 
-def test_grains_in_one_place_are_refused():
+def test_coincident_grains_are_refused():
     with pytest.raises(ValueError, match="same centre"):
         detect_contacts(rods(0.01, 0.01), np.zeros((2, 2)), np.ones(2, bool), box(1.0, 1.0), 1e-3)
 
 
-def test_walls_may_have_a_threshold_of_their_own():
+def test_wall_threshold_is_separate():
     position = np.array([[0.0101, 0.05], [0.0302, 0.05]])
     grains, walls, here = rods(0.01, 0.01), box(0.2, 0.1), np.ones(2, bool)
     pair, wall = (0, 1), (0, 5)

@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
+from rodsight.solver.contacts.kinematics import equilibrium_matrix, external_load, relative_motion
 
-from solver.bodies.grains import Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts, measure_contacts
-from solver.contacts.kinematics import equilibrium_matrix, external_load, relative_motion
-
-STEP = 1e-7  # m: its square over a radius, 1e-12 m, is what a first-order law may miss
+STEP = 1e-7  # [m] its square over a radius, 1e-12 m, is the error of first order
 FIRST_ORDER = 2e-4 * STEP  # curvature STEP / R = 1e-5 of a step, and rounding of centimetres, 2e-18 m
 EXACT = 1e-12  # rounding of a handful of terms of order one
 
@@ -54,8 +53,8 @@ def test_transpose_gives_the_sliding_of_material_points():
     def moved_point(grain: np.ndarray, arm: np.ndarray) -> np.ndarray:
         angle = STEP * rotation[grain]
         cosine, sine = np.cos(angle), np.sin(angle)
-        turned = np.stack([cosine * arm[:, 0] - sine * arm[:, 1], sine * arm[:, 0] + cosine * arm[:, 1]], axis=1)
-        return position[grain] + STEP * translation[grain] + turned
+        rotated = np.stack([cosine * arm[:, 0] - sine * arm[:, 1], sine * arm[:, 0] + cosine * arm[:, 1]], axis=1)
+        return position[grain] + STEP * translation[grain] + rotated
 
     pair = ~contacts.with_wall
     i, j, normal = contacts.i[pair], contacts.j[pair], contacts.normal[pair]
@@ -77,21 +76,21 @@ def test_relative_motion_agrees_with_the_transpose():
     np.testing.assert_allclose(np.concatenate([un, ut]), expected, atol=EXACT)
 
 
-def test_a_rigid_motion_of_everything_opens_and_slides_no_touching_contact():
+def test_rigid_motion_neither_opens_nor_slides_touching_contacts():
     grains, position, walls, contacts = packing()
     drift, spin = np.array([0.3, -0.2]), 0.8
 
     def rigid(point: np.ndarray) -> np.ndarray:
         return drift + spin * np.stack([-point[..., 1], point[..., 0]], axis=-1)
 
-    turning = Walls(walls.endpoints, rigid(walls.endpoints), walls.load)
-    un, ut = relative_motion(contacts, grains.radius, rigid(position), np.full(25, spin), turning)
-    # Surfaces that do not touch are a gap apart, and that arm turns too.
+    rotating = Walls(walls.endpoints, rigid(walls.endpoints), walls.load)
+    un, ut = relative_motion(contacts, grains.radius, rigid(position), np.full(25, spin), rotating)
+    # Surfaces that do not touch are separated by the gap, which rotates as well.
     np.testing.assert_allclose(un, 0.0, atol=EXACT)
     np.testing.assert_allclose(ut, spin * contacts.gap, atol=EXACT)
 
 
-def test_a_stack_of_three_grains_carries_load_and_weight():
+def test_stack_of_three_grains_carries_load_and_weight():
     radius = np.array([0.01, 0.008, 0.011])
     grains = Grains.of_rods(radius, density=2700.0, length=0.06)
     height = 2 * radius.sum()
@@ -101,14 +100,14 @@ def test_a_stack_of_three_grains_carries_load_and_weight():
     contacts = detect_contacts(grains, position, np.ones(3, bool), walls, 1e-9)
     matrix = equilibrium_matrix(contacts, radius, walls)
     weight = 9.81 * grains.mass
-    # 0-1, 0-floor, 1-2, 2-plate: every contact carries what is above it.
+    # 0-1, 0-floor, 1-2, 2-plate: every contact carries the weight and load above it.
     above = {1: 20 + weight[1:].sum(), 3: 20 + weight.sum(), 2: 20 + weight[2], 5: 20.0}
     fn = np.array([above[int(j)] for j in contacts.j])
     load = external_load(grains.mass, walls, (0.0, -9.81))
     np.testing.assert_allclose(matrix @ np.concatenate([fn, np.zeros(4)]), load, atol=EXACT * 20)
 
 
-def test_friction_turns_both_grains_the_same_way():
+def test_torques_of_friction_on_both_grains_have_the_same_sign():
     grains = Grains.of_rods(np.array([0.01, 0.02]), density=2700.0, length=0.06)
     position = np.array([[0.05, 0.05], [0.08, 0.05]])
     walls = box(1.0, 1.0)
@@ -117,7 +116,7 @@ def test_friction_turns_both_grains_the_same_way():
     np.testing.assert_allclose(torque, [-0.01, -0.02], atol=EXACT)
 
 
-def test_a_missing_grain_leaves_its_contacts_unknown():
+def test_relative_motion_at_contacts_of_a_missing_grain_is_nan():
     grains, _, walls, contacts = packing()
     translation = np.zeros((25, 2))
     translation[7] = np.nan
@@ -129,7 +128,7 @@ def test_a_missing_grain_leaves_its_contacts_unknown():
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_a_plate_has_a_row_only_under_load(loaded: bool):
+def test_plate_has_a_row_only_under_load(loaded: bool):
     grains, _, walls, contacts = packing()
     load = np.full(4, np.nan)
     if loaded:

@@ -1,4 +1,4 @@
-"""Pairs by key: nothing is lost on the way there and back, and sets are matched as a dictionary would."""
+"""Keys of pairs: conversion both ways, and operations on sets compared with dictionaries."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
-
-from solver.contacts.pairs import (
+from rodsight.solver.contacts.pairs import (
     align,
     are_among,
-    are_there,
+    are_present,
     common_rows,
     find_rows,
     join_keys,
     make_key,
     make_keys,
-    recall,
+    match_values,
     split_key,
     split_keys,
 )
@@ -27,7 +26,7 @@ KEYS = hnp.arrays(np.int64, st.integers(0, 12), elements=st.integers(0, 30), uni
 
 
 def values_of(key: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Values (c, 2) that tell which pair they belong to."""
+    """Values (c, 2) that identify their pairs."""
     return np.column_stack([key + 0.5, -key.astype(float)])
 
 
@@ -36,7 +35,7 @@ def as_dictionary(key: NDArray[np.int64]) -> dict[int, list[float]]:
 
 
 @given(BODIES, st.data())
-def test_a_pair_comes_back_from_its_key(bodies: int, data: st.DataObject) -> None:
+def test_pair_is_recovered_from_its_key(bodies: int, data: st.DataObject) -> None:
     j = data.draw(st.integers(1, bodies - 1))
     i = data.draw(st.integers(0, j - 1))
     key = make_keys(np.array([i], np.int32), np.array([j], np.int32), bodies)
@@ -46,7 +45,7 @@ def test_a_pair_comes_back_from_its_key(bodies: int, data: st.DataObject) -> Non
 
 
 @given(BODIES, st.data())
-def test_a_key_comes_back_from_its_pair(bodies: int, data: st.DataObject) -> None:
+def test_key_is_recovered_from_its_pair(bodies: int, data: st.DataObject) -> None:
     key = data.draw(hnp.arrays(np.int64, 5, elements=st.integers(0, bodies**2 - 1)))
     np.testing.assert_array_equal(make_keys(*split_keys(key, bodies), bodies), key)
 
@@ -56,31 +55,31 @@ def test_keys_of_many_bodies_do_not_wrap_around() -> None:
     assert make_keys(i, j, 70_000).tolist() == [69_998 * 70_000 + 69_999]
 
 
-def test_keys_ascend_as_pairs_do() -> None:
+def test_keys_ascend_in_the_order_of_pairs() -> None:
     i, j = np.triu_indices(7, 1)
     assert np.all(np.diff(make_keys(i, j, 7)) > 0)
 
 
-def test_a_pair_is_there_if_both_its_bodies_are_and_walls_always_are() -> None:
+def test_pair_is_present_if_both_bodies_are() -> None:
     present = np.array([True, False, True])  # and two walls
     i, j = np.array([0, 0, 1, 2, 1]), np.array([1, 2, 2, 4, 3])
-    np.testing.assert_array_equal(are_there(make_keys(i, j, 5), present, 5), [False, True, False, True, False])
+    np.testing.assert_array_equal(are_present(make_keys(i, j, 5), present, 5), [False, True, False, True, False])
 
 
 @given(KEYS, KEYS)
-def test_values_are_recalled_as_from_a_dictionary(key: NDArray[np.int64], former: NDArray[np.int64]) -> None:
+def test_values_are_matched_as_by_a_dictionary(key: NDArray[np.int64], former: NDArray[np.int64]) -> None:
     known = as_dictionary(former)
-    found = recall(key, former, values_of(former), fill=7.0)
+    found = match_values(key, former, values_of(former), fill=7.0)
     assert found.tolist() == [known.get(each, [7.0, 7.0]) for each in key.tolist()]
     row, there = find_rows(key, former)
     assert there.tolist() == [each in known for each in key.tolist()]
     np.testing.assert_array_equal(former[row[there]], key[there])
 
 
-def test_what_is_recalled_keeps_its_type() -> None:
+def test_matched_values_keep_their_dtype() -> None:
     former, age = np.array([4, 9]), np.array([2, 5], np.int32)
-    assert recall(np.array([9, 1]), former, age, fill=-1).tolist() == [5, -1]
-    assert recall(np.array([9, 1]), former, age, fill=-1).dtype == np.int32
+    assert match_values(np.array([9, 1]), former, age, fill=-1).tolist() == [5, -1]
+    assert match_values(np.array([9, 1]), former, age, fill=-1).dtype == np.int32
 
 
 @given(KEYS, KEYS)
@@ -88,8 +87,8 @@ def test_sets_are_aligned_as_dictionaries(key: NDArray[np.int64], other: NDArray
     union, one, two = align(key, values_of(key), other, values_of(other))
     assert union.tolist() == sorted({*key.tolist(), *other.tolist()}) == join_keys(key, other).tolist()
     for found, source in ((one, key), (two, other)):
-        told = as_dictionary(source)
-        assert found.tolist() == [told.get(each, [0.0, 0.0]) for each in union.tolist()]
+        expected = as_dictionary(source)
+        assert found.tolist() == [expected.get(each, [0.0, 0.0]) for each in union.tolist()]
 
 
 @given(KEYS, KEYS)
@@ -100,5 +99,5 @@ def test_common_pairs_are_found_in_both(key: NDArray[np.int64], other: NDArray[n
     assert are_among(key, other).sum() == len(both)
 
 
-def test_no_set_joins_to_none() -> None:
+def test_union_of_no_sets_is_empty() -> None:
     assert join_keys().tolist() == []

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.connectivity import coordination_number
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.contacts.radius_tuning import ABOVE_STEP, tune_radii
 
-from solver.bodies.grains import Grains
-from solver.bodies.walls import Walls
-from solver.contacts.connectivity import coordination_number
-from solver.contacts.contacts import detect_contacts
-from solver.contacts.radius_tuning import ABOVE_STEP, tune_radii
 from tests.packings import LENGTH, rods, squeezed_heap
 
 R = 0.008  # [m]
@@ -31,7 +31,7 @@ def tune(frames, wanted, change, radius=R):
     return tune_radii(grains, position, np.ones(position.shape[:2], bool), [each[1] for each in frames], wanted, change)
 
 
-def test_the_curve_of_a_square_lattice_is_its_staircase():
+def test_curve_of_a_square_lattice_is_its_step_function():
     # Neighbours touch at δR = 20 µm, walls at 70 µm, diagonals where 2 δR = √2 pitch − 2 R.
     frame = lattice(40e-6, 70e-6)
     diagonal = 0.5 * (np.sqrt(2) * (2 * R + 40e-6) - 2 * R)
@@ -45,22 +45,22 @@ def test_the_curve_of_a_square_lattice_is_its_staircase():
 
 
 @pytest.mark.parametrize(("wanted", "step"), [(0.5, 20e-6), (3.2, 20e-6), (3.3, 70e-6), (4.0, 70e-6)])
-def test_the_step_that_reaches_the_wanted_number_is_found(wanted, step):
+def test_step_that_reaches_the_required_number_is_found(wanted, step):
     found = tune([lattice(40e-6, 70e-6)], wanted, np.linspace(0.0, 1e-4, 4))
     assert found.met
-    # The lattice's own steps are spread by rounding: the answer is past the one that makes the number.
+    # Rounding separates the steps of the lattice: the solution is above the one that reaches the number.
     assert step - ROUNDING <= found.found <= step + 2 * ABOVE_STEP
     assert found.reached >= wanted
 
 
-def test_a_common_error_of_the_radii_is_undone():
+def test_common_error_of_the_radii_is_corrected():
     error = 30e-6
     exact = tune([lattice(40e-6, 70e-6)], 4.0, np.linspace(-2e-4, 2e-4, 21))
     short = tune([lattice(40e-6, 70e-6)], 4.0, np.linspace(-2e-4, 2e-4, 21), radius=R - error)
     assert short.found - exact.found == pytest.approx(error, abs=ROUNDING)
 
 
-def test_frames_count_alike():
+def test_frames_have_equal_weight():
     near, far = lattice(20e-6, 1e-3), lattice(60e-6, 1e-3)
     neighbours = 4 * (SIDE - 1) / SIDE
     found = tune([near, far], 0.5 * neighbours, np.array([0.0, 20e-6, 40e-6]))
@@ -70,7 +70,7 @@ def test_frames_count_alike():
     assert tune([near, far], 0.6 * neighbours, found.change).found == pytest.approx(30e-6, abs=2 * ABOVE_STEP)
 
 
-def test_a_number_out_of_reach_is_not_met():
+def test_number_out_of_range_gives_nan():
     frame = lattice(40e-6, 70e-6)
     for wanted in (0.0, 4.1):
         found = tune([frame], wanted, np.linspace(0.0, 1e-4, 5))
@@ -104,7 +104,7 @@ def test_contacts_detected_with_the_changed_radii_have_the_number_found(wanted):
         assert curve == pytest.approx(number(change), abs=EXACT)
 
 
-def test_nonsense_is_refused():
+def test_invalid_input_is_refused():
     frame = lattice(40e-6, 70e-6)
     with pytest.raises(ValueError, match="ascend"):
         tune([frame], 4.0, np.array([1e-5, 0.0]))

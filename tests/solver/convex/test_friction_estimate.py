@@ -1,22 +1,21 @@
 import numpy as np
 import pytest
-
-from solver.bodies.grains import Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
-from solver.convex.friction_estimate import (
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.convex.friction_estimate import (
     FACTORS,
     SlidingFrame,
+    _bracket_minimum,
     _jackknife,
-    _least,
-    _walk_into_valley,
+    _minimum,
     estimate_friction,
     relative_power_gap,
 )
-from solver.convex.program import assemble_balance
+from rodsight.solver.convex.program import assemble_balance
 
 EXACT = 1e-12  # rounding of a few terms of order one
-PARABOLA = 1e-9  # the parabola through three points of a parabola has its minimum
+PARABOLA = 1e-9  # a parabola through three points of a parabola has its minimum
 
 
 def test_gap_is_zero_at_coulombs_limit_and_one_without_friction():
@@ -58,28 +57,28 @@ def test_trials_are_sorted_and_every_gap_reported():
     assert np.all(np.isfinite(estimate.gap))
 
 
-def test_a_minimum_at_the_edge_is_said_to_be_one():
+def test_a_minimum_at_the_edge_is_not_enclosed():
     trial = np.array([0.5, 0.7, 1.0])
-    assert _least(trial, trial) == (0.5, False)
-    assert _least(trial, -trial) == (1.0, False)
+    assert _minimum(trial, trial) == (0.5, False)
+    assert _minimum(trial, -trial) == (1.0, False)
 
 
-def test_few_frames_have_no_spread():
+def test_few_frames_have_no_standard_deviation():
     assert np.isnan(estimate_friction([wedge(0.1)] * 2).factor_sd)
     assert estimate_friction([wedge(0.1)] * 3).factor_sd >= 0
 
 
 def test_no_sliding_gives_no_estimate():
     frame = wedge(0.1)
-    still = SlidingFrame(frame.balance, frame.contacts, np.zeros_like(frame.slip), frame.probability)
-    estimate = estimate_friction([still])
+    no_slip = SlidingFrame(frame.balance, frame.contacts, np.zeros_like(frame.slip), frame.probability)
+    estimate = estimate_friction([no_slip])
     assert np.isnan(estimate.factor)
     assert not estimate.enclosed
 
 
 def test_the_minimum_between_trials_is_found():
     trial = np.array([0.6, 0.8, 1.0, 1.3, 1.7])
-    factor, enclosed = _least(trial, 0.05 + np.log(trial / 0.93) ** 2)
+    factor, enclosed = _minimum(trial, 0.05 + np.log(trial / 0.93) ** 2)
     assert enclosed
     assert factor == pytest.approx(0.93, rel=PARABOLA)
 
@@ -95,34 +94,34 @@ def test_every_trial_is_solved_with_its_own_friction():
     frame = wedge(0.2)
     twisted = SlidingFrame(frame.balance, frame.contacts, np.array([-1.0, 1.0, -1.0]), frame.probability)
     gap = estimate_friction([twisted], factors=(0.5, 1.0, 2.0)).gap
-    # With more friction the grain can work against more of this sliding.
+    # With more friction the grain can oppose more of this sliding.
     assert gap[0] > 1.1 * gap[1] > 1.2 * gap[2]
 
 
-def valleys(lowest: np.ndarray) -> np.ndarray:
-    """Gaps of frames with their least at these factors (f,), at every one of FACTORS (f, q)."""
+def power_gaps(lowest: np.ndarray) -> np.ndarray:
+    """Gaps (f, q) at FACTORS of frames with their minimum at these factors (f,)."""
     return 0.1 + np.log(np.array(FACTORS) / lowest[:, None]) ** 2
 
 
 @pytest.mark.parametrize("workers", [1, 3])
 @pytest.mark.parametrize("lowest", [0.3, 0.55, 0.75, 0.92, 1.0, 1.1, 1.5, 2.5])
-def test_the_walk_finds_what_all_trials_would(lowest: float, workers: int):
-    every, trial = valleys(lowest * np.linspace(0.9, 1.1, 8)), np.array(FACTORS)
-    tried, gap = _walk_into_valley(trial, lambda factor: every[:, FACTORS.index(factor)], workers)
-    assert list(tried) == sorted(tried)
-    assert _least(tried, gap.mean(axis=0)) == _least(trial, every.mean(axis=0))
-    assert _jackknife(tried, gap) == _jackknife(trial, every)
+def test_bracketing_finds_the_minimum_of_all_trials(lowest: float, workers: int):
+    gaps, trial = power_gaps(lowest * np.linspace(0.9, 1.1, 8)), np.array(FACTORS)
+    evaluated, gap = _bracket_minimum(trial, lambda factor: gaps[:, FACTORS.index(factor)], workers)
+    assert list(evaluated) == sorted(evaluated)
+    assert _minimum(evaluated, gap.mean(axis=0)) == _minimum(trial, gaps.mean(axis=0))
+    assert _jackknife(evaluated, gap) == _jackknife(trial, gaps)
 
 
-def test_few_trials_are_needed_where_the_friction_is_as_told():
-    every = valleys(np.full(8, 0.92))
-    tried, _ = _walk_into_valley(np.array(FACTORS), lambda factor: every[:, FACTORS.index(factor)])
-    assert len(tried) <= 6
+def test_few_trials_are_needed_where_the_given_friction_is_right():
+    gaps = power_gaps(np.full(8, 0.92))
+    evaluated, _ = _bracket_minimum(np.array(FACTORS), lambda factor: gaps[:, FACTORS.index(factor)])
+    assert len(evaluated) <= 6
 
 
-def test_frames_that_disagree_are_walked_to_wherever_one_left_out_leads():
-    every = valleys(np.array([0.5, 1.0, 2.0]))  # without one of them: 0.71, 1 or 1.41
-    tried, gap = _walk_into_valley(np.array(FACTORS), lambda factor: every[:, FACTORS.index(factor)])
-    assert tried[0] < 0.7
-    assert tried[-1] > 1.45
-    assert _jackknife(tried, gap) == _jackknife(np.array(FACTORS), every)
+def test_bracketing_covers_every_leave_one_out_minimum():
+    gaps = power_gaps(np.array([0.5, 1.0, 2.0]))  # without one of them: 0.71, 1 or 1.41
+    evaluated, gap = _bracket_minimum(np.array(FACTORS), lambda factor: gaps[:, FACTORS.index(factor)])
+    assert evaluated[0] < 0.7
+    assert evaluated[-1] > 1.45
+    assert _jackknife(evaluated, gap) == _jackknife(np.array(FACTORS), gaps)

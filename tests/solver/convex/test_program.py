@@ -2,25 +2,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from solver.bodies.grains import Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import Contacts, detect_contacts
-from solver.convex.program import (
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import Contacts, detect_contacts
+from rodsight.solver.convex.program import (
     Balance,
     ConvexForces,
     ConvexSettings,
     assemble_balance,
-    polish,
+    project_onto_equilibrium,
     soft_slip,
-    solve_member,
+    solve_convex_member,
 )
 
 UNIT = 20.0  # N
-# The unbalance is priced, not forbidden, and the pull λ acts against it: by λ/ρ = 3e-6 of a force per constraint;
-# chains of a few contacts and the interior point's 1e-6 leave this much of a force unit.
+# The force residual is penalised, and the proximal term λ opposes it: λ/ρ = 3e-6 of a force per constraint. Chains of a
+# few contacts and the tolerance 1e-6 of the interior point leave this fraction of a force unit.
 BALANCED = 2e-4 * UNIT
-SAME = 1e-3 * UNIT  # two solves of one program by different routes, 1e-6 on its objective
+SAME = 1e-3 * UNIT  # two solves of one program with 1e-6 on its objective
 
 
 def box(width: float, height: float, top_load: float = np.nan) -> Walls:
@@ -66,10 +65,12 @@ def balance_of(
 
 def solve(balance: Balance, slip: np.ndarray | None = None, settings: ConvexSettings | None = None) -> ConvexForces:
     c = balance.contact_count
-    return solve_member(balance, np.zeros(c) if slip is None else slip, np.ones(c), np.zeros(c), np.zeros(c), settings)
+    return solve_convex_member(
+        balance, np.zeros(c) if slip is None else slip, np.ones(c), np.zeros(c), np.zeros(c), settings
+    )
 
 
-def unbalance(balance: Balance, forces: ConvexForces) -> float:
+def force_residual(balance: Balance, forces: ConvexForces) -> float:
     force = np.concatenate([forces.fn, forces.ft]) / UNIT
     return float(np.abs(balance.matrix @ force - balance.load).max() * UNIT)
 
@@ -90,7 +91,7 @@ def test_a_packing_is_in_balance_inside_the_coulomb_cone():
     slip = np.random.default_rng(0).normal(size=contacts.count)
     forces = solve(balance, slip)
     assert forces.converged
-    assert unbalance(balance, forces) < 5e-3 * UNIT  # a slip of one costs as much as ρ times an unbalance of 1e-3
+    assert force_residual(balance, forces) < 5e-3 * UNIT  # a slip of one costs as much as ρ times a residual of 1e-3
     assert forces.fn.min() >= 0
     assert np.all(np.abs(forces.ft) <= 0.25 * forces.fn)
     assert np.any(np.abs(forces.ft) > 0.2 * forces.fn)
@@ -135,7 +136,7 @@ def test_relabelling_grains_leaves_the_forces():
     body = np.concatenate([new_row, np.arange(grains.count, size)])
     a, b = body[contacts.i], body[contacts.j]
     row = np.searchsorted(other.key, np.minimum(a, b) * size + np.maximum(a, b))
-    # Exchanging i and j turns n and t round together with the force and the sliding: components stay.
+    # Exchanging i and j reverses n and t together with the force and the sliding: components stay.
     other_slip = np.empty(other.count)
     other_slip[row] = slip
     again = solve(balance_of(shuffled, walls, other), other_slip)
@@ -152,12 +153,12 @@ def test_a_mirror_image_has_mirrored_forces():
     mirrored = Walls(walls.endpoints[:, ::-1] * mirror, walls.velocity[:, ::-1] * mirror, walls.load)
     image = detect_contacts(grains, position * mirror, np.ones(grains.count, bool), mirrored, 1e-9)
     np.testing.assert_array_equal(image.key, contacts.key)
-    seen = solve(balance_of(grains, mirrored, image), -slip)
-    np.testing.assert_allclose(seen.fn, forces.fn, atol=SAME)
-    np.testing.assert_allclose(seen.ft, -forces.ft, atol=SAME)
+    reflected = solve(balance_of(grains, mirrored, image), -slip)
+    np.testing.assert_allclose(reflected.fn, forces.fn, atol=SAME)
+    np.testing.assert_allclose(reflected.ft, -forces.ft, atol=SAME)
 
 
-def test_a_doubtful_contact_is_spared_where_others_can_carry():
+def test_an_ambiguous_contact_is_unloaded_where_others_can_carry():
     grains, _, walls, contacts = lattice()
     balance = balance_of(grains, walls, contacts)
     c = contacts.count
@@ -165,35 +166,35 @@ def test_a_doubtful_contact_is_spared_where_others_can_carry():
     pair = int(np.flatnonzero(~contacts.with_wall & (sure.fn > 0.1 * UNIT))[0])
     probability = np.ones(c)
     probability[pair] = 1e-3
-    doubted = solve_member(balance, np.zeros(c), probability, np.zeros(c), np.zeros(c))
-    assert doubted.fn[pair] < 0.5 * sure.fn[pair]
-    assert unbalance(balance, doubted) < 5e-3 * UNIT
+    ambiguous = solve_convex_member(balance, np.zeros(c), probability, np.zeros(c), np.zeros(c))
+    assert ambiguous.fn[pair] < 0.5 * sure.fn[pair]
+    assert force_residual(balance, ambiguous) < 5e-3 * UNIT
 
 
-def test_former_forces_are_kept_where_the_motion_says_nothing():
+def test_previous_forces_are_kept_without_slip():
     grains, _, walls, contacts = lattice()
     balance = balance_of(grains, walls, contacts)
     c = contacts.count
-    former = solve(balance, np.random.default_rng(4).normal(size=c))
-    again = solve_member(balance, np.zeros(c), np.ones(c), former.fn, former.ft)
-    # What changes is the unbalance that the former slip was worth.
-    np.testing.assert_allclose(again.fn, former.fn, atol=0.02 * UNIT)
+    previous = solve(balance, np.random.default_rng(4).normal(size=c))
+    again = solve_convex_member(balance, np.zeros(c), np.ones(c), previous.fn, previous.ft)
+    # Only the force residual caused by the previous slip changes.
+    np.testing.assert_allclose(again.fn, previous.fn, atol=0.02 * UNIT)
     free = solve(balance)
-    assert np.abs(free.fn - former.fn).max() > 0.1 * UNIT
+    assert np.abs(free.fn - previous.fn).max() > 0.1 * UNIT
 
 
-def test_polish_balances_a_noisy_field_with_little_change():
+def test_projection_equilibrates_a_noisy_field_with_little_change():
     grains, _, walls, contacts = lattice()
     balance = balance_of(grains, walls, contacts)
     rng = np.random.default_rng(5)
     true = solve(balance)
     noisy_fn = true.fn * (1 + 0.1 * rng.normal(size=contacts.count))
-    polished = polish(balance, noisy_fn, true.ft)
-    before = unbalance(balance, replace(true, fn=noisy_fn))
-    assert unbalance(balance, polished) < 0.01 * before
-    change = np.linalg.norm(polished.fn - true.fn) / np.linalg.norm(noisy_fn - true.fn)
+    projected = project_onto_equilibrium(balance, noisy_fn, true.ft)
+    before = force_residual(balance, replace(true, fn=noisy_fn))
+    assert force_residual(balance, projected) < 0.01 * before
+    change = np.linalg.norm(projected.fn - true.fn) / np.linalg.norm(noisy_fn - true.fn)
     assert change < 1.0
-    assert np.all(np.abs(polished.ft) <= 0.25 * polished.fn)
+    assert np.all(np.abs(projected.ft) <= 0.25 * projected.fn)
 
 
 def test_without_load_the_given_total_fixes_the_scale():
@@ -204,7 +205,7 @@ def test_without_load_the_given_total_fixes_the_scale():
     np.testing.assert_allclose(forces.fn, 30.0, atol=BALANCED)
 
 
-def test_a_missing_grain_has_no_balance_to_keep():
+def test_a_missing_grain_has_no_equilibrium_equations():
     grains, position, walls, _ = stack()
     present = np.array([True, True, False])
     contacts = detect_contacts(grains, position, present, walls, 1e-9)
@@ -236,15 +237,15 @@ def test_coulomb_law_holds_exactly_at_any_friction(friction: float):
     assert np.all(np.abs(forces.ft) <= friction * forces.fn)
 
 
-def test_a_contact_as_likely_as_not_costs_nothing():
+def test_a_contact_of_even_probability_has_no_penalty():
     grains, _, walls, contacts = lattice()
     balance, zero = balance_of(grains, walls, contacts), np.zeros(contacts.count)
     slip = np.random.default_rng(2).normal(0.0, 0.5, contacts.count)
-    sure, even, doubtful = (
-        solve_member(balance, slip, np.full(contacts.count, p), zero, zero).fn for p in (1.0, 0.5, 0.45)
+    sure, even, ambiguous = (
+        solve_convex_member(balance, slip, np.full(contacts.count, p), zero, zero).fn for p in (1.0, 0.5, 0.45)
     )
     assert np.array_equal(sure, even)
-    assert not np.array_equal(sure, doubtful)
+    assert not np.array_equal(sure, ambiguous)
 
 
 def test_torques_are_balanced_over_the_mean_radius():

@@ -1,10 +1,14 @@
 import numpy as np
 import pytest
-
-from solver.bodies.grains import Grains
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
-from solver.detection.displacement import contact_displacement, displacement_scale, find_reversals, member_intervals
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.detection.displacement import (
+    contact_displacement,
+    displacement_scale,
+    find_reversals,
+    member_intervals,
+)
 
 EXACT = 1e-12  # rounding of centimetres
 SAMPLING = 0.1  # 400 grains, 8 neighbours each: the rms of a component is known to a few per cent
@@ -22,13 +26,13 @@ def test_scale_is_the_size_of_a_relative_displacement():
     assert displacement_scale(lattice(), lattice() + step, np.zeros(400)) == pytest.approx(expected, rel=SAMPLING)
 
 
-def test_noise_is_taken_off_the_scale():
+def test_noise_is_subtracted_from_the_scale():
     rng = np.random.default_rng(1)
     step = rng.normal(scale=1e-4, size=(400, 2))
-    quiet = displacement_scale(lattice(), lattice() + step, np.zeros(400))
+    exact = displacement_scale(lattice(), lattice() + step, np.zeros(400))
     noise = rng.normal(scale=5e-5, size=(2, 400, 2))
     noisy = displacement_scale(lattice() + noise[0], lattice() + step + noise[1], np.full(400, 5e-5))
-    assert noisy == pytest.approx(quiet, rel=SAMPLING)
+    assert noisy == pytest.approx(exact, rel=SAMPLING)
 
 
 def test_scale_never_falls_below_noise_nor_to_zero():
@@ -36,12 +40,12 @@ def test_scale_never_falls_below_noise_nor_to_zero():
     assert displacement_scale(lattice(), lattice(), np.zeros(400)) > 0
 
 
-def test_a_common_translation_has_no_scale():
+def test_common_translation_has_no_scale():
     moved = displacement_scale(lattice(), lattice() + 0.01, np.zeros(400))
     assert moved == pytest.approx(displacement_scale(lattice(), lattice(), np.zeros(400)), rel=1e-6)
 
 
-def test_missing_grains_do_not_count():
+def test_missing_grains_are_ignored():
     rng = np.random.default_rng(2)
     after = lattice() + rng.normal(scale=1e-4, size=(400, 2))
     whole = displacement_scale(lattice(), after, np.zeros(400))
@@ -57,14 +61,14 @@ def test_rolling_on_a_wall_is_no_sliding():
     position = np.array([[0.05, 0.01]])
     contacts = detect_contacts(grains, position, np.ones(1, bool), walls, 1e-9)
     angle = 0.01
-    rolled = position + np.array([[angle * 0.01, 0.0]])  # to the right, turning clockwise
+    rolled = position + np.array([[angle * 0.01, 0.0]])  # to the right, rotating clockwise
     both = (walls.endpoints, walls.endpoints)
-    turn = (np.zeros(1), np.full(1, -angle))
-    _, ut = contact_displacement(contacts, grains.radius, (position, rolled), turn, walls, both)
+    rotation = (np.zeros(1), np.full(1, -angle))
+    _, ut = contact_displacement(contacts, grains.radius, (position, rolled), rotation, walls, both)
     np.testing.assert_allclose(ut, 0.0, atol=EXACT)
-    # The floor is drawn to the right below a grain at rest: along +t, which is n = −y turned by 90°.
-    drawn = (walls.endpoints, walls.endpoints + np.array([1e-4, 0.0]))
-    _, ut = contact_displacement(contacts, grains.radius, (position, position), (np.zeros(1),) * 2, walls, drawn)
+    # The floor moves to the right below a grain at rest: along +t, which is n = −y rotated by 90°.
+    moved = (walls.endpoints, walls.endpoints + np.array([1e-4, 0.0]))
+    _, ut = contact_displacement(contacts, grains.radius, (position, position), (np.zeros(1),) * 2, walls, moved)
     np.testing.assert_allclose(ut, 1e-4, atol=EXACT)
 
 
@@ -77,32 +81,32 @@ def box_motion(shear: list[float]) -> np.ndarray:
     return np.array(frames)
 
 
-def test_a_reversal_is_found_where_the_motion_turns_round():
+def test_reversal_of_the_walls_is_found():
     none = np.empty((6, 0, 2))
     assert np.flatnonzero(find_reversals(box_motion([0, 1, 2, 3, 2, 1]), none)).tolist() == [3]
     assert not find_reversals(box_motion([0, 1, 2, 3, 4, 5]), none).any()
     assert np.flatnonzero(find_reversals(box_motion([0, 1, 2, 2, 2, 1]), none)).tolist() == [4]
 
 
-def test_grains_tell_a_reversal_where_no_wall_moves():
+def test_reversal_is_found_from_the_grains_where_no_wall_moves():
     start = lattice()
     shear = np.array([0, 1, 2, 1, 0]) * 1e-3
     position = np.stack([start + np.outer(start[:, 1], [s, 0.0]) for s in shear])
     position[1, 5] = np.nan
-    still = np.repeat(box_motion([0]), 5, axis=0)
-    assert np.flatnonzero(find_reversals(still, position)).tolist() == [2]
-    assert not find_reversals(still, np.repeat(start[None], 5, axis=0)).any()
+    at_rest = np.repeat(box_motion([0]), 5, axis=0)
+    assert np.flatnonzero(find_reversals(at_rest, position)).tolist() == [2]
+    assert not find_reversals(at_rest, np.repeat(start[None], 5, axis=0)).any()
 
 
 def test_no_interval_crosses_a_reversal_or_the_ends():
-    turned = np.zeros(12, bool)
-    turned[6] = True
-    assert member_intervals(4, turned) == ((3, 4), (4, 5), (3, 5), (2, 6))
-    assert member_intervals(5, turned) == ((4, 5), (5, 6), (4, 6), (3, 6))
-    assert member_intervals(6, turned) == ((5, 6), None, None, (4, 6))
-    assert member_intervals(7, turned) == ((6, 7), (7, 8), (6, 8), (6, 9))
-    assert member_intervals(0, turned) == (None, (0, 1), None, (0, 2))
-    assert member_intervals(11, turned) == ((10, 11), None, None, (9, 11))
+    reversed_at = np.zeros(12, bool)
+    reversed_at[6] = True
+    assert member_intervals(4, reversed_at) == ((3, 4), (4, 5), (3, 5), (2, 6))
+    assert member_intervals(5, reversed_at) == ((4, 5), (5, 6), (4, 6), (3, 6))
+    assert member_intervals(6, reversed_at) == ((5, 6), None, None, (4, 6))
+    assert member_intervals(7, reversed_at) == ((6, 7), (7, 8), (6, 8), (6, 9))
+    assert member_intervals(0, reversed_at) == (None, (0, 1), None, (0, 2))
+    assert member_intervals(11, reversed_at) == ((10, 11), None, None, (9, 11))
     assert member_intervals(1, np.zeros(2, bool)) == ((0, 1), None, None, None)
     with pytest.raises(ValueError, match="single frame"):
         member_intervals(0, np.zeros(1, bool))

@@ -1,57 +1,57 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.motion import Snapshot
+from rodsight.solver.detection.displacement import contact_displacement
+from rodsight.solver.detection.refinement import BLOCK, RefinedBlock, block_of, refine
+from rodsight.solver.detection.touch_probability import ContactProbabilitySettings
 
-from solver.bodies.grains import Grains
-from solver.bodies.motion import Snapshot
-from solver.detection.displacement import contact_displacement
-from solver.detection.refinement import BLOCK, RefinedBlock, block_of, refine
-from solver.detection.touch_probability import ContactProbabilitySettings
-from tests.solver.convex.test_members import box
+from tests.solver.convex.test_ensemble_members import box
 
 R, SIDE, FRAMES = 0.01, 12, 8
 SIGMA = 3e-5  # [m]
 SHEAR = 2e-3  # per frame: rows that touch slide
-CLOSER = 0.75  # of the noise, at most, is left in the coordinates that contacts fix
-BOASTING = 1.4  # true error of a sliding over the standard deviation stated for it, rms, at most
+NOISE_LEFT = 0.75  # greatest error of refined coordinates over the noise
+COVERAGE = 1.4  # greatest rms of true errors of the sliding over their standard deviations
 
 SETTINGS = ContactProbabilitySettings(overlap=2e-6)
 
 
 def sheared(sigma: float, missing: int | None = None) -> tuple[Grains, np.ndarray, list[Snapshot]]:
-    """Columns of a square lattice leaning over; the true positions (f, n, 2) and the snapshots."""
+    """A square lattice in simple shear: the true positions (f, n, 2) and the snapshots."""
     rng = np.random.default_rng(2)
     start = R * (1 + 2 * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).reshape(-1, 2))
     n, side = SIDE**2, 2 * R * SIDE
     true, snapshots = [], []
     for f in range(FRAMES):
-        lean = SHEAR * f
-        position = start @ np.array([[1.0, 0.0], [np.sin(lean), np.cos(lean)]])
+        angle = SHEAR * f
+        position = start @ np.array([[1.0, 0.0], [np.sin(angle), np.cos(angle)]])
         true.append(position)
         measured = position + rng.normal(scale=sigma, size=(n, 2))
         present = np.ones(n, bool)
         if missing is not None and f == 3:
             present[missing] = False
             measured[missing] = np.nan
-        endpoints = box(side, side * np.cos(lean), np.tan(lean))
+        endpoints = box(side, side * np.cos(angle), np.tan(angle))
         snapshots.append(Snapshot(30.0 * f, measured, np.zeros(n), present, endpoints, sigma))
     return Grains.of_rods(np.full(n, R), density=2700.0, length=0.06), np.array(true), snapshots
 
 
 def contacts_of(block: RefinedBlock, grains: Grains, snapshots: list[Snapshot], frame: int):  # type: ignore[no-untyped-def]
-    from solver.bodies.walls import Walls
+    from rodsight.solver.bodies.walls import Walls
 
     snapshot = snapshots[frame]
     walls = Walls(snapshot.endpoints, np.zeros((4, 2, 2)), np.full(4, np.nan))
     return (*block.contacts_at(snapshot, frame, grains, walls, 0.5), walls)
 
 
-def test_positions_come_closer_to_the_truth_than_the_photographs():
+def test_refined_positions_are_closer_to_the_truth():
     grains, true, snapshots = sheared(SIGMA)
     block = refine(grains, snapshots, SETTINGS)
-    assert np.sqrt(np.mean((block.position - true) ** 2)) < CLOSER * SIGMA
+    assert np.sqrt(np.mean((block.position - true) ** 2)) < NOISE_LEFT * SIGMA
 
 
-def test_what_is_left_of_the_noise_of_a_sliding_is_stated():
+def test_standard_deviation_of_the_refined_sliding_is_calibrated():
     grains, true, snapshots = sheared(SIGMA)
     block = refine(grains, snapshots, SETTINGS)
     contacts, _, walls = contacts_of(block, grains, snapshots, 4)
@@ -63,21 +63,21 @@ def test_what_is_left_of_the_noise_of_a_sliding_is_stated():
 
     error = slide((block.position_at(3), block.position_at(4))) - slide((true[3], true[4]))
     raw = slide((snapshots[3].position, snapshots[4].position)) - slide((true[3], true[4]))
-    with_rotation = block.slide_deviation(contacts, (3, 4), (SIGMA, SIGMA))
+    with_rotation = block.sliding_sd(contacts, (3, 4), (SIGMA, SIGMA))
     grain_count = np.where(contacts.with_wall, 1.0, 2.0)
-    deviation = np.sqrt(with_rotation**2 - 2.0 * grain_count * SIGMA**2)
+    sliding_sd = np.sqrt(with_rotation**2 - 2.0 * grain_count * SIGMA**2)
     assert np.sqrt(np.mean(error**2)) < np.sqrt(np.mean(raw**2))
-    assert np.sqrt(np.mean((error / deviation) ** 2)) < BOASTING
-    assert deviation.max() < 2.0 * SIGMA  # of the photographs alone
+    assert np.sqrt(np.mean((error / sliding_sd) ** 2)) < COVERAGE
+    assert sliding_sd.max() < 2.0 * SIGMA  # of the photographs alone
 
 
-def test_precise_positions_stay_where_they_are():
+def test_precise_positions_are_unchanged():
     grains, true, snapshots = sheared(1e-8)
     block = refine(grains, snapshots, SETTINGS)
     np.testing.assert_allclose(block.position, true, rtol=0, atol=1e-7)
 
 
-def test_a_grain_that_is_missing_is_not_made_up():
+def test_missing_grain_has_no_refined_position():
     grains, _, snapshots = sheared(SIGMA, missing=60)
     block = refine(grains, snapshots, SETTINGS)
     assert np.isnan(block.position[3, 60]).all()
@@ -87,7 +87,7 @@ def test_a_grain_that_is_missing_is_not_made_up():
 
 
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 40])
-def test_every_frame_lies_in_its_block_with_room_on_both_sides(count: int):
+def test_block_contains_the_window_of_every_frame(count: int):
     for k in range(count):
         number, start, end = block_of(k, count)
         assert number == k // BLOCK
@@ -95,7 +95,7 @@ def test_every_frame_lies_in_its_block_with_room_on_both_sides(count: int):
         assert end >= min(k + 4, count)
 
 
-def test_contacts_come_with_their_own_probability():
+def test_contacts_have_their_own_probability():
     grains, _, snapshots = sheared(SIGMA)
     block = refine(grains, snapshots[:3], SETTINGS, start=5)
     contacts, touch, _ = contacts_of(block, grains, [None] * 5 + snapshots, 6)  # type: ignore[list-item]

@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
-
-from solver.bodies.grains import Grains
-from solver.bodies.motion import Snapshot
-from solver.bodies.walls import Walls
-from solver.detection.touch_probability import (
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.motion import Snapshot
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.detection.touch_probability import (
     ContactProbabilitySettings,
-    find_candidates,
+    find_touch_candidates,
     probable_contacts,
     smooth_gaps,
     touch_probability,
@@ -27,7 +26,7 @@ def probability(gap: np.ndarray, **settings: float) -> np.ndarray:
 
 
 def enumerate_paths(gap: np.ndarray, state_gap: np.ndarray, start: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """P(state 0) per frame by summing over every path: slow and plain."""
+    """P(state 0) per frame by summing over every path."""
     frames, states = len(gap), len(state_gap)
     weight = np.zeros((frames, states))
     for path in np.ndindex(*([states] * frames)):
@@ -41,67 +40,67 @@ def enumerate_paths(gap: np.ndarray, state_gap: np.ndarray, start: np.ndarray, s
     return weight[:, 0] / weight.sum(axis=1)
 
 
-def test_a_pair_that_stays_at_zero_gap_touches():
+def test_pair_that_stays_at_zero_gap_touches():
     assert probability(np.zeros(FRAMES)).min() > 0.95
 
 
-def test_a_clear_gap_does_not_touch():
+def test_large_gap_does_not_touch():
     assert probability(np.full(FRAMES, 10 * SIGMA)).max() < 1e-6
 
 
-def test_a_gap_of_the_size_of_the_noise_stays_uncertain():
+def test_gap_of_the_size_of_the_noise_stays_uncertain():
     certain = probability(np.full(FRAMES, 2.0 * SIGMA))[FRAMES // 2, 0]
     assert 0.05 < certain < 0.95
 
 
-def test_more_photographs_make_more_certain():
+def test_more_photographs_increase_the_probability():
     once = probability(np.zeros(1))[0, 0]
     often = probability(np.zeros(FRAMES))[FRAMES // 2, 0]
     assert 0.5 < once < often
 
 
-def test_a_contact_that_opens_is_seen_to_open():
+def test_opening_contact_is_found():
     gap = np.array([0, 0, 0, 0, 60, 120, 180, 240]) * 1e-6
     touch = probability(gap)[:, 0]
     assert touch[:3].min() > 0.9
     assert touch[4:].max() < 1e-3
 
 
-def test_a_pair_that_comes_from_far_is_open_there():
+def test_closing_pair_is_open_at_first():
     gap = np.array([5e-3, 3e-3, 1e-3, 0, 0, 0, 0, 0])
     touch = probability(gap)[:, 0]
     assert touch[:3].max() < 1e-9
     assert touch[4:].min() > 0.9
 
 
-def test_a_missing_photograph_is_bridged():
+def test_missing_photograph_is_interpolated():
     gap = np.zeros(FRAMES)
     gap[3:5] = np.nan
     assert probability(gap).min() > 0.9
     assert probability(np.where(np.isnan(gap), gap, 10 * SIGMA)).max() < 0.05
 
 
-def test_the_ends_of_a_sequence_need_no_neighbours():
+def test_short_and_empty_sequences_are_valid():
     assert probability(np.zeros(2)).shape == (2, 1)
     assert probability(np.empty((3, 0))).shape == (3, 0)
     np.testing.assert_array_equal(probability(np.full(3, np.nan)), 0.5)
 
 
-def test_a_deep_overlap_still_touches():
+def test_deep_overlap_still_touches():
     gap = np.zeros(FRAMES)
     gap[4] = -30 * SIGMA
     assert probability(gap).min() > 0.9
 
 
-def test_time_runs_both_ways():
+def test_result_is_nearly_symmetric_in_time():
     gap = np.abs(np.random.default_rng(0).normal(size=(FRAMES, 40))) * 3 * SIGMA
     gap[:, 0] = 0.0
-    forth, back = probability(gap), probability(gap[::-1])[::-1]
-    # The chain is not exactly reversible (it opens by an exponential, closes from anywhere): the same verdict is asked.
-    assert np.mean((forth > 0.5) == (back > 0.5)) > 0.95
+    forward, backward = probability(gap), probability(gap[::-1])[::-1]
+    # The chain is not exactly reversible (it opens by an exponential law, closes from any gap): compare classes.
+    assert np.mean((forward > 0.5) == (backward > 0.5)) > 0.95
 
 
-def test_half_an_overlap_is_allowed_for():
+def test_half_the_overlap_is_added_to_the_gap():
     gap = np.full((FRAMES, 1), 1.2 * SIGMA)
     shifted = touch_probability(
         gap - 20e-6,
@@ -113,7 +112,7 @@ def test_half_an_overlap_is_allowed_for():
 
 
 def as_matrix(step: np.ndarray, state_gap: np.ndarray, width: np.ndarray, scale: float) -> np.ndarray:
-    """The probabilities (q, q) of going from row to column that the rows of a transition stand for."""
+    """Transition matrix (q, q), from row to column, of the rows of a transition."""
     _, opens, closes, spreads = step
     apart = np.abs(state_gap[:, None] - state_gap[None, :])
     matrix = spreads[:, None] * np.exp(-apart / scale) * width[None, :]
@@ -123,8 +122,8 @@ def as_matrix(step: np.ndarray, state_gap: np.ndarray, width: np.ndarray, scale:
 
 
 def test_smoother_agrees_with_summing_over_all_paths():
-    from solver.detection import touch_probability as module
-    from solver.detection.touch_probability_kernels import smooth_candidates
+    from rodsight.solver.detection import touch_probability as module
+    from rodsight.solver.detection.touch_probability_kernels import smooth_candidates
 
     rng = np.random.default_rng(1)
     states, frames = 4, 4
@@ -146,17 +145,17 @@ def test_smoother_agrees_with_summing_over_all_paths():
     np.testing.assert_allclose(touch, expected, atol=EXACT)
 
 
-def test_the_gap_of_a_lasting_contact_is_known_better_than_any_photograph_shows_it():
+def test_posterior_of_a_lasting_contact_is_narrower_than_the_noise():
     gap = np.random.default_rng(3).normal(0.0, SIGMA, (FRAMES, 200))
     sigma, scale = np.full(gap.shape, SIGMA), np.full(FRAMES - 1, SCALE)
     found = smooth_gaps(gap, sigma, scale, ContactProbabilitySettings())
-    sure = found.touch > 0.9
-    assert sure.mean() > 0.5
-    assert np.sqrt(found.variance[sure]).max() < SIGMA
-    assert np.abs(found.mean[sure]).mean() < 0.5 * np.abs(gap[sure]).mean()
+    certain = found.touch > 0.9
+    assert certain.mean() > 0.5
+    assert np.sqrt(found.variance[certain]).max() < SIGMA
+    assert np.abs(found.mean[certain]).mean() < 0.5 * np.abs(gap[certain]).mean()
 
 
-def test_an_unknown_gap_is_what_its_neighbours_in_time_make_of_it():
+def test_unknown_gap_is_inferred_from_other_frames():
     gap = np.zeros((FRAMES, 1))
     gap[FRAMES // 2] = np.nan
     found = smooth_gaps(gap, np.full(gap.shape, SIGMA), np.full(FRAMES - 1, SCALE), ContactProbabilitySettings())
@@ -166,7 +165,7 @@ def test_an_unknown_gap_is_what_its_neighbours_in_time_make_of_it():
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e-4, 1e-1])
 def test_transitions_are_probabilities_at_any_scale(scale: float):
-    from solver.detection.touch_probability import _states, find_transition
+    from rodsight.solver.detection.touch_probability import _states, find_transition
 
     state_gap, width = _states(5e-4)
     matrix = as_matrix(find_transition(state_gap, width, scale), state_gap, width, scale)
@@ -193,27 +192,27 @@ def three_grains() -> tuple[Grains, np.ndarray, list[Walls]]:
     return grains, position, [Walls.at_rest(endpoints)] * 2
 
 
-def test_candidates_are_pairs_near_in_any_frame_measured_in_all():
+def test_candidates_are_close_in_some_frame_and_measured_in_all():
     grains, position, walls = three_grains()
     sigma = np.full((2, 3), 1e-5)
-    found = find_candidates(grains, position, np.ones((2, 3), bool), sigma, walls, ContactProbabilitySettings())
+    found = find_touch_candidates(grains, position, np.ones((2, 3), bool), sigma, walls, ContactProbabilitySettings())
     assert list(zip(found.i.tolist(), found.j.tolist(), strict=True)) == [(0, 1), (0, 3), (1, 2), (1, 3)]
     np.testing.assert_allclose(found.gap[:, 2], [np.hypot(0.03, 0.04) - 0.02, 2e-5], atol=1e-15)
     np.testing.assert_allclose(found.sigma[0], 1e-5 * np.sqrt([2, 1, 2, 1]))
 
 
-def test_a_lost_grain_has_no_gap():
+def test_lost_grain_has_no_gap():
     grains, position, walls = three_grains()
     position[0, 1] = 7.0
     present = np.array([[True, False, True], [True, True, True]])
-    found = find_candidates(grains, position, present, np.full((2, 3), 1e-5), walls, ContactProbabilitySettings())
+    found = find_touch_candidates(grains, position, present, np.full((2, 3), 1e-5), walls, ContactProbabilitySettings())
     touches = (found.i == 1) | (found.j == 1)
     assert touches.any()
     assert np.all(np.isnan(found.gap[0, touches]))
     assert np.all(np.isfinite(found.gap[1]))
 
 
-def test_a_pair_is_a_candidate_up_to_what_noise_overlap_and_radii_may_do():
+def test_reach_of_candidates_includes_noise_overlap_and_radii():
     grains, position, walls = three_grains()
     sigma = np.full((2, 3), 1e-5)
     position = np.repeat(position[1:], 2, axis=0)
@@ -222,17 +221,17 @@ def test_a_pair_is_a_candidate_up_to_what_noise_overlap_and_radii_may_do():
     reach = 6.0 * np.sqrt(1e-10 + 0.5 * 16e-12) + 20e-6 + 15e-6
     for gap, found in ((0.999 * reach, True), (1.001 * reach, False)):
         position[:, 2] = [0.03, 0.03 + gap]
-        named = find_candidates(grains, position, np.ones((2, 3), bool), sigma, walls, settings)
+        named = find_touch_candidates(grains, position, np.ones((2, 3), bool), sigma, walls, settings)
         assert ((1, 2) in zip(named.i.tolist(), named.j.tolist(), strict=True)) is found
 
 
-def test_a_frame_is_judged_by_four_photographs_before_and_three_after_it():
+def test_window_has_four_frames_before_and_three_after():
     assert list(window_of(10, 40)) == [6, 7, 8, 9, 10, 11, 12, 13]
     assert list(window_of(1, 40)) == [0, 1, 2, 3, 4]
     assert list(window_of(38, 40)) == [34, 35, 36, 37, 38, 39]
 
 
-def test_improbable_pairs_and_those_of_a_lost_grain_are_left_out():
+def test_improbable_pairs_and_those_of_an_absent_grain_are_omitted():
     grains, position, walls = three_grains()
     position = np.repeat(position[1:], 3, axis=0)
     position[:, 2, 1] += 5e-5
@@ -243,11 +242,11 @@ def test_improbable_pairs_and_those_of_a_lost_grain_are_left_out():
     contacts, touch = probable_contacts(grains, window, 1, everything)
     pairs = list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))
     assert pairs == [(0, 1), (0, 3), (1, 2), (1, 3)]
-    doubtful = touch[pairs.index((1, 2))]
-    assert 0.0 < doubtful < 0.3
-    fewer, kept = probable_contacts(grains, window, 1, ContactProbabilitySettings(least=1.01 * doubtful))
+    uncertain = touch[pairs.index((1, 2))]
+    assert 0.0 < uncertain < 0.3
+    fewer, kept = probable_contacts(grains, window, 1, ContactProbabilitySettings(least=1.01 * uncertain))
     assert fewer.count == 3
     assert np.array_equal(np.delete(touch, pairs.index((1, 2))), kept)
-    gone = Snapshot(1.0, position[1], np.zeros(3), np.array([True, False, True]), walls[0].endpoints, 1e-5)
-    contacts, _ = probable_contacts(grains, [window[0], gone, window[2]], 1, everything)
+    absent = Snapshot(1.0, position[1], np.zeros(3), np.array([True, False, True]), walls[0].endpoints, 1e-5)
+    contacts, _ = probable_contacts(grains, [window[0], absent, window[2]], 1, everything)
     assert list(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True)) == [(0, 3)]

@@ -1,18 +1,17 @@
-"""Compiled code takes vectors: it must find what the plain loops find, and touch nothing else."""
+"""The vector implementations give the results of the plain loops and change no other numbers."""
 
 import numpy as np
 import pytest
 from numba import njit
-
-from solver.factor.blocks import (
+from rodsight.solver.factor.blocks import (
     PAIR,
     TRIPLE,
-    area_of,
-    lanes_of,
+    backward_substitution,
+    block_size,
+    forward_substitution,
+    padded_rows,
     scale_column,
-    take_from_rows,
-    take_products,
-    take_rows,
+    schur_update,
 )
 
 ENTRIES, NODES, FIRST, END, AT = 12, 20, 3, 8, 2
@@ -20,8 +19,8 @@ EXACT = 1e-14  # of numbers near one: products may be rounded once or twice
 
 
 @njit
-def products(row, blocks, where, block):
-    take_products(row, blocks, where, FIRST, END, block)
+def update(row, blocks, row_offset, block):
+    schur_update(row, blocks, row_offset, FIRST, END, block)
 
 
 @njit
@@ -30,13 +29,13 @@ def scale(blocks, block):
 
 
 @njit
-def from_rows(row, blocks, right, at, block):
-    take_from_rows(row, blocks, FIRST, END, right, at, block)
+def forward(row, blocks, rhs, at, block):
+    forward_substitution(row, blocks, FIRST, END, rhs, at, block)
 
 
 @njit
-def rows(row, blocks, right, at, block):
-    take_rows(row, blocks, FIRST, END, right, at, block)
+def backward(row, blocks, rhs, at, block):
+    backward_substitution(row, blocks, FIRST, END, rhs, at, block)
 
 
 @pytest.fixture(params=[PAIR, TRIPLE], ids=["pairs", "triples"])
@@ -46,10 +45,10 @@ def block(request):
 
 @pytest.fixture(params=[0, 1])
 def blocks(block, request):
-    """Blocks that begin at any number of an array: nothing may ask for more than a number's alignment."""
-    drawn = np.random.default_rng(4).normal(size=ENTRIES * area_of(block) + request.param)[request.param :]
-    drawn.reshape(ENTRIES, len(block), lanes_of(block))[:, :, len(block) :] = 0.0
-    return drawn
+    """Blocks at any offset of an array: only the alignment of a number may be assumed."""
+    random = np.random.default_rng(4).normal(size=ENTRIES * block_size(block) + request.param)[request.param :]
+    random.reshape(ENTRIES, len(block), padded_rows(block))[:, :, len(block) :] = 0.0
+    return random
 
 
 @pytest.fixture
@@ -57,22 +56,22 @@ def row():
     return np.random.default_rng(5).permutation(NODES)[:ENTRIES]
 
 
-def test_products_are_taken_where_the_rows_of_the_column_lie(block, blocks, row):
-    where = np.zeros(NODES, np.int64)
-    where[row[FIRST:END]] = area_of(block) * np.array([9, 11, 10, 8, 0])
+def test_a_schur_update_changes_the_rows_of_the_earlier_column(block, blocks, row):
+    row_offset = np.zeros(NODES, np.int64)
+    row_offset[row[FIRST:END]] = block_size(block) * np.array([9, 11, 10, 8, 0])
     found, expected = blocks.copy(), blocks.copy()
-    products(row, found, where, block)
-    take_products(row, expected, where, FIRST, END, block)
+    update(row, found, row_offset, block)
+    schur_update(row, expected, row_offset, FIRST, END, block)
     np.testing.assert_allclose(found, expected, rtol=0, atol=EXACT)
     changed = np.flatnonzero((found != blocks).reshape(ENTRIES, -1).any(axis=1))
     assert changed.tolist() == [0, 8, 9, 10, 11]
-    square = blocks.reshape(ENTRIES, len(block), lanes_of(block))
+    square = blocks.reshape(ENTRIES, len(block), padded_rows(block))
     product = square[FIRST].T @ square[FIRST][:, : len(block)]  # of the first entry with itself
     np.testing.assert_allclose(found.reshape(square.shape)[9], square[9] - product.T, atol=EXACT)
 
 
-def test_a_column_is_scaled_by_the_triangle_at_its_head(block, blocks):
-    square = blocks.reshape(ENTRIES, len(block), lanes_of(block))
+def test_a_column_is_scaled_by_its_diagonal_block(block, blocks):
+    square = blocks.reshape(ENTRIES, len(block), padded_rows(block))
     square[FIRST, :, : len(block)] = np.triu(square[FIRST, :, : len(block)])  # columns lie in rows here
     found, expected = blocks.copy(), blocks.copy()
     scale(found, block)
@@ -87,22 +86,22 @@ def test_a_column_is_scaled_by_the_triangle_at_its_head(block, blocks):
     assert np.array_equal(found.reshape(square.shape)[: FIRST + 1], square[: FIRST + 1])
 
 
-@pytest.mark.parametrize(("compiled", "plain"), [(from_rows, take_from_rows), (rows, take_rows)])
-def test_products_with_a_vector_are_taken_from_it_or_from_its_rows(block, blocks, row, compiled, plain):
-    lanes = lanes_of(block)
+@pytest.mark.parametrize(("compiled", "plain"), [(forward, forward_substitution), (backward, backward_substitution)])
+def test_substitution_subtracts_products_with_a_vector(block, blocks, row, compiled, plain):
+    lanes = padded_rows(block)
     row[FIRST:END] = [5, 7, 6, 9, 12]
-    right = np.random.default_rng(6).normal(size=NODES * lanes)
-    right.reshape(NODES, lanes)[:, len(block) :] = 0.0
-    found, expected = right.copy(), right.copy()
+    rhs = np.random.default_rng(6).normal(size=NODES * lanes)
+    rhs.reshape(NODES, lanes)[:, len(block) :] = 0.0
+    found, expected = rhs.copy(), rhs.copy()
     compiled(row, blocks, found, AT * lanes, block)
     plain(row, blocks, FIRST, END, expected, AT * lanes, block)
     np.testing.assert_allclose(found, expected, rtol=0, atol=EXACT)
-    changed = set(np.flatnonzero((found != right).reshape(NODES, lanes).any(axis=1)).tolist())
-    assert changed == ({5, 6, 7, 9, 12} if plain is take_from_rows else {AT})
+    changed = set(np.flatnonzero((found != rhs).reshape(NODES, lanes).any(axis=1)).tolist())
+    assert changed == ({5, 6, 7, 9, 12} if plain is forward_substitution else {AT})
     square = blocks.reshape(ENTRIES, len(block), lanes)[FIRST:END].swapaxes(1, 2)[:, : len(block)]
-    before, after = right.reshape(NODES, lanes)[:, : len(block)], found.reshape(NODES, lanes)[:, : len(block)]
-    if plain is take_from_rows:
+    before, after = rhs.reshape(NODES, lanes)[:, : len(block)], found.reshape(NODES, lanes)[:, : len(block)]
+    if plain is forward_substitution:
         np.testing.assert_allclose(after[5], before[5] - square[0] @ before[AT], atol=EXACT)
     else:
-        taken = np.einsum("pab,pa->b", square, before[row[FIRST:END]])
-        np.testing.assert_allclose(after[AT], before[AT] - taken, atol=EXACT)
+        product = np.einsum("pab,pa->b", square, before[row[FIRST:END]])
+        np.testing.assert_allclose(after[AT], before[AT] - product, atol=EXACT)

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from rodsight.solver.factor.blocks import PAIR, TRIPLE
+from rodsight.solver.factor.cholesky import factorize, solve
+from rodsight.solver.factor.pattern import find_pattern
 
-from solver.factor.blocks import PAIR, TRIPLE
-from solver.factor.cholesky import factorize, solve
-from solver.factor.pattern import find_pattern
 from tests.solver.factor.matrices import flat, lattice, square
 
 BLOCK = {2: PAIR, 3: TRIPLE}
@@ -12,24 +12,24 @@ EXACT = 1e-10  # relative, of matrices whose eigenvalues span a few hundred
 
 @pytest.mark.parametrize("size", [2, 3])
 @pytest.mark.parametrize(("side", "far"), [(1, 0), (2, 0), (7, 0), (7, 20)])
-def test_it_solves_as_the_whole_matrix_does(size: int, side: int, far: int):
-    pattern, blocks, whole = lattice(side, size, far)
-    right = np.random.default_rng(1).normal(size=len(whole))
-    expected = np.linalg.solve(whole, right)
+def test_the_solution_is_that_of_the_dense_matrix(size: int, side: int, far: int):
+    pattern, blocks, dense = lattice(side, size, far)
+    rhs = np.random.default_rng(1).normal(size=len(dense))
+    expected = np.linalg.solve(dense, rhs)
     assert factorize(pattern, blocks, np.empty(pattern.node_count, np.int64), BLOCK[size])
-    filled = np.zeros((pattern.node_count, size + size % 2))
-    filled[:, :size] = right.reshape(-1, size)
-    solve(pattern, blocks, filled.reshape(-1), BLOCK[size])
-    assert not filled[:, size:].any()
-    right = filled[:, :size].ravel()
-    np.testing.assert_allclose(right, expected, rtol=0, atol=EXACT * np.abs(expected).max())
+    padded = np.zeros((pattern.node_count, size + size % 2))
+    padded[:, :size] = rhs.reshape(-1, size)
+    solve(pattern, blocks, padded.reshape(-1), BLOCK[size])
+    assert not padded[:, size:].any()
+    rhs = padded[:, :size].ravel()
+    np.testing.assert_allclose(rhs, expected, rtol=0, atol=EXACT * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("size", [2, 3])
-def test_the_factor_is_that_of_the_whole_matrix(size: int):
-    pattern, blocks, whole = lattice(5, size)
+def test_the_factor_is_that_of_the_dense_matrix(size: int):
+    pattern, blocks, dense = lattice(5, size)
     factorize(pattern, blocks, np.empty(25, np.int64), BLOCK[size])
-    factor = np.linalg.cholesky(whole)
+    factor = np.linalg.cholesky(dense)
     for k, found in enumerate(square(blocks, size)):
         i, j = pattern.row[k] * size, pattern.column[k] * size
         expected = factor[i : i + size, j : j + size]

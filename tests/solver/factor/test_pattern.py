@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
+from rodsight.solver.factor.pattern import find_pattern
 
-from solver.factor.pattern import find_pattern
-from tests.solver.factor.matrices import couples, definite, lattice
+from tests.solver.factor.matrices import coupled_nodes, definite, lattice
 
-ZERO = 1e-14  # of an entry of a factor whose numbers are drawn: none vanishes by chance
+ZERO = 1e-14  # bound of a zero entry of a random factor
 
 
 def test_it_has_the_entries_of_the_factor_and_no_others():
-    pattern, _, whole = lattice(6, 1, far=9)
-    row, column = np.nonzero(np.abs(np.linalg.cholesky(whole)) > ZERO)
+    pattern, _, dense = lattice(6, 1, far=9)
+    row, column = np.nonzero(np.abs(np.linalg.cholesky(dense)) > ZERO)
     found = set(zip(pattern.row.tolist(), pattern.column.tolist(), strict=True))
     assert found == set(zip(row.tolist(), column.tolist(), strict=True))
 
@@ -22,21 +22,21 @@ def test_columns_begin_with_their_diagonal_and_ascend():
         assert np.all(np.diff(pattern.row[pattern.start[j] : pattern.start[j + 1]]) > 0)
 
 
-def test_rows_list_what_is_left_of_their_diagonal():
+def test_rows_list_the_entries_left_of_their_diagonal():
     pattern = lattice(5, 1)[0]
     for i in range(25):
         listed = pattern.left[pattern.left_start[i] : pattern.left_start[i + 1]]
         assert set(listed) == set(np.flatnonzero((pattern.row == i) & (pattern.column < i)))
 
 
-def test_neighbours_in_a_plane_fill_little():
-    """A band of this lattice's width would hold 41 entries a column, nested dissection about 16."""
-    pattern = find_pattern(1600, *couples(40))
+def test_fill_of_a_plane_lattice_is_small():
+    """A banded factor of this lattice has 41 entries per column, nested dissection about 16."""
+    pattern = find_pattern(1600, *coupled_nodes(40))
     assert pattern.entry_count < 14 * 1600
 
 
 def test_nodes_are_found_in_either_order():
-    a, b = couples(4, far=3)
+    a, b = coupled_nodes(4, far=3)
     pattern = find_pattern(17, a, b)
     entry = pattern.locate(a, b)
     assert np.array_equal(entry, pattern.locate(b, a))

@@ -1,12 +1,12 @@
-"""Rods taken out of a packing are put back where they were; where none is missing none is invented."""
+"""Inference of rods that were removed from a packing."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.inferred.unseen_rods import UnseenRods, UnseenRodSettings, infer_unseen
 
-from solver.bodies.grains import Array
-from solver.inferred.unseen_rods import UnseenRods, infer_unseen
 from tests.golden.forces import NOISE, STORED
 
 pytestmark = pytest.mark.unit
@@ -25,12 +25,12 @@ def infer(poses: dict[str, np.ndarray], gone: tuple[int, ...], sizes: Array | No
     seen = np.setdiff1d(np.arange(len(poses["radius"])), gone)
     position = poses["position"][:, seen]
     return infer_unseen(
-        poses["radius"][seen], position, np.isfinite(position).all(axis=2), poses["endpoints"], NOISE, sizes,
-        overlap=overlap,
+        poses["radius"][seen], position, np.isfinite(position).all(axis=2), poses["endpoints"],
+        UnseenRodSettings(NOISE, sizes, overlap),
     )  # fmt: skip
 
 
-def test_rods_that_were_taken_out_are_put_back(poses) -> None:
+def test_removed_rods_are_inferred(poses) -> None:
     found = infer(poses, GONE, np.unique(poses["radius"]))
     true = poses["position"][:, list(GONE)]
     for q, rod in enumerate(GONE):
@@ -42,7 +42,7 @@ def test_rods_that_were_taken_out_are_put_back(poses) -> None:
 
 
 @pytest.mark.parametrize("mean", [2e-4, 1e-4], ids=["all alike", "twice the mean"])
-def test_rods_that_overlap_by_a_per_cent_are_put_back_where_that_is_known(poses, mean) -> None:
+def test_removed_soft_rods_are_inferred_with_a_known_overlap(poses, mean) -> None:
     overlap = 2e-4
     soft = poses | {"radius": poses["radius"] + 0.5 * overlap}
     sizes = np.unique(soft["radius"])
@@ -57,7 +57,7 @@ def test_rods_that_overlap_by_a_per_cent_are_put_back_where_that_is_known(poses,
     assert infer(soft, (), sizes, mean).count == 0
 
 
-def test_no_rod_is_invented_where_none_is_missing(poses) -> None:
+def test_no_rod_is_inferred_where_none_is_missing(poses) -> None:
     assert infer(poses, (), np.unique(poses["radius"])).count == 0
 
 
@@ -70,13 +70,13 @@ def test_an_inferred_rod_overlaps_nothing(poses) -> None:
         assert np.nanmin(gap) > -10 * NOISE
 
 
-def test_two_photographs_tell_nothing(poses) -> None:
+def test_two_photographs_are_not_enough(poses) -> None:
     short = {name: values[:2] if name in ("position", "endpoints") else values for name, values in poses.items()}
     assert infer(short, GONE, np.unique(poses["radius"])).count == 0
 
 
 def ring(closing: float) -> UnseenRods:
-    """What is inferred inside six rods around a hole of their own size, one of which closes in after two frames."""
+    """Infer rods inside a ring of six around a hole of their size, one of which moves inward after two frames."""
     r = 8e-3
     angle = np.pi / 3 * np.arange(6)
     around = 2 * r * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -85,10 +85,12 @@ def ring(closing: float) -> UnseenRods:
     position[2:, 0] *= 1.0 - closing
     side = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
     walls = np.tile(np.stack([side, np.roll(side, -1, axis=0)], axis=1), (4, 1, 1, 1))
-    return infer_unseen(np.full(10, r), position, np.ones((4, 10), bool), walls, NOISE, np.array([r]))
+    return infer_unseen(
+        np.full(10, r), position, np.ones((4, 10), bool), walls, UnseenRodSettings(NOISE, np.array([r]))
+    )
 
 
-def test_a_hole_that_others_enter_held_no_rod() -> None:
+def test_hole_that_other_rods_enter_holds_no_rod() -> None:
     held = ring(closing=0.0)
     assert held.count == 1
     assert held.position == pytest.approx(0.0, abs=1e-6)

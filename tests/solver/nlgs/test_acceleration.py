@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import GrainMotion
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.nlgs.acceleration import PERIOD, Acceleration, extrapolate, inner_products
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps
+from rodsight.solver.nlgs.sweeping.kernels import advance, apply_forces
 
-from solver.bodies.grains import GrainMotion
-from solver.bodies.packing import Material
-from solver.contacts.contacts import detect_contacts
-from solver.nlgs.acceleration import PERIOD, Acceleration, extrapolate, inner_products
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps
-from solver.nlgs.sweeping.kernels import advance, apply_forces
 from tests.benchmarks.static_problems import FRICTION, IMPEDANCE, jammed_packing
 from tests.packings import squeezed_heap
 from tests.solver.nlgs.test_natural_map import natural_map_of
@@ -48,16 +48,16 @@ def test_accelerated_forces_never_leave_the_coulomb_cone(heap):
             break
 
 
-def test_a_listener_does_not_change_a_bit_of_an_accelerated_solve(heap):
+def test_an_observer_does_not_change_a_bit_of_an_accelerated_solve(heap):
     problem = assemble(*heap)
     total = 210
-    silent = solve(problem, settings(5, sweeps=total, natural_map=None), every=total)
+    unobserved = solve(problem, settings(5, sweeps=total, natural_map=None), every=total)
     for every in (1, 7, 30):
-        loud = solve(problem, settings(5, sweeps=total, natural_map=None), observer=lambda _: None, every=every)
-        assert np.array_equal(silent.force, loud.force)
+        observed = solve(problem, settings(5, sweeps=total, natural_map=None), observer=lambda _: None, every=every)
+        assert np.array_equal(unobserved.force, observed.force)
 
 
-def test_sweeps_between_those_heard_of_an_accelerated_solve_are_measured_alike(heap):
+def test_measured_sweeps_between_strides_of_an_accelerated_solve_have_the_same_residuals(heap):
     problem = assemble(*heap)
     each = np.concatenate([sweep.residuals for sweep in sweeps(problem, settings(5), every=[1] * 5 * PERIOD)])
     (found,) = (sweep.residuals for sweep in sweeps(problem, settings(5), every=[5 * PERIOD], measured=True))
@@ -75,7 +75,7 @@ def advance_periods(problem, acceleration, state, periods):
     force, body, plate = state
     for _ in range(periods):
         advance(problem, body, plate, force, PERIOD, 1.0)
-        acceleration.settle(body, plate, force)
+        acceleration.accept_or_undo(body, plate, force)
         acceleration.step(body, plate, force)
 
 
@@ -85,19 +85,19 @@ def test_a_step_that_raises_the_residual_is_undone(heap):
     acceleration = Acceleration(problem, force, 5)
     advance_periods(problem, acceleration, state, 1)
     advance(problem, body, plate, force, PERIOD, 1.0)
-    acceleration.settle(body, plate, force)
+    acceleration.accept_or_undo(body, plate, force)
     before = force.copy(), body.copy(), plate.copy()
     acceleration.step(body, plate, force)
-    force *= 50.0  # as if the step had gone astray
+    force *= 50.0  # as after a bad step
     apply_forces(problem, body, plate, force)
     advance(problem, body, plate, force, PERIOD, 1.0)
-    assert acceleration.settle(body, plate, force)
+    assert acceleration.accept_or_undo(body, plate, force)
     assert acceleration.rejected == 1
     for found, expected in zip((force, body, plate), before, strict=True):
         assert np.array_equal(found, expected)
 
 
-def test_after_a_step_undone_come_plain_sweeps(heap):
+def test_plain_sweeps_follow_an_undone_step(heap):
     problem = assemble(*heap)
     state = force, body, plate = state_of(problem)
     acceleration = Acceleration(problem, force, 5)
@@ -105,7 +105,7 @@ def test_after_a_step_undone_come_plain_sweeps(heap):
     force *= 50.0
     apply_forces(problem, body, plate, force)
     advance(problem, body, plate, force, PERIOD, 1.0)
-    assert acceleration.settle(body, plate, force)
+    assert acceleration.accept_or_undo(body, plate, force)
     plain = [x.copy() for x in state]
     acceleration.step(body, plate, force)
     advance(problem, body, plate, force, PERIOD, 1.0)
@@ -122,17 +122,17 @@ def test_the_residual_falls_over_accepted_steps(heap):
 
 
 def test_a_fixed_point_stays_where_it_is():
-    # Nothing moves and nothing weighs: zero forces are the solution, and no pair tells of any other.
+    # Without motion and weight, zero forces are the solution, and no pair (f, G(f)) changes them.
     grains, state, walls = squeezed_heap(np.random.default_rng(1))
-    still = GrainMotion(state.position, np.zeros_like(state.velocity), np.zeros_like(state.spin), state.present)
+    at_rest = GrainMotion(state.position, np.zeros_like(state.velocity), np.zeros_like(state.spin), state.present)
     walls = type(walls)(walls.endpoints, walls.velocity, np.full(4, np.nan))
-    contacts = detect_contacts(grains, still.position, still.present, walls, 2e-4)
-    problem = assemble(grains, still, walls, contacts, Material(0.3, 0.2), grains.mass * 1e3)
+    contacts = detect_contacts(grains, at_rest.position, at_rest.present, walls, 2e-4)
+    problem = assemble(grains, at_rest, walls, contacts, Material(0.3, 0.2), grains.mass * 1e3)
     solution = solve(problem, settings(5, sweeps=6 * PERIOD, natural_map=None))
     assert np.array_equal(solution.force, np.zeros((contacts.count, 2)))
 
 
-def test_products_and_extrapolation_are_what_they_say():
+def test_products_and_extrapolation_equal_plain_ones():
     rng = np.random.default_rng(0)
     rows, vector = rng.normal(size=(3, 70)), rng.normal(size=70)
     assert inner_products(rows, vector) == pytest.approx(rows @ vector, rel=1e-12)

@@ -1,12 +1,12 @@
-"""The residuals that the solver reports, against the same ones written plainly."""
+"""The residuals of the solver against plain implementations."""
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, relative_force_residual, solve, sweeps
 
-from solver.bodies.packing import Material
-from solver.contacts.contacts import detect_contacts
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, solve, sweeps, unbalance_of
 from tests.packings import squeezed_heap
 
 ROUNDING = 1e-9  # relative
@@ -25,8 +25,8 @@ def body_velocities(heap, force):
         np.add.at(velocity, body, sign * vector / every[body, None])
         np.add.at(surface, body, -2.0 * force[:, 1] / every[body])
     for w in np.flatnonzero(walls.loaded):
-        push = force[contacts.j == n + w, 0].sum() - walls.load[w]
-        velocity[n + w] = push / (30.0 * impedance.mean()) * walls.outward[w]
+        net_load = force[contacts.j == n + w, 0].sum() - walls.load[w]
+        velocity[n + w] = net_load / (30.0 * impedance.mean()) * walls.outward[w]
     return velocity, surface
 
 
@@ -58,7 +58,7 @@ def test_the_natural_map_is_that_of_the_forces(heap, number):
     assert solution.natural_map == pytest.approx(natural_map_of(heap, solution.force), rel=ROUNDING)
 
 
-def test_what_is_heard_is_what_the_forces_say(heap):
+def test_residuals_of_observed_sweeps_are_those_of_the_forces(heap):
     problem = assemble(*heap)
     before = np.zeros((len(problem.rows), 2))
     for sweep in sweeps(problem, NlgsSettings()):
@@ -68,7 +68,7 @@ def test_what_is_heard_is_what_the_forces_say(heap):
         relative = np.where(size > 0, change / np.where(size > 0, size, 1.0), (change > 0) * 1.0)
         assert sweep.force_change == pytest.approx(relative.max(), rel=ROUNDING)
         assert sweep.natural_map == pytest.approx(natural_map_of(heap, force), rel=ROUNDING)
-        assert sweep.unbalance == pytest.approx(unbalance_of(problem, force)[0], rel=ROUNDING)
+        assert sweep.unbalance == pytest.approx(relative_force_residual(problem, force)[0], rel=ROUNDING)
         before = force
         if sweep.number == 10:
             break

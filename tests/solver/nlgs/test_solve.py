@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps, to_contact_order
 
-from solver.bodies.packing import Material
-from solver.contacts.contacts import detect_contacts
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, Stop, solve, sweeps, to_contact_order
 from tests.packings import box, motion, problem_of, rods, squeezed_heap
 from tests.reference.twins.sweeps import plain_sweeps
 
@@ -30,25 +30,31 @@ def test_compiled_sweeps_equal_plain_ones(heap):
 
 
 @pytest.mark.parametrize(("every", "measured"), [(1, False), (7, False), (20, True), ((1, 30, 11), True)])
-def test_a_listener_does_not_change_a_bit(heap, every, measured):
+def test_an_observer_does_not_change_a_bit(heap, every, measured):
     problem = assemble(*heap)
-    silent = solve(problem, NlgsSettings(sweeps=60))
-    heard = []
-    loud = solve(problem, NlgsSettings(sweeps=60), observer=heard.append, every=every, measured=measured)
-    assert np.array_equal(silent.fn, loud.fn)
-    assert np.array_equal(silent.ft, loud.ft)
-    assert silent.sweeps == loud.sweeps == heard[-1].number == sum(len(sweep.residuals) for sweep in heard) == 60
+    unobserved = solve(problem, NlgsSettings(sweeps=60))
+    received = []
+    observed = solve(problem, NlgsSettings(sweeps=60), observer=received.append, every=every, measured=measured)
+    assert np.array_equal(unobserved.fn, observed.fn)
+    assert np.array_equal(unobserved.ft, observed.ft)
+    assert (
+        unobserved.sweeps
+        == observed.sweeps
+        == received[-1].number
+        == sum(len(sweep.residuals) for sweep in received)
+        == 60
+    )
 
 
-def test_strides_say_which_sweeps_are_heard(heap):
+def test_strides_select_the_observed_sweeps(heap):
     problem = assemble(*heap)
     assert [sweep.number for sweep in sweeps(problem, NlgsSettings(), every=(1, 30, 11))] == [1, 31, 42]
-    heard = []
-    solve(problem, NlgsSettings(sweeps=35), observer=lambda sweep: heard.append(sweep.number), every=(1, 30, 11))
-    assert heard == [1, 31, 35]
+    received = []
+    solve(problem, NlgsSettings(sweeps=35), observer=lambda sweep: received.append(sweep.number), every=(1, 30, 11))
+    assert received == [1, 31, 35]
 
 
-def test_sweeps_between_those_heard_are_measured_where_asked_for(heap):
+def test_sweeps_between_strides_are_measured_on_request(heap):
     problem = assemble(*heap)
     each = np.concatenate([sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[1] * 40)])
     (all_,) = (sweep.residuals for sweep in sweeps(problem, NlgsSettings(), every=[39], measured=True))
@@ -69,7 +75,7 @@ def test_every_force_lies_in_the_coulomb_cone(heap):
             break
 
 
-def test_residual_and_unbalance_fall_as_a_load_is_taken_up():
+def test_residuals_fall_as_a_load_is_transmitted():
     radius = 0.008
     column = motion(np.column_stack([np.full(6, 0.03), radius * (2 * np.arange(6) + 1)]))
     problem, _ = problem_of(rods(*[radius] * 6), column, box(0.06, 12 * radius, top_load=12.0))
@@ -79,25 +85,25 @@ def test_residual_and_unbalance_fall_as_a_load_is_taken_up():
     assert fine.unbalance < 1e-2 * coarse.unbalance
 
 
-def test_a_solve_tells_how_it_ended():
+def test_a_solution_states_how_the_solve_ended():
     problem, _ = problem_of(rods(0.008), motion(np.array([[0.03, 0.008]])), box(0.06, 0.016, top_load=12.0))
     assert solve(problem, NlgsSettings(sweeps=2)).stop is Stop.SWEEPS
     assert solve(problem, NlgsSettings(sweeps=9000, natural_map=1e-9)).stop is Stop.NATURAL_MAP
     assert solve(problem, NlgsSettings(sweeps=9000, force_change=1e-6)).stop is Stop.FORCE_CHANGE
-    lonely, _ = problem_of(rods(0.008), motion(np.array([[0.03, 0.01]])), box(0.06, 0.03))
-    assert solve(lonely, NlgsSettings()).stop is Stop.EMPTY
+    free_grain, _ = problem_of(rods(0.008), motion(np.array([[0.03, 0.01]])), box(0.06, 0.03))
+    assert solve(free_grain, NlgsSettings()).stop is Stop.EMPTY
 
 
-def test_a_guess_is_taken_in_the_order_of_the_contacts(heap):
+def test_a_guess_is_in_the_order_of_the_contacts(heap):
     problem = assemble(*heap)
     first = solve(problem, NlgsSettings(sweeps=30))
     onward = solve(problem, NlgsSettings(sweeps=30), guess=first.force)
     straight = solve(problem, NlgsSettings(sweeps=60))
     scale = straight.fn.max()
-    assert onward.fn == pytest.approx(straight.fn, abs=1e-9 * scale)  # body velocities are summed anew at a restart
+    assert onward.fn == pytest.approx(straight.fn, abs=1e-9 * scale)  # body velocities are recomputed at a restart
 
 
 @pytest.mark.parametrize("bad", [{"sweeps": -1}, {"relaxation": 2.0}, {"relaxation": 0.0}])
-def test_nonsense_settings_are_refused(bad):
+def test_invalid_settings_are_refused(bad):
     with pytest.raises(ValueError, match=r"relaxation|sweeps"):
         NlgsSettings(**bad)

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.solve import NlgsSettings, solve, sweeps
+from rodsight.solver.nlgs.sweep_record import SweepRecorder, recorded_sweeps
 
-from solver.bodies.packing import Material
-from solver.contacts.contacts import detect_contacts
-from solver.nlgs.problem import assemble
-from solver.nlgs.solve import NlgsSettings, solve, sweeps
-from solver.nlgs.sweep_record import SweepRecorder, recorded_sweeps
 from tests.packings import squeezed_heap
 
 SWEEPS = 150  # of a sub-step
@@ -14,7 +14,7 @@ ROUNDING = 1e-6  # relative, of single precision
 
 @pytest.fixture(scope="module")
 def steps():
-    """Problems of two sub-steps, the second of which knows fewer contacts."""
+    """Problems of two sub-steps, the second with fewer contacts."""
     grains, state, walls = squeezed_heap(np.random.default_rng(4), columns=9, rows=9)
     contacts = detect_contacts(grains, state.position, state.present, walls, 2e-4)
     rng = np.random.default_rng(0)
@@ -27,13 +27,13 @@ def record(steps, keep):
     for problem, contacts in steps:
         recorder.begin(problem, contacts)
         settings = NlgsSettings(sweeps=SWEEPS)
-        solve(problem, settings, observer=recorder.hear, every=recorder.strides(), measured=recorder.measured)
+        solve(problem, settings, observer=recorder.on_sweep, every=recorder.strides(), measured=recorder.measured)
     return recorder.history(steps[-1][1])
 
 
 @pytest.fixture(scope="module")
 def every_sweep(steps):
-    """What hearing every sweep says: residuals (s, 3), and forces by contact key."""
+    """Residuals (s, 3) of every sweep, and forces by contact key."""
     residuals, forces = [], []
     for problem, contacts in steps:
         for sweep in sweeps(problem, NlgsSettings(), every=[1] * SWEEPS):
@@ -43,7 +43,7 @@ def every_sweep(steps):
 
 
 @pytest.mark.parametrize("keep", ["log", "all", "none"])
-def test_every_sweep_has_a_row_which_is_exact_or_says_that_it_is_not_known(steps, every_sweep, keep):
+def test_every_sweep_has_a_row_of_exact_residuals_or_nan(steps, every_sweep, keep):
     history, (expected, _) = record(steps, keep), every_sweep
     found = np.column_stack([history.force_change, history.natural_map, history.unbalance])
     assert found.shape == expected.shape
@@ -67,7 +67,7 @@ def test_kept_forces_are_those_of_the_recorded_sweeps(steps, every_sweep, keep):
     assert history.fn.dtype == np.float32
 
 
-def test_contacts_that_a_sub_step_does_not_know_bear_nothing_in_it(steps):
+def test_contacts_that_a_sub_step_lacks_have_zero_force_in_it(steps):
     history = record(steps[::-1], "all")
     key = steps[1][1].key
     unknown = ~np.isin(steps[0][1].key, key)
@@ -76,7 +76,7 @@ def test_contacts_that_a_sub_step_does_not_know_bear_nothing_in_it(steps):
     assert np.any(history.fn[SWEEPS:, unknown] > 0)
 
 
-def test_nothing_heard_is_an_empty_history(steps):
+def test_without_sweeps_the_history_is_empty(steps):
     history = SweepRecorder(0, "log").history(steps[0][1])
     assert history.count == len(history.recorded) == 0
     assert history.fn.shape == (0, steps[0][1].count)

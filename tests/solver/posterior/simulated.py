@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from rodsight.solver.bodies.grains import Array
+from rodsight.solver.bodies.motion import Snapshot
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.contacts.pairs import Keys, make_keys
+from rodsight.solver.dem.dem_truth import DemFrame, DemSettings
+from rodsight.solver.dem.shear_cell import shear_photographs
 from rodsight.synthetic.dense_packing import prepare_packing
-
-from solver.bodies.grains import Array
-from solver.bodies.motion import Snapshot
-from solver.bodies.packing import Material, Packing
-from solver.contacts.pairs import Keys, make_keys
-from solver.dem.simulation import DemFrame, DemSettings, shear_photographs
 
 NOISE = 1e-5  # [m]
 GRAINS = 150

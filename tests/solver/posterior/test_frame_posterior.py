@@ -1,29 +1,29 @@
-"""The sampler against integrals done by brute force, and on packings whose forces are known."""
+"""The sampler against numerical integrals, and on packings with known forces."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.contacts.contacts import detect_contacts, measure_contacts
+from rodsight.solver.contacts.pairs import match_values
+from rodsight.solver.posterior.frame_evidence import FrameEvidence, KnownForces
+from rodsight.solver.posterior.frame_posterior import COVERAGE_FACTOR, infer_frame
+from rodsight.solver.posterior.posterior_settings import PosteriorSettings
+from rodsight.solver.posterior.radius_posterior import stack_frames
+from rodsight.solver.posterior.sampler.chain import make_sampler_grains, make_sampler_pairs, make_schedule, run_chain
+from rodsight.solver.statistics.balance import resultant_norms
 from scipy.stats import norm
 
-from solver.bodies.grains import Grains
-from solver.contacts.contacts import detect_contacts, measure_contacts
-from solver.contacts.pairs import recall
-from solver.posterior.frame_evidence import FrameEvidence, KnownForces
-from solver.posterior.frame_posterior import HONEST, infer_frame
-from solver.posterior.radii import stack_frames
-from solver.posterior.sampler.chain import centres_of, laws_of, pairs_of, run_chain
-from solver.posterior.settings import PosteriorSettings
-from solver.statistics.balance import unbalances
 from tests.packings import box, heap_at_rest
 
-LAW = PosteriorSettings(
-    balance=0.3, width=0.02, start_balance=0.3, start_width=0.02, stiffness=0.05, stiffness_sd=1e-7, offset_sd=1e-9,
-    rarity=0.0, annealing=0, settling=100, kept=20_000, chains=1,
+SETTINGS = PosteriorSettings(
+    balance_sd=0.3, gap_law_sd=0.02, start_balance_sd=0.3, start_gap_law_sd=0.02, compliance=0.05, compliance_sd=1e-7,
+    offset_sd=1e-9, force_rate=0.0, annealing=0, burn_in=100, kept=20_000, chains=1,
 )  # fmt: skip
 SEED = 3
-CHANCE = 0.02  # of 20 000 correlated draws
+SAMPLING_ERROR = 0.02  # of 20 000 correlated draws
 
 
 def rod_in_corner(
@@ -39,13 +39,13 @@ def rod_in_corner(
     )  # fmt: skip
 
 
-def log_open(h: np.ndarray, law: PosteriorSettings) -> np.ndarray:
-    b, l = law.width, law.open_gap
+def log_open(h: np.ndarray, settings: PosteriorSettings) -> np.ndarray:
+    b, l = settings.gap_law_sd, settings.mean_open_gap
     return np.log(np.sqrt(2 * np.pi) * b / l) - h / l + 0.5 * (b / l) ** 2 + norm.logcdf(h / b - b / l)
 
 
-def test_one_rod_between_two_walls_is_as_the_integral_says() -> None:
-    law = replace(LAW, gauge=2.0, open_gap=0.05, rarity=0.7)
+def test_rod_between_two_walls_matches_the_integral() -> None:
+    settings = replace(SETTINGS, gauge=2.0, mean_open_gap=0.05, force_rate=0.7)
     given = rod_in_corner(0.53, 0.5, [1, 3], friction=0.0, weight=(0.4, 0.0), prior=0.6)
     error = np.linspace(-0.16, 0.16, 161)[:, None, None]  # of the centre
     force = np.linspace(0.0, 3.0, 121)
@@ -55,86 +55,100 @@ def test_one_rod_between_two_walls_is_as_the_integral_says() -> None:
         for right in (False, True):
             fl = force[None, :, None] if left else np.zeros((1, 1, 1))
             fr = force[None, None, :] if right else np.zeros((1, 1, 1))
-            level = -0.5 * (error / 0.03) ** 2 - 0.5 * ((0.4 + fl - fr) / law.balance) ** 2
+            level = -0.5 * (error / 0.03) ** 2 - 0.5 * ((0.4 + fl - fr) / settings.balance_sd) ** 2
             for bears, h, f in ((left, height["left"], fl), (right, height["right"], fr)):
-                bearing = np.log(0.6) - 0.5 * ((h + law.stiffness * f) / law.width) ** 2 - law.rarity * f
-                level = level + (bearing if bears else np.log(0.4) + log_open(h, law))
-            level = level - 0.5 * law.gauge / 2 * (left + right - 1.2) ** 2
+                bearing = (
+                    np.log(0.6)
+                    - 0.5 * ((h + settings.compliance * f) / settings.gap_law_sd) ** 2
+                    - settings.force_rate * f
+                )
+                level = level + (bearing if bears else np.log(0.4) + log_open(h, settings))
+            level = level - 0.5 * settings.gauge / 2 * (left + right - 1.2) ** 2
             weight = np.exp(level) * force[1] ** (left + right)
             mass[left, right], right_force[left, right] = weight.sum(), (weight * fr).sum()
     total = sum(mass.values())
 
-    found = infer_frame(given, law, np.random.default_rng(SEED))
+    found = infer_frame(given, settings, np.random.default_rng(SEED))
     assert list(found.contacts.j) == [2, 4]
-    assert found.bears[0] == pytest.approx((mass[False, True] + mass[True, True]) / total, abs=CHANCE)
-    assert found.bears[1] == pytest.approx((mass[True, False] + mass[True, True]) / total, abs=CHANCE)
-    assert found.fn[0] == pytest.approx(sum(right_force.values()) / total, abs=CHANCE)
+    assert found.bearing_probability[0] == pytest.approx(
+        (mass[False, True] + mass[True, True]) / total, abs=SAMPLING_ERROR
+    )
+    assert found.bearing_probability[1] == pytest.approx(
+        (mass[True, False] + mass[True, True]) / total, abs=SAMPLING_ERROR
+    )
+    assert found.fn[0] == pytest.approx(sum(right_force.values()) / total, abs=SAMPLING_ERROR)
 
 
 @pytest.mark.parametrize("across", [0.1, 0.6])
-def test_a_rod_pushed_askew_against_a_wall_is_as_the_integral_over_coulombs_cone_says(across: float) -> None:
+def test_obliquely_loaded_rod_matches_the_integral_over_the_coulomb_cone(across: float) -> None:
     given = rod_in_corner(0.5, 0.49, [0], friction=0.4, weight=(across, -1.0), prior=0.999)
     f = np.linspace(0.0, 3.0, 301)[:, None]
     t = np.linspace(-1.2, 1.2, 241)[None, :]
     # The normal points down, the tangent to the right: on the rod act −f along y upward, −t along x, and the torque −t.
     resultant = (across - t) ** 2 + (f - 1.0) ** 2 + t**2
-    width = np.hypot(LAW.width, 0.03)  # the error of the centre is integrated out
-    level = -0.5 * resultant / LAW.balance**2 - 0.5 * (t / LAW.shear) ** 2
-    level = level - 0.5 * ((-0.01 + LAW.stiffness * f) / width) ** 2
+    width = np.hypot(SETTINGS.gap_law_sd, 0.03)  # with the error of the centre integrated out
+    level = -0.5 * resultant / SETTINGS.balance_sd**2 - 0.5 * (t / SETTINGS.tangential_sd) ** 2
+    level = level - 0.5 * ((-0.01 + SETTINGS.compliance * f) / width) ** 2
     weight = np.exp(level) * (np.abs(t) <= 0.4 * f)
 
-    found = infer_frame(given, LAW, np.random.default_rng(SEED))
-    bears = found.bears[0]
+    found = infer_frame(given, SETTINGS, np.random.default_rng(SEED))
+    bears = found.bearing_probability[0]
     assert bears > 0.99
-    assert found.fn[0] / bears == pytest.approx((weight * f).sum() / weight.sum(), abs=CHANCE)
-    assert found.ft[0] / bears == pytest.approx((weight * t).sum() / weight.sum(), abs=CHANCE)
-    spread = np.sqrt((weight * t**2).sum() / weight.sum() - (found.ft[0] / bears) ** 2)
-    assert found.ft_deviation[0] == pytest.approx(HONEST * spread, rel=0.1)
+    assert found.fn[0] / bears == pytest.approx((weight * f).sum() / weight.sum(), abs=SAMPLING_ERROR)
+    assert found.ft[0] / bears == pytest.approx((weight * t).sum() / weight.sum(), abs=SAMPLING_ERROR)
+    sd = np.sqrt((weight * t**2).sum() / weight.sum() - (found.ft[0] / bears) ** 2)
+    assert found.ft_sd[0] == pytest.approx(COVERAGE_FACTOR * sd, rel=0.1)
+    sd = np.sqrt((weight * f**2).sum() / weight.sum() - (found.fn[0] / bears) ** 2)
+    assert found.fn_sd[0] == pytest.approx(COVERAGE_FACTOR * sd, rel=0.1)
 
 
-def test_a_radius_that_is_too_small_is_told_from_a_centre_that_is_wrong() -> None:
-    # Pressed from four sides with equal gaps: no error of the centre explains them, one of the radius does.
+def test_radius_error_is_separated_from_centre_error() -> None:
+    # Equal gaps on four sides: an error of the radius explains them, one of the centre does not.
     given = rod_in_corner(0.55, 0.55, [0, 1, 2, 3], friction=0.0, weight=(0.0, 0.0), prior=0.999)
-    law = replace(LAW, stiffness=0.0, gauge=100.0)
-    exact = infer_frame(given, law, np.random.default_rng(SEED))
-    free = infer_frame(replace(given, radius_deviation=np.full(1, 0.1)), law, np.random.default_rng(SEED))
+    settings = replace(SETTINGS, compliance=0.0, gauge=100.0)
+    exact = infer_frame(given, settings, np.random.default_rng(SEED))
+    free = infer_frame(replace(given, radius_sd=np.full(1, 0.1)), settings, np.random.default_rng(SEED))
     assert abs(exact.radius_error[0]) < 1e-5
-    # Four heights of 0.05 of width .02 against a prior of 0.1.
+    # Four gaps of 0.05 with standard deviation .02 against a prior of 0.1.
     assert free.radius_error[0] == pytest.approx(0.05 / (1 + (0.02 / 0.1) ** 2 / 4), abs=5e-3)
     assert np.abs(free.centre_error).max() < 5e-3
 
 
-def test_a_radius_shared_by_two_frames_is_drawn_from_both_with_its_centres() -> None:
-    # Held from three sides in the one frame, from four in the other, where it stands aside: a Gaussian law.
+def test_radius_shared_by_two_frames_matches_the_gaussian_posterior() -> None:
+    # Three contacts in one frame, four in the other, where the centre is displaced: the posterior is Gaussian.
     gaps = [np.array([0.05, 0.05, 0.06]), np.array([0.07, 0.10, 0.07, 0.04])]
     frames = []
     for gap in gaps:
         walls = list(range(len(gap)))
         rod = rod_in_corner(0.55, 0.55, walls, friction=0.0, weight=(0.0, 0.0), prior=0.9999)
-        frames.append(replace(rod, radius_deviation=np.full(1, 0.1), contacts=replace(rod.contacts, gap=gap)))
-    pairs, centres = stack_frames([pairs_of(each) for each in frames], [centres_of(each) for each in frames])
-    law = replace(LAW, stiffness=0.0, gauge=1000.0)
-    chain = run_chain(pairs, centres, laws_of(law, 7.0, scale_known=False), law, np.random.default_rng(SEED))
+        frames.append(replace(rod, radius_sd=np.full(1, 0.1), contacts=replace(rod.contacts, gap=gap)))
+    pairs, grains = stack_frames(
+        [make_sampler_pairs(each) for each in frames], [make_sampler_grains(each) for each in frames]
+    )
+    settings = replace(SETTINGS, compliance=0.0, gauge=1000.0)
+    chain = run_chain(
+        pairs, grains, make_schedule(settings, 7.0, scale_known=False), settings, np.random.default_rng(SEED)
+    )
     assert chain.pair[:, 0].min() > 0.99
 
     design = np.zeros((7, 5))  # of δ, then ε of either frame: h = gap + n·ε − δ
     design[:, 0] = 1.0
     design[:3, 1:3], design[3:, 3:5] = -frames[0].contacts.normal, -frames[1].contacts.normal
-    precision = design.T @ design / law.width**2 + np.diag(np.array([0.1, 0.03, 0.03, 0.03, 0.03]) ** -2.0)
+    precision = design.T @ design / settings.gap_law_sd**2 + np.diag(np.array([0.1, 0.03, 0.03, 0.03, 0.03]) ** -2.0)
     covariance = np.linalg.inv(precision)
-    mean = covariance @ design.T @ np.concatenate(gaps) / law.width**2
+    mean = covariance @ design.T @ np.concatenate(gaps) / settings.gap_law_sd**2
     np.testing.assert_array_equal(chain.error[0, 2], chain.error[1, 2])
     assert chain.error[0, 2] == pytest.approx(mean[0], abs=2e-3)
     np.testing.assert_allclose(chain.error[:, :2], mean[1:].reshape(2, 2), atol=2e-3)
     assert chain.error[0, 3] - chain.error[0, 2] ** 2 == pytest.approx(covariance[0, 0], rel=0.15)
 
 
-def test_friction_turns_a_rod_that_two_walls_hold_as_the_integral_over_both_cones_says() -> None:
-    """Down and to the right, pushed askew: torques of both contacts must cancel, and P(bears) feels the cones."""
+def test_rod_at_two_walls_with_friction_matches_the_integral_over_both_cones() -> None:
+    """Under an oblique load both torques must cancel, and both cones change the bearing probability."""
     given = rod_in_corner(0.6, 0.5, [0, 1], friction=0.6, weight=(0.8, -1.0), prior=0.3)
-    law = replace(LAW, balance=0.2, shear=0.8, open_gap=0.05, gauge=1e-9)
+    settings = replace(SETTINGS, balance_sd=0.2, tangential_sd=0.8, mean_open_gap=0.05, gauge=1e-9)
     f, t = np.linspace(0.0, 2.0, 26), np.linspace(-1.2, 1.2, 25)
-    width = np.hypot(law.width, 0.03)
+    width = np.hypot(settings.gap_law_sd, 0.03)
     cell = (f[1] - f[0]) * (t[1] - t[0])
     one, two = np.meshgrid(f, t, indexing="ij")
     inside = np.abs(two) <= 0.6 * one + 1e-9
@@ -148,7 +162,7 @@ def test_friction_turns_a_rod_that_two_walls_hold_as_the_integral_over_both_cone
             r = (cone if right_bears else none)[None, :, :]
             level = (
                 -0.5
-                / law.balance**2
+                / settings.balance_sd**2
                 * (
                     (0.8 - g[..., 1] - r[..., 0]) ** 2
                     + (-1.0 + g[..., 0] - r[..., 1]) ** 2
@@ -157,11 +171,16 @@ def test_friction_turns_a_rod_that_two_walls_hold_as_the_integral_over_both_cone
             )
             for bears, force in ((ground_bears, g), (right_bears, r)):
                 if bears:
-                    level = level - 0.5 * (law.stiffness * force[..., 0] / width) ** 2 - np.log(width)
-                    level = level - 0.5 * (force[..., 1] / law.shear) ** 2 - 0.5 * np.log(2 * np.pi) - np.log(law.shear)
+                    level = level - 0.5 * (settings.compliance * force[..., 0] / width) ** 2 - np.log(width)
+                    level = (
+                        level
+                        - 0.5 * (force[..., 1] / settings.tangential_sd) ** 2
+                        - 0.5 * np.log(2 * np.pi)
+                        - np.log(settings.tangential_sd)
+                    )
                     level = level + np.log(0.3 * cell / np.sqrt(2 * np.pi))
                 else:
-                    level = level + np.log(0.7) + log_open(np.zeros(1), replace(law, width=float(width)))
+                    level = level + np.log(0.7) + log_open(np.zeros(1), replace(settings, gap_law_sd=float(width)))
                     level = level - np.log(width) - 0.5 * np.log(2 * np.pi)
             weight = np.exp(level)
             total += weight.sum()
@@ -169,10 +188,10 @@ def test_friction_turns_a_rod_that_two_walls_hold_as_the_integral_over_both_cone
             ground_t += (weight * g[..., 1]).sum()
             right += (weight * right_bears).sum()
 
-    found = infer_frame(given, law, np.random.default_rng(SEED))
-    assert found.fn[0] == pytest.approx(ground / total, abs=2 * CHANCE)
-    assert found.ft[0] == pytest.approx(ground_t / total, abs=CHANCE)
-    assert found.bears[1] == pytest.approx(right / total, abs=2 * CHANCE)
+    found = infer_frame(given, settings, np.random.default_rng(SEED))
+    assert found.fn[0] == pytest.approx(ground / total, abs=2 * SAMPLING_ERROR)
+    assert found.ft[0] == pytest.approx(ground_t / total, abs=SAMPLING_ERROR)
+    assert found.bearing_probability[1] == pytest.approx(right / total, abs=2 * SAMPLING_ERROR)
 
 
 def heap_evidence(noise: float) -> tuple[FrameEvidence, np.ndarray]:
@@ -182,7 +201,7 @@ def heap_evidence(noise: float) -> tuple[FrameEvidence, np.ndarray]:
     position = heap.state.position + np.random.default_rng(1).normal(0.0, noise, (n, 2))
     near = detect_contacts(heap.packing.grains, position, heap.state.present, heap.walls, 0.02 * 2 * radius[0])
     c = near.count
-    truth = recall(near.key, heap.contacts.key, np.column_stack([heap.fn, heap.ft]))
+    truth = match_values(near.key, heap.contacts.key, np.column_stack([heap.fn, heap.ft]))
     unit = float(np.linalg.norm(heap.packing.weight, axis=1).mean())
     given = FrameEvidence(
         near, np.full(c, 0.9), np.full(c, 0.3), radius, np.full(n, max(noise, 1e-6)), np.zeros(n), np.ones(n, bool),
@@ -191,28 +210,28 @@ def heap_evidence(noise: float) -> tuple[FrameEvidence, np.ndarray]:
     return given, truth
 
 
-QUICK = PosteriorSettings(stiffness_sd=1e-5, annealing=200, settling=100, kept=200)
+QUICK = PosteriorSettings(compliance_sd=1e-5, annealing=200, burn_in=100, kept=200)
 
 
-def test_a_heap_under_its_weight_is_in_balance_and_carries_what_it_weighs() -> None:
+def test_heap_is_in_balance_and_the_ground_carries_its_weight() -> None:
     given, _ = heap_evidence(1e-5)
     found = infer_frame(given, QUICK, np.random.default_rng(SEED))
     weight = given.known.weight
-    unbalance = unbalances(found.contacts, found.fn, found.ft, weight)
+    unbalance = resultant_norms(found.contacts, found.fn, found.ft, weight)
     assert unbalance.mean() < 0.3 * np.linalg.norm(weight, axis=1).mean()
     on_ground = found.contacts.j == len(weight)
     assert found.fn[on_ground].sum() == pytest.approx(-weight[:, 1].sum(), rel=0.03)
     assert 0.8 < found.trust < 1.0
 
 
-def test_the_same_generator_gives_the_same_bits_whatever_runs_beside_it() -> None:
+def test_same_generator_gives_same_bits_in_parallel() -> None:
     given, _ = heap_evidence(1e-5)
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda _: infer_frame(given, QUICK, np.random.default_rng(SEED)), range(4)))
     other = infer_frame(given, QUICK, np.random.default_rng(SEED + 1))
     for each in found[1:]:
         np.testing.assert_array_equal(each.fn, found[0].fn)
-        np.testing.assert_array_equal(each.bears, found[0].bears)
+        np.testing.assert_array_equal(each.bearing_probability, found[0].bearing_probability)
     assert not np.array_equal(other.fn, found[0].fn)
     assert 0.0 < found[0].agreement < 1.0
 
@@ -231,58 +250,60 @@ def plate_evidence(load: float, gap: float = 0.0) -> FrameEvidence:
 
 
 @pytest.mark.parametrize("load", [20.0, 40.0])
-def test_forces_on_a_plate_add_up_to_its_load(load: float) -> None:
+def test_forces_on_a_plate_sum_to_its_load(load: float) -> None:
     found = infer_frame(plate_evidence(load), QUICK, np.random.default_rng(SEED))
     assert found.fn[found.contacts.j == 6].sum() == pytest.approx(load, rel=0.03)
-    assert found.fn[found.contacts.j == 4].sum() == pytest.approx(load, rel=0.1)  # what the ground bears
+    assert found.fn[found.contacts.j == 4].sum() == pytest.approx(load, rel=0.1)  # reaction of the ground
 
 
-def test_without_any_known_force_the_mean_force_is_the_unit() -> None:
+def test_without_known_forces_the_mean_force_is_the_unit() -> None:
     given = plate_evidence(20.0)
     free = replace(given, known=KnownForces(10.0, np.zeros((4, 2)), np.full(given.contacts.count, -1), np.empty(0)))
     found = infer_frame(free, QUICK, np.random.default_rng(SEED))
-    assert found.fn.sum() / found.bears.sum() == pytest.approx(10.0, rel=0.15)
+    assert found.fn.sum() / found.bearing_probability.sum() == pytest.approx(10.0, rel=0.15)
 
 
-def test_a_pair_that_stands_apart_does_not_bear() -> None:
+def test_open_pair_does_not_bear() -> None:
     found = infer_frame(plate_evidence(20.0, gap=0.03), QUICK, np.random.default_rng(SEED))
     between_columns = found.contacts.gap > 0.02
-    assert found.bears[between_columns].max() < 0.05
-    assert found.bears[~between_columns & (np.abs(found.contacts.normal[:, 1]) > 0.9)].min() > 0.9
+    assert found.bearing_probability[between_columns].max() < 0.05
+    assert found.bearing_probability[~between_columns & (np.abs(found.contacts.normal[:, 1]) > 0.9)].min() > 0.9
 
 
-def test_the_overlap_per_force_is_found_where_positions_are_precise() -> None:
+def test_overlap_per_force_is_found_from_precise_positions() -> None:
     given = plate_evidence(20.0)
     force = np.where(
         np.abs(given.contacts.normal[:, 1]) > 0.9, np.where(given.contacts.normal[:, 1] != 0, 1.0, 0.0), 0.0
     )
     contacts = replace(given.contacts, gap=-5e-3 * force)
-    soft = replace(given, contacts=contacts, centre_deviation=np.full(4, 1e-5))
-    law = replace(QUICK, stiffness_sd=1e-2, width=2e-4)
-    found = infer_frame(soft, law, np.random.default_rng(SEED))
-    assert found.overlap == pytest.approx(5e-3 * found.fn.sum() / found.bears.sum() / 10.0, rel=0.05)
-    assert found.overlap_deviation < 0.2 * found.overlap
+    soft = replace(given, contacts=contacts, centre_sd=np.full(4, 1e-5))
+    settings = replace(QUICK, compliance_sd=1e-2, gap_law_sd=2e-4)
+    found = infer_frame(soft, settings, np.random.default_rng(SEED))
+    assert found.overlap == pytest.approx(5e-3 * found.fn.sum() / found.bearing_probability.sum() / 10.0, rel=0.05)
+    assert found.overlap_sd < 0.2 * found.overlap
 
 
-def test_a_grain_whose_neighbours_are_unknown_need_not_be_in_balance() -> None:
+def test_grain_with_unknown_neighbours_need_not_be_in_balance() -> None:
     given = rod_in_corner(0.5, 0.49, [0], friction=0.4, weight=(0.0, 1.0), prior=0.9)  # pulled away from its only wall
-    held = infer_frame(given, LAW, np.random.default_rng(SEED))
-    free = infer_frame(replace(given, balanced=np.zeros(1, bool)), LAW, np.random.default_rng(SEED))
+    held = infer_frame(given, SETTINGS, np.random.default_rng(SEED))
+    free = infer_frame(replace(given, balanced=np.zeros(1, bool)), SETTINGS, np.random.default_rng(SEED))
     assert held.fn[0] < 0.2
     assert free.fn[0] > 0.4
 
 
-def test_a_grain_at_the_edge_is_pushed_from_outside_by_no_more_than_its_like() -> None:
+def test_outside_forces_on_edge_grains_are_of_the_mean_force() -> None:
     given = rod_in_corner(0.5, 0.49, [0], friction=0.4, weight=(0.0, 1.0), prior=0.9)  # pulled away from its only wall
     edge = replace(given, balanced=np.zeros(1, bool), edge=np.ones(1, bool))
     hard = replace(edge, known=replace(given.known, weight=np.array([[0.0, 40.0]])))
-    held, mild, strong = (infer_frame(each, LAW, np.random.default_rng(SEED)).fn[0] for each in (given, edge, hard))
+    held, mild, strong = (
+        infer_frame(each, SETTINGS, np.random.default_rng(SEED)).fn[0] for each in (given, edge, hard)
+    )
     assert mild > held + 0.2
     assert mild > strong + 0.2
 
 
-def test_settings_that_cannot_be_are_refused() -> None:
-    with pytest.raises(ValueError, match="width of the posterior must be positive"):
-        PosteriorSettings(width=0.0)
+def test_invalid_settings_are_rejected() -> None:
+    with pytest.raises(ValueError, match="gap_law_sd of the posterior must be positive"):
+        PosteriorSettings(gap_law_sd=0.0)
     with pytest.raises(ValueError, match="at least one chain"):
         PosteriorSettings(chains=0)

@@ -1,17 +1,17 @@
-"""One frame that shows nothing, or cannot be solved, costs no other."""
+"""A frame that is unusable or cannot be solved fails alone."""
 
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from rodsight.solver.assessment.status import CHAIN_UNBALANCED
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.frame_forces import FrameStatus
+from rodsight.solver.sequence import frames as sequence
+from rodsight.solver.sequence.failure import find_fault
 
-from solver.bodies.grains import Grains
-from solver.sequence import frames as sequence
-from solver.sequence.failure import find_fault
-from solver.sequence.frame_forces import FrameStatus
-from solver.sequence.judging.judgement import CHAIN_UNBALANCED
-from tests.solver.sequence.test_frames import ENSEMBLE, SETTINGS, run, sheared_frames
+from tests.solver.sequence.test_frames import ENSEMBLE, SETTINGS, run, sheared_frames, solved_heap
 
 BAD, COUNT = 3, 7
 
@@ -29,10 +29,16 @@ def infinite(snapshot):
     return replace(snapshot, position=np.where(np.arange(36)[:, None] == 5, np.inf, snapshot.position))
 
 
-@cache
 def sound_frames(settings):
-    """The frames of the heap when nothing is wrong."""
-    return [frame for frame, _ in run(*sheared_frames(COUNT), settings)]
+    """The frames of the heap without faults."""
+    return [frame for frame, _ in solved_heap(settings, COUNT)]
+
+
+@cache
+def solve_with_fault(settings, spoil):
+    packing, snapshots = sheared_frames(COUNT)
+    snapshots[BAD] = spoil(snapshots[BAD])
+    return run(packing, snapshots, settings)
 
 
 def assert_only_the_bad_one_failed(frames, sound):
@@ -51,26 +57,25 @@ def assert_only_the_bad_one_failed(frames, sound):
 
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
 @pytest.mark.parametrize("spoil", [blank, without_walls, infinite])
-def test_a_frame_that_shows_nothing_fails_alone(settings, spoil):
-    packing, snapshots = sheared_frames(COUNT)
-    snapshots[BAD] = spoil(snapshots[BAD])
-    assert_only_the_bad_one_failed([frame for frame, _ in run(packing, snapshots, settings)], sound_frames(settings))
+def test_an_unusable_frame_fails_alone(settings, spoil):
+    frames = [frame for frame, _ in solve_with_fault(settings, spoil)]
+    assert_only_the_bad_one_failed(frames, sound_frames(settings))
 
 
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
-def test_a_frame_that_is_half_black_is_told_and_hardly_believed(settings):
+def test_a_half_black_frame_is_reported_with_a_low_trust(settings):
     packing, snapshots = sheared_frames(COUNT)
     half = snapshots[BAD].position[:, 0] < np.median(snapshots[BAD].position[:, 0])
     position = np.where(half[:, None], np.nan, snapshots[BAD].position)
     snapshots[BAD] = replace(snapshots[BAD], position=position, present=~half)
     frames = [frame for frame, _ in run(packing, snapshots, settings)]
-    told = [frame.frame for frame in frames if "50 % of the grains are not seen" in frame.reason]
-    assert told == [BAD]
+    reported = [frame.frame for frame in frames if "50 % of the grains are not found" in frame.reason]
+    assert reported == [BAD]
     assert frames[BAD].status is FrameStatus.SUSPECT
     assert not frames[BAD].trust > 0.5
 
 
-def test_what_a_method_raises_fails_the_frame_and_is_told(monkeypatch):
+def test_an_exception_fails_the_frame_and_is_reported(monkeypatch):
     packing, snapshots = sheared_frames(COUNT)
     solve_frame = sequence.solve_frame
 
@@ -79,17 +84,17 @@ def test_what_a_method_raises_fails_the_frame_and_is_told(monkeypatch):
             raise ZeroDivisionError("by an\nempty frame")
         return solve_frame(problem, state)
 
-    sound, heard = sound_frames(SETTINGS), []
+    sound, observed = sound_frames(SETTINGS), []
     monkeypatch.setattr(sequence, "solve_frame", solve)
-    frames = [frame for frame, _ in run(packing, snapshots, observer=lambda *told: heard.append(told))]
+    frames = [frame for frame, _ in run(packing, snapshots, observer=lambda *event: observed.append(event))]
     assert_only_the_bad_one_failed(frames, sound)
     assert frames[BAD].failed_reason == "it could not be solved (ZeroDivisionError: by an empty frame)"
-    ((frame, error),) = heard
+    ((frame, error),) = observed
     assert (frame, type(error)) == (BAD, ZeroDivisionError)
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit, MemoryError])
-def test_what_is_not_the_frames_fault_ends_the_sequence(monkeypatch, stop):
+def test_interrupts_and_lack_of_memory_end_the_sequence(monkeypatch, stop):
     def solve(problem, state):
         raise stop
 
@@ -98,9 +103,9 @@ def test_what_is_not_the_frames_fault_ends_the_sequence(monkeypatch, stop):
         run(*sheared_frames(2))
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # as where nobody makes them errors
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # as in a run, where warnings are not errors
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
-def test_masses_beyond_all_numbers_fail_every_frame(settings):
+def test_infinite_masses_fail_every_frame(settings):
     packing, snapshots = sheared_frames(3)
     grains = packing.grains
     heavy = Grains.of_rods(grains.radius, density=1e308, length=1e3)
@@ -108,24 +113,24 @@ def test_masses_beyond_all_numbers_fail_every_frame(settings):
     assert {frame.status for frame in frames} == {FrameStatus.FAILED}
 
 
-def test_a_failure_goes_on_from_a_kept_state_bit_for_bit():
+def test_a_sequence_resumes_after_a_failed_frame_bit_for_bit():
     packing, snapshots = sheared_frames(COUNT)
     snapshots[BAD] = blank(snapshots[BAD])
-    whole = run(packing, snapshots, ENSEMBLE)
+    whole = solve_with_fault(ENSEMBLE, blank)
     resumed = run(packing, snapshots, ENSEMBLE, state=whole[BAD][1], first=BAD + 1)
     for (frame, _), (again, _) in zip(whole[BAD + 1 :], resumed, strict=True):
         assert np.array_equal(frame.fn, again.fn)
 
 
-def test_a_sequence_that_shows_nothing_fails_whole():
+def test_all_frames_of_an_unusable_sequence_fail():
     packing, snapshots = sheared_frames(3)
     frames = [frame for frame, _ in run(packing, [blank(each) for each in snapshots], ENSEMBLE)]
     assert {frame.status for frame in frames} == {FrameStatus.FAILED}
 
 
-def test_forces_that_balance_nothing_are_a_fault():
+def test_forces_out_of_balance_or_not_finite_are_a_fault():
     frame, _ = run(*sheared_frames(3))[-1]
     assert find_fault(frame) == ""
-    assert "balance nothing" in find_fault(replace(frame, grain_unbalance=np.full(36, 1.2)))
+    assert "not in equilibrium" in find_fault(replace(frame, grain_unbalance=np.full(36, 1.2)))
     assert "no finite ft" in find_fault(replace(frame, ft=np.where(frame.ft == frame.ft.max(), np.nan, frame.ft)))
     assert "not finite" in find_fault(replace(frame, unbalance=np.nan))

@@ -1,22 +1,25 @@
+"""Sequences of frames: state, lost grains, resets, verdicts and the ensemble."""
+
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
+from rodsight.solver.assessment.penalties import assess
+from rodsight.solver.assessment.trust import INFERRED_PENALTY, unseen_penalty
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.motion import LastSeen, Snapshot, motion_to
+from rodsight.solver.bodies.packing import Material, Packing
+from rodsight.solver.contacts.verdicts import Verdicts
+from rodsight.solver.frame_forces import FrameStatus
+from rodsight.solver.nlgs.chain import ChainSettings
+from rodsight.solver.nlgs.force_memory import ForceMemory
+from rodsight.solver.nlgs.sweep_record import recorded_sweeps
+from rodsight.solver.sequence import ensemble
+from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.solver.sequence.settings import SequenceSettings
+from rodsight.solver.sequence.state import SequenceState
 
-from solver.bodies.grains import Grains
-from solver.bodies.motion import LastSeen, Snapshot, motion_to
-from solver.bodies.packing import Material, Packing
-from solver.contacts.verdicts import Verdicts
-from solver.nlgs.chain import ChainSettings
-from solver.nlgs.sweep_record import recorded_sweeps
-from solver.nlgs.warm_start import ForceMemory
-from solver.sequence import ensemble
-from solver.sequence.frame_forces import FrameStatus
-from solver.sequence.frames import solve_sequence
-from solver.sequence.judging.doubts import lower_bound
-from solver.sequence.judging.judgement import INFERRED_DOUBT, unseen_doubt
-from solver.sequence.settings import SequenceSettings
-from solver.sequence.state import SequenceState
 from tests.packings import LENGTH, squeezed_heap
 
 SETTINGS = SequenceSettings(estimator="nlgs", chain=ChainSettings(sweeps=40), threshold=2e-4)
@@ -24,7 +27,7 @@ ENSEMBLE = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40)
 
 
 def sheared_frames(count, lost=()):
-    """A heap that is sheared a little from frame to frame; `lost`: (frame, grain) without a pose."""
+    """A heap in shear steps of 0.002; `lost`: (frame, grain) without a pose."""
     grains, state, walls = squeezed_heap(np.random.default_rng(3))
     packing = Packing(grains, LENGTH, Material(0.25, 0.25), np.array([np.nan, np.nan, 5e4, np.nan]))
     snapshots = []
@@ -46,10 +49,16 @@ def run(packing, snapshots, settings=SETTINGS, **kwargs):
     return list(solve_sequence(packing, snapshots, settings, **kwargs))
 
 
+@cache
+def solved_heap(settings=SETTINGS, count=4):
+    """The frames and states of a sheared heap. The ensemble refines positions of several frames together."""
+    return run(*sheared_frames(count), settings)
+
+
 @pytest.mark.parametrize("settings", [SETTINGS, ENSEMBLE], ids=["nlgs", "ensemble"])
-def test_a_sequence_goes_on_from_a_kept_state_bit_for_bit(settings):
+def test_a_sequence_resumes_from_a_stored_state_bit_for_bit(settings):
     packing, snapshots = sheared_frames(5)
-    whole = run(packing, snapshots, settings)
+    whole = solved_heap(settings, 5)
     resumed = run(packing, snapshots, settings, state=whole[2][1], first=3)
     for (frame, _), (again, _) in zip(whole[3:], resumed, strict=True):
         assert np.array_equal(frame.fn, again.fn)
@@ -57,7 +66,7 @@ def test_a_sequence_goes_on_from_a_kept_state_bit_for_bit(settings):
         assert np.array_equal(frame.age, again.age)
 
 
-def test_frames_before_a_motion_exists_and_after_are_resets_then_carry_on():
+def test_the_first_two_frames_of_a_chain_are_resets():
     frames = [frame for frame, _ in run(*sheared_frames(4))]
     assert [frame.status for frame in frames[:2]] == [FrameStatus.RESET, FrameStatus.RESET]
     assert frames[1].frames_since_reset == 0
@@ -65,7 +74,7 @@ def test_frames_before_a_motion_exists_and_after_are_resets_then_carry_on():
     assert np.isnan(frames[0].trust)
 
 
-def test_a_lost_grain_takes_no_part_and_comes_back():
+def test_a_lost_grain_has_no_contacts_until_it_is_found_again():
     packing, snapshots = sheared_frames(5, lost=[(2, 14)])
     frames = [frame for frame, _ in run(packing, snapshots)]
 
@@ -77,7 +86,7 @@ def test_a_lost_grain_takes_no_part_and_comes_back():
     assert touching(frames[3])
 
 
-def test_forces_of_a_lost_grains_contacts_are_remembered():
+def test_forces_of_the_contacts_of_a_lost_grain_are_kept():
     packing, snapshots = sheared_frames(4, lost=[(2, 14)])
     states = [state for _, state in run(packing, snapshots)]
     bodies = packing.grains.count + 4
@@ -89,23 +98,23 @@ def test_forces_of_a_lost_grains_contacts_are_remembered():
     assert of(states[1]) == of(states[2])
 
 
-def test_motion_since_a_grain_was_last_seen_bridges_its_absence():
+def test_the_velocity_of_a_grain_found_again_is_that_since_it_was_last_seen():
     packing, snapshots = sheared_frames(3, lost=[(1, 14)])
-    seen = LastSeen.never(packing.grains.count).renewed(snapshots[0]).renewed(snapshots[1])
+    seen = LastSeen.never(packing.grains.count).updated(snapshots[0]).updated(snapshots[1])
     motion = motion_to(snapshots[2], seen, snapshots[1].time, snapshots[1].endpoints)
     expected = (snapshots[2].position[14] - snapshots[0].position[14]) / 60.0
     assert motion.grains.velocity[14] == pytest.approx(expected)
 
 
-def test_an_unseen_grain_moves_like_its_neighbours():
+def test_an_unseen_grain_has_the_velocity_of_its_neighbours():
     packing, snapshots = sheared_frames(2, lost=[(0, 14)])
-    seen = LastSeen.never(packing.grains.count).renewed(snapshots[0])
+    seen = LastSeen.never(packing.grains.count).updated(snapshots[0])
     motion = motion_to(snapshots[1], seen, snapshots[0].time, snapshots[0].endpoints)
     around = motion.grains.velocity[[13, 15, 8, 20]]
     assert around[:, 0].min() <= motion.grains.velocity[14, 0] <= around[:, 0].max()
 
 
-def test_time_must_go_forward():
+def test_times_that_do_not_ascend_are_refused():
     packing, snapshots = sheared_frames(2)
     late = [snapshots[0], Snapshot(0.0, *[getattr(snapshots[1], n) for n in Snapshot.__slots__[1:]])]
     with pytest.raises(ValueError, match="not after"):
@@ -119,7 +128,7 @@ def test_a_single_frame_can_be_solved():
     assert frames[0][0].status is FrameStatus.RESET
 
 
-def test_every_sweep_is_heard_and_the_last_recorded_is_the_frames_own():
+def test_every_sweep_is_counted_and_the_last_recorded_one_has_the_forces_of_the_frame():
     packing, snapshots = sheared_frames(3)
     frame, _ = run(packing, snapshots)[2]
     history = frame.history
@@ -137,7 +146,7 @@ def test_recorded_sweeps_are_log_spaced_and_end_with_the_last():
     assert len(recorded_sweeps(50, "all")) == 50
 
 
-def test_memory_recalls_forces_by_the_pair_and_zero_for_strangers():
+def test_memory_recalls_forces_by_pair_and_zero_for_unknown_pairs():
     packing, snapshots = sheared_frames(2)
     frame, _ = run(packing, snapshots)[1]
     memory = ForceMemory(frame.contacts.key[::2], np.column_stack([frame.fn, frame.ft])[::2])
@@ -169,42 +178,41 @@ def test_the_ensemble_reports_a_balanced_field_inside_the_coulomb_cone():
         assert not np.any((frame.contacts.i == 14) & (frame.frame == 2))
 
 
-def test_a_single_frame_falls_back_to_the_chain():
-    packing, snapshots = sheared_frames(1)
-    frame, _ = run(packing, snapshots, ENSEMBLE)[0]
+def test_a_single_frame_is_solved_by_the_chain():
+    frame, _ = solved_heap(ENSEMBLE, 1)[0]
     assert np.array_equal(frame.fn, frame.nlgs_fn)
 
 
-def test_the_members_disagreement_is_evidence_and_a_single_chain_has_none():
-    packing, snapshots = sheared_frames(4)
-    for frame, state in run(packing, snapshots, ENSEMBLE):
+def test_the_ensemble_has_a_disagreement_and_a_single_chain_has_none():
+    for frame, state in solved_heap(ENSEMBLE):
         assert state.evidence.disagreement > 0
         assert state.evidence.unbalance == frame.unbalance
         assert np.all(frame.fn_sd[frame.fn > 0] > 0)
-    for _, state in run(packing, snapshots):
+    for _, state in solved_heap():
         assert np.isnan(state.evidence.disagreement)
 
 
-def test_a_frame_says_what_of_its_trust_rods_take_that_nobody_saw():
+def test_a_frame_reports_the_penalty_for_unseen_rods():
     packing, snapshots = sheared_frames(2)
     for inferred in (0, 2):
         frame, state = run(replace(packing, inferred=inferred), snapshots)[1]
-        assert frame.unseen_doubt == unseen_doubt(state.evidence)
-        assert (frame.unseen_doubt > 2 * INFERRED_DOUBT / packing.grains.count - 1e-12) == (inferred == 2)
+        assert frame.unseen_penalty == unseen_penalty(state.evidence)
+        assert (frame.unseen_penalty > 2 * INFERRED_PENALTY / packing.grains.count - 1e-12) == (inferred == 2)
 
 
-def test_a_share_of_the_load_is_evidence_only_where_a_load_is_known():
+def test_the_load_fraction_is_known_only_with_a_load():
     packing, snapshots = sheared_frames(3)
     imposed = Packing(packing.grains, packing.length, packing.material, np.full(4, np.nan))
-    assert run(packing, snapshots)[2][1].evidence.load_share > 0
-    assert np.isnan(run(imposed, snapshots)[2][1].evidence.load_share)
+    assert run(packing, snapshots)[2][1].evidence.load_fraction > 0
+    assert np.isnan(run(imposed, snapshots)[2][1].evidence.load_fraction)
 
 
 @pytest.mark.slow
-def test_members_are_kept_when_asked_for():
+def test_members_are_kept_on_request():
     packing, snapshots = sheared_frames(4)
-    asked = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40), keep_members=True)
-    for (frame, _), (without, _) in zip(run(packing, snapshots, asked), run(packing, snapshots, ENSEMBLE), strict=True):
+    requested = SequenceSettings(estimator="ensemble", chain=ChainSettings(sweeps=40), keep_members=True)
+    runs = run(packing, snapshots, requested), run(packing, snapshots, ENSEMBLE)
+    for (frame, _), (without, _) in zip(*runs, strict=True):
         assert without.member_force is None
         assert frame.member_force is not None
         assert frame.member_force.shape == (frame.contacts.count, 7, 2)
@@ -225,15 +233,15 @@ def test_a_reset_can_be_forced_at_a_frame(settings):
     packing, snapshots = sheared_frames(5)
     frames = [frame for frame, _ in run(packing, snapshots, replace(settings, reset_frames=frozenset({3})))]
     assert frames[3].status is FrameStatus.RESET
-    assert "asked for a reset" in frames[3].reason
+    assert "requested a reset" in frames[3].reason
     assert [frame.frames_since_reset for frame in frames[3:]] == [0, 1]
 
 
-def test_a_reset_at_a_rearrangement_says_what_it_changed_and_can_be_forbidden(monkeypatch):
+def test_a_reset_at_a_rearrangement_reports_the_change_and_can_be_disabled(monkeypatch):
     def rearranging(evidence):
-        return (FrameStatus.RESET if evidence.reset else FrameStatus.REARRANGING), "so this test says"
+        return (FrameStatus.RESET if evidence.reset else FrameStatus.REARRANGING), "decided by this test"
 
-    monkeypatch.setattr("solver.sequence.frame.judge", rearranging)
+    monkeypatch.setattr("rodsight.solver.sequence.frame.decide_status", rearranging)
     packing, snapshots = sheared_frames(5)
     settings = replace(SETTINGS, reset_to_zero=True, kept_frames=frozenset({3}))
     frames = [frame for frame, _ in run(packing, snapshots, settings)]
@@ -243,53 +251,53 @@ def test_a_reset_at_a_rearrangement_says_what_it_changed_and_can_be_forbidden(mo
     assert not np.array_equal(frames[2].fn, carried[2].fn)
 
 
-def test_surfaces_overlap_by_a_share_of_the_mean_diameter_unless_told():
+def test_the_overlap_is_a_fraction_of_the_mean_diameter_unless_given():
     radius = np.array([0.007, 0.009])
-    told, usual = SequenceSettings(overlap=2e-6).for_radii(radius), SequenceSettings().for_radii(radius)
+    given, usual = SequenceSettings(overlap=2e-6).for_radii(radius), SequenceSettings().for_radii(radius)
     assert usual.overlap == usual.ensemble.probability.overlap == pytest.approx(3e-4 * 0.016)
-    assert told.overlap == told.ensemble.probability.overlap == 2e-6
+    assert given.overlap == given.ensemble.probability.overlap == 2e-6
 
 
-def test_a_pair_that_people_saw_touch_is_certain_whatever_its_gaps_say():
+def test_a_pair_confirmed_by_a_reviewer_is_certain_whatever_its_gaps():
     packing, snapshots = sheared_frames(3)
-    detected, _ = run(packing, snapshots, ENSEMBLE)[2]
-    doubtful = detected.contacts.key[[np.argmin(detected.probability)]]
+    detected, before = solved_heap(ENSEMBLE, 3)[2][0], solved_heap(ENSEMBLE, 3)[1][1]
+    uncertain = detected.contacts.key[[np.argmin(detected.probability)]]
     assert detected.probability.min() < 0.9
-    frame, state = run(packing, snapshots, ENSEMBLE, verdicts={2: Verdicts(forced=doubtful)})[2]
-    assert state.members.pairs.of(doubtful) == 1.0
-    assert frame.probability[frame.contacts.key == doubtful] == detected.probability.min()  # as detected
+    verdicts = {2: Verdicts(forced=uncertain)}
+    ((frame, state),) = run(packing, snapshots, ENSEMBLE, verdicts=verdicts, state=before, first=2)
+    assert state.members.pairs.of(uncertain) == 1.0
+    assert frame.probability[frame.contacts.key == uncertain] == detected.probability.min()  # as detected
 
 
 def test_only_the_ensemble_compares_two_starts():
-    packing, snapshots = sheared_frames(4)
-    chain = [frame.start_difference for frame, _ in run(packing, snapshots)]
-    ensemble = [frame.start_difference for frame, _ in run(packing, snapshots, ENSEMBLE)]
+    chain = [frame.start_difference for frame, _ in solved_heap()]
+    ensemble = [frame.start_difference for frame, _ in solved_heap(ENSEMBLE)]
     assert np.isnan(chain).all()
     assert np.isnan(ensemble[0])
     assert np.isfinite(ensemble[1:]).all()
     assert ensemble[3] < ensemble[1]
 
 
-def test_two_starts_are_compared_until_they_agreed_for_three_frames_and_again_after_a_reset():
+def test_two_starts_are_compared_until_they_agree_for_three_frames_and_after_a_reset():
     packing, snapshots = sheared_frames(8)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ensemble, "SETTLED_DIFFERENCE", 10.0)  # any two starts agree so far
+        patch.setattr(ensemble, "SETTLED_DIFFERENCE", 10.0)  # any two starts agree within it
         solved = run(packing, snapshots, replace(ENSEMBLE, reset_frames=frozenset([6])))
     known = [bool(np.isfinite(frame.start_difference)) for frame, _ in solved]
     assert known == [False, True, True, True, False, False, True, True]
     assert [state.evidence.start_forgotten for _, state in solved] == [False] * 3 + [True] * 3 + [False] * 2
 
 
-def test_what_a_lost_grain_hides_lowers_the_trust():
+def test_the_hidden_forces_of_a_lost_grain_lower_the_trust():
     packing, snapshots = sheared_frames(5, lost=[(2, 14)])
     (seen, _), (holed, state) = run(packing, snapshots)[1:3]
-    assert seen.hidden_share == 0.0
-    assert 0.0 < holed.hidden_share < 1.0
-    assert holed.trust == pytest.approx(lower_bound(state.evidence))
-    assert holed.trust < lower_bound(replace(state.evidence, hidden_share=0.0))
+    assert seen.hidden_fraction == 0.0
+    assert 0.0 < holed.hidden_fraction < 1.0
+    assert holed.trust == pytest.approx(assess(state.evidence).trust)
+    assert holed.trust < assess(replace(state.evidence, hidden_fraction=0.0)).trust
 
 
-def test_coming_back_from_a_faulty_frame_is_no_jump_of_the_stress():
+def test_the_return_from_a_faulty_frame_is_no_jump_of_the_stress():
     packing, snapshots = sheared_frames(5)
     state = run(packing, snapshots)[2][1]
     state = replace(state, sound_pressure=state.pressure)

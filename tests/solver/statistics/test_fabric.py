@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-
-from solver.statistics.fabric import (
+from rodsight.solver.statistics.fabric import (
     anisotropies,
     contact_fabric,
     contact_harmonic,
@@ -9,10 +8,10 @@ from solver.statistics.fabric import (
     tangential_harmonic,
     value_harmonic,
 )
-from solver.statistics.stress import principal_stresses
+from rodsight.solver.statistics.stress import principal_stresses
 
 EXACT = 1e-9  # rounding in sums over some thousand contacts
-THREE = 3e-3  # products of three anisotropies, which the formula for the friction angle leaves out
+THREE = 3e-3  # products of three anisotropies, which the formula for the friction angle neglects
 
 
 def normals(angle):
@@ -20,10 +19,10 @@ def normals(angle):
 
 
 def directions(amplitude, direction, count=4000):
-    """Angles that follow the density (1 + a cos 2(θ − θ₀)) / 2π evenly, by inverting its distribution function."""
+    """Quantiles of the density (1 + a cos 2(θ − θ₀)) / 2π, by inverting its distribution function."""
     fine = np.linspace(0.0, 2.0 * np.pi, 200_001)
-    share = (fine + 0.5 * amplitude * np.sin(2.0 * fine)) / (2.0 * np.pi)
-    return np.interp((np.arange(count) + 0.5) / count, share, fine) + direction
+    cumulative = (fine + 0.5 * amplitude * np.sin(2.0 * fine)) / (2.0 * np.pi)
+    return np.interp((np.arange(count) + 0.5) / count, cumulative, fine) + direction
 
 
 def same_axis(a, b):
@@ -31,7 +30,7 @@ def same_axis(a, b):
 
 
 @pytest.mark.parametrize(("amplitude", "direction"), [(0.1, 0.3), (0.4, -1.2), (0.9, 1.5)])
-def test_the_contact_anisotropy_of_a_known_distribution_is_found(amplitude, direction):
+def test_contact_anisotropy_of_a_known_distribution_is_found(amplitude, direction):
     found = contact_harmonic(normals(directions(amplitude, direction)))
     assert found.amplitude == pytest.approx(amplitude, abs=1e-5)
     assert same_axis(found.direction, direction)
@@ -39,7 +38,7 @@ def test_the_contact_anisotropy_of_a_known_distribution_is_found(amplitude, dire
     assert fabric_anisotropy(tensor) == pytest.approx(found.amplitude, rel=EXACT)
 
 
-def test_a_force_anisotropy_is_found_whatever_the_directions_of_the_contacts():
+def test_force_anisotropy_does_not_depend_on_the_distribution_of_contacts():
     # A contact anisotropy along another axis, and no contact at all in a quarter of the directions.
     angle = directions(0.5, -0.9)
     angle = angle[np.abs(np.sin(angle - 0.4)) > np.sin(np.pi / 8)]
@@ -62,7 +61,7 @@ def test_weights_count_like_repetitions():
     assert tensor == pytest.approx(contact_fabric(np.repeat(normals(angle), times, axis=0)))
 
 
-def test_a_tangential_anisotropy_is_found_with_its_sign():
+def test_tangential_anisotropy_is_found_with_its_sign():
     angle = directions(0.3, 0.8)
     found = tangential_harmonic(normals(angle), -5.0 * 0.12 * np.sin(2.0 * (angle - 0.7)), 5.0)
     assert found.amplitude == pytest.approx(0.12, rel=EXACT)
@@ -71,7 +70,7 @@ def test_a_tangential_anisotropy_is_found_with_its_sign():
     assert against.along(0.7) == pytest.approx(-0.12, rel=EXACT)
 
 
-def test_a_contact_turned_round_is_the_same_contact():
+def test_reversed_normal_is_the_same_contact():
     angle, flip = directions(0.3, 0.8, 500), np.tile([1.0, -1.0], 250)
     fn, ft = 2.0 + np.cos(2.0 * angle), 0.2 * np.sin(2.0 * angle + 1.0)
     one = anisotropies(normals(angle), normals(angle), fn, ft)
@@ -81,7 +80,7 @@ def test_a_contact_turned_round_is_the_same_contact():
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.35])
-def test_the_anisotropies_add_up_to_the_friction_angle_of_their_stress(turn):
+def test_anisotropies_add_up_to_the_friction_angle_of_their_stress(turn):
     # `turn` sets the axes of the anisotropies apart from one another.
     angle = directions(0.25, 1.0 + turn)
     branch = 0.016 * (1.0 + 0.02 * np.cos(2.0 * (angle - 1.0 + turn)))[:, None] * normals(angle)
@@ -97,10 +96,10 @@ def test_the_anisotropies_add_up_to_the_friction_angle_of_their_stress(turn):
     assert abs(0.5 * found.normal.along(direction) - sine) > 10 * THREE
 
 
-def test_few_contacts_have_an_answer():
+def test_few_contacts_give_finite_values():
     none = anisotropies(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0))
     assert none.sine_of_friction_angle(0.3) == 0.0
-    # Contacts along one axis, but for rounding, cannot tell how a force depends on direction.
+    # Contacts along one axis, up to rounding, do not determine the dependence on direction.
     column = value_harmonic(normals(np.full(6, 0.5) + 1e-12 * np.arange(6)), np.array([1.0, 2, 3, 4, 5, 6]))
     assert (column.mean, column.amplitude) == (pytest.approx(3.5), pytest.approx(0.0, abs=EXACT))
     # Along two axes, as on a square lattice, they can: f₀ (1 ± a).

@@ -2,10 +2,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.statistics.force_chains import find_force_chains, symmetric_grain_stresses
+from rodsight.solver.statistics.stress import love_weber_stress
 
-from solver.contacts.contacts import detect_contacts
-from solver.statistics.force_chains import find_force_chains, grain_stresses
-from solver.statistics.stress import love_weber_stress
 from tests.packings import LENGTH, box, rods, squeezed_heap
 
 R = 0.01  # [m]
@@ -33,28 +33,28 @@ def in_file(*rows, force=10.0):
     return {(min(a, b), max(a, b)): force for a, b in pairwise(rows)}
 
 
-def test_the_stress_of_a_squeezed_grain_is_its_force_over_its_section():
+def test_stress_of_a_squeezed_grain_is_its_force_over_its_section():
     # Three grains between two walls: two forces F at ± R on each, so σ = 2 F R / (π R² L) along the file.
     position = np.array([[R, 0.5], [3 * R, 0.5], [5 * R, 0.5]])
     grains = rods(R, R, R)
     contacts = detect_contacts(grains, position, np.ones(3, bool), box(6 * R, 1.0), TOUCH)
-    stress = grain_stresses(contacts, np.full(4, 30.0), np.zeros(4), position, grains, LENGTH)
+    stress = symmetric_grain_stresses(contacts, np.full(4, 30.0), np.zeros(4), position, grains, LENGTH)
     assert stress[:, 0, 0] == pytest.approx(2 * 30.0 / (np.pi * R * LENGTH))
     assert np.abs(stress[:, 1, 1]).max() < 1e-9 * stress[0, 0, 0]
 
 
-def test_the_stresses_of_grains_add_up_to_that_of_the_packing():
+def test_stresses_of_grains_add_up_to_that_of_the_packing():
     rng = np.random.default_rng(3)
     grains, state, walls = squeezed_heap(rng)
     contacts = detect_contacts(grains, state.position, state.present, walls, 3e-4)
     fn, ft = rng.exponential(10.0, contacts.count), rng.normal(0.0, 2.0, contacts.count)
-    each = grain_stresses(contacts, fn, ft, state.position, grains, LENGTH)
+    each = symmetric_grain_stresses(contacts, fn, ft, state.position, grains, LENGTH)
     total = np.einsum("n,nab->ab", np.pi * grains.radius**2, each)
     packing = love_weber_stress(contacts, fn, ft, state.position, 1.0, LENGTH)
     assert total == pytest.approx(0.5 * (packing + packing.T), rel=1e-9)
 
 
-def test_a_straight_column_is_one_chain():
+def test_straight_column_is_one_chain():
     found = chains_of(path([0.5, 0.3], 90, 90, 90, 90), in_file(0, 1, 2, 3, 4), idle=5)
     # The ends bear on one side only: half the stress of the others, still above the mean of 4 / 10.
     assert found.count == 1
@@ -68,20 +68,20 @@ def test_two_grains_are_no_chain():
     assert chains_of(path([0.5, 0.3], 90), in_file(0, 1), idle=4).count == 0
 
 
-def test_columns_side_by_side_are_chains_of_their_own():
+def test_parallel_columns_are_separate_chains():
     position = np.vstack([path([0.6, 0.3], 90, 90), path([0.3, 0.3], 90, 90, 90)])
     found = chains_of(position, in_file(0, 1, 2) | in_file(3, 4, 5, 6), idle=7)
     assert found.length.tolist() == [3, 4]
     assert found.chain[:7].tolist() == [0, 0, 0, 1, 1, 1, 1]
 
 
-def test_a_column_below_the_mean_stress_is_no_chain():
+def test_column_below_the_mean_stress_is_no_chain():
     position = np.vstack([path([0.6, 0.3], 90, 90), path([0.3, 0.3], 90, 90, 90)])
     found = chains_of(position, in_file(0, 1, 2, force=1.0) | in_file(3, 4, 5, 6, force=10.0))
     assert found.chain.tolist() == [-1, -1, -1, 0, 0, 0, 0]
 
 
-def test_a_chain_may_bend_but_not_round_a_corner():
+def test_chain_may_bend_but_not_by_a_right_angle():
     bent = chains_of(path([0.5, 0.3], 90, 90, 60, 60), in_file(0, 1, 2, 3, 4), idle=5)
     assert bent.length.tolist() == [5]
     # At a right angle the corner grain leans to the stronger side, 0-1-2, and the other side leaves it.
@@ -91,7 +91,7 @@ def test_a_chain_may_bend_but_not_round_a_corner():
     assert corner.chain[:5].tolist() == [0, 0, 0, -1, -1]
 
 
-def test_a_zigzag_is_a_chain_only_within_the_greatest_angle():
+def test_zigzag_is_a_chain_only_within_the_greatest_angle():
     # Links at ± 40° from the vertical: by symmetry the inner grains' σ₁ is vertical.
     position, force = path([0.5, 0.3], 50, 130, 50, 130, 50), in_file(0, 1, 2, 3, 4, 5)
     assert chains_of(position, force, idle=6).length.tolist() == [6]
@@ -110,7 +110,7 @@ def test_links_on_one_side_of_a_grain_make_no_chain_through_it():
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [4, 3, 0, 1, 2]])
-def test_a_link_needs_both_of_its_grains(order):
+def test_link_needs_both_of_its_grains(order):
     # A column 0-1-2 ends on grain 2 of a row 3-2-4 that carries far more, so that its σ₁ lies along the row.
     position = np.vstack([path([0.5, 0.3], 90, 90), [[0.5 - 2 * R, 0.3 + 4 * R], [0.5 + 2 * R, 0.3 + 4 * R]]])
     place = np.argsort(order)  # grain k of the drawing is numbered place[k]
@@ -120,7 +120,7 @@ def test_a_link_needs_both_of_its_grains(order):
     assert found.chain[place].tolist() == [-1, -1, 0, 0, 0]
 
 
-def test_grains_out_of_sight_count_neither_in_the_mean_nor_in_chains():
+def test_absent_grains_are_excluded_from_mean_and_chains():
     # σ₁ is as 10, 20 and 10: only the middle grain is above the mean of these three.
     position = np.vstack([path([0.5, 0.3], 90, 90), np.full((4, 2), np.nan)])
     grains, present = rods(*[R] * 7), np.arange(7) < 3

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
-
-from solver.bodies.walls import Walls
-from solver.contacts.connectivity import coordination_number, rattlers
-from solver.contacts.contacts import detect_contacts
-from solver.statistics.fabric import contact_fabric, fabric_anisotropy
-from solver.statistics.stress import (
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.connectivity import coordination_number, rattlers
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.statistics.fabric import contact_fabric, fabric_anisotropy
+from rodsight.solver.statistics.stress import (
     friction_angle,
     grain_stresses,
     love_weber_stress,
@@ -15,6 +14,7 @@ from solver.statistics.stress import (
     wall_forces,
     wall_ratio_angle,
 )
+
 from tests.packings import LENGTH, box, rods
 
 EXACT = 1e-12
@@ -41,17 +41,17 @@ def test_love_weber_stress_is_the_pressure_on_the_walls():
     assert abs(direction) == pytest.approx(np.pi / 2)
 
 
-def test_stresses_of_grains_are_their_shares_of_the_stress():
+def test_stresses_of_grains_sum_to_the_stress():
     contacts, fn, position, _ = square_of_four(2e4, 5e4)
-    radius, share = np.full(4, 0.01), 4.0 / np.pi  # a square over the circle in it
+    radius, ratio = np.full(4, 0.01), 4.0 / np.pi  # a square over the circle in it
     alike = grain_stresses(contacts, fn, np.zeros_like(fn), radius, LENGTH)
-    assert alike == pytest.approx(share * np.tile(np.diag([2e4, 5e4]), (4, 1, 1)), rel=EXACT, abs=1e-8)
+    assert alike == pytest.approx(ratio * np.tile(np.diag([2e4, 5e4]), (4, 1, 1)), rel=EXACT, abs=1e-8)
     ft = np.where(contacts.with_wall, 0.0, np.linspace(-0.2, 0.2, contacts.count) * fn)
     whole = love_weber_stress(contacts, fn, ft, position, 0.04**2, LENGTH)
-    assert np.mean(grain_stresses(contacts, fn, ft, radius, LENGTH), axis=0) == pytest.approx(share * whole, abs=1e-8)
+    assert np.mean(grain_stresses(contacts, fn, ft, radius, LENGTH), axis=0) == pytest.approx(ratio * whole, abs=1e-8)
 
 
-def test_the_wall_ratio_is_taken_on_the_loaded_plate():
+def test_wall_ratio_is_that_of_the_loaded_plate():
     contacts, fn, _, walls = square_of_four(2e4, 5e4)
     ft = np.where(contacts.j == 4 + 2, 0.2 * fn, 0.0)
     total = wall_forces(contacts, fn, ft)
@@ -59,14 +59,14 @@ def test_the_wall_ratio_is_taken_on_the_loaded_plate():
     assert wall_ratio_angle(walls, sums_on_walls(contacts, fn, ft)) == pytest.approx(np.arctan(0.2))
 
 
-def test_a_principal_direction_turns_with_the_stress():
+def test_principal_direction_rotates_with_the_stress():
     angle = np.deg2rad(33.0)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     _, _, direction = principal_stresses(turn @ np.diag([3.0, 1.0]) @ turn.T)
     assert direction == pytest.approx(angle)
 
 
-def test_the_area_of_a_sheared_box_is_that_of_its_parallelogram():
+def test_area_of_a_sheared_box_is_that_of_its_parallelogram():
     c = np.array([[0.0, 0.0], [0.5, 0.0], [0.6, 0.6], [0.1, 0.6]])
     walls = Walls(np.stack([c, np.roll(c, -1, axis=0)], axis=1), np.zeros((4, 2, 2)), np.full(4, np.nan))
     assert packing_area(walls, c) == pytest.approx(0.3)
@@ -74,7 +74,7 @@ def test_the_area_of_a_sheared_box_is_that_of_its_parallelogram():
     assert packing_area(shuffled, c) == pytest.approx(0.3)
 
 
-def test_rattlers_are_peeled_until_none_is_left():
+def test_rattlers_are_removed_until_none_is_left():
     # A chain hanging from a wall: its end has one contact, and without it the next one has one, and so on.
     r = 0.01
     position = np.array([[r, 0.5], [3 * r, 0.5], [5 * r, 0.5]])

@@ -1,1 +1,1 @@
-"""Forces over the packing: lines of contacts in every sweep, their colours, their doubt, the true ones beside them."""
+"""Forces over the packing: contact lines of every sweep, their colours and uncertainty, and the true forces."""

@@ -1,4 +1,4 @@
-"""Writes the contact forces: the network once a frame, its widths and colours as the sweeps go."""
+"""Writes the contact forces: the network once per frame, its widths and colours at the recorded sweeps."""
 
 from __future__ import annotations
 
@@ -10,37 +10,55 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from solver.bodies.grains import Array
-from solver.contacts.contacts import Contacts, ContactState
-from solver.nlgs.sweep_record import SweepHistory
-from solver.sequence.frame_forces import FrameForces
-
+from ....solver.bodies.grains import Array
+from ....solver.contacts.contacts import Contacts, ContactState
+from ....solver.frame_forces import FrameForces
+from ....solver.nlgs.sweep_record import SweepHistory
+from ....solver.statistics.force_statistics import mobilisation
 from ...look import entities
 from ...look.clock import Clock
 from ...look.colours import SLIDING, packed_one
 from ...look.force_style import ForceStyle
 from ...look.scene import Scene
-from ...look.values import known
+from ...look.values import nullable
 from .contact_colours import contact_colours
 
-CHUNK_BYTES = 1_000_000  # of one columnar message: the viewers load and drop data by the message
-FIRST_SWEEPS = 8  # kept whatever the spacing
+CHUNK_BYTES = 1_000_000  # size of one columnar message, the unit in which viewers load and drop data
+FIRST_SWEEPS = 8  # always kept
 
 
 class SweepChoice(StrEnum):
-    """Which recorded sweeps go into the recording."""
+    """The sweeps that are written to the recording."""
 
-    LOG = "log"  # logarithmically spaced ones
-    ALL = "all"  # every one in which a width or a colour changes
+    LOG = "log"  # logarithmically spaced sweeps
+    ALL = "all"  # every sweep in which a width or a colour changes
     NONE = "none"  # the reported field only
 
 
 def log_network(
-    clock: Clock, scene: Scene, forces: FrameForces, former: FrameForces | None, choice: SweepChoice, kept: int
+    clock: Clock, scene: Scene, forces: FrameForces, previous: FrameForces | None, choice: SweepChoice, kept: int
 ) -> int:
-    """Log one frame's contact forces, from its first sweep to the reported field; former: those of the frame before.
+    """Log the contact forces of one frame, from its first sweep to the reported field.
 
-    At most `kept` sweeps with SweepChoice.LOG. Returns the rows written.
+    Parameters
+    ----------
+    clock : Clock
+        The frame on the timelines.
+    scene : Scene
+        The run.
+    forces : FrameForces
+        The frame.
+    previous : FrameForces, optional
+        The frame before; None for the first.
+    choice : SweepChoice
+        The sweeps that are recorded.
+    kept : int
+        Greatest number of sweeps, with SweepChoice.LOG.
+
+    Returns
+    -------
+    int
+        Number of rows written.
     """
     rows, fn, _ = visible_sweeps(forces, clock.last - clock.first, choice, kept)
     style, contacts = scene.style, forces.contacts
@@ -54,7 +72,7 @@ def log_network(
             draw_order=20.0,
         ),
         contact_values(scene, forces),
-        *contact_colours(scene, forces, former),
+        *contact_colours(scene, forces, previous),
     )
     if scene.walls.cell is not None:
         _log_far_halves(clock, scene, forces)
@@ -64,7 +82,7 @@ def log_network(
 
 
 def _log_far_halves(clock: Clock, scene: Scene, forces: FrameForces) -> None:
-    """The second halves of contacts across the edge of the cell, as reported: the first ones are with the others."""
+    """Log the second halves of contacts across the edge of the cell, as reported; the first are with the others."""
     rows, lines = scene.far_halves(clock.frame, forces.contacts)
     fn = np.nan_to_num(forces.fn[rows])
     clock.stream.log(
@@ -81,10 +99,25 @@ def _log_far_halves(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 def visible_sweeps(
     forces: FrameForces, last: int, choice: SweepChoice, kept: int
 ) -> tuple[NDArray[np.int64], NDArray[np.floating], NDArray[np.floating]]:
-    """Choose the rows of a frame (r,), the first 0, the greatest `last`, and their f_n and f_t (r, c) [N].
+    """Select the rows of a frame that are recorded.
 
-    The row `last` holds the reported field; the one before it is the last sweep of the chain. Where the
-    first sweep's forces were not kept, row 0 shows the network without force.
+    Parameters
+    ----------
+    forces : FrameForces
+        The frame.
+    last : int
+        The row of the reported field, after the last sweep of the chain.
+    choice : SweepChoice
+        The sweeps that are recorded.
+    kept : int
+        Greatest number of sweeps, with SweepChoice.LOG.
+
+    Returns
+    -------
+    rows : array (r,)
+        Ascending from 0 to `last`.
+    fn, ft : array (r, c)
+        Forces of these rows [N]; zero in row 0 if the forces of the first sweep were not kept.
     """
     reported = np.nan_to_num(np.stack([forces.fn, forces.ft]))[:, None]
     if last == 0 or choice is SweepChoice.NONE:
@@ -93,14 +126,14 @@ def visible_sweeps(
     chosen = chosen_sweeps(history, choice, kept)
     rows, force = history.recorded[chosen], [history.fn[chosen], history.ft[chosen]]
     if len(rows) == 0 or rows[0] != 0:
-        nothing = np.zeros((1, reported.shape[2]))
-        rows, force = np.concatenate([[0], rows]), [np.concatenate([nothing, each]) for each in force]
+        zero = np.zeros((1, reported.shape[2]))
+        rows, force = np.concatenate([[0], rows]), [np.concatenate([zero, each]) for each in force]
     fn, ft = (np.concatenate([each, end]) for each, end in zip(force, reported, strict=True))
     return np.concatenate([rows, [last]]), fn, ft
 
 
 def chosen_sweeps(history: SweepHistory, choice: SweepChoice, kept: int) -> NDArray[np.int64]:
-    """Rows of history.recorded that go into the recording, ascending."""
+    """Return the rows of history.recorded that are written, ascending."""
     available = np.arange(len(history.recorded))
     if choice is SweepChoice.ALL or len(available) <= kept:
         return available
@@ -111,34 +144,38 @@ def chosen_sweeps(history: SweepHistory, choice: SweepChoice, kept: int) -> NDAr
 
 
 def contact_values(scene: Scene, forces: FrameForces) -> rr.AnyValues:
-    """What a click on a contact shows."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mobilisation = np.abs(forces.ft) / (scene.friction * forces.fn)
+    """Return the values that a click on a contact shows."""
+    mobilised = mobilisation(forces.fn, forces.ft, contact_friction(scene, forces))
     return rr.AnyValues(
         **body_values(scene, forces.contacts),
-        fn=known(forces.fn),
-        ft=known(forces.ft),
-        gap_um=known((1e6 * forces.contacts.gap).astype(np.float32)),
-        fn_sd=known(forces.fn_sd.astype(np.float32)),
-        mobilisation=known(np.where(forces.fn > 0.0, mobilisation, np.nan).astype(np.float32)),
+        fn=nullable(forces.fn),
+        ft=nullable(forces.ft),
+        gap_um=nullable((1e6 * forces.contacts.gap).astype(np.float32)),
+        fn_sd=nullable(forces.fn_sd.astype(np.float32)),
+        mobilisation=nullable(np.where(forces.fn > 0.0, mobilised, np.nan).astype(np.float32)),
         state=pa.array([ContactState(s).name.lower() for s in forces.state.tolist()], pa.string()),
         age=pa.array(forces.age.astype(np.int32)),
-        probability=known(forces.probability.astype(np.float32)),
+        probability=nullable(forces.probability.astype(np.float32)),
         sliding_probability=_where_known(forces.sliding_probability, forces),
         bearing_probability=_where_known(forces.bearing_probability, forces),
     )
 
 
+def contact_friction(scene: Scene, forces: FrameForces) -> Array:
+    """Return the coefficient of friction of every contact (c,); in files of earlier versions that between grains."""
+    return np.full(forces.contacts.count, scene.friction) if forces.friction is None else forces.friction
+
+
 def _where_known(probability: Array | None, forces: FrameForces) -> pa.Array:
-    """Values of contacts (c,), absent where files of earlier versions have none."""
+    """Return values of contacts (c,), absent in files of earlier versions."""
     values = np.full(forces.contacts.count, np.nan) if probability is None else probability
-    return known(values.astype(np.float32))
+    return nullable(values.astype(np.float32))
 
 
 def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:
-    """Who touches whom: rows i, j, the id of grain i and the name of body j.
+    """Return the bodies of contacts: rows i and j, the id of grain i and the name of body j.
 
-    With types of their own: where a recording's first frame has no contacts, empty lists would have none.
+    The types are explicit, as empty lists would have none if the first frame has no contacts.
     """
     return {
         "i": pa.array(contacts.i),
@@ -151,13 +188,29 @@ def body_values(scene: Scene, contacts: Contacts) -> dict[str, Any]:
 def send_sweeps(
     clock: Clock, style: ForceStyle, rows: NDArray[np.int64], fn: NDArray[np.floating], *, thin: bool
 ) -> int:
-    """Send widths and colours of rows (r,), fn (r, c); `thin` leaves out rows that look like the one before.
+    """Send widths and colours of sweeps.
 
-    Returns the rows sent.
+    Parameters
+    ----------
+    clock : Clock
+        The frame on the timelines.
+    style : ForceStyle
+        Widths and colours.
+    rows : array (r,)
+        Rows of the frame.
+    fn : array (r, c)
+        Forces in these rows [N].
+    thin : bool
+        Leave out rows that look like the row before.
+
+    Returns
+    -------
+    int
+        Number of rows sent.
     """
     count = fn.shape[1]
     step = max(CHUNK_BYTES // (8 * count), 1)
-    former: tuple[NDArray, NDArray] | None = None
+    previous: tuple[NDArray, NDArray] | None = None
     sent = 0
     for start in range(0, len(rows), step):
         part = slice(start, start + step)
@@ -165,11 +218,11 @@ def send_sweeps(
         keep = np.ones(len(radii), bool)
         if thin:
             keep[1:] = (np.diff(radii, axis=0) != 0).any(axis=1) | (colours[1:] != colours[:-1]).any(axis=1)
-            if former is not None:
-                keep[0] = bool((radii[0] != former[0]).any() or (colours[0] != former[1]).any())
+            if previous is not None:
+                keep[0] = bool((radii[0] != previous[0]).any() or (colours[0] != previous[1]).any())
             if start + step >= len(rows):
-                keep[-1] = True  # the reported field is always there
-            former = radii[-1], colours[-1]
+                keep[-1] = True  # the reported field is always sent
+            previous = radii[-1], colours[-1]
         kept = rows[part][keep]
         if len(kept):
             lengths = np.full(len(kept), count)
@@ -190,13 +243,13 @@ def _log_sliding(clock: Clock, scene: Scene, forces: FrameForces) -> None:
 
 
 def _log_sliding_points(clock: Clock, scene: Scene, point: NDArray[np.float32], fn: Array) -> None:
-    """Marks that grow a little with the force, so that weak sliding contacts do not crowd the view."""
-    share = np.clip(fn / scene.style.range.top, 0.0, 1.0)
+    """Log marks whose size increases slightly with the force: weak sliding contacts must not dominate the view."""
+    fraction = np.clip(fn / scene.style.range.top, 0.0, 1.0)
     clock.stream.log(
         entities.SLIDING,
         rr.Points2D(
             point,
-            radii=(scene.canvas.grain_radius * (0.07 + 0.12 * np.sqrt(share))).astype(np.float32),
+            radii=(scene.canvas.grain_radius * (0.07 + 0.12 * np.sqrt(fraction))).astype(np.float32),
             colors=packed_one(SLIDING),
             draw_order=30.0,
         ),

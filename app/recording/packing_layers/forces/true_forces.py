@@ -1,27 +1,26 @@
-"""Writes the true forces beside the inferred ones, and how well they agree."""
+"""Writes the true forces beside the inferred forces, and their agreement."""
 
 from __future__ import annotations
 
 import numpy as np
 import rerun as rr
 
-from solver.contacts.contacts import ContactSource, measure_contacts
-from solver.contacts.pairs import align
-from solver.sequence.frame_forces import FrameForces
-from solver.statistics.agreement import Agreement, compare_forces
-
 from ....results.results import TruthContacts
+from ....solver.contacts.contacts import ContactSource, measure_contacts
+from ....solver.contacts.pairs import align
+from ....solver.frame_forces import FrameForces
+from ....solver.statistics.agreement import Agreement, compare_forces
 from ...look import entities
 from ...look.axes import Axes, round_step
 from ...look.clock import Clock
 from ...look.colours import INK, SERIES, packed_one
 from ...look.scene import Scene
-from ...look.values import known, log_scalar
+from ...look.values import log_scalar, nullable
 from .network import body_values
 
 
 class TruthWriter:
-    """Logs the truth of every frame."""
+    """Logs the true forces of every frame."""
 
     def __init__(self, scene: Scene, truth: TruthContacts) -> None:
         self._scene = scene
@@ -54,11 +53,11 @@ class TruthWriter:
             stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=2.0), static=True)
 
     def log(self, clock: Clock, forces: FrameForces) -> Agreement:
-        """Log one frame's truth and its agreement with the inferred forces."""
+        """Log the true forces of one frame and return their agreement with the inferred forces."""
         scene, truth = self._scene, self._truth
         rows = np.flatnonzero(truth.frame == clock.frame)
         key = truth.i[rows] * (scene.grains.count + scene.walls.count) + truth.j[rows]
-        order = np.argsort(key, kind="stable")  # that of contacts
+        order = np.argsort(key, kind="stable")  # the order of contacts
         rows, key = rows[order], key[order]
         shown = rows[self._drawable(clock.frame, rows)]
         contacts = measure_contacts(
@@ -78,13 +77,16 @@ class TruthWriter:
                 colors=scene.style.colours(fn),
                 draw_order=20.0,
             ),
-            rr.AnyValues(**body_values(scene, contacts), fn=known(fn), ft=known(ft)),
+            rr.AnyValues(**body_values(scene, contacts), fn=nullable(fn), ft=nullable(ft)),
         )
         clock.end()
         listed = forces.source != ContactSource.FORBIDDEN_BY_REVIEWER
-        ours, inferred = forces.contacts.key[listed], np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed])
+        inferred_key, inferred = (
+            forces.contacts.key[listed],
+            np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed]),
+        )
         true = np.column_stack([truth.fn[rows], truth.ft[rows]])
-        _, (true_fn, _), (inferred_fn, _) = (each.T for each in align(key, true, ours, inferred))
+        _, (true_fn, _), (inferred_fn, _) = (each.T for each in align(key, true, inferred_key, inferred))
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,
@@ -95,14 +97,14 @@ class TruthWriter:
                 draw_order=20.0,
             ),
         )
-        agreement = compare_forces(ours, inferred, key, true)
+        agreement = compare_forces(inferred_key, inferred, key, true)
         log_scalar(clock, entities.TRUTH_R_FN, agreement.r_fn)
         log_scalar(clock, entities.TRUTH_R_FT, agreement.r_ft)
         log_scalar(clock, entities.TRUTH_ERROR, agreement.relative_l2)
         return agreement
 
     def _drawable(self, frame: int, rows: np.ndarray) -> np.ndarray:
-        """Which true contacts have both bodies in the frame; the others count as missed, but cannot be drawn."""
+        """Return which true contacts have both bodies in the frame; the others count as missed but cannot be drawn."""
         n, present = self._scene.grains.count, self._scene.tracks.present[frame]
         i, j = self._truth.i[rows], self._truth.j[rows]
         return present[i] & ((j >= n) | present[np.minimum(j, n - 1)])

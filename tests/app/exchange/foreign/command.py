@@ -1,4 +1,4 @@
-"""The command import, called as a user does."""
+"""Helpers that call the command `import` and read its output."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from rodsight.experiment.walls import read_walls
 from rodsight.tracks import Tracks, WallTracks
 
 
-def take_in(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """Import; gives what was printed, on one line."""
+def import_files(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Import; return the output on one line."""
     with pytest.raises(SystemExit) as end:
         main(["import", *map(str, arguments)])
-    said = capsys.readouterr()
-    assert not end.value.code, said.err
-    return " ".join(said.out.split())
+    printed = capsys.readouterr()
+    assert not end.value.code, printed.err
+    return " ".join(printed.out.split())
 
 
 def refuse(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """Import what is wrong; gives the one line of complaint."""
+    """Import invalid files; return the error line."""
     with pytest.raises(SystemExit) as end:
         main(["import", *map(str, arguments)])
     assert end.value.code == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    return said
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    return printed
 
 
 def tracks_in(folder: Path) -> Tracks:

@@ -1,4 +1,4 @@
-"""Small files as other programs write them; two grains side by side, the second of which moves up as seen."""
+"""Small files in the formats of other programs: two grains side by side, the second of which moves up as seen."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from .command import refuse, take_in, tracks_in, walls_in
+from .command import import_files, refuse, tracks_in, walls_in
 
 PIXEL = 2e-4
 
@@ -24,9 +24,9 @@ def test_trackpy_saved_as_csv_and_as_parquet(tmp_path, capsys):
     table.to_parquet(tmp_path / "linked.parquet")
     for name in ("linked.csv", "linked.parquet"):
         out = tmp_path / f"out {name}"
-        said = take_in(capsys, "trackpy", tmp_path / name, out, "--pixel-size", PIXEL, "--radius", 5)
+        printed = import_files(capsys, "trackpy", tmp_path / name, out, "--pixel-size", PIXEL, "--radius", 5)
         expect_pair(out, np.array([10.0, 0.0, 2.0]) * PIXEL, 5 * PIXEL)
-        assert "radius of gyration" in said
+        assert "radius of gyration" in printed
     assert "--pixel-size" in refuse(capsys, "trackpy", tmp_path / "linked.csv", tmp_path / "no")
 
 
@@ -76,36 +76,36 @@ SIMPLE = """<?xml version="1.0" encoding="UTF-8"?>
 
 def test_trackmate_spots_with_four_rows_of_header(tmp_path, capsys):
     (tmp_path / "spots.csv").write_text(SPOTS)
-    said = take_in(capsys, "trackmate", tmp_path / "spots.csv", tmp_path / "out")
+    printed = import_files(capsys, "trackmate", tmp_path / "spots.csv", tmp_path / "out")
     expect_pair(tmp_path / "out", np.array([2e-3, 0.0, 4e-4]), 1e-3)
-    assert "1 rows belong to no grain" in said
+    assert "1 rows without a grain" in printed
 
 
 def test_trackmate_session_and_simple_tracks(tmp_path, capsys):
     (tmp_path / "session.xml").write_text(SESSION)
     (tmp_path / "tracks.xml").write_text(SIMPLE)
-    take_in(capsys, "trackmate", tmp_path / "session.xml", tmp_path / "one")
+    import_files(capsys, "trackmate", tmp_path / "session.xml", tmp_path / "one")
     expect_pair(tmp_path / "one", np.array([2e-3, 0.0, 4e-4]), 1e-3)
     arguments = ("trackmate", tmp_path / "tracks.xml", tmp_path / "two", "--radius", 5)
     assert "--pixel-size" in refuse(capsys, *arguments)
-    take_in(capsys, *arguments, "--pixel-size", PIXEL)
+    import_files(capsys, *arguments, "--pixel-size", PIXEL)
     expect_pair(tmp_path / "two", np.array([10.0, 0.0, 2.0]) * PIXEL, 5 * PIXEL)
     (tmp_path / "bad.xml").write_text(SESSION[:300])
     assert "is not XML" in refuse(capsys, "trackmate", tmp_path / "bad.xml", tmp_path / "three")
 
 
-def test_a_track_that_splits_as_cells_do_is_named(tmp_path, capsys):
+def test_a_splitting_track_is_named(tmp_path, capsys):
     (tmp_path / "spots.csv").write_text(SPOTS.replace("ID15,15,,", "ID15,15,1,"))
     (tmp_path / "session.xml").write_text(
         SESSION.replace('TARGET_ID="14" />', 'TARGET_ID="14" /><Edge SPOT_SOURCE_ID="12" SPOT_TARGET_ID="15" />')
     )
     for name in ("spots.csv", "session.xml"):
-        said = refuse(capsys, "trackmate", tmp_path / name, tmp_path / "out")
-        assert "track 1: has two spots in frame 1: it splits or merges" in said
+        printed = refuse(capsys, "trackmate", tmp_path / name, tmp_path / "out")
+        assert "track 1: has two spots in frame 1: it splits or merges" in printed
         assert not (tmp_path / "out").exists()
 
 
-def test_trackmate_table_of_results_as_imagej_saves_it(tmp_path, capsys):
+def test_trackmate_table_of_results_saved_by_imagej(tmp_path, capsys):
     """Before version 7: numbered rows, tabs, None for a spot without a track, one row of header and no units."""
     (tmp_path / "Spots in tracks statistics.txt").write_text(
         " \tLabel\tID\tTRACK_ID\tPOSITION_X\tPOSITION_Y\tFRAME\tRADIUS\n"
@@ -115,9 +115,9 @@ def test_trackmate_table_of_results_as_imagej_saves_it(tmp_path, capsys):
     )
     arguments = ("trackmate", tmp_path / "Spots in tracks statistics.txt", tmp_path / "out")
     assert "--pixel-size" in refuse(capsys, *arguments)
-    said = take_in(capsys, *arguments, "--pixel-size", PIXEL)
+    printed = import_files(capsys, *arguments, "--pixel-size", PIXEL)
     expect_pair(tmp_path / "out", np.array([10.0, 0.0, 2.0]) * PIXEL, 5 * PIXEL)
-    assert "1 rows belong to no grain" in said
+    assert "1 rows without a grain" in printed
 
 
 def test_rodtracker_ends_of_the_first_camera(tmp_path, capsys):
@@ -129,13 +129,15 @@ def test_rodtracker_ends_of_the_first_camera(tmp_path, capsys):
         "0,0,0,0,0,0,20,50,20,46,1,2,513,1,1,red,1\n"
         "0,0,0,0,0,0,-1,-1,-1,-1,1,2,513,0,1,blue,0\n"
     )
-    said = take_in(capsys, "rodtracker", tmp_path / "rods.csv", tmp_path / "out", "--pixel-size", PIXEL, "--radius", 5)
+    printed = import_files(
+        capsys, "rodtracker", tmp_path / "rods.csv", tmp_path / "out", "--pixel-size", PIXEL, "--radius", 5
+    )
     tracks = tracks_in(tmp_path / "out")
     assert tracks.position[0] / PIXEL == pytest.approx(np.array([[10.0, 0.0], [20.0, 0.0]]))
     assert tracks.position[1, 1] / PIXEL == pytest.approx([20.0, 2.0])
     assert tracks.rotation[0] == pytest.approx([0.0, 0.5 * np.pi])
-    assert "Camera gp3" in said
-    assert "1 rows tell no place" in said
+    assert "Camera gp3" in printed
+    assert "1 rows give no position" in printed
     assert "red-1" in (tmp_path / "out" / "ids.csv").read_text()
 
 
@@ -149,32 +151,32 @@ def test_liggghts_dump_with_spins_and_a_fixed_box(tmp_path, capsys):
     one = dump(0, ["2 1 3 1 0 1 0.1 7", "1 1 1 1 0 1 0 7"])
     two = dump(100, ["1 1 1 1 0 1 0 7", "2 1 3 1.4 0 1 0.3 7"])
     (tmp_path / "dump.all").write_text(one + two)
-    said = take_in(capsys, "lammps", tmp_path / "dump.all", tmp_path / "out", "--interval", 0.01)
+    printed = import_files(capsys, "lammps", tmp_path / "dump.all", tmp_path / "out", "--interval", 0.01)
     expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
     tracks, walls = tracks_in(tmp_path / "out"), walls_in(tmp_path / "out")
     assert tracks.rotation[1] == pytest.approx([0.0, 0.2])
     assert tracks.time.tolist() == [0.0, 1.0]
     assert walls is not None
     assert walls.endpoints[1, walls.name.index("right")] == pytest.approx(np.array([[6.0, 0.0], [6.0, 4.0]]))
-    assert "PROPOSED" not in said
-    assert "omegaz summed up" in said
-    assert "Left out: fx" in said
+    assert "PROPOSED" not in printed
+    assert "omegaz integrated" in printed
+    assert "Left out: fx" in printed
 
 
-def test_a_box_that_shrinks_with_the_grains_is_no_wall_and_an_empty_step_no_frame(tmp_path, capsys):
-    """As LIGGGHTS writes a box of meshes, before the first grain is poured in and after."""
+def test_a_shrinking_box_gives_proposed_walls_and_an_empty_step_no_frame(tmp_path, capsys):
+    """A box of meshes from LIGGGHTS, before and after the first grain is poured in."""
     folder = tmp_path / "post"
     folder.mkdir()
     for step, y in ((0, None), (800, 1.0), (1600, 1.4)):
         rows = [] if y is None else ["1 1 1 1 0 1 0 7", f"2 1 3 {y} 0 1 0 7"]
         (folder / f"dump{step}.liggghts").write_text(dump(step, rows, box="mm mm mm"))
-    said = take_in(capsys, "lammps", folder, tmp_path / "out")
+    printed = import_files(capsys, "lammps", folder, tmp_path / "out")
     expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
-    assert "PROPOSED, NOT MEASURED: the faces of the simulation's box" in said
+    assert "PROPOSED, NOT MEASURED: the faces of the simulation's box" in printed
     assert "PROPOSED, NOT MEASURED" in (tmp_path / "out" / "experiment.toml").read_text()
 
 
-def test_lammps_dumps_of_a_folder_with_shares_of_the_box_and_quaternions(tmp_path, capsys):
+def test_lammps_dumps_of_a_folder_with_scaled_coordinates_and_quaternions(tmp_path, capsys):
     folder = tmp_path / "post"
     folder.mkdir()
     columns = "id type diameter xs ys zs c_q[1] c_q[2] c_q[3] c_q[4]"
@@ -183,7 +185,7 @@ def test_lammps_dumps_of_a_folder_with_shares_of_the_box_and_quaternions(tmp_pat
         rows = ["1 1 2 0.1666666667 0.25 0.5 1 0 0 0", f"2 1 2 0.5 {y} 0.5 {half if step == 10 else '1 0 0 0'}"]
         (folder / f"dump.{step}").write_text(dump(step, rows, box="pp ff pp", columns=columns))
     (folder / "log.txt").write_text("no dump")
-    take_in(capsys, "lammps", folder, tmp_path / "out")
+    import_files(capsys, "lammps", folder, tmp_path / "out")
     expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
     assert tracks_in(tmp_path / "out").rotation[1] == pytest.approx([0.0, 0.3])
     walls = walls_in(tmp_path / "out")
@@ -191,10 +193,10 @@ def test_lammps_dumps_of_a_folder_with_shares_of_the_box_and_quaternions(tmp_pat
     assert walls.name == ("bottom", "top")
 
 
-def test_a_dump_that_breaks_off_is_named(tmp_path, capsys):
+def test_an_incomplete_dump_is_named(tmp_path, capsys):
     whole = dump(0, ["1 1 1 1 0 1 0 7", "2 1 3 1 0 1 0 7"])
     (tmp_path / "dump").write_text(whole[:-18])
-    assert "row 11: is not the 8 cells" in refuse(capsys, "lammps", tmp_path / "dump", tmp_path / "out")
+    assert "row 11: does not have 8 cells" in refuse(capsys, "lammps", tmp_path / "dump", tmp_path / "out")
     (tmp_path / "dump").write_text("ITEM: TIMESTEP\nlate\n")
     assert "ITEM: TIMESTEP" in refuse(capsys, "lammps", tmp_path / "dump", tmp_path / "out")
 
@@ -204,9 +206,9 @@ def test_yade_text_of_two_steps(tmp_path, capsys):
     folder.mkdir()
     for step, z in ((9, 1.0), (10, 1.4)):
         (folder / f"s{step}.txt").write_text(f"#format x_y_z_r_matId\n# a test\n1\t0\t1\t1\t0\n3\t0\t{z}\t1\t0\n")
-    said = take_in(capsys, "yade", folder, tmp_path / "out", "--columns", "y=z")
+    printed = import_files(capsys, "yade", folder, tmp_path / "out", "--columns", "y=z")
     expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
-    assert "Left out: matId" in said
+    assert "Left out: matId" in printed
 
 
 def test_yade_vtk_with_ids(tmp_path, capsys):
@@ -218,16 +220,16 @@ def test_yade_vtk_with_ids(tmp_path, capsys):
             f"3 {y} 0\n1 1 0\n\nPOINT_DATA 2\nSCALARS radius double 1\nLOOKUP_TABLE default\n1\n1\n\n"
             "SCALARS id int 1\nLOOKUP_TABLE default\n8\n4\n"
         )
-    take_in(capsys, "yade", folder, tmp_path / "out")
+    import_files(capsys, "yade", folder, tmp_path / "out")
     expect_pair(tmp_path / "out", np.array([2.0, 0.0, 0.4]), 1.0)
     assert tracks_in(tmp_path / "out").id.tolist() == [4, 8]
 
 
-def expect_pair(folder: Path, apart_and_rise: np.ndarray, radius: float) -> None:
-    """From the first grain to the second, and how far that one rises as seen."""
+def expect_pair(folder: Path, vector_and_rise: np.ndarray, radius: float) -> None:
+    """Check the vector from the first grain to the second, and the rise of the second."""
     tracks = tracks_in(folder)
     between = tracks.position[0, 1] - tracks.position[0, 0]
     rise = tracks.position[1, 1] - tracks.position[0, 1]
-    assert [*between, rise[1]] == pytest.approx(apart_and_rise, abs=1e-9)
+    assert [*between, rise[1]] == pytest.approx(vector_and_rise, abs=1e-9)
     assert rise[0] == pytest.approx(0.0, abs=1e-12)
     assert tracks.radius == pytest.approx([radius, radius])

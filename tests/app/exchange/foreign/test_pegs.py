@@ -1,4 +1,4 @@
-"""Photoelastic discs and their forces, in both ways that PeGS and the rigidity library write them."""
+"""Photoelastic discs and their forces, in both formats of PeGS and the rigidity library."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
 
-from .command import refuse, take_in, tracks_in, walls_in
+from .command import import_files, refuse, tracks_in, walls_in
 
 PIXEL = 1e-4
 DISCS = "1,100,300,30,7.5\n2,160.5,300,30,0\n3,130,248,29,0\n"
-ROW_TELLS = "0,0.5,0\n0.3,0,0.2\n0,0,0\n"  # disc 1 tells .5 on its contact with 2, disc 2 tells .3 and .2 on 3
+READINGS = "0,0.5,0\n0.3,0,0.2\n0,0,0\n"  # row: disc that is read, column: other disc
 
 
-def write_frame(folder: Path, stem: str, discs: str = DISCS, normal: str = ROW_TELLS) -> None:
+def write_frame(folder: Path, stem: str, discs: str = DISCS, normal: str = READINGS) -> None:
     (folder / f"{stem}_ParticleData.dlm").write_text(discs)
     (folder / f"{stem}_NormWeightedAdjacencyMatrix.dlm").write_text(normal)
     (folder / f"{stem}_TanWeightedAdjacencyMatrix.dlm").write_text(normal.replace("0.", "0.0"))
@@ -28,12 +28,12 @@ def truth_in(folder: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def test_both_sides_of_a_contact_are_kept_beside_their_mean(tmp_path, capsys):
+def test_both_readings_of_a_contact_are_stored_beside_their_mean(tmp_path, capsys):
     folder = tmp_path / "solved"
     folder.mkdir()
     for stem in ("DSC9_solved", "DSC10_solved"):
         write_frame(folder, stem, DISCS if stem == "DSC9_solved" else DISCS.replace("248", "247"))
-    said = take_in(capsys, "pegs", folder, tmp_path / "out")
+    printed = import_files(capsys, "pegs", folder, tmp_path / "out")
     rows = truth_in(tmp_path / "out")
     assert [(row["frame"], row["i"], row["j"]) for row in rows[:2]] == [("0", "1", "2"), ("0", "2", "3")]
     assert [float(row["fn"]) for row in rows[:2]] == pytest.approx([0.4, 0.2])
@@ -44,21 +44,21 @@ def test_both_sides_of_a_contact_are_kept_beside_their_mean(tmp_path, capsys):
     assert np.isnan(tracks.rotation).all()
     rise = tracks.position[1, 2] - tracks.position[0, 2]
     assert rise == pytest.approx([0.0, PIXEL])
-    assert "pixel size is not told" in said
-    assert "4 forces are the truth" in said
+    assert "pixel size is unknown" in printed
+    assert "4 measured forces are in truth_contacts.csv" in printed
     config = load_experiment(tmp_path / "out").config
     assert config.material.stiffness == "estimate"
     assert config.boundary is not None
     assert config.boundary.grains == "outer"
-    take_in(capsys, "pegs", folder, tmp_path / "boxed", "--walls", "box")
+    import_files(capsys, "pegs", folder, tmp_path / "boxed", "--walls", "box")
     assert walls_in(tmp_path / "boxed") is not None
 
 
-def test_bonds_alone_have_one_side(tmp_path, capsys):
+def test_bonds_without_matrices_give_one_reading(tmp_path, capsys):
     write_frame(tmp_path, "one")
     for file in tmp_path.glob("*Matrix.dlm"):
         file.unlink()
-    take_in(capsys, "pegs", tmp_path, tmp_path / "out", "--pixel-size", 2 * PIXEL)
+    import_files(capsys, "pegs", tmp_path, tmp_path / "out", "--pixel-size", 2 * PIXEL)
     rows = truth_in(tmp_path / "out")
     assert [(row["i"], row["j"], row["fn_i"], row["fn_j"]) for row in rows] == [
         ("1", "2", "", "0.3"), ("2", "3", "", "0.1"),
@@ -70,16 +70,16 @@ def test_lists_of_all_photographs(tmp_path, capsys):
     positions = "".join(f"{frame},{row}\n" for frame in (3, 4) for row in DISCS.splitlines())
     (tmp_path / "particle_positions.txt").write_text(positions)
     (tmp_path / "Adjacency_list.txt").write_text("3,1,2,.01,.5\n3,2,1,.01,.3\n3,1,-1,0,.9\n4,2,3,0,.2\n4,2,77,0,.2\n")
-    said = take_in(capsys, "pegs", tmp_path, tmp_path / "out")
+    printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out")
     rows = truth_in(tmp_path / "out")
     assert [(row["frame"], row["i"], row["j"]) for row in rows] == [("0", "1", "2"), ("1", "2", "3")]
     assert float(rows[0]["fn"]) == pytest.approx(0.4)
-    assert "1 forces on walls are left out" in said
-    assert "1 forces are left out" in said
+    assert "1 forces on walls are left out" in printed
+    assert "1 forces of discs without a position are left out" in printed
 
 
 def test_damaged_files_are_named(tmp_path, capsys):
-    assert "holds neither" in refuse(capsys, "pegs", tmp_path, tmp_path / "out")
+    assert "contains neither" in refuse(capsys, "pegs", tmp_path, tmp_path / "out")
     write_frame(tmp_path, "one", discs=DISCS.replace("248", "x"))
     assert "row 3: '3,130,x,29,0' is not numbers" in refuse(capsys, "pegs", tmp_path, tmp_path / "out")
     write_frame(tmp_path, "one", normal="0,1\n1,0\n")
@@ -92,3 +92,32 @@ def test_damaged_files_are_named(tmp_path, capsys):
     (tmp_path / "one_bonds.txt").write_text("3 0 0 0 1\n")
     assert "names disc 3 of 3" in refuse(capsys, "pegs", tmp_path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_forces_that_are_given_twice_are_one_reading(tmp_path, capsys):
+    discs = "".join(f"{k},{100 + 60 * k},300,30,0\n" for k in range(1, 5))
+    matrix = np.zeros((4, 4))
+    for k, force in enumerate((0.5, 0.3, 0.7)):
+        matrix[k, k + 1] = matrix[k + 1, k] = force
+    text = "\n".join(",".join(map(str, row)) for row in matrix.tolist()) + "\n"
+    write_frame(tmp_path, "one", discs, text)
+    printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out")
+    assert "3 contacts are given twice and are equal: copies" in printed
+    rows = truth_in(tmp_path / "out")
+    assert [float(row["fn"]) for row in rows] == [0.5, 0.3, 0.7]
+    assert {row["fn_j"] for row in rows} == {""}
+    matrix[1, 0] = 0.4  # a reading of its own
+    write_frame(tmp_path, "one", discs, "\n".join(",".join(map(str, row)) for row in matrix.tolist()) + "\n")
+    assert "copies" not in import_files(capsys, "pegs", tmp_path, tmp_path / "two")
+    assert truth_in(tmp_path / "two")[0]["fn_j"] == "0.4"
+
+
+def test_discs_that_the_file_puts_at_the_edge_are_the_boundary(tmp_path, capsys):
+    rows = [f"{frame},{k},{60 * (k % 4)},{60 * (k // 4)},30,{int(k % 4 == 0)}" for frame in (1, 2) for k in range(12)]
+    (tmp_path / "particle_positions.txt").write_text("\n".join(rows) + "\n")
+    printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out")
+    assert "The 3 grains at the edge" in printed
+    assert (tmp_path / "out/boundary.csv").read_text().split() == ["id", "0", "4", "8"]
+    assert load_experiment(tmp_path / "out").config.boundary.grains == "boundary.csv"
+    import_files(capsys, "pegs", tmp_path, tmp_path / "outer", "--walls", "outer")
+    assert load_experiment(tmp_path / "outer").config.boundary.grains == "outer"

@@ -1,4 +1,4 @@
-"""Any tracker's table becomes an experiment, or is refused in a line that names the row."""
+"""The table of any tracker is imported, or refused with a message that names the row."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from .command import refuse, take_in, tracks_in, walls_in
+from .command import import_files, refuse, tracks_in, walls_in
 
 COLUMNS = "frame=t,id=rod,x=X,y=Y,theta=turn,radius=R"
 ROWS = [(5, "a", 10.0, 20.0, 350.0, 4.0), (5, "b", 18.0, 20.0, 0.0, 4.0), (7, "a", 11.0, 22.0, 5.0, 4.0)]
@@ -24,7 +24,7 @@ def write(file: Path, separator: str = ",", *, start: str = "", end: str = "\n",
 
 
 def expect_rows(folder: Path) -> None:
-    """Grain a moves by (1, −2) px and turns by −15° as seen from above; b is lost in the second frame."""
+    """Grain a moves by (1, −2) px and rotates by −15° as seen; b is lost in the second frame."""
     tracks = tracks_in(folder)
     assert tracks.id.tolist() == [0, 1]
     assert tracks.radius == pytest.approx([4.0 * PIXEL, 4.0 * PIXEL])
@@ -41,18 +41,18 @@ def expect_rows(folder: Path) -> None:
     [(",", "", "\n", "."), (";", "\ufeff", "\r\n", "."), ("\t", "", "\r\n", "."), (" ", "", "\n", "."),
      (";", "", "\r\n", ","), ("\t", "", "\n", ","), ("  ", "# made by hand\n", "\n", ",")],
 )  # fmt: skip
-def test_whatever_stands_between_the_cells(tmp_path, capsys, separator, start, end, decimal):
+def test_every_separator_and_decimal_mark_is_read(tmp_path, capsys, separator, start, end, decimal):
     file = write(tmp_path / "any.txt", separator, start=start, end=end, decimal=decimal)
-    said = take_in(
+    printed = import_files(
         capsys, "table", file, tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL, "--y-down", "--degrees",
         "--interval", 30,
     )  # fmt: skip
     expect_rows(tmp_path / "out")
-    assert "they were 5 … 7" in said
-    assert "1 poses lost" in said
-    assert "ids.csv" in said
-    assert "jumped by turns" in said
-    assert "add [walls]" in said
+    assert "they were 5 … 7" in printed
+    assert "1 poses lost" in printed
+    assert "ids.csv" in printed
+    assert "Jumps by 2π were removed" in printed
+    assert "add [walls]" in printed
 
 
 def test_parquet_and_utf_16(tmp_path, capsys):
@@ -63,7 +63,7 @@ def test_parquet_and_utf_16(tmp_path, capsys):
     (tmp_path / "wide.csv").write_bytes(codecs.BOM_UTF16_LE + text.encode("utf-16-le"))
     for name in ("any.parquet", "wide.csv"):
         out = tmp_path / f"out {name}"
-        take_in(
+        import_files(
             capsys, "table", tmp_path / name, out, "--columns", COLUMNS, "--pixel-size", PIXEL, "--y-down",
             "--degrees", "--interval", 30,
         )  # fmt: skip
@@ -72,32 +72,32 @@ def test_parquet_and_utf_16(tmp_path, capsys):
 
 def test_a_table_without_a_header_has_numbered_columns(tmp_path, capsys):
     (tmp_path / "bare.txt").write_text("0 3 .1 .2\n0 4 .3 .2\n")
-    said = take_in(
+    printed = import_files(
         capsys, "table", tmp_path / "bare.txt", tmp_path / "out", "--columns", "frame=1,id=2,x=3,y=4", "--radius", 0.1
     )
     tracks = tracks_in(tmp_path / "out")
     assert tracks.id.tolist() == [3, 4]
     assert tracks.radius.tolist() == [0.1, 0.1]
     assert np.isnan(tracks.rotation).all()
-    assert "rotation is unknown" in said
+    assert "rotation is unknown" in printed
 
 
-def test_y_counts_from_the_last_row_of_a_photograph_that_is_told(tmp_path, capsys):
+def test_y_is_measured_from_the_last_row_with_a_given_height(tmp_path, capsys):
     file = write(tmp_path / "any.csv")
-    take_in(
+    import_files(
         capsys, "table", file, tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL, "--y-down",
         "--height", 100,
     )  # fmt: skip
     assert tracks_in(tmp_path / "out").position[0, 0, 1] == pytest.approx(79.0 * PIXEL)
 
 
-def test_a_proposed_box_holds_every_grain_and_says_that_it_is_proposed(tmp_path, capsys):
+def test_a_proposed_box_contains_every_grain_and_is_marked_as_proposed(tmp_path, capsys):
     file = write(tmp_path / "any.csv")
-    said = take_in(
+    printed = import_files(
         capsys, "table", file, tmp_path / "out", "--columns", COLUMNS, "--pixel-size", PIXEL, "--walls", "box",
         "--pressure", "top=5e4", "left=2e4",
     )  # fmt: skip
-    assert "PROPOSED, NOT MEASURED" in said
+    assert "PROPOSED, NOT MEASURED" in printed
     assert "PROPOSED, NOT MEASURED" in (tmp_path / "out" / "experiment.toml").read_text()
     tracks, walls = tracks_in(tmp_path / "out"), walls_in(tmp_path / "out")
     assert walls is not None
@@ -110,19 +110,19 @@ def test_a_proposed_box_holds_every_grain_and_says_that_it_is_proposed(tmp_path,
     assert np.nanmin(gap, axis=2) == pytest.approx(np.zeros((2, 4)), abs=1e-12)
 
 
-def test_walls_of_a_file_are_turned_so_that_the_packing_lies_to_their_left(tmp_path, capsys):
+def test_walls_of_a_file_are_oriented_with_the_packing_to_their_left(tmp_path, capsys):
     file = write(tmp_path / "any.csv")
     rows = ["frame,wall,x1,y1,x2,y2", "5,floor,0,26,30,26", "7,floor,0,27,30,27"]
     (tmp_path / "bars.csv").write_text("\n".join(rows))
     arguments = ("--columns", COLUMNS, "--pixel-size", PIXEL, "--y-down", "--walls", tmp_path / "bars.csv")
-    take_in(capsys, "table", file, tmp_path / "out", *arguments)
+    import_files(capsys, "table", file, tmp_path / "out", *arguments)
     walls = walls_in(tmp_path / "out")
     assert walls is not None
     assert walls.endpoints[0, 0] == pytest.approx(np.array([[0.0, -4.0], [30.0, -4.0]]) * PIXEL)
     assert walls.endpoints[1, 0, :, 1] == pytest.approx(np.full(2, -5.0) * PIXEL)
     (tmp_path / "bars.csv").write_text("\n".join(rows[:2]))
-    take_in(capsys, "table", file, tmp_path / "still", *arguments)
-    walls = walls_in(tmp_path / "still")
+    import_files(capsys, "table", file, tmp_path / "fixed", *arguments)
+    walls = walls_in(tmp_path / "fixed")
     assert walls is not None
     assert np.ptp(walls.endpoints, axis=0).max() == 0.0
 
@@ -130,7 +130,7 @@ def test_walls_of_a_file_are_turned_so_that_the_packing_lies_to_their_left(tmp_p
 @pytest.mark.parametrize(
     ("text", "columns", "problem"),
     [
-        ("t,rod,X,Y\n0,1,2,3\n", "frame=t,id=rod,x=X", "which column is y?"),
+        ("t,rod,X,Y\n0,1,2,3\n", "frame=t,id=rod,x=X", "has no column for y: give --columns y=…"),
         ("t,rod,X,Y\n0,1,2,3\n", "frame=t,id=rod,x=X,y=Z", "column Z: there is no such column"),
         ("t,rod,X,Y\n0,1,2,3\n", "frame=t,id=rod,x=X,z=Y", "z: is not known"),
         ("t,rod,X,Y\n0,1,2,3\n", "frame", "is not ROLE=COLUMN"),
@@ -138,7 +138,7 @@ def test_walls_of_a_file_are_turned_so_that_the_packing_lies_to_their_left(tmp_p
         ("t,rod,X,Y\n0,1,two,3\n", "frame=t,id=rod,x=X,y=Y", "row 2, X = 'two': is not a number"),
         ("t,rod,X,Y\n0.5,1,2,3\n", "frame=t,id=rod,x=X,y=Y", "row 2, t = '0.5'"),
         ("t,rod,X,Y\n1e30,1,2,3\n", "frame=t,id=rod,x=X,y=Y", "row 2, t = '1e30'"),
-        ("t,rod,X,Y\n0,1,2,3\n0,1.0,4,3\n", "frame=t,id=rod,x=X,y=Y", "row 3, rod = '1.0': stands twice in frame 0"),
+        ("t,rod,X,Y\n0,1,2,3\n0,1.0,4,3\n", "frame=t,id=rod,x=X,y=Y", "row 3, rod = '1.0': occurs twice in frame 0"),
         ("t;rod;X;Y\n0;1;2,5;3\n0;2;1.234,5;3\n0;3;1,5;3.5\n", "frame=t,id=rod,x=X,y=Y", "row 2, X = '2,5'"),
         ("t,rod,X,Y\n0,,2,3\n", "frame=t,id=rod,x=X,y=Y", "is empty: no row belongs to a grain"),
         ("t,rod,X,Y\n0,1,2,3\n", "frame=t,id=rod,x=X,y=Y", "--radius"),
@@ -146,18 +146,18 @@ def test_walls_of_a_file_are_turned_so_that_the_packing_lies_to_their_left(tmp_p
         ("", "frame=t,id=rod,x=X,y=Y", "is empty"),
     ],
 )
-def test_what_is_wrong_is_named_and_nothing_is_written(tmp_path, capsys, text, columns, problem):
+def test_errors_are_named_and_nothing_is_written(tmp_path, capsys, text, columns, problem):
     (tmp_path / "bad.csv").write_text(text)
     assert problem in refuse(capsys, "table", tmp_path / "bad.csv", tmp_path / "out", "--columns", columns)
     assert not (tmp_path / "out").exists()
 
 
-def test_options_that_do_not_fit_are_refused(tmp_path, capsys):
+def test_inconsistent_options_are_refused(tmp_path, capsys):
     file = write(tmp_path / "any.csv")
     arguments = ("table", file, tmp_path / "out", "--columns", COLUMNS)
-    assert "is no wall" in refuse(capsys, *arguments, "--pressure", "top=5e4")
+    assert "is not a wall" in refuse(capsys, *arguments, "--pressure", "top=5e4")
     assert "is not WALL=PA" in refuse(capsys, *arguments, "--walls", "box", "--pressure", "top")
     assert "is not positive" in refuse(capsys, *arguments, "--pixel-size", -1)
     assert "there is no such file" in refuse(capsys, *arguments, "--walls", tmp_path / "none.csv")
-    take_in(capsys, *arguments)
-    assert "is there already" in refuse(capsys, *arguments)
+    import_files(capsys, *arguments)
+    assert "already exists" in refuse(capsys, *arguments)

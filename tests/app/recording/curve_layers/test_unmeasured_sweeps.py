@@ -12,7 +12,7 @@ from tests.app.recording.rows import rows
 SWEEPS, SPACING = 50, 7
 
 
-def test_sweeps_that_were_not_measured_leave_no_gap_in_the_curves(tmp_path):
+def test_unmeasured_sweeps_leave_no_gap_in_the_curves(tmp_path):
     results = make_results(1, sweeps=SWEEPS)
     sweep = np.arange(SWEEPS)
     known = (sweep % SPACING == 0) | (sweep == SWEEPS - 1)

@@ -12,16 +12,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.cli.main import main
+from rodsight.recording.archive.readback import read_forces
+from rodsight.recording.archive.repair import repair_recording
 from rodsight.recording.files.live import LiveRecording
-from rodsight.recording.files.live_process import LiveProcess, _Waiting
-from rodsight.recording.files.readback import read_forces
-from rodsight.recording.files.repair import repair_recording
+from rodsight.recording.files.live_process import LiveProcess, _MessageQueue
 
 from tests.app.recording.fake_results import make_results
 from tests.browser import forces_drawn, open_when_served, picture_of, wait_for_colour, wait_for_forces
-from tests.program import SENT, TELLING, wait_until_told
+from tests.program import REPORTING, SENT, wait_for_report
 
-CANVAS = (13, 14, 18)  # behind a packing
+CANVAS = (13, 14, 18)  # background of a packing
 
 
 def before(results):
@@ -38,7 +38,7 @@ def test_the_file_of_a_live_recording_is_complete(results, tmp_path):
     found = read_forces(live.path)
     assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
     assert live.notes == []
-    # Frames reach the file one by one, which must not keep it from being whole.
+    # The file must be complete although the frames are written one by one.
     assert repair_recording(live.path, tmp_path / "again.rrd").frames == len(results.frames)
 
 
@@ -50,13 +50,13 @@ def test_every_finished_frame_is_in_the_file_before_the_next_begins(tmp_path):
         for count, (forces, statistics) in enumerate(zip(results.frames, results.statistics, strict=True), 1):
             live.frame(forces, statistics)
             copy = tmp_path / f"copy{count}.rrd"
-            copy.write_bytes(live.path.read_bytes())  # as if the machine went down here
-            assert repair_recording(copy, tmp_path / f"mended{count}.rrd").frames == count
+            copy.write_bytes(live.path.read_bytes())  # as after a crash of the machine
+            assert repair_recording(copy, tmp_path / f"repaired{count}.rrd").frames == count
     finally:
         live.close()
 
 
-def test_nobody_outside_this_machine_is_served(results, tmp_path):
+def test_requests_from_outside_this_machine_are_refused(results, tmp_path):
     live = LiveRecording(tmp_path / "live.rrd", "web")
     live.start(before(results))
     try:
@@ -70,11 +70,11 @@ def test_nobody_outside_this_machine_is_served(results, tmp_path):
 
 
 def other_address() -> str:
-    """An address of this machine beside 127.0.0.1: another of the loopback network, which 0.0.0.0 would listen on."""
+    """Return another address of the loopback network, on which 0.0.0.0 would listen."""
     return "127.0.0.2"
 
 
-def test_a_viewer_where_there_is_no_display_is_only_told_about(results, tmp_path, monkeypatch):
+def test_without_a_display_only_a_hint_is_given(results, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -85,62 +85,62 @@ def test_a_viewer_where_there_is_no_display_is_only_told_about(results, tmp_path
 
 
 @pytest.mark.screen
-def test_a_watched_run_ends_with_the_full_recording_alone(tracked, tmp_path, capsys):
+def test_a_watched_run_ends_with_the_full_recording_only(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     with pytest.raises(SystemExit) as end:
         main(["run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=50"])
     assert not end.value.code
-    told = capsys.readouterr().out
-    assert "ssh -L" in told
-    assert "http://127.0.0.1:" in told
+    output = capsys.readouterr().out
+    assert "ssh -L" in output
+    assert "http://127.0.0.1:" in output
     assert sorted(file.name for file in out.glob("*.rrd")) == ["recording.rrd"]
     assert len(read_forces(out / "recording.rrd")) == 5
 
 
-def test_what_another_process_records_is_complete(results, tmp_path):
-    told: list[str] = []
-    live = LiveProcess(tmp_path / "live.rrd", told.append, viewer="web")
+def test_the_recording_of_another_process_is_complete(results, tmp_path):
+    messages: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", messages.append, viewer="web")
     live.start(before(results))
     for forces, statistics in zip(results.frames, results.statistics, strict=True):
         live.frame(forces, statistics)
-    live.close(whole=True)
+    live.close(complete=True)
     found = read_forces(live.path)
     assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
-    assert ["Watch it at" in sentence for sentence in told] == [True]
-    assert not any(answers(port) for port in ports_of(told[0]))
+    assert ["Watch it at" in sentence for sentence in messages] == [True]
+    assert not any(answers(port) for port in ports_of(messages[0]))
 
 
-def test_a_process_that_breaks_off_does_no_harm_to_the_run(results, tmp_path):
-    told: list[str] = []
-    live = LiveProcess(tmp_path / "live.rrd", told.append)
+def test_a_killed_live_process_does_not_affect_the_run(results, tmp_path):
+    messages: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", messages.append)
     live.start(before(results))
     live._process.kill()
     for forces, statistics in zip(results.frames, results.statistics, strict=True):
         live.frame(forces, statistics)
-    live.close(whole=True)
-    assert told == ["The live view broke off, without harm to the run."]
+    live.close(complete=True)
+    assert messages == ["The live view broke off, without harm to the run."]
 
 
-def test_without_room_for_frames_that_wait_the_view_ends_and_the_run_goes_on(results, tmp_path, monkeypatch):
-    told: list[str] = []
-    live = LiveProcess(tmp_path / "live.rrd", told.append)
+def test_without_disk_space_for_waiting_frames_the_view_ends_and_the_run_continues(results, tmp_path, monkeypatch):
+    messages: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", messages.append)
     live.start(replace(results, frames=(), statistics=()))
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(_Waiting, "put", full)
+    monkeypatch.setattr(_MessageQueue, "put", full)
     live.frame(results.frames[0], results.statistics[0])
-    live.close(whole=False)
-    assert told[0] == "The live view ends here, without harm to the run: No space left on device."
+    live.close(complete=False)
+    assert messages[0] == "The live view ends here, without harm to the run: No space left on device."
 
 
 def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
-    told: list[str] = []
-    live = LiveProcess(tmp_path / "live.rrd", told.append, viewer="web")
-    live.close(whole=True)
+    messages: list[str] = []
+    live = LiveProcess(tmp_path / "live.rrd", messages.append, viewer="web")
+    live.close(complete=True)
     assert live._process.returncode is not None
-    assert told == []
+    assert messages == []
     assert not live.path.exists()
 
 
@@ -148,22 +148,22 @@ def test_a_run_that_solves_nothing_leaves_no_process_and_no_recording(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
 def test_a_run_that_is_stopped_leaves_a_recording_that_opens_and_no_server(tracked, tmp_path, number):
     out = tmp_path / "out"
-    command = [*TELLING, "run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=20000"]
+    command = [*REPORTING, "run", str(tracked), "--out", str(out), "--view", "web", "--set", "solver.sweeps=20000"]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert run.stdout is not None
     ports = ports_of(run.stdout.readline())
-    wait_until_told(run, SENT, 2)  # what is still under way to the recording is lost with a killed run
-    os.killpg(run.pid, number)  # as a terminal does: to all of its processes
-    told, said = run.communicate(timeout=60)  # its servers' processes have ended too, or these pipes were still open
+    wait_for_report(run, SENT, 2)  # frames not yet sent are lost if the run is killed
+    os.killpg(run.pid, number)  # as a terminal does: all its processes
+    output, errors = run.communicate(timeout=60)  # ends only if the processes of its servers have closed these pipes
     assert len(ports) == 1
     assert not any(answers(port) for port in ports)
     assert len(read_forces(out / "recording-live.rrd")) >= 2
     assert not (out / "recording.rrd").exists()
     if number == signal.SIGKILL:
-        assert run.returncode == -signal.SIGKILL, said
+        assert run.returncode == -signal.SIGKILL, errors
     else:
-        assert run.returncode == 128 + number, said
-        assert "What was solved so far" in told
+        assert run.returncode == 128 + number, errors
+        assert "The frames solved so far" in output
 
 
 def ports_of(hint: str) -> list[int]:
@@ -183,10 +183,10 @@ def test_the_live_page_draws_the_forces_as_they_come(results, tmp_path, page):
     live = LiveRecording(tmp_path / "live.rrd", "web")
     live.start(before(results))
     try:
-        page.emulate_media(color_scheme="light")  # so that nothing is dark but a view
+        page.emulate_media(color_scheme="light")  # so that only a view is dark
         open_when_served(page, f"{live.address}&renderer=webgl")
         wait_for_colour(page, np.array([300, 400]), CANVAS, least=2000, reach=25)
-        assert not forces_drawn(picture_of(page))  # nothing solved yet
+        assert not forces_drawn(picture_of(page))  # no frame is solved yet
         for forces, statistics in zip(results.frames, results.statistics, strict=True):
             live.frame(forces, statistics)
         wait_for_forces(page)

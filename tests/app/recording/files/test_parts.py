@@ -1,4 +1,4 @@
-"""A long recording in parts: each opens alone, all read as one."""
+"""A long recording in parts: each part opens alone, and all are read as one recording."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
-from rodsight.recording.files.catalogue import find_recordings
-from rodsight.recording.files.finished_run import write_recording
-from rodsight.recording.files.readback import read_forces
-from rodsight.recording.files.share import share_recording
+from rodsight.recording.archive.catalogue import find_recordings
+from rodsight.recording.archive.readback import read_forces
+from rodsight.recording.archive.share import share_recording
+from rodsight.recording.files.finished_run import RecordingOptions, write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.parts import part_of, parts_of
 from rodsight.recording.viewing.pictures import timeline_values
@@ -35,14 +35,14 @@ def whole(results, tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def split(results, tmp_path_factory) -> Path:
     file = tmp_path_factory.mktemp("split") / "recording.rrd"
-    written = write_recording(results, file, part_frames=IN_ONE)
+    written = write_recording(results, file, options=RecordingOptions(part_frames=IN_ONE))
     assert written.parts == 3
     assert written.size == sum(each.stat().st_size for each in file.parent.iterdir())
     assert "3 files" in written.notes[-1]
     return file
 
 
-def test_all_parts_together_are_the_recording(whole, split):
+def test_all_parts_together_equal_the_recording(whole, split):
     one, many = read_forces(whole), read_forces(split)
     assert list(one) == list(many) == list(range(FRAMES))
     for frame in one:
@@ -57,7 +57,7 @@ def test_every_part_opens_alone(whole, split):
     for number, part in enumerate(parts_of(split)):
         entry, store = RrdReader(str(part)).recordings()[0], RrdReader(str(part)).store()
         assert entry.recording_id == RrdReader(str(split)).recordings()[0].recording_id
-        layers = {path for path in paths if path.startswith(entities.FILM_FRAMES)} | {"/flags"}  # of some frames
+        layers = {path for path in paths if path.startswith(entities.FILM_FRAMES)} | {"/flags"}  # only in some frames
         assert paths - layers - set(store.schema().entity_paths()) == set()
         frames = {int(k) for c in store.stream().filter(has_timeline=entities.FRAME).to_chunks()
                   for k in c.to_record_batch().column(entities.FRAME).to_pylist()}  # fmt: skip
@@ -70,25 +70,29 @@ def test_some_frames_of_several_parts_are_shared(split, tmp_path):
     assert shared.former_size == sum(each.stat().st_size for each in parts_of(split))
 
 
-def test_parts_are_no_recordings_of_their_own_for_a_folder(split):
+def test_parts_are_not_listed_as_recordings_of_a_folder(split):
     assert find_recordings(split.parent) == [split]
 
 
 def test_a_shorter_recording_leaves_no_part_behind(results, tmp_path):
     file = tmp_path / "recording.rrd"
-    write_recording(results, file, part_frames=IN_ONE)
+    write_recording(results, file, options=RecordingOptions(part_frames=IN_ONE))
     write_recording(replace(results, frames=results.frames[:FRAMES]), file)
     assert [each.name for each in tmp_path.iterdir()] == ["recording.rrd"]
 
 
-def test_a_part_of_another_recording_is_none_of_it(whole, split, tmp_path):
+def test_a_part_of_another_recording_is_ignored(whole, split, tmp_path):
     for source, name in ((whole, "recording.rrd"), (part_of(split, 2), "recording-part-2.rrd")):
         (tmp_path / name).write_bytes(source.read_bytes())
     assert parts_of(tmp_path / "recording.rrd") == [tmp_path / "recording.rrd"]
 
 
 def test_a_size_is_that_of_all_parts(results, tmp_path):
-    full = write_recording(results, tmp_path / "full.rrd", part_frames=IN_ONE, sweeps="all")
-    less = write_recording(results, tmp_path / "less.rrd", part_frames=IN_ONE, sweeps="all", max_size=full.size - 1)
+    full = write_recording(results, tmp_path / "full.rrd", options=RecordingOptions(part_frames=IN_ONE, sweeps="all"))
+    less = write_recording(
+        results,
+        tmp_path / "less.rrd",
+        options=RecordingOptions(part_frames=IN_ONE, sweeps="all", max_size=full.size - 1),
+    )
     assert less.size < full.size
     assert not list(tmp_path.glob("*.part"))

@@ -8,8 +8,8 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 from rodsight.experiment.units import Scale
-from rodsight.recording.files.finished_run import _check_whole, write_recording
-from rodsight.recording.files.readback import read_forces
+from rodsight.recording.archive.readback import read_forces
+from rodsight.recording.files.finished_run import RecordingOptions, _check_complete, write_recording
 from rodsight.recording.files.recorder import Recorder
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
@@ -18,8 +18,8 @@ from rodsight.recording.look.scene import Scene
 from rodsight.recording.packing_layers.forces.network import SweepChoice
 from rodsight.recording.tabs.blueprint import Tab
 from rodsight.recording.viewing.viewer import viewer_binary
+from rodsight.solver.frame_forces import FrameStatus
 
-from solver.sequence.frame_forces import FrameStatus
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest
@@ -42,7 +42,7 @@ def test_the_same_run_recorded_twice_is_the_same(results, truth, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_the_comparison_sees_a_force_that_differs(results, tmp_path):
+def test_the_comparison_detects_a_differing_force(results, tmp_path):
     write_recording(results, tmp_path / "first.rrd")
     fn = results.frames[1].fn.copy()
     fn[0] *= 1.001
@@ -56,7 +56,7 @@ def test_the_file_embeds_its_blueprint(recording):
     assert len(RrdReader(str(recording.path)).recordings()) == 1
 
 
-def test_an_interrupted_recording_leaves_the_former_file_untouched(results, tmp_path):
+def test_an_interrupted_recording_leaves_the_former_file_unchanged(results, tmp_path):
     path = tmp_path / "run.rrd"
     write_recording(results, path)
     former = path.read_bytes()
@@ -71,13 +71,13 @@ def test_an_interrupted_recording_leaves_the_former_file_untouched(results, tmp_
     assert [child.name for child in tmp_path.iterdir()] == ["run.rrd"]
 
 
-def test_progress_is_told_after_every_frame(results, tmp_path):
-    told = []
-    write_recording(results, tmp_path / "run.rrd", progress=lambda done, total: told.append((done, total)))
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+def test_progress_is_reported_after_every_frame(results, tmp_path):
+    calls = []
+    write_recording(results, tmp_path / "run.rrd", progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def test_a_stream_in_memory_takes_the_same_frames_one_by_one(results, tmp_path):
+def test_a_stream_in_memory_receives_the_same_frames_one_by_one(results, tmp_path):
     canvas = Canvas.around(results.tracks, None)
     style = ForceStyle.on(canvas, ForceRange.of(results.frames))
     scene = Scene(
@@ -96,28 +96,30 @@ def test_a_stream_in_memory_takes_the_same_frames_one_by_one(results, tmp_path):
     assert all(np.array_equal(found[forces.frame].fn, forces.fn) for forces in results.frames)
 
 
-def test_a_recorder_that_was_not_started_says_so(results):
+def test_a_recorder_that_was_not_started_raises(results):
     recorder = Recorder(rr.RecordingStream(entities.APPLICATION_ID))
     with pytest.raises(RuntimeError, match="start"):
         recorder.frame(results.frames[0], results.statistics[0])
 
 
-def test_a_size_limit_thins_the_sweeps_and_says_so(tmp_path):
+def test_a_size_limit_reduces_the_sweeps_and_adds_a_note(tmp_path):
     results = make_results(3, 10, 10, sweeps=400)
-    full = write_recording(results, tmp_path / "full.rrd", sweeps="all")
-    least = write_recording(results, tmp_path / "least.rrd", sweeps="none")
+    full = write_recording(results, tmp_path / "full.rrd", options=RecordingOptions(sweeps="all"))
+    least = write_recording(results, tmp_path / "least.rrd", options=RecordingOptions(sweeps="none"))
     limit = (full.size + least.size) // 2
-    report = write_recording(results, tmp_path / "limited.rrd", sweeps="all", max_size=limit)
+    report = write_recording(results, tmp_path / "limited.rrd", options=RecordingOptions(sweeps="all", max_size=limit))
     assert report.size <= limit < full.size
     assert report.sweeps is SweepChoice.LOG
     assert "Limited" in report.notes[0]
-    hopeless = write_recording(results, tmp_path / "hopeless.rrd", sweeps="all", max_size=1000)
+    hopeless = write_recording(
+        results, tmp_path / "hopeless.rrd", options=RecordingOptions(sweeps="all", max_size=1000)
+    )
     assert hopeless.sweeps is SweepChoice.NONE
     assert "Still larger" in hopeless.notes[-1]
     assert len(read_forces(hopeless.path)) == 3
 
 
-def test_frames_without_contacts_or_forces_are_recorded_too(tmp_path):
+def test_frames_without_contacts_or_forces_are_recorded(tmp_path):
     results = make_results(3, sweeps=20)
     empty = results.frames[1].contacts.select(np.zeros(results.frames[1].contacts.count, bool))
     none, number = np.empty(0), np.empty((20, 0), np.float32)
@@ -149,24 +151,24 @@ def test_photographs_need_a_scale(results, tmp_path):
 
 def test_an_unknown_tab_is_refused(results, tmp_path):
     with pytest.raises(ValueError, match="Truth"):
-        write_recording(results, tmp_path / "run.rrd", active=Tab.TRUTH)
+        write_recording(results, tmp_path / "run.rrd", options=RecordingOptions(active=Tab.TRUTH))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_without_its_end_is_not_taken_for_a_recording(tmp_path):
+def test_a_file_without_its_end_is_refused(tmp_path):
     stream = rr.RecordingStream(entities.APPLICATION_ID)
     stream.save(tmp_path / "cut.rrd", write_footer=False)
     stream.log("/summary", rr.TextDocument("nothing"), static=True)
     stream.disconnect()
-    with pytest.raises(OSError, match="whole"):
-        _check_whole(tmp_path / "cut.rrd")
+    with pytest.raises(OSError, match="completely"):
+        _check_complete(tmp_path / "cut.rrd")
 
 
 def test_a_side_file_opens_as_one_recording_with_every_sweep(tmp_path):
     from rodsight.recording.files.side_file import record_side_file
 
     results = make_results(3, sweeps=200)
-    main = write_recording(results, tmp_path / "run.rrd", sweeps="log").path
+    main = write_recording(results, tmp_path / "run.rrd", options=RecordingOptions(sweeps="log")).path
     size = record_side_file(results, main, tmp_path / "side.rrd", [1])
     assert size == (tmp_path / "side.rrd").stat().st_size
     entries = [RrdReader(str(path)).recordings()[0] for path in (main, tmp_path / "side.rrd")]

@@ -10,7 +10,7 @@ FEW = ("--set", "solver.sweeps=300", "--set", "solver.estimator=nlgs")
 
 
 @pytest.mark.slow
-def test_a_budget_is_kept_and_what_it_cost_is_said(tracked, tmp_path, capsys):
+def test_a_size_limit_is_kept_and_its_reductions_are_reported(tracked, tmp_path, capsys):
     out = tmp_path / "out"
     common = ("record", str(tracked), "--out", str(out), "--sweeps", "all", *FEW)
     assert rodsight(*common) == 0
@@ -35,4 +35,4 @@ def test_every_sweep_of_chosen_frames_goes_to_a_side_file(tracked, tmp_path, cap
     assert rodsight(*common, "--full-frames", "9") == 2
     assert "no frame 9" in capsys.readouterr().err
     assert rodsight(*common) == 0
-    assert not (out / "recording-sweeps.rrd").exists()  # the recording holds everything again
+    assert not (out / "recording-sweeps.rrd").exists()  # the recording contains all sweeps again

@@ -1,4 +1,4 @@
-"""A disk that refuses a recording, or says nothing, is an error in time."""
+"""A disk that refuses a recording, or does not respond, raises an error in time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from rodsight.errors import RunError
+from rodsight.process.errors import RunError
 from rodsight.recording.files import finished_run, writing
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.viewing.viewer import viewer_binary
@@ -23,37 +23,37 @@ FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=200", "--quiet"
 
 
 @pytest.mark.parametrize("taken", [0, 1, 3])
-def test_a_full_disk_is_said_and_the_older_recording_stays(results, tmp_path, monkeypatch, taken):
+def test_a_full_disk_is_reported_and_the_older_recording_kept(results, tmp_path, monkeypatch, taken):
     file = tmp_path / "recording.rrd"
     file.write_bytes(b"older")
-    put, done = writing.put, []
+    write_all, done = writing.write_all, []
 
     def filling(target: int, content: bytes) -> None:
         if len(done) == taken:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        done.append(put(target, content))
+        done.append(write_all(target, content))
 
-    monkeypatch.setattr(writing, "put", filling)
-    with pytest.raises(OSError, match="No space left") as told:
+    monkeypatch.setattr(writing, "write_all", filling)
+    with pytest.raises(OSError, match="No space left") as raised:
         write_recording(results, file)
-    assert told.value.filename == f"{file}.part"
+    assert raised.value.filename == f"{file}.part"
     assert [each.name for each in tmp_path.iterdir()] == [file.name]
     assert file.read_bytes() == b"older"
 
 
-def test_a_disk_that_says_nothing_is_given_up(results, tmp_path, monkeypatch):
+def test_an_unresponsive_disk_raises_at_the_deadline(results, tmp_path, monkeypatch):
     answer = threading.Event()
-    monkeypatch.setattr(writing, "put", lambda *_: answer.wait())
+    monkeypatch.setattr(writing, "write_all", lambda *_: answer.wait())
     monkeypatch.setattr(writing, "DEADLINE", 0.2)
     try:
-        with pytest.raises(OSError, match="nothing could be written for") as told:
+        with pytest.raises(OSError, match="nothing could be written for") as raised:
             write_recording(results, tmp_path / "recording.rrd")
-        assert told.value.errno == errno.ETIMEDOUT
+        assert raised.value.errno == errno.ETIMEDOUT
     finally:
         answer.set()
 
 
-def test_room_is_asked_for_before_anything_is_written(results, tmp_path, monkeypatch):
+def test_free_space_is_checked_before_anything_is_written(results, tmp_path, monkeypatch):
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**9, 10**9 - 1000, 1000))
     with pytest.raises(RunError, match=r"0\.001 MB free, and the recording needs more than"):
@@ -67,13 +67,13 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(place)]
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("no disk can be made here: that needs root")
+        pytest.skip("a disk cannot be mounted: that needs root")
     yield place
     subprocess.run(["umount", "--lazy", str(place)], check=True)
 
 
 @pytest.mark.screen
-def test_a_disk_that_is_full_costs_the_recording_and_nothing_else(tracked, tmp_path, small_disk):
+def test_a_full_disk_prevents_the_recording_and_nothing_else(tracked, tmp_path, small_disk):
     out = tmp_path / "out"
     assert rodsight("solve", tracked, "--out", out, *FEW) == 0
     for name in ("results.h5", "manifest.json"):
@@ -89,9 +89,9 @@ def test_a_disk_that_is_full_costs_the_recording_and_nothing_else(tracked, tmp_p
     assert sorted(each.name for each in small_disk.iterdir()) == ["manifest.json", "others", "results.h5"]
 
 
-def test_the_index_of_a_long_recording_is_made_apart_and_is_all_that_differs(results, tmp_path, monkeypatch):
+def test_the_index_of_a_long_recording_is_made_separately_and_is_the_only_difference(results, tmp_path, monkeypatch):
     write_recording(results, tmp_path / "short.rrd")
-    monkeypatch.setattr(finished_run, "LONG", 1)
+    monkeypatch.setattr(finished_run, "SEPARATE_INDEX_FRAMES", 1)
     write_recording(results, tmp_path / "long.rrd")
     compared = ["rrd", "compare", "--unordered", str(tmp_path / "short.rrd"), str(tmp_path / "long.rrd")]
     assert subprocess.run([viewer_binary(), *compared], capture_output=True, timeout=60).returncode == 0

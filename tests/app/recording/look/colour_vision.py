@@ -1,4 +1,4 @@
-"""Colours as seen without red or green cones or in grey, and how far apart they look."""
+"""Differences of colours in normal, red-blind and green-blind vision and in grey."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _WHITE = _XYZ.sum(axis=1)
 
 
 def cie76(one: tuple[int, ...], other: tuple[int, ...], vision: str = "usual") -> float:
-    """Distance of two sRGB colours in CIELAB, as seen by a vision of VISIONS."""
+    """Return the CIELAB distance of two sRGB colours in a vision of VISIONS."""
     return float(np.linalg.norm(_lab(one, vision) - _lab(other, vision)))
 
 
 def _lab(colour: tuple[int, ...], vision: str) -> np.ndarray:
-    share = np.array(colour[:3]) / 255.0
-    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    fraction = np.array(colour[:3]) / 255.0
+    linear = np.where(fraction <= 0.04045, fraction / 12.92, ((fraction + 0.055) / 1.055) ** 2.4)
     seen = np.clip(VISIONS[vision] @ linear, 0.0, 1.0)
     ratio = _XYZ @ seen / _WHITE
     root = np.where(ratio > 0.008856, np.cbrt(ratio), 7.787 * ratio + 16.0 / 116.0)

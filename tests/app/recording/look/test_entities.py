@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from rodsight.recording.curve_layers.settling import ALL_TRACKED, SOME_CUT, SOME_INFERRED, SOME_LOST, tracking_state
-from rodsight.recording.files.finished_run import write_recording
+from rodsight.recording.files.finished_run import RecordingOptions, write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.force_style import ForceRange, ForceStyle
@@ -25,7 +25,7 @@ def expected(*absent: Condition) -> dict[str, tuple[set[str], set[str]]]:
 
 
 def written(path) -> dict[str, tuple[set[str], set[str]]]:
-    """What is in the file; the entities of single frames as one."""
+    """Return the entities in the file, those of single frames as one."""
     per_frame = {entity.path for entity in SCHEMA if entity.per_frame}
     found = {}
     for path_of, parts in components(path).items():
@@ -37,13 +37,13 @@ def written(path) -> dict[str, tuple[set[str], set[str]]]:
     return found
 
 
-def test_a_full_recording_holds_exactly_what_the_schema_says(recording):
+def test_a_full_recording_contains_exactly_the_entities_of_the_schema(recording):
     assert written(recording.path) == expected(Condition.CELL)
 
 
-def test_a_bare_recording_holds_the_unconditional_part_of_the_schema(tmp_path):
+def test_a_minimal_recording_contains_the_unconditional_part_of_the_schema(tmp_path):
     report = write_recording(make_results(1, sweeps=0, recorded=np.empty(0, int)), tmp_path / "bare.rrd")
-    # The only frame is a reset, so that something is flagged.
+    # The only frame is a reset, which is flagged.
     absent = (Condition.PHOTOGRAPHS, Condition.TRUTH, Condition.TOLERANCE, Condition.SWEPT, Condition.RADII)
     absent += (Condition.WALL_FORCES, Condition.BUDGET)
     assert written(report.path) == expected(*absent, Condition.CELL)
@@ -81,7 +81,7 @@ def test_both_timelines_end_a_frame_with_the_reported_field(tmp_path):
             assert shown["fn"] == forces.fn.tolist()
 
 
-def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path):
+def test_sliding_marks_are_cleared_at_the_start_of_the_next_frame(tmp_path):
     results = make_results(2, sweeps=30)
     path = write_recording(results, tmp_path / "run.rrd").path
     assert len(latest(path, entities.SLIDING, entities.SWEEP, 30)["Points2D:positions"]) > 0
@@ -89,9 +89,9 @@ def test_sliding_marks_of_a_former_frame_are_gone_when_the_next_begins(tmp_path)
     assert len(latest(path, entities.SLIDING, entities.FRAME, 1)["Points2D:positions"]) > 0
 
 
-def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
+def test_every_sweep_has_its_residuals_for_any_choice_of_kept_forces(tmp_path):
     results = make_results(3, sweeps=50, recorded=np.array([0, 10, 49]))
-    path = write_recording(results, tmp_path / "run.rrd", sweeps="none").path
+    path = write_recording(results, tmp_path / "run.rrd", options=RecordingOptions(sweeps="none")).path
     logged = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
     found = [row for row in logged if "sweep" in row]
     assert [row["sweep"] for row in found] == [
@@ -101,7 +101,7 @@ def test_every_sweep_has_its_residuals_whatever_forces_were_kept(tmp_path):
     ]  # none for the reported field
     expected_values = np.concatenate([np.log10(frame.history.natural_map) for frame in results.frames])
     assert np.array_equal([row["Scalars:scalars"][0] for row in found], expected_values)
-    of_frames = [row for row in logged if "sweep" not in row]  # on the timeline of frames the last sweep of each
+    of_frames = [row for row in logged if "sweep" not in row]  # on the timeline of frames: the last sweep of each
     assert [row["frame"] for row in of_frames] == [0, 1, 2]
     assert np.array_equal([row["Scalars:scalars"][0] for row in of_frames], expected_values[49::50])
 
@@ -114,12 +114,12 @@ def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, result
     assert len(latest(recording.path, entities.GRAINS_LOST, entities.FRAME, 1)["LineStrips2D:strips"]) == 0
     assert len(latest(recording.path, entities.GRAINS_LOST, entities.FRAME, 2)["LineStrips2D:strips"]) == 2
     flags = [row["TextLog:text"][0] for row in rows(recording.path, entities.FLAGS)]
-    assert any("lost grain 120" in flag for flag in flags)
+    assert any("grain 120 is lost" in flag for flag in flags)
 
 
-def test_the_chain_s_own_last_sweep_is_shown_before_the_reported_field(tmp_path):
+def test_the_last_sweep_of_the_chain_is_shown_before_the_reported_field(tmp_path):
     results = make_results(2, sweeps=50)
-    other = [replace(frame, fn=0.5 * frame.fn) for frame in results.frames]  # reported by something else
+    other = [replace(frame, fn=0.5 * frame.fn) for frame in results.frames]  # reported by another estimator
     path = write_recording(replace(results, frames=other), tmp_path / "run.rrd").path
     style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(other))
     frame = other[0]
@@ -129,35 +129,35 @@ def test_the_chain_s_own_last_sweep_is_shown_before_the_reported_field(tmp_path)
     assert reported == style.radii(frame.fn).tolist() != chain
 
 
-def _with_status(results, *, status, seen: bool, frame: int = 2, row: int = 20):
+def _with_status(results, *, status, visible: bool, frame: int = 2, row: int = 20):
     tracks = results.tracks
     changed, position = tracks.status.copy(), tracks.position.copy()
     changed[frame, row] = status
-    if not seen:
+    if not visible:
         position[frame, row] = np.nan
     return replace(tracks, status=changed, position=position)
 
 
-def test_the_lane_of_tracking_tells_what_is_lost_from_what_the_border_cuts_and_what_is_inferred():
+def test_the_tracking_lane_distinguishes_lost_cut_and_inferred_grains():
     results = make_results(3)
     assert tracking_state(results.tracks, 2) == ALL_TRACKED
-    assert tracking_state(_with_status(results, status=TrackStatus.LOST, seen=False), 2) == SOME_LOST
-    assert tracking_state(_with_status(results, status=TrackStatus.OUT_OF_FRAME, seen=False), 2) == SOME_CUT
-    inferred = _with_status(results, status=TrackStatus.INFERRED, seen=True)
+    assert tracking_state(_with_status(results, status=TrackStatus.LOST, visible=False), 2) == SOME_LOST
+    assert tracking_state(_with_status(results, status=TrackStatus.OUT_OF_FRAME, visible=False), 2) == SOME_CUT
+    inferred = _with_status(results, status=TrackStatus.INFERRED, visible=True)
     assert tracking_state(inferred, 2) == SOME_INFERRED
     assert tracking_state(inferred, 1) == ALL_TRACKED
 
 
-def test_what_the_border_cuts_is_not_counted_as_lost():
+def test_a_grain_cut_by_the_border_is_not_counted_as_lost():
     results = make_results(3)
-    cut = _with_status(results, status=TrackStatus.OUT_OF_FRAME, seen=False)
+    cut = _with_status(results, status=TrackStatus.OUT_OF_FRAME, visible=False)
     assert cut.describe_missing() == "0 poses lost, 1 rod cut by the picture's border (1 pose)"
     assert not cut.lost.any()
     unseen = replace(results.tracks, inferred=np.arange(results.grains.count) == 20)
     assert unseen.describe_missing() == "0 poses lost, 1 rod inferred"
 
 
-def test_an_inferred_rod_has_a_colour_of_its_own():
+def test_an_inferred_rod_has_a_distinct_colour():
     status = np.array([TrackStatus.OK, TrackStatus.SUSPECT, TrackStatus.INFERRED, TrackStatus.LOST], np.uint8)
     colours = grain_colours(status, np.array([True, True, True, False]))
     assert len(set(colours.tolist())) == 4

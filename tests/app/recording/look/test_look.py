@@ -2,18 +2,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.experiment.shown import LARGEST, show
+from rodsight.experiment.jpeg_photographs import LARGEST, encode_jpeg
 from rodsight.experiment.units import Scale
 from rodsight.recording.look.canvas import NOMINAL_RADIUS, Canvas
 from rodsight.recording.look.colours import (
-    _DIFFERENCE_WAY,
-    _DOUBT_WAY,
-    _FORCE_WAY,
-    _GAP_WAY,
-    _PROBABILITY_WAY,
+    _DIFFERENCE_PATH,
+    _FORCE_PATH,
+    _GAP_PATH,
+    _PROBABILITY_PATH,
+    _UNCERTAINTY_PATH,
     FORCE_RAMP,
     RAMP_LEVELS,
-    even_way,
+    even_path,
     lab_from_lch,
     linear_srgb,
     packed,
@@ -23,29 +23,29 @@ from rodsight.recording.packing_layers.forces.network import SweepChoice, chosen
 
 from tests.app.recording.fake_results import RADIUS, make_results
 
-GAMUT = 0.01  # of linear sRGB: what clipping may change without being seen
+GAMUT = 0.01  # of linear sRGB: invisible change by clipping
 EVEN = 1e-6  # relative: rounding
 
 
-@pytest.mark.parametrize("way", [_FORCE_WAY, _GAP_WAY, _DOUBT_WAY, _PROBABILITY_WAY, _DIFFERENCE_WAY])
-def test_a_ramp_is_perceptually_even_and_can_be_shown(way):
-    lab = even_way(lab_from_lch(way), RAMP_LEVELS)
+@pytest.mark.parametrize("path", [_FORCE_PATH, _GAP_PATH, _UNCERTAINTY_PATH, _PROBABILITY_PATH, _DIFFERENCE_PATH])
+def test_a_ramp_is_perceptually_uniform_and_within_srgb(path):
+    lab = even_path(lab_from_lch(path), RAMP_LEVELS)
     steps = np.linalg.norm(np.diff(lab, axis=0), axis=1)
-    # A step that rounds a corner of the way is shorter as the crow flies; all others are equal.
-    assert np.sum(steps < (1.0 - EVEN) * steps.max()) <= len(way) - 2
+    # The straight distance of a step around a corner of the path is shorter; all others are equal.
+    assert np.sum(steps < (1.0 - EVEN) * steps.max()) <= len(path) - 2
     linear = linear_srgb(lab)
     assert linear.min() > -GAMUT
     assert linear.max() < 1.0 + GAMUT
 
 
 def test_greater_forces_are_always_lighter():
-    light = even_way(lab_from_lch(_FORCE_WAY), RAMP_LEVELS)[:, 0]
+    light = even_path(lab_from_lch(_FORCE_PATH), RAMP_LEVELS)[:, 0]
     assert np.all(np.diff(light) > 0.0)
 
 
-def test_white_and_black_come_out_of_oklab_as_they_should():
+def test_oklab_white_and_black_are_srgb_white_and_black():
     linear = linear_srgb(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
-    assert np.allclose(linear, [[1.0] * 3, [0.0] * 3], atol=1e-4)  # the constants have ten digits, near-cancelling
+    assert np.allclose(linear, [[1.0] * 3, [0.0] * 3], atol=1e-4)  # the constants have ten digits and nearly cancel
 
 
 def test_packed_colours_keep_their_channels():
@@ -67,13 +67,13 @@ def test_only_weak_contacts_are_grey():
     style = ForceStyle(ForceRange(10.0, 60.0), NOMINAL_RADIUS, 0.25)
     colours = style.colours(np.array([np.nan, 0.0, 1.0, 4.9, 5.1, 60.0, 1e6]))
     red, green, blue = (colours >> shift & 0xFF for shift in (24, 16, 8))
-    spread = np.maximum(np.maximum(red, green), blue) - np.minimum(np.minimum(red, green), blue)
-    assert np.all(spread[:4] < 12)
-    assert np.all(spread[4:] > 40)
+    chroma = np.maximum(np.maximum(red, green), blue) - np.minimum(np.minimum(red, green), blue)
+    assert np.all(chroma[:4] < 12)
+    assert np.all(chroma[4:] > 40)
     assert colours[5] == colours[6] == packed(FORCE_RAMP[-1:])[0]
 
 
-def test_a_run_without_any_force_has_a_range_all_the_same():
+def test_a_run_without_any_force_has_a_valid_range():
     assert ForceRange.of([]).top > ForceRange.of([]).mean > 0.0
 
 
@@ -83,7 +83,7 @@ def test_the_quantum_is_a_quarter_pixel_for_the_nominal_grain():
     assert canvas.quantum == 0.25
 
 
-def test_points_lie_where_the_photograph_shows_them():
+def test_points_coincide_with_the_photograph():
     tracks, height = make_results(1).tracks, 3000
     canvas = Canvas.around(tracks, Scale(RADIUS / 40.0, height), (height, 2001))
     assert canvas.shrink == 2
@@ -93,9 +93,9 @@ def test_points_lie_where_the_photograph_shows_them():
     middle = Scale(RADIUS / 40.0, height).to_world(np.array([503.5, 1003.5]))
     import cv2
 
-    shown = np.asarray(cv2.imdecode(show(picture).jpeg, cv2.IMREAD_GRAYSCALE))
-    row, column = np.argwhere(shown > 128).mean(axis=0) + 0.5  # centres of pixels in the viewer's coordinates
-    assert np.allclose(canvas.points(middle), [column, row], atol=0.05)  # [px], what JPEG does to an edge
+    shown = np.asarray(cv2.imdecode(encode_jpeg(picture).jpeg, cv2.IMREAD_GRAYSCALE))
+    row, column = np.argwhere(shown > 128).mean(axis=0) + 0.5  # centres of pixels in viewer coordinates
+    assert np.allclose(canvas.points(middle), [column, row], atol=0.05)  # [px], change of an edge by JPEG
 
 
 def test_chosen_sweeps_keep_the_first_ones_and_the_limit():
@@ -116,4 +116,4 @@ def test_the_first_row_is_the_first_sweep_and_the_last_the_reported_field(choice
     assert np.array_equal(ft[-1], forces.ft)
     if choice is not SweepChoice.NONE:
         assert rows.tolist() == [0, 5, 50, 199, 200]
-        assert not fn[0].any()  # nothing was kept of the first sweep: no force is claimed
+        assert not fn[0].any()  # the forces of the first sweep were not kept

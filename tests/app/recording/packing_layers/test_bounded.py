@@ -1,4 +1,4 @@
-"""What bounds a packing is drawn: a periodic cell with contacts in two halves, and the boundary's grains."""
+"""The boundary of a packing is drawn: a periodic cell with contacts in two halves, and boundary grains."""
 
 from dataclasses import replace
 
@@ -7,17 +7,17 @@ import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.colours import BOUNDARY, packed_one
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
 from rodsight.tracks import WallTracks
 
-from solver.bodies.walls import Walls
-from solver.contacts.contacts import detect_contacts
 from tests.app.recording.fake_results import RADIUS, make_results
 from tests.app.recording.rows import latest
 
 
 @pytest.fixture(scope="module")
 def in_cell():
-    """The invented packing in a cell of its own size, its contacts measured across the edges."""
+    """Return the synthetic packing in a cell of its size, with contacts across the edges."""
     results = make_results(2, sweeps=0, recorded=np.empty(0, int))
     f = results.tracks.frame_count
     extent = np.ptp(results.tracks.position[0], axis=0) + 2.0 * RADIUS
@@ -26,9 +26,9 @@ def in_cell():
     walls = WallTracks((), np.empty((f, 0, 2, 2)), np.empty(0), cell=cell)
     frames = []
     for k, frame in enumerate(results.frames):
-        here = Walls.at_rest(np.empty((0, 2, 2)), cell=cell[k])
+        fixed = Walls.at_rest(np.empty((0, 2, 2)), cell=cell[k])
         found = detect_contacts(
-            results.grains, results.tracks.position[k], results.tracks.present[k], here, 0.5 * RADIUS
+            results.grains, results.tracks.position[k], results.tracks.present[k], fixed, 0.5 * RADIUS
         )
         rows = np.arange(found.count) % frame.contacts.count
         columns = {
@@ -56,7 +56,7 @@ def test_contacts_across_the_edge_are_two_halves_and_no_line_crosses_the_picture
     assert longest < 0.5 * np.ptp(outline, axis=0).max()
 
 
-def test_grains_of_the_boundary_have_a_tone_of_their_own(tmp_path):
+def test_boundary_grains_have_a_distinct_colour(tmp_path):
     results = make_results(1, sweeps=0, recorded=np.empty(0, int))
     boundary = np.arange(results.grains.count) % 3 == 0
     write_recording(replace(results, tracks=replace(results.tracks, boundary=boundary)), tmp_path / "b.rrd")

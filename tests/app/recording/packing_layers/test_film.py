@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import numpy as np
+from rodsight.recording.archive.share import share_recording
 from rodsight.recording.files.finished_run import write_recording
-from rodsight.recording.files.share import share_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.force_style import ForceRange
 from rodsight.recording.packing_layers.film import (
@@ -21,7 +21,7 @@ from tests.app.recording.rows import latest, rows
 OUTLINE = 8  # lines around the walls, the last ones of a picture
 
 
-def test_pictures_are_few_and_span_the_run():
+def test_pictures_are_few_and_cover_the_run():
     assert film_frames(3).tolist() == [0, 1, 2]
     chosen = film_frames(200)
     assert len(chosen) == PICTURES
@@ -29,7 +29,7 @@ def test_pictures_are_few_and_span_the_run():
     assert np.ptp(np.diff(chosen)) <= 1
 
 
-def test_a_picture_holds_the_strong_forces_of_its_frame_beside_those_before(recording, results):
+def test_a_picture_shows_the_strong_forces_of_its_frame_beside_earlier_pictures(recording, results):
     strong = STRONG * ForceRange.of(results.frames).mean
     (left, right), (top, bottom) = film_bounds(read_layout(recording.path).canvas, 3)
     middles = []
@@ -46,9 +46,9 @@ def test_a_picture_holds_the_strong_forces_of_its_frame_beside_those_before(reco
         here = latest(recording.path, entities.FILM_PLACE, entities.FRAME, frame)["LineStrips2D:strips"]
         assert np.allclose(np.array(here), lines[-OUTLINE:])
     across, down = (np.diff(np.array(middles), axis=0)).T
-    assert np.all(across[:2] > 0.3 * (right - left) * 0.9)  # three in a row,
+    assert np.all(across[:2] > 0.3 * (right - left) * 0.9)  # three in a row
     assert np.allclose(down[:2], 0.0, atol=1.0)
-    assert down[2] > 0.9 * (bottom - top) / 3  # the fourth below the first
+    assert down[2] > 0.9 * (bottom - top) / 3  # the fourth is below the first
 
 
 def test_the_film_of_sweeps_ends_with_the_reported_forces(recording, results):
@@ -63,13 +63,13 @@ def test_the_film_of_sweeps_ends_with_the_reported_forces(recording, results):
     assert inside.all(axis=1).sum() == np.sum(results.frames[1].fn > strong)
 
 
-def test_a_shared_recording_has_the_pictures_of_its_frames_alone(recording, tmp_path):
+def test_a_shared_recording_has_only_the_pictures_of_its_frames(recording, tmp_path):
     path = share_recording(recording.path, tmp_path / "small.rrd", first=1, stop=3).path
     there = [frame for frame in range(4) if rows(path, f"{entities.FILM_FRAMES}/{frame}")]
     assert there == [1, 2]
 
 
-def test_the_films_cost_little(tmp_path):
+def test_the_films_are_small(tmp_path):
     results = make_results(6, 16, 14, sweeps=300)
     path = write_recording(results, tmp_path / "run.rrd").path
     stacked = sum(

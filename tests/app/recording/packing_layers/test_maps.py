@@ -7,40 +7,40 @@ import pytest
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.packing_layers.forces.contact_colours import COLOURINGS
-from rodsight.recording.packing_layers.unconverged import changes_per_sweep, doubt_colours
+from rodsight.recording.packing_layers.residual_maps import changes_per_sweep, residual_colours
+from rodsight.solver.contacts.contacts import Contacts
+from rodsight.solver.statistics.balance import grain_unbalance, resultant_norms
 
-from solver.contacts.contacts import Contacts
-from solver.statistics.balance import grain_unbalance, unbalances
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import latest, rows
 
 ROUNDING = 1e-12
 
 
-def test_the_unbalance_of_every_sweep_is_that_of_its_own_forces():
+def test_the_unbalance_of_every_sweep_is_that_of_its_forces():
     results = make_results(1, sweeps=5)
     forces = results.frames[0]
-    weightless, here = np.zeros((results.grains.count, 2)), np.ones(results.grains.count, bool)
-    found = unbalances(forces.contacts, forces.history.fn, forces.history.ft, weightless)
+    weightless, present = np.zeros((results.grains.count, 2)), np.ones(results.grains.count, bool)
+    found = resultant_norms(forces.contacts, forces.history.fn, forces.history.ft, weightless)
     for row in range(5):
         fn, ft = forces.history.fn[row].astype(float), forces.history.ft[row].astype(float)
-        alone = grain_unbalance(forces.contacts, fn, ft, weightless, here)
+        alone = grain_unbalance(forces.contacts, fn, ft, weightless, present)
         assert np.allclose(found[row] / fn[fn > 0].mean(), alone, rtol=ROUNDING)
 
 
-def test_a_squeezed_grain_is_quiet_and_its_neighbours_glow():
+def test_a_compressed_grain_is_dark_and_its_neighbours_are_bright():
     contacts = Contacts(
         np.array([0, 1], np.int32), np.array([1, 2], np.int32), np.zeros(2), np.array([[1.0, 0.0], [1.0, 0.0]]),
         np.zeros((2, 2)), 3, 0,
     )  # fmt: skip
-    found = unbalances(contacts, np.array([[7.0, 7.0]]), np.zeros((1, 2)), np.zeros((3, 2)))
+    found = resultant_norms(contacts, np.array([[7.0, 7.0]]), np.zeros((1, 2)), np.zeros((3, 2)))
     assert found.tolist() == [[7.0, 0.0, 7.0]]
-    quiet, loud = doubt_colours(np.array([0.0, 1.0]))
-    assert quiet != loud
+    dark, bright = residual_colours(np.array([0.0, 1.0]))
+    assert dark != bright
 
 
-def test_louder_colours_are_lighter_and_the_unknown_is_faint():
-    colours = doubt_colours(np.array([1e-9, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 9.0, np.nan]))
+def test_greater_residuals_are_brighter_and_unknown_ones_faint():
+    colours = residual_colours(np.array([1e-9, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 9.0, np.nan]))
     assert colours[0] == colours[1]
     assert colours[5] == colours[6]
     assert len(set(colours[:6].tolist())) == 5
@@ -50,7 +50,7 @@ def test_louder_colours_are_lighter_and_the_unknown_is_faint():
     assert np.all(np.diff(luminance) > 0)
 
 
-def test_maps_follow_the_sweeps_and_end_with_the_reported_field(tmp_path):
+def test_maps_change_with_the_sweeps_and_end_with_the_reported_field(tmp_path):
     results = make_results(2, sweeps=40)
     path = write_recording(results, tmp_path / "run.rrd").path
     frame = results.frames[0]
@@ -60,14 +60,14 @@ def test_maps_follow_the_sweeps_and_end_with_the_reported_field(tmp_path):
     assert early != late
     mean, history = frame.fn[frame.fn > 0].mean(), frame.history
     step = np.hypot(history.fn[39] - history.fn[38], history.ft[39] - history.ft[38]) / mean
-    assert late == end == doubt_colours(100.0 * step).tolist()  # a hundredth of the range of the unbalance
+    assert late == end == residual_colours(100.0 * step).tolist()  # a hundredth of the range of the unbalance
     grains = latest(path, entities.UNBALANCE_MAP, entities.FRAME, 0)["Points2D:colors"]
-    weightless, here = np.zeros((results.grains.count, 2)), results.tracks.present[0]
-    unbalance = grain_unbalance(frame.contacts, frame.fn, frame.ft, weightless, here)
-    assert grains == doubt_colours(unbalance).tolist()
+    weightless, present = np.zeros((results.grains.count, 2)), results.tracks.present[0]
+    unbalance = grain_unbalance(frame.contacts, frame.fn, frame.ft, weightless, present)
+    assert grains == residual_colours(unbalance).tolist()
 
 
-def test_a_change_between_distant_sweeps_is_that_of_one_of_them_on_average():
+def test_a_change_between_distant_sweeps_is_the_mean_per_sweep():
     fn = np.array([[1.0, 5.0], [4.0, 5.0], [4.0, 15.0]])
     ft = np.array([[0.0, 2.0], [4.0, 2.0], [4.0, 2.0]])
     found = changes_per_sweep(np.array([0, 1, 11]), fn, ft)
@@ -88,7 +88,7 @@ def test_probabilities_are_shown_per_contact_and_counted(tmp_path):
     assert expected == pytest.approx([probability.sum()])
 
 
-def test_walls_have_one_curve_each_with_its_name(recording, results):
+def test_every_wall_has_one_curve_with_its_name(recording, results):
     shown = latest(recording.path, entities.WALL_NORMAL_FORCE, entities.FRAME, 1)
     names = [
         row["SeriesLines:names"]

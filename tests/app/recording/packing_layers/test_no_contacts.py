@@ -1,4 +1,4 @@
-"""A frame in which no grain touches another is recorded like any other."""
+"""A frame without contacts is recorded."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.recording.archive.readback import read_forces
 from rodsight.recording.files.finished_run import write_recording
-from rodsight.recording.files.readback import read_forces
+from rodsight.solver.frame_forces import FrameForces
+from rodsight.solver.quantity import columns
 
-from solver.bodies.quantity import columns
-from solver.sequence.frame_forces import FrameForces
 from tests.app.recording.fake_results import make_results
 
 

@@ -5,25 +5,25 @@ import numpy as np
 import pytest
 from rodsight.cli.main import main
 from rodsight.recording.viewing.headless import HeadlessViewer, NoPictureError, vulkan_drivers
-from rodsight.recording.viewing.pictures import Shown, timeline_values, write_film
+from rodsight.recording.viewing.pictures import PictureSettings, timeline_values, write_film
 
-from tests.browser import read_picture, warm_share
+from tests.browser import read_picture, warm_fraction
 
 needs_vulkan = pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
 
 
 @needs_vulkan
 @pytest.mark.screen
-def test_tabs_and_views_are_pictured_at_any_time(recording):
+def test_pictures_of_tabs_and_views_at_any_time(recording):
     with HeadlessViewer(recording.path, width=900, height=600) as viewer:
         assert viewer.tabs[0] == "Experiment"
         viewer.set_time("frame", 1)
         network = read_picture(viewer.picture("Force network"))
-        assert 0.01 < warm_share(network) < 0.5
+        assert 0.01 < warm_fraction(network) < 0.5
         assert viewer.picture("Force network") == viewer.picture("Force network")
         # The first sweep of a frame has less force than the reported field.
         viewer.set_time("sweep", 61)
-        assert warm_share(read_picture(viewer.picture("Force network"))) < 0.8 * warm_share(network)
+        assert warm_fraction(read_picture(viewer.picture("Force network"))) < 0.8 * warm_fraction(network)
         anisotropies = read_picture(viewer.picture("Anisotropies"))  # of another tab
         assert np.ptp(anisotropies) > 100
         assert viewer.warnings() == []
@@ -34,15 +34,17 @@ def test_tabs_and_views_are_pictured_at_any_time(recording):
 @needs_vulkan
 @pytest.mark.slow
 def test_a_film_has_one_picture_for_every_frame(recording, tmp_path):
-    size = write_film(recording.path, tmp_path / "run.mp4", range(4), Shown(view="Force network", size=(640, 480)))
+    size = write_film(
+        recording.path, tmp_path / "run.mp4", range(4), PictureSettings(view="Force network", size=(640, 480))
+    )
     assert (tmp_path / "run.mp4").stat().st_size == size
     film = cv2.VideoCapture(str(tmp_path / "run.mp4"))
     pictures = []
     while (step := film.read())[0]:
         pictures.append(step[1])
     assert len(pictures) == 4
-    assert all(warm_share(each[..., ::-1]) > 0.005 for each in pictures)
-    assert np.abs(pictures[0].astype(int) - pictures[3]).mean() > 0.5  # grey levels: the frames differ
+    assert all(warm_fraction(each[..., ::-1]) > 0.005 for each in pictures)
+    assert np.abs(pictures[0].astype(int) - pictures[3]).mean() > 0.5  # grey levels
 
 
 def test_the_timelines_are_read_from_the_file(recording, results):

@@ -1,4 +1,4 @@
-"""A run on another machine, watched from here through ssh. The other machine is a network namespace of its own."""
+"""A run on another machine, watched through ssh; the other machine is a network namespace."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from rodsight.synthetic.synthesis import synthesize
 from tests.browser import open_when_served, wait_for_forces
 from tests.program import RODSIGHT
 
-pytestmark = [pytest.mark.slow, pytest.mark.screen]  # a minute and more: two networks, a page drawn through ssh
+pytestmark = [pytest.mark.slow, pytest.mark.screen]  # more than a minute: two networks, a page drawn through ssh
 
 HERE, THERE, SSH_PORT = "10.231.87.1", "10.231.87.2", 2222
-CONNECTED = "connected"  # what the tunnel says once it is there
+CONNECTED = "connected"  # output of the tunnel when it is open
 
 
 @dataclass(frozen=True)
 class Machine:
-    """The other machine: commands in it, and how ssh gets there."""
+    """The other machine: its namespace, and the key for ssh."""
 
     name: str
     key: Path
@@ -42,8 +42,8 @@ class Machine:
             "StrictHostKeyChecking=no", "UserKnownHostsFile=/dev/null", "ExitOnForwardFailure=yes", "BatchMode=yes",
             "PermitLocalCommand=yes", f"LocalCommand=echo {CONNECTED}",
         )  # fmt: skip
-        told = [part for option in options for part in ("-o", option)]
-        return ["ssh", "-N", "-p", str(SSH_PORT), "-i", str(self.key), *told, *forwards, f"root@{THERE}"]
+        arguments = [part for option in options for part in ("-o", option)]
+        return ["ssh", "-N", "-p", str(SSH_PORT), "-i", str(self.key), *arguments, *forwards, f"root@{THERE}"]
 
 
 def ip(*arguments: str) -> None:
@@ -79,13 +79,13 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
         ):
             ip("netns", "exec", name, "ip", *arguments)
         made = Machine(name, make_key(tmp_path / "user_key"))
-        run = Path("/run/sshd")  # where sshd locks itself in
+        run = Path("/run/sshd")  # the chroot directory of sshd
         if not run.exists():
             run.mkdir(mode=0o755)
             stack.callback(shutil.rmtree, run)
         server = made.start(sshd, "-D", "-e", "-f", sshd_config(tmp_path), stderr=subprocess.PIPE, text=True)
         stack.callback(end, server)
-        wait_until_said(server.stderr, "Server listening on")
+        wait_for_output(server.stderr, "Server listening on")
         yield made
 
 
@@ -113,15 +113,15 @@ def reaches(host: str, port: int) -> bool:
     return True
 
 
-def wait_until_said(lines: IO[str] | None, part: str) -> None:
-    """Read what a process says until a line has some part."""
+def wait_for_output(lines: IO[str] | None, part: str) -> None:
+    """Read the output of a process up to a line that contains a text."""
     assert lines is not None
-    said = []
+    output = []
     for line in lines:
-        said.append(line)
+        output.append(line)
         if part in line:
             return
-    pytest.fail(f"it ended, saying {said}")
+    pytest.fail(f"the process ended with the output {output}")
 
 
 def end(process: subprocess.Popen) -> None:
@@ -144,30 +144,28 @@ def running(process: subprocess.Popen) -> Iterator[subprocess.Popen]:
         end(process)
 
 
-def test_a_run_on_another_machine_is_watched_through_ssh_and_in_no_other_way(
-    machine: Machine, tmp_path: Path, page: Page
-):
+def test_a_run_on_another_machine_is_watched_through_ssh_only(machine: Machine, tmp_path: Path, page: Page):
     experiment = tmp_path / "far"
     synthesize(experiment, grains=120, frames=12, photographs=False, noise=1e-5, seed=1)
     command = [*RODSIGHT, "run", experiment, "--view", "web", "--out", tmp_path / "out"]
     command += ["--set", "solver.sweeps=60000"]  # long enough to be watched
     with running(machine.start(*command, stdout=subprocess.PIPE, text=True)) as run:
         assert run.stdout is not None
-        told = run.stdout.readline()
-        found = re.search(r"Watch it at (\S+) .*-L (\d+):localhost:\2 ", told)
-        assert found, told
+        line = run.stdout.readline()
+        found = re.search(r"Watch it at (\S+) .*-L (\d+):localhost:\2 ", line)
+        assert found, line
         address, ports = found[1], (int(found[2]),)
         for port in ports:
             if reaches("127.0.0.1", port):
-                pytest.skip(f"port {port} of this machine is taken: the tunnel needs it")
-            assert not reaches(THERE, port)  # nothing is served to the network
+                pytest.skip(f"port {port} of this machine, which the tunnel needs, is in use")
+            assert not reaches(THERE, port)  # not served to the network
         with running(subprocess.Popen(machine.tunnel(*ports), stdout=subprocess.PIPE, text=True)) as tunnel:
-            wait_until_said(tunnel.stdout, CONNECTED)
+            wait_for_output(tunnel.stdout, CONNECTED)
             open_when_served(page, f"{address}&renderer=webgl")
             assert tunnel.poll() is None
             wait_for_forces(page)
-        assert run.poll() is None  # it was watched while it was solved
-    # Terminated, the run takes its servers with it.
+        assert run.poll() is None  # still being solved
+    # The servers end with the terminated run.
     left = subprocess.run(["ip", "netns", "pids", machine.name], capture_output=True, text=True, check=True).stdout
     names = {Path(f"/proc/{pid}/comm").read_text().strip() for pid in left.split()}
     assert names == {"sshd"}

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.recording.files.finished_run import write_recording
-from rodsight.recording.look.texts import _ALIKE, _RANGES, _SIGNS, printable
+from rodsight.recording.files.finished_run import RecordingOptions, write_recording
+from rodsight.recording.look.printable_text import _RANGES, _SIGNS, _SUBSTITUTES, printable
 from rodsight.recording.tabs.blueprint import Tab
 from rodsight.recording.viewing import viewer
 from rodsight.recording.viewing.headless import HeadlessViewer, vulkan_drivers
-from rodsight.recording.viewing.viewer import open_viewer, view_command
+from rodsight.recording.viewing.open_viewer import open_viewer
+from rodsight.recording.viewing.viewer import view_command
 
-from tests.browser import read_picture, warm_share
+from tests.browser import read_picture, warm_fraction
 
 
 def test_the_command_names_the_viewer_of_the_installed_wheel(tmp_path):
@@ -24,13 +25,13 @@ def test_the_command_names_the_viewer_of_the_installed_wheel(tmp_path):
     assert viewer.viewer_binary().is_file()
 
 
-def test_the_viewer_knows_the_options_that_are_used():
+def test_the_viewer_has_the_options_that_are_used():
     known = subprocess.run([viewer.viewer_binary(), "--help"], capture_output=True, text=True, timeout=60).stdout
     assert "--bind" in known
     assert "--hide-welcome-screen" in known
 
 
-def test_a_viewer_tells_nobody_of_its_use(recording, tmp_path, monkeypatch):
+def test_a_viewer_stores_no_usage_data(recording, tmp_path, monkeypatch):
     for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "CI"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("FORCE_RERUN_ANALYTICS", "1")
@@ -46,7 +47,7 @@ def test_a_viewer_tells_nobody_of_its_use(recording, tmp_path, monkeypatch):
         assert kept_of(tmp_path / "as it comes", dict(os.environ)) != []
 
 
-def test_every_viewer_is_started_with_the_environment_that_is_ours():
+def test_every_viewer_is_started_with_the_environment_without_analytics():
     for file in Path(viewer.__file__).parents[1].rglob("*.py"):
         text = file.read_text(encoding="utf-8")
         starts = text.count("viewer_binary()") - text.count("def viewer_binary()")
@@ -54,7 +55,7 @@ def test_every_viewer_is_started_with_the_environment_that_is_ours():
             assert "viewer_environment()" in text, file
 
 
-def test_without_a_display_one_line_says_how_to_look(recording, monkeypatch):
+def test_without_a_display_one_line_states_the_command(recording, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -72,7 +73,7 @@ def test_with_a_display_the_native_viewer_is_started(recording, monkeypatch):
     assert started == [view_command(recording.path)]
 
 
-def test_no_viewer_is_started_when_none_is_asked_for(recording, monkeypatch):
+def test_no_viewer_is_started_if_none_is_requested(recording, monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("a viewer was started"))
     assert "rodsight view" in str(open_viewer(recording.path, "none"))
 
@@ -86,17 +87,19 @@ def test_a_missing_recording_is_named(tmp_path):
 @pytest.mark.screen
 def test_the_viewer_draws_the_forces_and_every_printable_character(results, tmp_path):
     characters = "".join(chr(code) for low, high in _RANGES for code in range(low, high + 1))
-    characters += "".join(sorted(_SIGNS - {"\n"})) + "".join(_ALIKE.values())
+    characters += "".join(sorted(_SIGNS - {"\n"})) + "".join(_SUBSTITUTES.values())
     assert printable(characters) == characters
     named = replace(results, name="all", configuration=characters)
     frames = [replace(forces, reason=characters) for forces in results.frames]
-    path = write_recording(replace(named, frames=frames), tmp_path / "all.rrd", active=Tab.SUMMARY).path
+    path = write_recording(
+        replace(named, frames=frames), tmp_path / "all.rrd", options=RecordingOptions(active=Tab.SUMMARY)
+    ).path
     with HeadlessViewer(path) as viewer:
         front = viewer.picture()
         viewer.show_tab(Tab.SUMMARY)
-        assert viewer.picture() == front  # the tab that was asked for came up by itself
+        assert viewer.picture() == front  # the requested tab was in front at the start
         # The summary shows the characters in proportional and in monospaced type.
         text, network = read_picture(viewer.picture("Summary")), read_picture(viewer.picture("Force network"))
-    assert 0.01 < warm_share(network) < 0.5  # of the picture, that strong forces and the legend cover
+    assert 0.01 < warm_fraction(network) < 0.5  # fraction of the picture covered by strong forces and the legend
     assert len(np.unique(network.reshape(-1, network.shape[-1]), axis=0)) > 100
     assert np.ptp(text[..., 0]) > 100

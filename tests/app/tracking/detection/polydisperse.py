@@ -1,11 +1,10 @@
-"""Thousands of discs of very different sizes, nearly touching, quickly laid and quickly drawn."""
+"""Synthetic photographs of thousands of nearly touching discs of very different sizes."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
-
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
 
 FINE = 4  # sub-pixels a side
 BITS = 8  # of a sub-pixel that OpenCV draws with
@@ -15,15 +14,15 @@ EXPONENT = 1.6  # of the sizes: many small, few large
 def lay_discs(
     width: int, height: int, smallest: float, largest: float, most: int, generator: np.random.Generator
 ) -> tuple[Array, Array, Array]:
-    """x, y, radius (n,) [px]: from the largest to the smallest, each beside what is there, `most` attempts in all."""
-    room = np.full((height, width), np.inf, np.float32)  # [px] from every pixel to the next disc
+    """Lay discs x, y, radius (n,) [px] from the largest to the smallest, each beside others, with `most` attempts."""
+    gap_map = np.full((height, width), np.inf, np.float32)  # [px] from every pixel to the next disc
     row, column = np.mgrid[0:height, 0:width].astype(np.float32)
-    share = generator.random(most)
+    fraction = generator.random(most)
     ends = largest**-EXPONENT, smallest**-EXPONENT
     circles = []
-    for r in np.sort((ends[0] + share * (ends[1] - ends[0])) ** (-1.0 / EXPONENT))[::-1]:
-        place = generator.integers(0, room.size, 4000)
-        gap = room.ravel()[place] - r
+    for r in np.sort((ends[0] + fraction * (ends[1] - ends[0])) ** (-1.0 / EXPONENT))[::-1]:
+        place = generator.integers(0, gap_map.size, 4000)
+        gap = gap_map.ravel()[place] - r
         fits = place[(gap >= 0.0) & (gap < 1.0)] if circles else place
         if len(fits) == 0:
             continue
@@ -31,7 +30,7 @@ def lay_discs(
         circles.append((x, y, float(r)))
         side = int(r + 2.0 * largest)
         part = np.s_[max(int(y) - side, 0) : int(y) + side, max(int(x) - side, 0) : int(x) + side]
-        np.minimum(room[part], np.hypot(column[part] - x, row[part] - y) - np.float32(r), out=room[part])
+        np.minimum(gap_map[part], np.hypot(column[part] - x, row[part] - y) - np.float32(r), out=gap_map[part])
     x, y, radius = np.array(circles).T
     return x, y, radius
 

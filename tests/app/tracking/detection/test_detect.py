@@ -1,4 +1,4 @@
-"""Finding grains on a photograph: all of them, nothing else, and where they are."""
+"""Detection of grains: completeness, false detections and accuracy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_centres_are_exact_to_a_tenth_of_a_pixel(packed: tuple[Rods, Detection])
     error = np.stack([found.x[index] - rods.x, found.y[index] - rods.y], axis=1)
     assert np.sqrt((error**2).mean()) < CENTRE_ALLOWED
     scaled = error / found.sigma[index, None]
-    # Few rods and shading that is not noise: within a factor, not to a per cent.
+    # The rods are few and their shading is no noise: the agreement is to a factor, not to a per cent.
     assert 0.4 < np.sqrt((scaled**2).mean()) < 2.0
 
 
@@ -54,7 +54,7 @@ def test_rods_cut_by_the_border_are_found_when_half_in_view() -> None:
     in_view = (rods.y + 0.2 * rods.radius < HEIGHT) & (rods.x > 0) & (rods.x < WIDTH)
     assert (rods.y + rods.radius > HEIGHT)[in_view].any()
     assert near[in_view].all()
-    # What is found beyond is a rod too.
+    # Further detections are rods as well.
     assert found.count == len(np.unique(index[near]))
 
 
@@ -73,7 +73,7 @@ def test_nothing_is_found_on_an_empty_photograph() -> None:
     assert detect_grains(noise, DetectionSettings(radii=CLASSES)).count == 0
 
 
-def test_position_where_no_grain_is_has_no_quality() -> None:
+def test_position_without_a_grain_has_no_quality() -> None:
     blank = np.full((300, 300), 30.0, np.float32)
     found = refine_grains(blank, np.array([150.0]), np.array([150.0]), np.array([30.0]))
     assert found.quality[0] == 0.0
@@ -81,6 +81,6 @@ def test_position_where_no_grain_is_has_no_quality() -> None:
     assert (found.x[0], found.y[0]) == (150.0, 150.0)
 
 
-def test_radii_that_are_no_radii_are_refused() -> None:
+def test_invalid_radii_are_refused() -> None:
     with pytest.raises(ValueError, match="radii"):
         DetectionSettings(radii=(0.5,))

@@ -1,4 +1,4 @@
-"""Detection where little is told or the picture is poor: any size, soft or tiny photographs, shaded rims."""
+"""Detection without settings or on poor photographs: any size, blurred or small photographs, shaded rims."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.photographs import LUMA
+from rodsight.tracking.detection.circle_measurement import CircleMeasurer, MeasuredCircle
 from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
-from rodsight.tracking.detection.outlines import Measured, Outliner
 
 from tests.app.tracking.real_like import Laboratory, brown_photograph
 
@@ -37,11 +37,11 @@ def photograph(
 def test_the_blur_of_a_photograph_is_measured_and_does_not_move_radii(blur: float) -> None:
     x, y, radius = rods_on_a_grid(22.0, 60.0)
     image = photograph(Laboratory(blur=blur, light=0.0), x, y, radius)
-    outliner = Outliner(image, 22.0)
+    measurer = CircleMeasurer(image, 22.0)
     rough = np.column_stack([x, y, *(np.full(len(x), each) for each in (22.0, 2.0, 0.0, np.inf))])
-    measured = [Measured(*one) for one in outliner.measure(rough).tolist()]
+    measured = [MeasuredCircle(*one) for one in measurer.measure(rough).tolist()]
     # A pixel is a square of side 1: it blurs by 1/sqrt(12) more.
-    assert outliner.estimate_blur(measured) == pytest.approx(np.hypot(blur, 0.29), abs=BLUR_ALLOWED)
+    assert measurer.estimate_blur(measured) == pytest.approx(np.hypot(blur, 0.29), abs=BLUR_ALLOWED)
     found = detect_grains(image, DetectionSettings(radius_range=(15.0, 30.0)))
     assert found.count == len(x)
     assert abs(float(np.median(found.radius)) - 22.0) < RADIUS_ALLOWED
@@ -56,8 +56,8 @@ def test_a_sharp_binary_picture_is_no_obstacle() -> None:
     assert np.abs(found.radius - 22.0).max() < 0.5
 
 
-def test_sizes_one_to_eight_are_found_when_nothing_is_told() -> None:
-    """Neither does a circle inside a large rod's texture count, nor one beyond the usual sizes get lost."""
+def test_sizes_one_to_eight_are_found_without_settings() -> None:
+    """Circles in a large rod's texture are rejected, and rods beyond the usual sizes are found."""
     x = np.array([110.0, 300.3, 300.0, 60.5, 120.2, 180.0, 240.0, 389.0, 224.0])
     y = np.array([110.0, 90.4, 270.0, 300.0, 260.6, 320.0, 390.0, 389.0, 190.0])
     radius = np.array([96.0, 72.0, 80.0, 30.0, 22.0, 16.0, 14.0, 12.0, 12.0])
@@ -68,7 +68,7 @@ def test_sizes_one_to_eight_are_found_when_nothing_is_told() -> None:
     assert np.abs(found.radius - radius[near.argmin(axis=1)]).max() < 1.0
 
 
-def test_one_sided_shadow_is_told_in_sigma() -> None:
+def test_sigma_covers_a_one_sided_shadow() -> None:
     x, y, radius = rods_on_a_grid(20.0, 44.0)
     found = detect_grains(
         photograph(Laboratory(shadow=0.5, highlight=30.0), x, y, radius), DetectionSettings(radius_range=(14.0, 28.0))
@@ -77,7 +77,7 @@ def test_one_sided_shadow_is_told_in_sigma() -> None:
     nearest = np.hypot(found.x[:, None] - x, found.y[:, None] - y).argmin(axis=1)
     error = np.stack([found.x - x[nearest], found.y - y[nearest]], axis=1)
     assert np.sqrt((error**2).mean()) < CENTRE_ALLOWED
-    # Shading moves all rods alike, so few rods tell as much as many: half as large again is still covered.
+    # Shading displaces all rods alike, so many rods are no better evidence than few: a factor of 1.5 is allowed.
     assert np.sqrt(((error / found.sigma[:, None]) ** 2).mean()) < 1.5
 
 

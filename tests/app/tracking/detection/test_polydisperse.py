@@ -1,4 +1,4 @@
-"""Hundreds of discs from five pixels to fifty, where nothing is told about their sizes."""
+"""Detection of hundreds of discs with radii from five to fifty pixels and no setting of their sizes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.app.tracking.real_like import Laboratory, brown_photograph
 WIDTH, HEIGHT = 460, 400
 SMALLEST, LARGEST = 5.0, 50.0  # [px]
 CENTRE_ALLOWED = 0.15  # [px] rms; the smallest show ten pixels of outline
-RECALL_LEAST = 0.97  # some of the smallest show next to no outline
+MIN_RECALL = 0.97  # some of the smallest show next to no outline
 
 
 @pytest.mark.screen  # many seconds of detection
@@ -35,6 +35,6 @@ def test_small_discs_among_large_ones_are_found_and_nothing_else(painted: bool) 
     rows = whole[index]
     assert (radius < 8.0).sum() > 40
     assert near[rows].max() < 0.3 * SMALLEST
-    assert len(np.unique(index[rows])) >= RECALL_LEAST * whole.sum()
+    assert len(np.unique(index[rows])) >= MIN_RECALL * whole.sum()
     error = np.stack([found.x - x[index], found.y - y[index]])[:, rows]
     assert np.sqrt((error**2).mean()) < CENTRE_ALLOWED

@@ -1,4 +1,4 @@
-"""Brown, scratched, badly lit rods without speckle, down to a radius of 14 pixels: all found, all followed."""
+"""Detection and tracking of brown, scratched, dimly lit rods without speckle, down to a radius of 14 pixels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DULL = Laboratory(face=90.0, grain=6.0, light=0.45, blur=1.4, noise=2.0)
 
 def photographed(
     folder: Path, laboratory: Laboratory, rods: Rods, dx: np.ndarray | float, dy: np.ndarray | float,
-    turn: np.ndarray, noise_seed: int,
+    rotation: np.ndarray, noise_seed: int,
 ) -> np.ndarray:  # fmt: skip
     file = folder / f"{noise_seed}.png"
     image = brown_photograph(
@@ -36,7 +36,7 @@ def photographed(
         rods.x + dx,
         rods.y + dy,
         rods.radius,
-        turn,
+        rotation,
         pattern_seed=1,
         noise_seed=noise_seed,
     )
@@ -75,15 +75,15 @@ def test_brown_rods_are_followed_over_thirteen_pixels_and_five_degrees(
     laboratory: Laboratory, first: np.ndarray, rods: Rods, tmp_path: Path
 ) -> None:
     generator = np.random.default_rng(3)
-    turn = generator.normal(np.deg2rad(5.0), 0.03, rods.count)
+    rotation = generator.normal(np.deg2rad(5.0), 0.03, rods.count)
     dx, dy = 12.0 + generator.normal(0.0, 0.4, rods.count), -5.0 + generator.normal(0.0, 0.4, rods.count)
     tracker = Tracker(first, (rods.x, rods.y, rods.radius))
-    poses = tracker.follow(photographed(tmp_path, laboratory, rods, dx, dy, turn, 2), [tracker.first()])
+    poses = tracker.follow(photographed(tmp_path, laboratory, rods, dx, dy, rotation, 2), [tracker.first()])
     error = np.stack([poses.x - rods.x - dx, poses.y - rods.y - dy])
     assert poses.has_pose.all()
     assert np.abs(error).max() < WRONG
     assert np.sqrt((error**2).mean()) < FOLLOWED_ALLOWED
-    assert np.sqrt(np.mean((poses.rotation - turn) ** 2)) < 0.005
+    assert np.sqrt(np.mean((poses.rotation - rotation) ** 2)) < 0.005
     assert (poses.status != TrackStatus.SUSPECT).mean() > 0.97
 
 

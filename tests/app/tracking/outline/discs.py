@@ -1,4 +1,4 @@
-"""Photographs of discs without paint: plain ones of either shade, and transparent ones with fringes of light."""
+"""Synthetic photographs of discs without paint: plain bright or dark ones, and photoelastic ones with fringes."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from solver.bodies.grains import Array
+from rodsight.solver.bodies.grains import Array
 
 FINE = 3  # sub-pixels a side
 
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """How a kind of discs is lit. Grey levels of the picture."""
+    """Grey levels, noise and blur of a kind of discs."""
 
     inside: float
     outside: float
@@ -32,7 +31,7 @@ KINDS = {"white on black": WHITE, "black on white": BLACK, "fringes": TRANSPAREN
 def photograph_discs(
     light: Light, shape: tuple[int, int], x: Array, y: Array, radius: Array, force: Array, seed: int
 ) -> np.ndarray:
-    """The photograph (h, w) float32 of discs x, y, radius, force (n,): fringes run out from three contacts of each."""
+    """Draw discs x, y, radius, force (n,) in a photograph (h, w) float32: fringes start at three contacts of each."""
     height, width = shape
     picture = np.full((height * FINE, width * FINE), light.outside, np.float32)
     contacts = np.random.default_rng(99).uniform(0.0, 2.0 * np.pi, (len(x), 3))  # where they are pressed
@@ -56,7 +55,7 @@ def photograph_discs(
 
 
 def lay_row_by_row(columns: int, rows: int, radii: tuple[float, float], seed: int = 0) -> tuple[Array, Array, Array]:
-    """x, y, radius (n,) [px] of discs that nearly touch, rows of alternating sizes."""
+    """Lay discs x, y, radius (n,) [px] that nearly touch, in rows of alternating sizes."""
     rng = np.random.default_rng(seed)
     step = radii[0] + radii[1] + 0.6
     column, row = np.meshgrid(np.arange(columns), np.arange(rows))

@@ -1,4 +1,4 @@
-"""Discs followed by their rims: all of them, how exactly, and what is said of the rest."""
+"""Tracking of discs by their rims: completeness, accuracy, and the status of failures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def discs() -> Discs:
     return lay_row_by_row(10, 10, RADII)
 
 
-def begin(light: Light, discs: Discs, force: float = 0.8) -> OutlineTracker:
+def make_tracker(light: Light, discs: Discs, force: float = 0.8) -> OutlineTracker:
     x, y, radius = discs
     n = len(x)
     image = photograph_discs(light, SHAPE, x, y, radius, np.full(n, force), 1)
@@ -35,9 +35,9 @@ def begin(light: Light, discs: Discs, force: float = 0.8) -> OutlineTracker:
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_discs_are_followed_whatever_their_inside_does(discs: Discs, kind: str) -> None:
+def test_discs_are_tracked_with_changing_interiors(discs: Discs, kind: str) -> None:
     x, y, radius = discs
-    tracker, rng = begin(KINDS[kind], discs), np.random.default_rng(3)
+    tracker, rng = make_tracker(KINDS[kind], discs), np.random.default_rng(3)
     history, errors, scaled = [tracker.first()], [], []
     dx, dy = np.zeros(len(x)), np.zeros(len(x))
     for k in range(1, 5):
@@ -60,7 +60,7 @@ def test_discs_are_followed_whatever_their_inside_does(discs: Discs, kind: str) 
 
 def test_a_common_jump_of_most_of_a_radius_loses_none(discs: Discs) -> None:
     x, y, radius = discs
-    tracker = begin(WHITE, discs)
+    tracker = make_tracker(WHITE, discs)
     near = photograph_discs(WHITE, SHAPE, x + 4.0, y, radius, 0.0 * x, 2)
     history = [tracker.first(), tracker.follow(near, [tracker.first()])]
     jumped = tracker.follow(photograph_discs(WHITE, SHAPE, x + 12.0, y - 4.0, radius, 0.0 * x, 3), history)
@@ -71,7 +71,7 @@ def test_a_common_jump_of_most_of_a_radius_loses_none(discs: Discs) -> None:
 
 def test_a_disc_that_is_taken_away_is_lost_and_found_again(discs: Discs) -> None:
     x, y, radius = discs
-    tracker = begin(WHITE, discs)
+    tracker = make_tracker(WHITE, discs)
     there = np.arange(len(x)) != 44
     without = photograph_discs(WHITE, SHAPE, x[there], y[there], radius[there], 0.0 * x[there], 2)
     history = [tracker.first(), tracker.follow(without, [tracker.first()])]
@@ -84,14 +84,14 @@ def test_a_disc_that_is_taken_away_is_lost_and_found_again(discs: Discs) -> None
 
 
 def test_a_blank_photograph_shows_no_disc(discs: Discs) -> None:
-    tracker = begin(WHITE, discs)
+    tracker = make_tracker(WHITE, discs)
     blank = np.random.default_rng(1).normal(90.0, 2.0, SHAPE).astype(np.float32)
     assert not tracker.follow(blank, [tracker.first()]).has_pose.any()
 
 
-def test_a_disc_that_leaves_the_picture_is_said_to() -> None:
+def test_a_disc_that_leaves_the_photograph_is_out_of_frame() -> None:
     x, y, radius = np.array([60.0, 200.0, 300.0]), np.array([100.0, 200.0, 100.0]), np.full(3, 15.0)
-    tracker, history = begin(WHITE, (x, y, radius)), []
+    tracker, history = make_tracker(WHITE, (x, y, radius)), []
     history.append(tracker.first())
     for shift in (20.0, 40.0, 60.0, 75.0):
         image = photograph_discs(WHITE, SHAPE, x - shift, y, radius, 0.0 * x, int(shift))

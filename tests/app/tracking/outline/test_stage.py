@@ -1,4 +1,4 @@
-"""photographs.follow = "outline" as a user meets it."""
+"""The setting photographs.follow = "outline" through the command line."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""A bar's inner edge is found from a line near it, and the bars of a frame from the rods between them."""
+"""Detection of a bar's inner edge from a line near it, and of a frame's bars from the rods between them."""
 
 import cv2
 import numpy as np
 import pytest
-from rodsight.tracking.walls.inner_edge import find_bars, meeting_lines, snap_to_edge
+from rodsight.tracking.walls.inner_edge import find_bars, lines_to_corners, snap_to_edge
 
 
 @pytest.fixture
@@ -20,21 +20,21 @@ def bar():
 
 
 def test_a_line_drawn_by_hand_moves_onto_the_edge(bar):
-    found, share = snap_to_edge(bar, np.array([[45.0, 309.0], [455.0, 273.0]]), 20.0)
+    found, fraction = snap_to_edge(bar, np.array([[45.0, 309.0], [455.0, 273.0]]), 20.0)
     true = 302.0 - 24.0 * found[:, 0] / 499.0
     assert np.abs(found[:, 1] - true).max() < 1.0
-    assert share > 0.5
+    assert fraction > 0.5
 
 
 def test_where_there_is_no_edge_a_line_stays(bar):
     empty = np.full_like(bar, 50.0)
     line = np.array([[45.0, 309.0], [455.0, 273.0]])
-    found, share = snap_to_edge(empty, line, 20.0)
-    assert share < 0.34
+    found, fraction = snap_to_edge(empty, line, 20.0)
+    assert fraction < 0.34
     assert np.isfinite(found).all()
 
 
-def test_rods_in_a_sheared_frame_tell_its_bars():
+def test_bars_are_found_from_the_rods_of_a_sheared_frame():
     row, column = np.mgrid[0:9, 0:12]
     x = 60.0 + 40.0 * column + 6.0 * (8 - row)
     y = 50.0 + 40.0 * row
@@ -55,6 +55,6 @@ def test_lines_are_cut_where_they_meet():
     bottom, right = [[1.0, 9.0], [8.0, 9.0]], [[9.0, 12.0], [9.0, 2.0]]
     top, left = [[12.0, 1.0], [2.0, 1.0]], [[0.0, 0.0], [0.0, 7.0]]
     lines = np.array([bottom, right, top, left])
-    met = meeting_lines(lines)
+    met = lines_to_corners(lines)
     np.testing.assert_allclose(met[0], [[0.0, 9.0], [9.0, 9.0]])
     np.testing.assert_allclose(met[2], [[9.0, 1.0], [0.0, 1.0]])

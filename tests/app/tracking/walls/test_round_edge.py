@@ -1,4 +1,4 @@
-"""A round wall's edge is found from a circle near it, whichever side the packing is on."""
+"""Detection of a round wall's edge from a circle near it, with the packing on either side."""
 
 import cv2
 import numpy as np
@@ -29,9 +29,9 @@ def photographed(*, inside: bool) -> np.ndarray:
 @pytest.mark.parametrize("inside", [True, False])
 def test_a_circle_drawn_by_hand_moves_onto_the_edge(inside):
     drawn = TRUE[0] + 4.0, TRUE[1] - 3.0, TRUE[2] + 3.0
-    found, share = snap_to_rim(photographed(inside=inside), drawn, 12.0, inside=inside)
+    found, fraction = snap_to_rim(photographed(inside=inside), drawn, 12.0, inside=inside)
     assert found == pytest.approx(TRUE, abs=EXACT)
-    assert share > 0.5
+    assert fraction > 0.5
 
 
 def test_a_circle_that_leaves_the_picture_is_found_by_what_is_in_it():
@@ -43,7 +43,7 @@ def test_a_circle_that_leaves_the_picture_is_found_by_what_is_in_it():
 def test_where_there_is_no_edge_a_circle_stays():
     rng = np.random.default_rng(1)
     empty = rng.normal(60.0, 8.0, (500, 500)).astype(np.float32)
-    found, share = snap_to_rim(empty, TRUE, 12.0, inside=True)
+    found, fraction = snap_to_rim(empty, TRUE, 12.0, inside=True)
     assert found == TRUE
-    assert share < 0.34
+    assert fraction < 0.34
     assert snap_to_rim(empty, (3000.0, 0.0, 40.0), 12.0, inside=True) == ((3000.0, 0.0, 40.0), 0.0)

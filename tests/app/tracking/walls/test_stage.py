@@ -1,4 +1,4 @@
-"""What the tracking stage makes of walls: how well they are known is stored, and what lies beyond them is no grain."""
+"""Walls in the tracking stage: their standard deviation is stored, and discs beyond them are no grains."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from rodsight.experiment.reading.tables import read_table
 
-from tests.app.tracking.photographed import Tracked, off_walls, track
+from tests.app.tracking.photographed import Tracked, track, wall_errors
 
 BEYOND = 140  # [px] of backing added on the right of every photograph
 FACTOR = 4.0  # standard deviations that cover every error of few endpoints
 
 
-def test_how_well_followed_walls_are_known_is_stored_with_them(followed: Tracked) -> None:
+def test_sigma_of_tracked_walls_is_stored(followed: Tracked) -> None:
     walls, true = followed.walls, followed.true_walls
     assert walls.sigma is not None
     assert walls.sigma.shape == true.shape[:2]
-    assert np.isnan(walls.sigma[0]).all()  # told by the table
-    off = np.abs(off_walls(walls.endpoints, true))[1:].max(axis=-1)
+    assert np.isnan(walls.sigma[0]).all()  # given by the table
+    off = np.abs(wall_errors(walls.endpoints, true))[1:].max(axis=-1)
     assert (walls.sigma[1:] > 0.0).all()
     assert (off < FACTOR * walls.sigma[1:]).all()
     assert walls.frames(1, 3).sigma == pytest.approx(walls.sigma[1:3])
@@ -29,8 +29,8 @@ def test_how_well_followed_walls_are_known_is_stored_with_them(followed: Tracked
         assert store["walls/sigma"].attrs["unit"] == "m"
 
 
-def test_a_wall_told_in_a_later_frame_has_no_sigma_there(partly_told: Tracked) -> None:
-    walls = partly_told.walls
+def test_a_wall_given_in_a_later_frame_has_no_sigma_there(partly_given: Tracked) -> None:
+    walls = partly_given.walls
     assert walls.sigma is not None
     top = walls.name.index("top")
     assert np.isfinite(walls.sigma[:, top]).tolist() == [False, True, False, True]
@@ -41,13 +41,13 @@ def test_walls_of_a_table_have_no_sigma(plain: Tracked) -> None:
 
 
 @pytest.mark.screen  # many seconds of photographs
-def test_round_things_beyond_the_walls_are_no_grains(photographed: Path, tmp_path: Path) -> None:
+def test_discs_beyond_the_walls_are_no_grains(photographed: Path, tmp_path: Path) -> None:
     table = read_table(photographed / "grains.csv", ("id", "radius"))  # of the truth: the experiment detects
     x, y = _add_a_wheel(photographed, float(np.median(table.numbers("radius"))))
     tracks, _ = track(photographed, tmp_path / "with", "--frames", "0:2")
     assert tracks.grain_count == len(table)
     assert np.hypot(*(_found(tmp_path / "with") - (x, y)).T).min() > 20.0
-    # It is the walls that keep it out: without them it is found.
+    # Without the walls the disc is found, so the walls exclude it.
     text = (photographed / "experiment.toml").read_text()
     (photographed / "experiment.toml").write_text(_without_walls(text))
     track(photographed, tmp_path / "without", "--frames", "0:2")
@@ -55,7 +55,7 @@ def test_round_things_beyond_the_walls_are_no_grains(photographed: Path, tmp_pat
 
 
 def _add_a_wheel(experiment: Path, radius: float) -> tuple[float, float]:
-    """A bright disc on the backing on the right of all photographs; returns its centre [px]."""
+    """Draw a bright disc on the background on the right of all photographs; returns its centre [px]."""
     x = y = 0.0
     for file in sorted((experiment / "photos").iterdir()):
         image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)

@@ -1,10 +1,15 @@
-"""Compiled code moves eight records at once: the same numbers must arrive where the plain loops say."""
+"""The vector implementations copy eight records at once, with the same result as the plain loops."""
 
 import numpy as np
 import pytest
 from numba import njit
-
-from solver.nlgs.sweeping.grain_records import RECORD, WIDTH, gather_differences, gather_records, scatter_records
+from rodsight.solver.nlgs.sweeping.grain_records import (
+    RECORD,
+    WIDTH,
+    gather_differences,
+    gather_records,
+    scatter_records,
+)
 
 GRAINS, STRIDE = 40, 16
 
@@ -26,7 +31,7 @@ def scatter(rows, at, body, ids, first):
 
 @pytest.fixture(params=[0, 1, 3])
 def body(request):
-    """Records that begin at any number of an array: nothing may ask for more than a number's alignment."""
+    """Records at any offset of an array: only the alignment of a number may be assumed."""
     return np.random.default_rng(4).normal(size=RECORD * GRAINS + request.param)[request.param :]
 
 
@@ -36,7 +41,7 @@ def ids():
 
 
 @pytest.mark.parametrize(("first", "at"), [(0, 0), (5, 8), (GRAINS - WIDTH, 3)])
-def test_records_come_in_rows(body, ids, first, at):
+def test_records_are_gathered_in_rows(body, ids, first, at):
     found, expected = np.zeros(RECORD * STRIDE + at), np.zeros(RECORD * STRIDE + at)
     gather(body, ids, first, found, at)
     gather_records(body, ids, first, expected, at, STRIDE)
@@ -46,7 +51,7 @@ def test_records_come_in_rows(body, ids, first, at):
 
 
 @pytest.mark.parametrize(("first", "at"), [(0, 0), (5, 8), (GRAINS - WIDTH, 3)])
-def test_rows_go_back_to_records_and_nowhere_else(body, ids, first, at):
+def test_rows_are_scattered_to_their_records_only(body, ids, first, at):
     rows = np.random.default_rng(6).normal(size=RECORD * STRIDE + at)
     found, expected = body.copy(), body.copy()
     scatter(rows, at, found, ids, first)
@@ -57,7 +62,7 @@ def test_rows_go_back_to_records_and_nowhere_else(body, ids, first, at):
 
 
 @pytest.mark.parametrize(("first", "second", "at"), [(0, 8, 0), (5, 20, 8), (GRAINS - WIDTH, 1, 3)])
-def test_differences_of_records_come_in_rows(body, ids, first, second, at):
+def test_differences_of_records_are_gathered_in_rows(body, ids, first, second, at):
     found, expected = np.zeros(RECORD * STRIDE + at), np.zeros(RECORD * STRIDE + at)
     subtract(body, ids, first, second, found, at)
     gather_differences(body, ids, first, second, expected, at, STRIDE)

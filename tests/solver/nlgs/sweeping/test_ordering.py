@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from rodsight.solver.bodies.packing import Material
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.nlgs.problem import assemble
+from rodsight.solver.nlgs.sweeping.ordering import GROUP, visiting_order
 
-from solver.bodies.packing import Material
-from solver.contacts.contacts import detect_contacts
-from solver.nlgs.problem import assemble
-from solver.nlgs.sweeping.ordering import GROUP, visiting_order
 from tests.packings import squeezed_heap
 
 
@@ -31,7 +31,7 @@ def test_contacts_of_a_group_share_no_body(heap, size):
     inner = contacts.select(~contacts.with_wall)
     order, grouped = order_of(inner, size)
     assert grouped % size == 0
-    assert grouped >= 0.5 * inner.count  # else there would be little to test
+    assert grouped >= 0.5 * inner.count  # otherwise the test covers little
     for group in order[:grouped].reshape(-1, size):
         bodies = np.concatenate([inner.i[group], inner.j[group]])
         assert len(np.unique(bodies)) == 2 * size
@@ -61,7 +61,7 @@ def test_contacts_that_all_share_a_body_are_in_no_group():
     assert np.array_equal(np.sort(order), np.arange(5))
 
 
-def test_no_contacts_are_in_order():
+def test_no_contacts_have_an_empty_order():
     order, grouped = visiting_order(np.empty((0, 2)), np.empty(0, np.int32), np.empty(0, np.int32), 8)
     assert len(order) == grouped == 0
 

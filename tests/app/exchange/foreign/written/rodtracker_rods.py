@@ -1,4 +1,4 @@
-"""Five rods seen end on, slightly askew, the last of which rises and is not seen in the end; saved by RodTracker."""
+"""Five slightly inclined rods seen end on, the last of which rises and is hidden at the end; saved by RodTracker."""
 
 import sys
 from pathlib import Path
@@ -17,9 +17,9 @@ for frame in (500, 501, 502):
         hidden = last and frame == 502
         ends = [-1.0] * 4 if hidden else [x - 3.0, lifted - 2.0, x + 3.0, lifted + 2.0]
         names = [f"{axis}{end}_{camera}" for camera in ("gp3", "gp4") for end in (1, 2) for axis in "xy"]
-        seen = {"seen_gp3": int(not hidden), "seen_gp4": int(not hidden)}
+        observed = {"seen_gp3": int(not hidden), "seen_gp4": int(not hidden)}
         rows.append(
-            {**dict(zip(names, 2 * ends, strict=True)), **seen, "particle": k, "frame": frame, "color": "black"}
+            {**dict(zip(names, 2 * ends, strict=True)), **observed, "particle": k, "frame": frame, "color": "black"}
         )
 
 application = QtWidgets.QApplication(sys.argv)  # QT_QPA_PLATFORM=offscreen

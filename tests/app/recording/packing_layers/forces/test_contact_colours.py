@@ -20,7 +20,7 @@ def coloured(tmp_path, frames) -> list[dict[str, list[int]]]:
     return [{name: each[f"by_{name}:colors"] for name in COLOURINGS} for each in shown]
 
 
-def test_every_contact_has_a_colour_by_every_quantity_and_grey_where_it_is_not_known(tmp_path):
+def test_every_contact_has_a_colour_by_every_quantity_and_grey_if_unknown(tmp_path):
     frames = make_results(2, sweeps=20).frames
     slides = np.linspace(0.0, 1.0, frames[1].contacts.count)
     first, second = coloured(tmp_path, [frames[0], replace(frames[1], sliding_probability=slides)])
@@ -32,7 +32,7 @@ def test_every_contact_has_a_colour_by_every_quantity_and_grey_where_it_is_not_k
     assert second["sliding"][0] != second["sliding"][-1]
 
 
-def test_the_change_is_that_of_a_contact_itself_since_the_frame_before(tmp_path):
+def test_the_change_is_that_of_each_contact_since_the_frame_before(tmp_path):
     frames = make_results(2, sweeps=20).frames
     same = replace(frames[0], frame=1)
     more = replace(same, fn=same.fn + np.where(np.arange(len(same.fn)) == 3, same.fn.mean(), 0.0))
@@ -45,7 +45,7 @@ def test_the_change_is_that_of_a_contact_itself_since_the_frame_before(tmp_path)
 
 
 @pytest.mark.parametrize("name", COLOURINGS)
-def test_a_colour_goes_along_its_ramp_and_stays_at_its_ends(name):
+def test_a_colour_varies_along_its_ramp_and_is_clipped_at_its_ends(name):
     low, end, middle, high, beyond = COLOURINGS[name].colours(np.array([-1.0, 0.0, 0.5, 1.0, 7.0])).tolist()
     assert low == end
     assert high == beyond

@@ -1,0 +1,146 @@
+"""The command that converts tracks, simulations and photoelastic forces of other programs: import."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from rich.console import Console
+
+from ...exchange.foreign.format_names import FileFormat
+from ...process.errors import InputError
+from ..arguments import Quiet
+from ..terminal import print_line
+
+if TYPE_CHECKING:
+    from ...exchange.foreign.experiment_folder import FolderContents
+    from ...exchange.foreign.observations import ImportedTracks
+
+
+def import_(
+    form: Annotated[
+        FileFormat,
+        tyro.conf.Positional,
+        tyro.conf.arg(
+            help="table: of any tracker, by --columns; trackpy, trackmate, rodtracker: trackers; lammps (and "
+            "LIGGGHTS), yade: simulations; pegs: photoelastic discs with their forces; dic: dic_out_N.txt or CONFNNNN"
+        ),
+    ],
+    source: Annotated[
+        Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE", help="to read, or a folder, depending on the form")
+    ],
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the new experiment")],
+    /,
+    columns: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="frame=…,id=…,x=…,y=…[,theta=…,radius=…]",
+            help="names of the columns, or their numbers from 1; also diameter=…, time=…; overrides those of the form",
+        ),
+    ] = None,
+    pixel_size: Annotated[float | None, tyro.conf.arg(help="the file's unit of length [m]; default: metres")] = None,
+    y_down: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="y points down, as in pictures")] = False,
+    height: Annotated[
+        float | None,
+        tyro.conf.arg(help="of a photograph [px]; y is measured up from its last row; default: from the highest y"),
+    ] = None,
+    degrees: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="theta is in degrees")] = False,
+    radius: Annotated[float | None, tyro.conf.arg(help="of all grains without one, in the file's unit")] = None,
+    interval: Annotated[float, tyro.conf.arg(help="between photographs, or of a step [s]")] = 1.0,
+    precision: Annotated[float | None, tyro.conf.arg(help="of a position, in the file's unit")] = None,
+    walls: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="box|outer|none|FILE",
+            help="box: four bars proposed at the outermost grains; outer: those grains are the boundary; "
+            "FILE: frame,wall,x1,y1,x2,y2 in the file's unit",
+        ),
+    ] = None,
+    corner_radius: Annotated[
+        float | None,
+        tyro.conf.arg(
+            help="dic: of the discs at the frame's corners, in the file's unit; default: the largest that overlaps no "
+            "rod"
+        ),
+    ] = None,
+    pressure: Annotated[
+        tuple[str, ...], tyro.conf.arg(metavar="WALL=PA", help="pressure on walls [Pa], such as top=50e3")
+    ] = (),
+    pairs: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="FILE",
+            help="pair forces of a simulation [N] as truth: dump local, or a table frame,i,j,fx,fy; names by --columns",
+        ),
+    ] = None,
+    quiet: Quiet = False,
+) -> int:
+    """Convert files of another program to an experiment: tracks, grains, times, walls, experiment.toml.
+
+    Data that cannot be converted are named, also in experiment.toml.
+
+    A tracker's table in pixels: rodsight import table spots.csv my_test --columns frame=t,id=rod,x=x,y=y,radius=r
+    --pixel-size 1.2e-4 --y-down --walls box --pressure top=50e3
+
+    Photoelastic discs: rodsight import pegs solved/ my_test --pixel-size 1e-4
+
+    Example: rodsight import table sample_data/shear/truth_tracks.csv my_test --radius 0.008 --walls box
+    --columns frame=frame,id=id,x=x,y=y,theta=theta
+    """
+    from ...exchange.foreign.import_files import ImportRequest, import_files
+    from ...exchange.foreign.tracker_tables import parse_columns
+
+    request = ImportRequest(
+        form, source, parse_columns(columns), pixel_size, y_down, height, degrees, radius, interval, precision, walls,
+        _pressures(pressure), corner_radius, pairs,
+    )  # fmt: skip
+    imported, contents = import_files(request, out)
+    _report(Console(quiet=quiet), out, imported, contents)
+    return 0
+
+
+def _pressures(given: tuple[str, ...]) -> dict[str, float]:
+    found = {}
+    for each in given:
+        name, equals, text = each.partition("=")
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (equals and name and math.isfinite(value)):
+            raise InputError("--pressure", each, "is not WALL=PA, such as top=50e3")
+        found[name] = value
+    return found
+
+
+def _report(console: Console, out: Path, imported: ImportedTracks, contents: FolderContents) -> None:
+    from ...exchange.foreign.experiment_folder import bar_names
+
+    tracks = imported.tracks
+    for remark in imported.remarks:
+        print_line(console, remark)
+    if contents.walls is not None:
+        print_line(console, f"Walls {', '.join(contents.walls.name)}: {contents.walls.remark}")
+    if contents.corners is not None:
+        names = bar_names(contents.corners) if contents.walls is None else contents.walls.name
+        found = f"The corners of the frame are discs where the bars {', '.join(names)} meet."
+        print_line(console, f"{found} {contents.corners.remark}")
+    elif contents.cell is not None:
+        print_line(console, "The box has two periodic directions: [boundary] periodic, with its vectors in cell.csv.")
+    elif contents.outer_grains:
+        which = (
+            f"The {len(contents.edge)} grains at the edge, by the file," if contents.edge else "The outermost grains"
+        )
+        print_line(console, f"{which} are the boundary ([boundary] grains), since no walls are given.")
+    if contents.truth is not None:
+        print_line(console, f"{len(contents.truth['frame'])} measured forces are in truth_contacts.csv.")  # type: ignore[arg-type]
+    given = (contents.walls, contents.corners, contents.cell)
+    bounded = any(each is not None for each in given) or contents.outer_grains
+    add = "" if bounded else f"add [walls] to {out / 'experiment.toml'}, then "
+    print_line(
+        console,
+        f"{out}: {tracks.grain_count} grains in {tracks.frame_count} frames. Next: {add}rodsight check {out}, then "
+        f"rodsight run {out}",
+    )

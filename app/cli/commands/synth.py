@@ -1,0 +1,105 @@
+"""The command that makes synthetic experiments: synth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from ...process.errors import InputError, RunError
+from ...synthetic.scenarios.preset_names import MeasuredPreset, PhotographedPreset, ScenarioName
+from ..arguments import Quiet
+from ..terminal import progress_of
+
+if TYPE_CHECKING:
+    from ...process.progress import Progress
+
+
+def synth(
+    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT", help="folder to write")],
+    /,
+    preset: Annotated[
+        PhotographedPreset | MeasuredPreset | ScenarioName,
+        tyro.conf.arg(
+            help="small and paper can be photographed; photoelastic: discs and their forces as PeGS writes them, for "
+            "rodsight import pegs; the others are scenarios of tracks: --no-photographs"
+        ),
+    ] = "small",
+    seed: Annotated[int, tyro.conf.arg(help="of the packing, its paint and its noise")] = 0,
+    photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
+    noise: Annotated[
+        float | None,
+        tyro.conf.arg(help="of a tracked position [m], with --no-photographs; default 0, or the scenario's"),
+    ] = None,
+    depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
+    jpeg_quality: Annotated[
+        int | None, tyro.conf.arg(help="of 8-bit photographs, 1 to 100; default: the preset's")
+    ] = None,
+    png: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="write PNG, not JPEG")] = False,
+    grains: Annotated[int | None, tyro.conf.arg(help="number of rods; default: the preset's")] = None,
+    frame_count: Annotated[
+        int | None, tyro.conf.arg(name="frames", help="number of photographs; default: the preset's")
+    ] = None,
+    step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs [°]")] = None,
+    pixel_size: Annotated[float | None, tyro.conf.arg(help="side of a pixel [m]")] = None,
+    reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="reverse the shear half way")] = False,
+    quiet: Quiet = False,
+) -> int:
+    """Make a synthetic experiment with its truth: explicit DEM, walls, speckle photographs.
+
+    A scenario of tracks: rodsight synth no_plate --preset isotropic --no-photographs
+
+    Example: rodsight synth my_test --preset small --seed 3
+    """
+    from ...synthetic.scenarios.scenario_folder import make_scenario
+    from ...synthetic.synthesis import synthesize
+
+    with _at_rest(out), progress_of(quiet) as progress:
+        if preset in ("small", "paper"):
+            made = synthesize(
+                out, progress=progress, preset=preset, seed=seed, photographs=photographs, noise=noise or 0.0,
+                depth=depth, jpeg_quality=jpeg_quality, png=png, grains=grains, frames=frame_count,
+                step_degrees=step_degrees, pixel_size=pixel_size, reversal=reversal,
+            )  # fmt: skip
+        else:
+            refused = {
+                "--photographs": photographs and preset != "photoelastic", "--frames": frame_count,
+                "--step-degrees": step_degrees, "--pixel-size": pixel_size, "--jpeg-quality": jpeg_quality,
+                "--png": png, "--reversal": reversal,
+            }  # fmt: skip
+            for option, value in refused.items():
+                if value:
+                    raise InputError("synth", f"{option} with preset {preset}", "applies to photographed presets only")
+            if preset == "photoelastic":
+                return _photoelastic(out, seed, grains, progress, quiet=quiet)
+            made = make_scenario(out, preset, seed, grains=grains, noise=noise, progress=progress)
+    if not quiet:
+        content = f"{len(made.truth.radius)} rods, {made.truth.frame_count} frames"
+        Console().print(f"{out}: {content}. Next: rodsight run {out}", highlight=False)
+    return 0
+
+
+def _photoelastic(out: Path, seed: int, grains: int | None, progress: Progress, *, quiet: bool) -> int:
+    from ...synthetic.photoelastic import make_photoelastic
+
+    made = make_photoelastic(out, seed, grains=grains, progress=progress)
+    if not quiet:
+        content = f"{len(made.truth.radius)} discs, {made.truth.frame_count} photographs"
+        command = f"rodsight import pegs {out} EXPERIMENT --pixel-size {made.pixel_size:.4g}"
+        Console().print(f"{out}: {content}. Next: {command}", highlight=False, soft_wrap=True)
+    return 0
+
+
+@contextmanager
+def _at_rest(out: Path) -> Iterator[None]:
+    """Report in one line a simulation that does not come to rest."""
+    from ...solver.dem.dem_truth import UnbalancedError
+
+    try:
+        yield
+    except UnbalancedError as error:
+        raise RunError(f"{out}: {error}; try another --seed or number of --grains") from None

@@ -1,0 +1,52 @@
+"""Stored results that a command reads: the file of a given path, its experiment and its truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..process.errors import InputError
+
+if TYPE_CHECKING:
+    from ..results.results import Results
+    from ..run_folder import Run
+
+
+def results_file(path: Path) -> Path:
+    """Return results.h5 of a run's folder, or the file itself."""
+    from ..run_folder import RESULTS
+
+    return path / RESULTS if path.is_dir() else path
+
+
+def recording_file(path: Path) -> Path:
+    """Return recording.rrd of a run's folder, or the file itself."""
+    from ..run_folder import RECORDING
+
+    return path / RECORDING if path.is_dir() else path
+
+
+def has_experiment(path: Path) -> bool:
+    """Whether the experiment of results is at hand. Raises InputError where there are no results."""
+    from ..results.hdf5.store import origin_of
+    from ..run_folder import find_experiment
+
+    file = results_file(path)
+    try:
+        find_experiment(file, origin_of(file))
+    except InputError:
+        if not file.is_file():
+            raise
+        return False
+    return True
+
+
+def load_run(path: Path) -> tuple[Run, Results]:
+    """Load results with the experiment that they belong to. Raises InputError."""
+    from ..experiment.experiment import load_experiment
+    from ..results.hdf5.store import load_results, origin_of
+    from ..run_folder import Run, find_experiment
+
+    file = results_file(path)
+    results, origin = load_results(file), origin_of(file)
+    return Run(load_experiment(find_experiment(file, origin)), file.parent, origin.frames), results

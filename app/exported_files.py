@@ -1,0 +1,217 @@
+"""Files of a run for other programs and for papers: tables, VTK, OVITO, graphs, tracker files, figures, pictures, film.
+
+The command `export` and `rodsight.export` call these functions.
+"""
+
+from __future__ import annotations
+
+import io
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from .process.errors import InputError
+from .process.progress import Progress
+
+if TYPE_CHECKING:
+    from .experiment.units import Scale
+    from .figures.figure_style import Width
+    from .figures.gallery import FileKind
+    from .results.results import Results, TruthContacts
+
+ExportKind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Pictures of a recording to draw."""
+
+    recording: Path
+    timeline: str
+    times: tuple[int, int | None] | None  # first and end on the timeline; None: all
+    step: int
+    tab: str | None
+    view: str | None
+    size: tuple[int, int]  # [px] width and height
+    rate: float  # [1/s] pictures of a film
+
+
+def write_data(
+    kind: ExportKind,
+    results: Results,
+    target: Path,
+    *,
+    form: Literal["csv", "parquet"] = "csv",
+    pixel_size: float | None = None,
+) -> list[Path]:
+    """Write results in a data format into a folder; return the files.
+
+    Parameters
+    ----------
+    kind : {'tables', 'vtk', 'ovito', 'graph', 'dic'}
+    results : Results
+    target : Path
+        Folder to write to.
+    form : {'csv', 'parquet'}
+        Of tables.
+    pixel_size : float, optional
+        Side of a pixel [m], for dic; default: the experiment's.
+    """
+    from .exchange.contact_graph import write_graphs
+    from .exchange.dic_files import write_sequence
+    from .exchange.ovito_files import write_ovito
+    from .exchange.tidy_tables import write_tables
+    from .exchange.vtk_polydata import write_polydata
+
+    writers: dict[str, Callable[[], list[Path]]] = {
+        "tables": lambda: write_tables(results, target, form),
+        "dic": lambda: write_sequence(results.tracks, _scale_of(results, pixel_size), target, results.walls),
+        "vtk": lambda: write_polydata(results, target),
+        "ovito": lambda: write_ovito(results, target),
+        "graph": lambda: write_graphs(results, target),
+    }
+    return writers[kind]()
+
+
+def draw_pictures(drawing: Drawing, out: Path | None, progress: Progress, *, film: bool) -> list[Path]:
+    """Draw a recording as a film, or as pictures; return the files.
+
+    Raises
+    ------
+    InputError
+        A value is out of range, or the pictures cannot be drawn here.
+    """
+    from .recording.viewing.headless import NoPictureError
+    from .recording.viewing.pictures import PictureSettings, timeline_values, write_film, write_pictures
+
+    recording, step = drawing.recording, drawing.step
+    if step < 1:
+        raise InputError("--step", str(step), "is not a positive number")
+    if not 0.0 < drawing.rate <= 120.0:
+        raise InputError("--rate", str(drawing.rate), "is not between 0 and 120 pictures a second")
+    try:
+        first, last = timeline_values(recording, drawing.timeline)
+        begin, end = drawing.times or (0, None)
+        if drawing.times is not None and not first <= begin <= (last if end is None else end - 1) <= last:
+            given = f"{begin}:{'' if end is None else end}"
+            raise InputError("--frames", given, f"is not a range of {first}:{last + 1} on the timeline "
+                             f"{drawing.timeline}")  # fmt: skip
+        chosen = range(max(begin, first), last + 1 if end is None else end, step)
+        shown = PictureSettings(drawing.timeline, drawing.tab, drawing.view, drawing.size)
+
+        def report(done: int, total: int) -> None:
+            progress("drawing", done, total)
+
+        if film:
+            file = out if out is not None else recording.with_suffix(".mp4")
+            write_film(recording, file, chosen, shown, rate=drawing.rate, progress=report)
+            return [file]
+        folder = out if out is not None else recording.parent / "pictures"
+        return write_pictures(recording, folder, chosen, shown, progress=report)
+    except NoPictureError as error:
+        raise InputError("export", "", str(error)) from None
+
+
+def draw_figure_frames(
+    file: Path, out: Path | None, figure: str, drawing: Drawing, progress: Progress, *, film: bool
+) -> list[Path]:
+    """Draw a figure of every frame of a run as a film, or as pictures; return the files. Needs no viewer.
+
+    Parameters
+    ----------
+    file : Path
+        results.h5.
+    out : Path, optional
+        The film, or the folder of the pictures.
+    figure : str
+        Name of a figure: forces, density, rose, stress, time, truth.
+    drawing : Drawing
+        Frames, step, width [px] and rate; the other values are not used.
+    progress : Progress
+    film : bool
+        A film instead of pictures.
+
+    Raises
+    ------
+    InputError
+        A value is out of range, or the figure cannot be drawn.
+    """
+    from .process.atomic import write_atomically
+    from .recording.viewing.film_file import encode_film
+    from .recording.viewing.headless import NoPictureError
+    from .results.hdf5.store import load_results
+    from .run_truth import truth_of
+    from .solver.frame_forces import FrameStatus
+
+    results, truth = load_results(file), truth_of(file) if figure == "truth" else None
+    begin, end = drawing.times or (0, None)
+    chosen = range(len(results.frames))[begin : end : drawing.step]
+    frames = [k for k in chosen if results.frames[k].status is not FrameStatus.FAILED]
+    if not frames or drawing.step < 1:
+        raise InputError("--frames", f"{begin}:{'' if end is None else end}", "names no frame with forces")
+
+    def pictures() -> Iterator[bytes]:
+        for done, k in enumerate(frames, 1):
+            yield _figure_as_png(results, figure, k, truth, drawing.size[0])
+            progress("drawing", done, len(frames))
+
+    try:
+        if film:
+            target = out if out is not None else file.with_name(f"{figure}.mp4")
+            encode_film(target, pictures(), drawing.rate)
+            return [target]
+        folder = out if out is not None else file.parent / "pictures"
+        files = [folder / f"{figure}_{k:06d}.png" for k in frames]
+        folder.mkdir(parents=True, exist_ok=True)
+        for each, picture in zip(files, pictures(), strict=True):
+            write_atomically(each, picture)
+        return files
+    except (ValueError, NoPictureError) as error:
+        raise InputError("--figure", figure, str(error)) from None
+
+
+def _figure_as_png(results: Results, figure: str, frame: int, truth: TruthContacts | None, width: int) -> bytes:
+    from .figures.figure_style import paper_style
+    from .figures.gallery import draw_figure
+
+    drawn = draw_figure(results, figure, frame, width="double", truth=truth)
+    stream = io.BytesIO()
+    with paper_style():
+        drawn.savefig(stream, format="png", dpi=width / float(drawn.get_size_inches()[0]))
+    return stream.getvalue()
+
+
+def write_run_figures(
+    file: Path, out: Path | None, formats: tuple[FileKind, ...], frame: int | None, width: Width
+) -> list[Path]:
+    """Write the figures of a run, also against the truth if there is one; return the files. Raises InputError."""
+    from .figures.gallery import write_figures
+    from .results.hdf5.store import load_results
+    from .run_truth import truth_of
+
+    folder = file.parent / "figures" if out is None else out
+    results, truth = load_results(file), truth_of(file)
+    try:
+        return write_figures(results, folder, formats, frame=frame, width=width, truth=truth)
+    except (IndexError, ValueError) as error:
+        raise InputError("--frame", str(frame), str(error)) from None
+
+
+def _scale_of(results: Results, pixel_size: float | None) -> Scale:
+    """Return the scale of the photographs; an unknown height is chosen to contain the packing."""
+    from .experiment.config.experiment_file import ExperimentFile
+    from .experiment.units import Scale
+
+    if pixel_size is None:
+        section = ExperimentFile.model_validate(tomllib.loads(results.configuration)).photographs
+        given = section.pixel_size if section is not None else None
+        pixel_size = given[0] if isinstance(given, tuple) else given
+    if pixel_size is None:
+        raise InputError("--pixel-size", "", "is missing: these grains were not tracked in photographs")
+    if not pixel_size > 0.0:
+        raise InputError("--pixel-size", str(pixel_size), "is not positive")
+    tracks = results.tracks
+    top = tracks.position[tracks.present][:, 1].max() + tracks.radius.max()
+    return Scale(pixel_size, int(top / pixel_size) + 2)

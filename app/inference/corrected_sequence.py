@@ -1,0 +1,51 @@
+"""A sequence as the solver reads it: calibrated tracks, the packing, and complete settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ..results.results import Results
+from ..solver.bodies.interpolation import interpolate_ignored_frames
+from ..solver.bodies.motion import Snapshot
+from ..solver.bodies.packing import Packing
+from ..solver.boundary.boundary_correction import Boundary
+from ..solver.calibration.calibrate import Calibration
+from ..solver.contacts.radius_tuning import RadiusTuning
+from ..solver.contacts.verdicts import Verdicts
+from ..solver.convex.friction_check import WallFriction
+from ..solver.sequence.settings import SequenceSettings
+from ..tracks import Tracks, WallTracks
+from .snapshots import make_snapshots
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectedSequence:
+    """A sequence after all corrections, ready to be solved."""
+
+    packing: Packing
+    tracks: Tracks
+    walls: WallTracks
+    snapshots: Sequence[Snapshot]
+    settings: SequenceSettings
+    verdicts: Mapping[int, Verdicts]
+    calibration: Calibration | None  # None: not tried
+    tuning: RadiusTuning | None  # None: not requested
+    boundary: Boundary | None  # None: used as given
+    failed: Mapping[int, str]  # unusable frames with the reason; their snapshots are interpolated
+    wall_friction: WallFriction | None = None  # measured at walls; None: given, or as between rods
+    friction_measured: bool = False  # whether the friction between rods was measured
+    noise_remark: str = ""  # where the measured noise contradicts the stated one
+
+    def with_tracks(self, tracks: Tracks) -> CorrectedSequence:
+        """The sequence of the same rods with other positions and radii."""
+        snapshots = interpolate_ignored_frames(make_snapshots(tracks, self.walls), self.failed)
+        packing = replace(self.packing, grains=replace(self.packing.grains, radius=tracks.radius))
+        return replace(self, tracks=tracks, packing=packing, snapshots=snapshots)
+
+    def unsolved_results(self) -> Results:
+        """Results without any frame."""
+        return Results(
+            "", self.tracks, self.walls, self.packing.grains, self.packing.material.friction, (), (), "",
+            calibration=self.calibration, radius_tuning=self.tuning, boundary=self.boundary,
+        )  # fmt: skip

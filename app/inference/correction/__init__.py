@@ -1,0 +1,1 @@
+"""Corrections before contacts are found: boundary, noise, calibration, radii, friction, unseen grains."""

@@ -1,0 +1,77 @@
+"""Correction of the boundary and the noise before calibration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...solver.bodies.grains import Grains
+from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
+from ...solver.boundary.camera_distortion import find_camera_distortion
+from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
+from ...tracks import Tracks, WallTracks
+from ..snapshots import make_snapshots, measure_sequence
+from .calibration import radius_classes
+
+
+def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
+    """Replace the stated noise by the noise that the gaps show, where they contradict.
+
+    The noise is read from changes of the gaps of touching rods in time, so constant errors of centres and radii do not
+    enter.
+
+    Returns
+    -------
+    Tracks
+    str
+        A sentence on the contradiction; empty: none.
+    """
+    grains = Grains.of_rods(tracks.radius, density=1.0, length=1.0)
+    found = measure_precision(grains, make_snapshots(replace(tracks, centre_sigma=None), walls))
+    if found is None:
+        return tracks, ""
+    factor = contradiction(found, _stated_noise(tracks))
+    if factor == 1.0:
+        return tracks, ""
+    return replace(tracks, sigma=factor * tracks.sigma), describe_contradiction(found, factor)
+
+
+def correct_camera(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
+    """Remove the camera's distortion from a packing without walls, where gaps of touching pairs show one.
+
+    Walls, where there are any, are measured with the same camera and show it better.
+
+    Returns
+    -------
+    Tracks
+    str
+        Sentences on the correction and on what remains; empty: neither.
+    """
+    if walls.count or walls.cell is not None:
+        return tracks, ""
+    classes = radius_classes(tracks.radius)
+    position = np.where(tracks.present[..., None], tracks.position, np.nan)
+    alike = np.zeros(tracks.grain_count, np.int64)
+    found = find_camera_distortion(position, tracks.radius, alike if classes is None else classes)
+    if found is None:
+        return tracks, ""
+    return replace(tracks, position=found.correct(tracks.position)), "; ".join(found.describe())
+
+
+def _stated_noise(tracks: Tracks) -> float:
+    """Standard deviation of a position component [m], rms over all poses."""
+    return float(np.sqrt(np.mean(tracks.sigma[tracks.present] ** 2)))
+
+
+def correct_walls(
+    settings: BoundarySettings, tracks: Tracks, walls: WallTracks
+) -> tuple[Tracks, WallTracks, Boundary | None]:
+    """Correct walls to rigid bars that meet, and rods in the frame of the walls; None without motion."""
+    if tracks.frame_count < 2 or walls.count == 0:
+        return tracks, walls, None
+    measured = measure_sequence(tracks, walls)
+    found, boundary = correct_boundary(measured, _stated_noise(tracks), walls.end_kinds, settings)
+    rotation = np.where(np.isfinite(tracks.rotation), found.rotation, np.nan)
+    corrected = replace(tracks, position=found.position, rotation=rotation)
+    return corrected, replace(walls, endpoints=found.endpoints), boundary

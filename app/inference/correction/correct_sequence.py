@@ -1,0 +1,109 @@
+"""Correction of a sequence before contacts are found: boundary, noise, softness, calibration, radii, friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...process.errors import UndeterminedError
+from ...solver.bodies.interpolation import interpolate_ignored_frames
+from ...solver.contacts.radius_tuning import RadiusTuning
+from ...solver.sequence.failure import find_unseen
+from ..corrected_sequence import CorrectedSequence
+from ..inputs import Inputs
+from ..snapshots import make_snapshots
+from .boundary import correct_camera, correct_walls, measure_noise
+from .calibration import calibrate_tracks, known_radii
+from .close_photographs import advise_stride
+from .friction import measure_friction, measure_friction_of_walls, tuned_radii
+from .outliers import replace_outliers
+from .radii import calibrate_with_radii
+from .soft_grain_errors import correct_soft_grains
+from .softness import find_softness
+from .unseen import add_unseen
+
+
+class CoordinationError(UndeterminedError):
+    """No change of the radii gives the requested coordination number."""
+
+    def __init__(self, tuning: RadiusTuning) -> None:
+        low, high = tuning.coordination_number.min(), tuning.coordination_number.max()
+        super().__init__(f"cannot be met: z goes from {low:.2f} to {high:.2f} as all radii change by up to 4 %")
+        self.key = f"contacts.coordination = {tuning.wanted}"
+
+
+def correct_sequence(inputs: Inputs) -> CorrectedSequence:
+    """Correct tracks, walls and radii as the settings request, and measure what is not given.
+
+    Parameters
+    ----------
+    inputs : Inputs
+
+    Returns
+    -------
+    CorrectedSequence
+
+    Raises
+    ------
+    UndeterminedError
+        A requested friction coefficient or coordination number cannot be determined.
+    """
+    walls, settings = inputs.walls, inputs.settings
+    tracks, outlier_remark = replace_outliers(inputs.tracks)
+    given = make_snapshots(tracks, walls)
+    failed = find_unseen(given) | tracks.failed
+    nothing_seen = len(failed) == tracks.frame_count
+    if nothing_seen:
+        settings = replace(settings, boundary=None, calibration=None, coordination=None)
+    else:  # walls of an unusable photograph are interpolated
+        walls = replace(
+            walls, endpoints=np.stack([each.endpoints for each in interpolate_ignored_frames(given, failed)])
+        )
+    overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
+    calibration = tuning = boundary = None
+    remarks = [outlier_remark, "", "", ""]
+    if settings.boundary is not None:
+        if settings.boundary.camera:
+            tracks, remarks[1] = correct_camera(tracks, walls)
+        if settings.sequence.measure_precision:
+            tracks, remarks[2] = measure_noise(tracks, walls)
+        remarks[3] = advise_stride(tracks)
+        tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
+    if settings.calibration is not None:
+        sequence = find_softness(inputs.material, settings.sequence, tracks, walls, failed)
+        # Overlaps of soft grains are forces: calibration would remove them as errors.
+        settings = replace(settings, sequence=sequence, calibration=None if sequence.soft else settings.calibration)
+    if settings.calibration is not None:
+        observed = settings.calibration, tracks, walls, overlap, failed
+        if settings.sequence.uses_positions:
+            tracks, walls, calibration = calibrate_with_radii(inputs.material, *observed)
+        else:
+            tracks, walls, calibration = calibrate_tracks(*observed)
+    if settings.infer_unseen:
+        tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius), settings.sequence.measured_overlap)
+        calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
+    material, inferred = inputs.material, 0 if tracks.inferred is None else int(tracks.inferred.sum())
+    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+    if settings.coordination is not None:
+        tuning = tuned_radii(packing, tracks, walls, settings.coordination, failed)
+        if not tuning.met:
+            raise CoordinationError(tuning)
+        tracks = replace(tracks, radius=tracks.radius + tuning.found)
+        packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+    snapshots, of_walls = make_snapshots(tracks, walls), None
+    if material.friction_measured and not nothing_seen:
+        seen = interpolate_ignored_frames(snapshots, failed)
+        probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
+        material = measure_friction(material, packing, seen, probability, settings.sequence.workers)
+        packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+        of_walls = measure_friction_of_walls(material, packing, seen, probability, settings.sequence.workers)
+        if of_walls is not None:
+            material = replace(material, wall_friction=of_walls.measured)
+            packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+    corrected = CorrectedSequence(
+        packing, tracks, walls, snapshots if nothing_seen else interpolate_ignored_frames(snapshots, failed),
+        settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
+        inputs.material.friction_measured, "; ".join(each for each in remarks if each),
+    )  # fmt: skip
+    return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)

@@ -1,0 +1,131 @@
+"""Friction coefficients that the motion shows, and radii that give a requested coordination number."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...process.errors import UndeterminedError
+from ...solver.bodies.motion import Snapshot
+from ...solver.bodies.packing import Packing
+from ...solver.bodies.rods import RodMaterial
+from ...solver.contacts.radius_tuning import RadiusTuning, tune_radii
+from ...solver.convex.friction_check import FRAMES, FrictionCheck, WallFriction, check_friction, measure_wall_friction
+from ...solver.detection.touch_probability import ContactProbabilitySettings
+from ...solver.frame_forces import FrameForces, FrameStatus
+from ...solver.nlgs.chain import ChainSettings, force_scale
+from ...tracks import Tracks, WallTracks
+from ..corrected_sequence import CorrectedSequence
+from ..snapshots import make_snapshots
+
+GUESSES = 5  # of the friction, each by the previous one
+SAME_FRICTION = 0.02  # relative change below which the iteration has converged
+POSSIBLE = (0.02, 2.0)  # range of the friction
+REACH = 0.04  # largest change of the radii, as a fraction of the mean radius
+CURVE_POINTS = 81
+ENOUGH_CONTACTS = 8000  # of all frames together, to measure friction on: more frames of a large packing add only time
+FEWEST_FRAMES = 4  # for an interval
+TOLERATED_LOSS = 0.005  # fraction of lost grains: their forces are missing from the balance
+
+
+def check_sequence_friction(sequence: CorrectedSequence, frames: Sequence[FrameForces]) -> FrictionCheck | None:
+    """Check the given friction on the quietest consecutive frames of a solved sequence.
+
+    Returns
+    -------
+    FrictionCheck or None
+        With the coefficient measured at walls, if any. None with too few frames, without friction, or with too many
+        lost grains.
+    """
+    packing, snapshots = sequence.packing, sequence.snapshots
+    if len(snapshots) < 4 or packing.material.friction <= 0 or packing.material.wall_friction <= 0:
+        return None
+    found = [(frame.status, frame.contacts.count) for frame in frames]
+    calm = np.array([status in (FrameStatus.SETTLED, FrameStatus.SETTLING) for status, _ in found])
+    lost = np.array([1.0 - snapshot.present.mean() for snapshot in snapshots])
+    contacts = max(int(np.median([count for _, count in found])), 1)
+    wanted = int(np.clip(-(-ENOUGH_CONTACTS // contacts), FEWEST_FRAMES, FRAMES))
+    count = min(wanted, len(snapshots) - 2)
+    starts = np.arange(1, len(snapshots) - count)
+    quiet = calm & (lost <= TOLERATED_LOSS)
+    first = int(starts[np.argmax([quiet[s : s + count].sum() for s in starts])])
+    if lost[first - 1 : first + count + 1].mean() > TOLERATED_LOSS:
+        return None
+    unit = force_scale(packing, ChainSettings())
+    probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
+    check = check_friction(packing, snapshots, first, first + count - 1, unit, probability, sequence.settings.workers)
+    walls = sequence.wall_friction
+    if check is None or walls is None:
+        return check
+    return replace(check, wall_measured=walls.measured, wall_low=walls.low, wall_high=walls.high)
+
+
+def measure_friction(
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> RodMaterial:
+    """Measure the friction from the motion, repeated with the result until both agree; a given wall friction stays.
+
+    Raises
+    ------
+    FrictionError
+        The motion does not determine it.
+    """
+    count = min(FRAMES, len(snapshots) - 2)
+    if count < 1:
+        raise FrictionError("three photographs are needed to measure it")
+    first = max(1, (len(snapshots) - count) // 2)
+    unit = force_scale(packing, ChainSettings())
+    for _ in range(GUESSES):
+        guess = replace(packing, material=material.friction_law())
+        found = check_friction(guess, snapshots, first, first + count - 1, unit, settings, workers)
+        if not np.isfinite(found.measured):
+            raise FrictionError("nothing slides in these photographs, so they do not determine it: give a number")
+        change = abs(found.measured / material.friction - 1.0)
+        material = replace(material, friction=float(np.clip(found.measured, *POSSIBLE)))
+        if found.enclosed and change < SAME_FRICTION:
+            return material
+    ended = f"{GUESSES} guesses ended at {material.friction:.3f}"
+    raise FrictionError(f"the motion does not determine it ({ended}): give a number")
+
+
+def measure_friction_of_walls(
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> WallFriction | None:
+    """Measure the friction at walls from the motion; None where it is given, or not shown."""
+    count = min(FRAMES, len(snapshots) - 2)
+    if material.wall_friction is not None or count < FEWEST_FRAMES:
+        return None
+    first = max(1, (len(snapshots) - count) // 2)
+    unit = force_scale(packing, ChainSettings())
+    return measure_wall_friction(packing, snapshots, first, first + count - 1, unit, settings, workers)
+
+
+class FrictionError(UndeterminedError):
+    """The motion does not determine the friction coefficient."""
+
+    key = 'material.friction = "measured"'
+
+
+def tuned_radii(
+    packing: Packing, tracks: Tracks, walls: WallTracks, wanted: float, failed: Collection[int] = ()
+) -> RadiusTuning:
+    """Find the common change of all radii that gives the requested coordination number, rattlers excluded.
+
+    failed: unusable frames.
+    """
+    seen = [k for k in range(tracks.frame_count) if k not in failed]
+    reach = REACH * float(packing.grains.radius.mean())
+    change = np.linspace(-reach, reach, CURVE_POINTS)
+    snapshots = make_snapshots(tracks, walls)
+    bodies = [packing.walls_of(snapshots[k]) for k in seen]
+    return tune_radii(packing.grains, tracks.position[seen], tracks.present[seen], bodies, wanted, change)

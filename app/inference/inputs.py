@@ -1,0 +1,43 @@
+"""Inputs of the inference: everything that the forces follow from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..solver.bodies.rods import RodMaterial
+from ..solver.contacts.verdicts import Verdicts
+from ..solver.convex.friction_check import FrictionCheck
+from ..tracks import Tracks, WallTracks
+from .inference_settings import InferenceSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Everything that the forces follow from."""
+
+    tracks: Tracks
+    walls: WallTracks
+    material: RodMaterial = field(default_factory=RodMaterial)
+    settings: InferenceSettings = field(default_factory=InferenceSettings)
+    verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # of reviewers, by row of the frame
+
+    def with_friction(self, friction: float, check: FrictionCheck | None = None) -> Inputs:
+        """Fix a friction coefficient that was to be measured, so that a sequence solved again does not measure it.
+
+        Parameters
+        ----------
+        friction : float
+            Coefficient between rods.
+        check : FrictionCheck, optional
+            Holds the coefficient measured at walls, too.
+        """
+        if not self.material.friction_measured:
+            return self
+        of_walls = self.material.wall_friction
+        if of_walls is None and check is not None and np.isfinite(check.wall_measured):
+            of_walls = check.wall_measured
+        known = replace(self.material, friction=friction, wall_friction=of_walls, friction_measured=False)
+        return replace(self, material=known)

@@ -1,0 +1,98 @@
+"""The check of an experiment's input without computing, with a prediction of the accuracy of its forces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from . import pipeline
+from .inference.predicted_accuracy import EXAMINED_PHOTOGRAPHS, measure_data_quality
+from .prediction import describe_photographs, describe_prediction
+from .run_folder import Run
+from .tracks import Tracks, WallTracks
+
+UNKNOWN = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class InputReport:
+    """Valid input in numbers and sentences."""
+
+    name: str
+    frames: int  # photographs, or frames of the tracks
+    photographs: bool  # whether photographs are tracked, rather than given tracks used
+    grains: int | None  # None: not detected yet
+    walls: tuple[str, ...]
+    boundaries: str  # in a phrase
+    expected_correlation: float = UNKNOWN  # of the normal forces, at settled frames; NaN: not predicted
+    expected_low: float = UNKNOWN  # with `expected_high`, an interval with a coverage of two thirds
+    expected_high: float = UNKNOWN
+    sufficient: bool | None = None  # whether the motion determines the forces; None: not predicted
+    notes: tuple[str, ...] = field(default_factory=tuple)  # remarks on the input
+    unused: tuple[str, ...] = field(default_factory=tuple)  # columns of tables that are not used
+    prediction: tuple[str, ...] = field(default_factory=tuple)  # sentences on the expected accuracy
+
+    def content(self) -> str:
+        """Describe the content of the experiment in a phrase."""
+        if not self.photographs:
+            return f"{self.grains} grains tracked over {self.frames} frames, {self.boundaries}"
+        detected = "" if self.grains is None else f", {self.grains} grains in the first"
+        return f"{self.frames} photographs{detected}, {self.boundaries}"
+
+    def as_plain(self) -> dict[str, Any]:
+        """Return plain values for JSON; None where a number is unknown."""
+        values = asdict(self)
+        return {key: None if isinstance(each, float) and math.isnan(each) else each for key, each in values.items()}
+
+
+def check_input(run: Run, *, predict: bool = True) -> InputReport:
+    """Validate the input of a run, and predict the accuracy of its forces.
+
+    Parameters
+    ----------
+    run : Run
+        Its folder is not used.
+    predict : bool
+        Track the first three photographs, or use the first frames of given tracks.
+
+    Raises
+    ------
+    InputError
+        The input is invalid.
+    """
+    tracks, walls = pipeline.check(run)
+    photographed = run.experiment.config.photographs is not None
+    count = len(run.experiment.photographs()) if tracks is None else tracks.frame_count
+    first, first_walls, sentences = tracks, walls, []
+    if first is None:  # rods and walls that run would refuse are refused here
+        first, first_walls = pipeline.check_first_photographs(run, EXAMINED_PHOTOGRAPHS if predict else 1)
+    if predict:
+        if tracks is None:
+            sentences = describe_photographs(run.experiment)
+        assert first is not None
+        sentences += describe_prediction(first, first_walls)[0]
+    unused = tuple(
+        f"{file}: columns that are not used: {', '.join(names)}."
+        for file, names in run.experiment.inputs.unused_columns.items()
+        if names
+    )
+    quality = measure_data_quality(first, first_walls) if predict and first is not None else None
+    r, low, high = (UNKNOWN,) * 3 if quality is None else quality.expected
+    return InputReport(
+        run.experiment.name, count, photographed, None if first is None else first.grain_count,
+        () if walls is None else walls.name, _describe_boundaries(tracks, walls), r, low, high,
+        None if quality is None else quality.suffices, tuple(run.notes), unused, tuple(sentences),
+    )  # fmt: skip
+
+
+def _describe_boundaries(tracks: Tracks | None, walls: WallTracks | None) -> str:
+    """Describe the boundaries of the packing in a phrase."""
+    if walls is None:
+        return "no walls: it can be tracked but not solved"
+    parts = [f"{walls.count} walls"] if walls.count else []
+    if walls.cell is not None:
+        parts.append("in a periodic cell")
+    if tracks is not None and tracks.boundary is not None:
+        parts.append(f"{int(tracks.boundary.sum())} of them the boundary")
+    return ", ".join(parts) or "bounded by grains"

@@ -1,0 +1,194 @@
+"""Files of other programs in Python: imported as experiments, exported from runs."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal, TypedDict, Unpack, get_args
+
+import pandas as pd
+
+from ..exchange.foreign.format_names import FileFormat
+from ..exported_files import Drawing, ExportKind, draw_pictures, write_data, write_run_figures
+from ..process.errors import InputError
+from ..run_folder import RECORDING
+from .comparisons import Source, as_run
+from .shown_progress import shown_progress
+
+DRAWN = ("pictures", "video")
+FIGURES = "figures"
+
+
+class ImportOptions(TypedDict, total=False):
+    """How to read the files, as the options of `rodsight import`."""
+
+    form: FileFormat
+    pixel_size: float
+    y_down: bool
+    height: float
+    degrees: bool
+    radius: float
+    interval: float
+    precision: float
+    walls: str
+    pressure: Mapping[str, float]
+    pairs: str | PathLike[str]
+
+
+class ExportOptions(TypedDict, total=False):
+    """Options of `rodsight export`, each for some kinds."""
+
+    kind: Literal["csv", "parquet"]
+    pixel_size: float
+    frames: tuple[int, int | None]
+    timeline: Literal["frame", "sweep"]
+    step: int
+    tab: str
+    view: str
+    size: tuple[int, int]
+    rate: float
+    frame: int
+    formats: tuple[Literal["pdf", "svg", "png"], ...]
+    width: Literal["single", "double"]
+
+
+def import_table(
+    source: str | PathLike[str] | pd.DataFrame,
+    folder: str | PathLike[str],
+    columns: Mapping[str, str] | None = None,
+    **options: Unpack[ImportOptions],
+) -> pd.DataFrame:
+    """Convert a table of another program to an experiment folder, as `rodsight import`.
+
+    Parameters
+    ----------
+    source : path or data frame
+        Table, or folder of files, depending on the form.
+    folder : path
+        Folder of the new experiment.
+    columns : mapping of str to str, optional
+        Names of columns by role: frame, id, x, y, theta, radius or diameter, time.
+    **options
+        - form : 'table' (default), 'trackpy', 'trackmate', 'rodtracker', 'lammps', 'yade', 'pegs', 'dic'.
+        - pixel_size : float, the files' unit of length [m]; default: metres.
+        - y_down : bool, y points down, as in pictures; height [px] of a photograph: y is measured from its last row.
+        - degrees : bool, theta is in degrees.
+        - radius : float, of all grains without one, in the files' unit.
+        - interval : float, time between photographs, or of a step [s].
+        - precision : float, standard deviation of a position, in the files' unit.
+        - walls : 'box', 'outer', 'none', or a table frame,wall,x1,y1,x2,y2.
+        - pressure : mapping of str to float, on walls [Pa].
+        - pairs : path, pair forces of a simulation [N] as truth.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The imported tracks: frame, id, x, y [m], theta [rad], radius [m]. `.attrs["remarks"]`: what was assumed, or
+        could not be converted.
+
+    Raises
+    ------
+    InputError
+        The files cannot be read, or the folder holds an experiment already.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> spots = pd.DataFrame({"t": [0, 0, 1, 1], "rod": [1, 2, 1, 2], "X": [0.1, 0.12, 0.1, 0.12], "Y": [0.1] * 4})
+    >>> roles = {"frame": "t", "id": "rod", "x": "X", "y": "Y"}
+    >>> tracks = rodsight.import_table(spots, "from_spots", roles, radius=0.01, walls="box")
+    >>> len(tracks), rodsight.check("from_spots", predict=False)["walls"]
+    (4, ('bottom', 'right', 'top', 'left'))
+    """
+    from ..exchange.foreign.import_files import ImportRequest, import_files
+
+    known = ImportOptions.__annotations__
+    for name in options:
+        if name not in known:
+            raise InputError("import_table", name, f"is not an option: there are {', '.join(known)}")
+    form: FileFormat = options.get("form", "table")
+    others: dict[str, Any] = {name: each for name, each in options.items() if name != "form"}
+    if "pairs" in others:
+        others["pairs"] = Path(others["pairs"])
+    with tempfile.TemporaryDirectory(prefix="rodsight-") as place:
+        file = Path(place) / "data_frame.csv" if isinstance(source, pd.DataFrame) else Path(source)
+        if isinstance(source, pd.DataFrame):
+            source.to_csv(file, index=False)
+        imported, _ = import_files(ImportRequest(form, file, columns or {}, **others), Path(folder))
+    tracks = imported.tracks
+    frame, grain = tracks.present.nonzero()
+    table = pd.DataFrame(
+        {
+            "frame": frame, "id": tracks.id[grain], "x": tracks.position[frame, grain, 0],
+            "y": tracks.position[frame, grain, 1], "theta": tracks.rotation[frame, grain],
+            "radius": tracks.radius[grain],
+        }
+    )  # fmt: skip
+    table.attrs["units"] = {"x": "m", "y": "m", "theta": "rad", "radius": "m"}
+    table.attrs["remarks"] = list(imported.remarks)
+    return table
+
+
+def export(
+    what: ExportKind, results: Source, out: str | PathLike[str] | None = None, **options: Unpack[ExportOptions]
+) -> list[Path]:
+    """Write a run for another program or for a paper, as `rodsight export`.
+
+    Parameters
+    ----------
+    what : {'tables', 'vtk', 'ovito', 'graph', 'dic', 'figures', 'pictures', 'video'}
+        vtk is for ParaView, graph (GraphML) for networkx, Gephi and igraph.
+    results : Run or path
+    out : path, optional
+        Folder, or file of a video; default: beside the results, which a run in memory does not have.
+    **options
+        - kind : 'csv' (default) or 'parquet'; of tables.
+        - pixel_size : float [m]; of dic.
+        - frames (first, end), timeline ('frame' or 'sweep'), step, tab, view, size (width, height) [px]; of pictures
+          and video; rate [1/s] of video.
+        - frame, formats ('pdf', 'svg', 'png'), width ('single' or 'double'); of figures.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files.
+
+    Raises
+    ------
+    InputError
+        The kind is unknown, an option is wrong, or the run has no file or recording that is needed.
+
+    Examples
+    --------
+    >>> [file.name for file in rodsight.export("tables", "runs/shear", "tables")][:2]
+    ['contacts.csv', 'grains.csv']
+    """
+    run = as_run(results)
+    if what not in get_args(ExportKind):
+        raise InputError("export", repr(what), f"is not a kind: there are {', '.join(get_args(ExportKind))}")
+    for name in options:
+        if name not in ExportOptions.__annotations__:
+            raise InputError("export", name, f"is not an option: there are {', '.join(ExportOptions.__annotations__)}")
+    target = None if out is None else Path(out)
+    if run.file is None and (target is None or what in (*DRAWN, FIGURES)):
+        raise InputError("export", what, "needs a run with a folder, or for data the argument out")
+    if what in DRAWN:
+        assert run.file is not None
+        recording = run.file.with_name(RECORDING)
+        if not recording.is_file():
+            raise InputError(recording, "", "there is no such recording")
+        drawing = Drawing(
+            recording, options.get("timeline", "frame"), options.get("frames"), options.get("step", 1),
+            options.get("tab"), options.get("view"), options.get("size", (1600, 1000)), options.get("rate", 6.0),
+        )  # fmt: skip
+        return draw_pictures(drawing, target, shown_progress(), film=what == "video")
+    if what == FIGURES:
+        assert run.file is not None
+        formats, width = options.get("formats", ("pdf", "svg")), options.get("width", "single")
+        return write_run_figures(run.file, target, formats, options.get("frame"), width)
+    if target is None:
+        assert run.file is not None
+        target = run.file.parent / what
+    return write_data(what, run.results, target, form=options.get("kind", "csv"), pixel_size=options.get("pixel_size"))

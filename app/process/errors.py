@@ -1,0 +1,33 @@
+"""Errors that end a command with one line: wrong input, or a failure that the input did not cause."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(Exception):
+    """The input is wrong and its author can correct it.
+
+    The message is one line: the file, the row or key, the value, what was expected.
+    """
+
+    def __init__(self, file: Path | str, where: str, problem: str) -> None:
+        text = ": ".join(part for part in (str(file), where, problem) if part)
+        super().__init__(" ".join(text.split()))
+        self.problem = problem  # without the file and the place in it
+
+
+class RunError(Exception):
+    """Work cannot continue although the input is valid: a full disk, another run in the folder, nothing to solve.
+
+    The message is one line: the cause and the cure.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(" ".join(text.split()))
+
+
+class UndeterminedError(ValueError):
+    """These data do not determine a quantity that a key of the settings requests; `key` is the name of that key."""
+
+    key = ""

@@ -1,0 +1,1 @@
+"""Recordings that exist: listed, read back, summarised as cards, shared and repaired."""

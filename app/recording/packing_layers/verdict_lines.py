@@ -1,0 +1,39 @@
+"""Writes the contacts with verdicts of a reviewer: added or forbidden."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+
+from ...solver.contacts.contacts import ContactSource
+from ...solver.frame_forces import FrameForces
+from ..look import entities
+from ..look.clock import Clock
+from ..look.colours import ADDED, FORBIDDEN, packed_one
+from ..look.scene import Scene
+
+REVIEWER_SOURCES = (ContactSource.ADDED_BY_REVIEWER, ContactSource.FORBIDDEN_BY_REVIEWER)
+
+
+def log_verdicts(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    """Log the contacts of one frame that a reviewer added or forbade."""
+    rows = np.flatnonzero(np.isin(forces.source, REVIEWER_SOURCES))
+    contacts, source = forces.contacts.select(rows), forces.source[rows]
+    added = source == ContactSource.ADDED_BY_REVIEWER
+    clock.start()
+    clock.stream.log(
+        entities.VERDICTS,
+        rr.LineStrips2D(
+            scene.branches(clock.frame, contacts),
+            radii=np.float32(0.14 * scene.canvas.grain_radius),
+            colors=np.where(added, packed_one(ADDED), packed_one(FORBIDDEN)).astype(np.uint32),
+            draw_order=30.0,
+        ),
+        rr.AnyValues(
+            # With an explicit type, which an empty list would lack.
+            source=pa.array([ContactSource(value).name.lower() for value in source.tolist()], pa.string()),
+            grain_a=scene.tracks.id[contacts.i],
+            body_b=scene.body_names(contacts.j),
+        ),
+    )

@@ -1,0 +1,52 @@
+"""Verdicts of a run as a table: imported into the log, exported from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from ..verdicts.table import export_verdicts, import_verdicts
+from .judging.candidate_pairs import find_candidate_pairs
+from .reviewed_pairs import store_forces
+from .reviewed_run import open_reviewed_run
+
+
+def import_table(path: Path, file: Path, *, reviewer: str | None, complete: bool) -> int:
+    """Append a table of verdicts, or of contacts, to the log of a run, and print their number; the exit status."""
+    count = import_verdicts_of_run(path, file, reviewer=reviewer, complete=complete)
+    log = open_reviewed_run(path).log
+    Console().print(f"{count} verdicts added to {log.file}.", highlight=False, soft_wrap=True)
+    return 0
+
+
+def import_verdicts_of_run(path: Path, file: Path, *, reviewer: str | None, complete: bool) -> int:
+    """Append a table of verdicts, or of contacts, to the log of a run; return their number.
+
+    Parameters
+    ----------
+    path : Path
+        An experiment, a run's folder or results.h5.
+    file : Path
+        Table frame,i,j[,verdict,reviewer,time,seconds].
+    reviewer : str or None
+        Reviewer of rows that name none; default: the file's name.
+    complete : bool
+        The table lists every contact of its frames: all other candidate pairs are judged no contact.
+    """
+    run = open_reviewed_run(path)
+    found = [find_candidate_pairs(run.results, k, run.threshold) for k in range(len(run.results.frames))]
+    pairs = {each.frame: list(zip(each.contacts.i.tolist(), each.contacts.j.tolist(), strict=True)) for each in found}
+    entries = import_verdicts(
+        run.log, file, run.bodies, reviewer or file.stem, first_frame=run.first_frame,
+        frame_count=len(run.results.frames), candidates=pairs if complete else None,
+    )  # fmt: skip
+    store_forces(run, entries)
+    return len(entries)
+
+
+def export_table(path: Path, file: Path) -> int:
+    """Write the verdicts of a run as a table; return the exit status."""
+    count = export_verdicts(open_reviewed_run(path).log, file)
+    Console().print(f"{count} verdicts in {file}.", highlight=False, soft_wrap=True)
+    return 0

@@ -1,0 +1,1 @@
+"""Sensitivity of the inferred forces to uncertain inputs: inputs are varied and sequences solved again."""

@@ -1,1 +1,0 @@
-"""How much the inferred forces depend on what nobody knows exactly: inputs varied, sequences solved again."""

@@ -1,0 +1,1 @@
+"""Scenarios: simulated tests, and experiment folders that depart from them as those of laboratories do."""

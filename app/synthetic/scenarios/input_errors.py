@@ -1,0 +1,143 @@
+"""Wrong input: mistakes that people make in tables and settings, one function each.
+
+Sizes are those met in practice: a sign, a unit, a row too late, a few per cent of a radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.bodies.grains import Array
+from .departures import Departure
+from .observed_data import ObservedData
+
+OUTLIERS, OUTLIER_SIZE = 0.02, (3e-4, 2e-3)  # of all poses; [m]
+MISSING = 0.1  # of all poses
+WRONG_CLASS = 0.1  # of the rods
+CLASS_ERROR = 0.02  # of one class of radii
+OVERHANG = 0.05  # [m] of the bars beyond the packing at either end
+CORRELATED_NOISE, CORRELATION = 1e-5, 0.9  # [m] of a position component; from photograph to photograph
+
+
+def reverse_time(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """List the photographs in reverse order."""
+    return _reorder(observed, np.arange(len(observed.position))[::-1])
+
+
+def swap_frames(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """Swap every second photograph with its successor."""
+    order = np.arange(len(observed.position))
+    for k in range(2, len(order) - 1, 3):
+        order[[k, k + 1]] = order[[k + 1, k]]
+    return _reorder(observed, order)
+
+
+def duplicate_frame(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """Take one photograph twice."""
+    order = np.arange(len(observed.position))
+    order[len(order) // 2 :] -= 1
+    return _reorder(observed, order)
+
+
+def scale_rotation(factor: float) -> Departure:
+    """State rotations times a factor: −1 clockwise, 0 unknown but stated, 180/π in degrees."""
+
+    def depart(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+        assert observed.rotation is not None
+        return replace(observed, rotation=factor * observed.rotation)
+
+    return depart
+
+
+def drop_rotation(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State no rotations."""
+    return replace(observed, rotation=None)
+
+
+def delay_walls(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the walls one photograph late."""
+    late = np.maximum(np.arange(len(observed.position)) - 1, 0)
+    return replace(observed, endpoints=observed.endpoints[late])
+
+
+def fix_top(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the plate at rest."""
+    endpoints, top = observed.endpoints.copy(), observed.wall_names.index("top")
+    endpoints[:, top] = endpoints[0, top]
+    return replace(observed, endpoints=endpoints)
+
+
+def stretch_picture(factor: float) -> Departure:
+    """Stretch x of rods and walls by a relative error, as non-square pixels do."""
+
+    def depart(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+        scale = np.array([1.0 + factor, 1.0])
+        return replace(observed, position=observed.position * scale, endpoints=observed.endpoints * scale)
+
+    return depart
+
+
+def misstate_class(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the radius of the middle class too large."""
+    radius, middle = observed.radius.copy(), np.median(observed.radius)
+    radius[np.isclose(radius, middle)] *= 1.0 + CLASS_ERROR
+    return replace(observed, radius=radius)
+
+
+def confuse_classes(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State some rods as of another class."""
+    radius, classes = observed.radius.copy(), np.unique(observed.radius)
+    chosen = rng.permutation(len(radius))[: round(WRONG_CLASS * len(radius))]
+    radius[chosen] = classes[(np.searchsorted(classes, radius[chosen]) + 1) % len(classes)]
+    return replace(observed, radius=radius)
+
+
+def extend_bars(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the ends of the plate, which overhangs the packing, as its wall."""
+    endpoints, top = observed.endpoints.copy(), observed.wall_names.index("top")
+    along = endpoints[:, top, 1] - endpoints[:, top, 0]
+    along *= OVERHANG / np.linalg.norm(along, axis=1)[:, None]
+    endpoints[:, top, 0] -= along
+    endpoints[:, top, 1] += along
+    return replace(observed, endpoints=endpoints)
+
+
+def add_outliers(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """Displace some poses of single photographs by .3 to 2 mm."""
+    frames, n = observed.position.shape[:2]
+    wrong = rng.random((frames, n)) < OUTLIERS
+    wrong[0] = False
+    size, angle = rng.uniform(*OUTLIER_SIZE, (frames, n)), rng.uniform(0.0, 2.0 * np.pi, (frames, n))
+    shift = np.where(wrong, size, 0.0)[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return replace(observed, position=observed.position + shift)
+
+
+def lose_poses(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """Leave rods out of some photographs, other ones in each."""
+    lost = rng.random(observed.position.shape[:2]) < MISSING
+    lost[0] = False
+    return replace(observed, lost=lost)
+
+
+def correlate_noise(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """Add errors of the centres that change slowly from photograph to photograph."""
+    error = CORRELATED_NOISE * rng.standard_normal(observed.position.shape)
+    for k in range(1, len(error)):
+        error[k] = CORRELATION * error[k - 1] + np.sqrt(1.0 - CORRELATION**2) * error[k]
+    return replace(observed, position=observed.position + error)
+
+
+def state_walls_rough(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the rods' friction for smooth walls, too."""
+    return replace(observed, known=replace(observed.known, wall_friction=observed.known.friction))
+
+
+def _reorder(observed: ObservedData, order: NDArray[np.int64]) -> ObservedData:
+    """List the photographs (f,) in another order; their truth follows them."""
+    rotation: Array | None = None if observed.rotation is None else observed.rotation[order]
+    return replace(
+        observed, position=observed.position[order], rotation=rotation, endpoints=observed.endpoints[order], shown=order
+    )

@@ -1,0 +1,21 @@
+"""Names of presets and scenarios, without the code that makes them, for the help of commands."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+PhotographedPreset = Literal["small", "paper"]
+MeasuredPreset = Literal["photoelastic"]  # no experiment, but the output of another program
+Group = Literal["correct", "missing physics", "wrong input"]
+ScenarioName = Literal[
+    "shear", "sheared", "biaxial", "isotropic", "gravity", "soft", "softer", "soft_radii_03", "soft_unseen",
+    "nearly_jammed",
+    "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
+    "mu_low", "mu_high", "step_05", "step_1", "ten_frames", "periodic", "outer", "circle", "loads",
+    "loose", "cyclic", "noise_40", "correlated_noise",
+    "stiff", "stiff_moving", "base_friction", "cohesion", "strong_cohesion", "friction_spread",
+    "smooth_walls", "inertia", "rolling", "sizes_10",
+    "time_reversed", "swapped_frames", "duplicate_frame", "theta_sign", "theta_zero", "theta_degrees", "theta_absent",
+    "mu_01", "mu_05", "walls_late", "top_fixed", "aspect_03", "aspect_1", "class_2", "wrong_class", "overhang",
+    "outliers", "missing_poses",
+]  # fmt: skip

@@ -1,0 +1,220 @@
+"""The scenarios: how the truth of each is simulated, and how its experiment folder departs from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...solver.bodies.grains import Array
+from ...solver.dem.dem_truth import DemSettings
+from ..dense_packing import choose_two_radii, choose_wide_radii
+from .departures import (
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    Departure,
+    crop_to_interior,
+    displace_centres,
+    keep_ten_frames,
+    keep_unchanged,
+    misstate_friction,
+    misstate_wall_ends,
+    move_camera,
+    omit_rods,
+    scatter_radii,
+    shrink_radii,
+    state_corners,
+    state_photoelastic_discs,
+)
+from .input_errors import (
+    add_outliers,
+    confuse_classes,
+    correlate_noise,
+    delay_walls,
+    drop_rotation,
+    duplicate_frame,
+    extend_bars,
+    fix_top,
+    lose_poses,
+    misstate_class,
+    reverse_time,
+    scale_rotation,
+    state_walls_rough,
+    stretch_picture,
+    swap_frames,
+)
+from .loading_paths import (
+    LoadingPath,
+    compress_biaxially,
+    load_isotropically,
+    push_core,
+    push_heap,
+    shear,
+    shear_cyclically,
+    shear_purely,
+    shear_under_loads,
+)
+from .preset_names import Group, ScenarioName
+
+DISC_NOISE = 1.18e-4  # [m], 0.7 % of a mean diameter of the two sizes
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A simulated truth and how its data depart from it."""
+
+    meaning: str
+    loading: LoadingPath
+    departure: Departure = keep_unchanged
+    noise: float = 1e-5  # [m] of a position component
+    scale_stated: bool = True  # of forces, where the simulation has a loaded wall
+    group: Group = "correct"
+
+    @property
+    def scale_known(self) -> bool:
+        """Whether a loaded plate or the weight determines the scale of the forces."""
+        loaded = bool(self.loading.plates or self.loading.measured)
+        return self.scale_stated and (loaded or any(self.loading.settings.gravity))
+
+
+SHEAR = LoadingPath(shear, 0.25, plates=("top",))
+SOFT = LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=1.6e6))
+HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
+DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
+
+MOVED = LoadingPath(shear, 0.25, initial_shear=2.0, plates=("top",))  # the first photograph is like the others
+
+
+def _sheared(**changes: Any) -> LoadingPath:
+    """Simple shear after 2° of it, with other settings of the simulation."""
+    return replace(MOVED, settings=DemSettings(**changes))
+
+
+def _choose_ten(count: int, rng: np.random.Generator) -> Array:
+    """Draw radii (n,) [m] between 3 and 30 mm, with equal area per size."""
+    return 1.0 / rng.uniform(1.0 / 0.03, 1.0 / 0.003, count)
+
+
+def _missing(meaning: str, loading: LoadingPath, departure: Departure = keep_unchanged) -> Scenario:
+    return Scenario(meaning, loading, departure, group="missing physics")
+
+
+def _wrong(meaning: str, departure: Departure) -> Scenario:
+    return Scenario(f"sheared; {meaning}", MOVED, departure, group="wrong input")
+
+
+SCENARIOS: dict[ScenarioName, Scenario] = {
+    "shear": Scenario("simple shear under a plate, .25° a photograph, 10 µm noise, no other error", SHEAR),
+    "sheared": Scenario(
+        "the same after 3° of shear, its friction mobilised, so that the first photograph is like the others",
+        LoadingPath(shear, 0.25, initial_shear=3.0, plates=("top",)),
+    ),
+    "biaxial": Scenario(
+        "biaxial compression of radii 1:5, .3 % a photograph, the right side under constant pressure",
+        LoadingPath(compress_biaxially, 0.003, plates=("right",), sizes=choose_wide_radii),
+    ),
+    "isotropic": Scenario(
+        "loaded and unloaded from two sides between 1 and 3 times 50 kPa; no pressure is stated",
+        LoadingPath(load_isotropically, 0.0),
+    ),
+    "gravity": Scenario(
+        "a heap with a free surface, pushed by its right wall; no plate",
+        LoadingPath(push_heap, 0.002, settings=HEAP, open_top=True),
+    ),
+    "soft": Scenario(
+        "simple shear of soft rods that overlap by about .25 % of a diameter",
+        SOFT,
+    ),
+    "soft_radii_03": Scenario("soft; radii with .3 % random error, as large as the overlaps", SOFT,
+                           scatter_radii(0.003)),
+    "soft_unseen": Scenario("soft; 3 % of the rods are in no photograph", SOFT, omit_rods),
+    "softer": Scenario(
+        "simple shear of very soft rods that overlap by about 1.1 % of a diameter",
+        LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_stiffness=3e5)),
+    ),
+    "nearly_jammed": Scenario(
+        "two sizes of soft discs on a base with friction, pure shear of .3 % a photograph; no rotations, no pressure, "
+        "radii 3 % too small, noise .7 % of a diameter",
+        LoadingPath(shear_purely, 0.003, settings=DISCS, sizes=choose_two_radii, loose=True),
+        state_photoelastic_discs,
+        DISC_NOISE,
+    ),
+    "corners": Scenario("shear; walls end where the bars meet", SHEAR, state_corners),
+    "short_walls": Scenario("shear; the side walls are stated 13 % too short", SHEAR, misstate_wall_ends),
+    "unseen": Scenario("shear; 3 % of the rods are in no photograph", SHEAR, omit_rods),
+    "camera": Scenario("shear; every photograph is shifted by up to 60 µm relative to the walls", SHEAR, move_camera),
+    "centres": Scenario("shear; centres with 50 µm error fixed in the rod, precision stated so", SHEAR,
+                     displace_centres),
+    "radii_03": Scenario("shear; radii with .3 % random error", SHEAR, scatter_radii(0.003)),
+    "radii_1": Scenario("shear; radii with 1 % random error", SHEAR, scatter_radii(0.01)),
+    "radius_offset": Scenario("shear; all radii are 3 % of their mean too small", SHEAR, shrink_radii),
+    "mu_low": Scenario("shear; friction stated as .2 instead of .25", SHEAR, misstate_friction(LOW_FRICTION)),
+    "mu_high": Scenario("shear; friction stated as .4 instead of .25", SHEAR, misstate_friction(HIGH_FRICTION)),
+    "step_05": Scenario("simple shear of .5° a photograph", LoadingPath(shear, 0.5, plates=("top",))),
+    "step_1": Scenario("simple shear of 1° a photograph", LoadingPath(shear, 1.0, plates=("top",))),
+    "periodic": Scenario(
+        "simple shear of a periodic cell at constant pressure, .25° a photograph",
+        LoadingPath(shear, 0.25, periodic=True),
+    ),
+    "outer": Scenario(
+        "shear; walls and the rods near them are outside the picture; the outermost rods are the boundary",
+        SHEAR,
+        crop_to_interior,
+        scale_stated=False,
+    ),
+    "circle": Scenario(
+        "a core is pushed and rotated through a packing in a ring under pressure, 1 % of its radius a photograph",
+        LoadingPath(push_core, 0.01, plates=("ring",), ring=True),
+    ),
+    "loads": Scenario(
+        "simple shear, .25° a photograph, while the loads on plate and right side oscillate by 40 % and 20 %: both "
+        "are stated as measured by sensors",
+        LoadingPath(shear_under_loads, 0.25, initial_shear=1.0, measured=("top", "right")),
+    ),
+    "ten_frames": Scenario("shear; radii with .3 % random error, and ten photographs only", SHEAR, keep_ten_frames),
+    "loose": Scenario("sheared, of a packing prepared with friction", replace(MOVED, loose=True)),
+    "cyclic": Scenario(
+        "shear to and fro by four steps of .05°",
+        LoadingPath(shear_cyclically, 0.05, initial_shear=2.0, plates=("top",)),
+    ),
+    "noise_40": Scenario("sheared; 40 µm noise", MOVED, noise=4e-5),
+    "correlated_noise": Scenario("sheared; further errors of 10 µm that change slowly", MOVED, correlate_noise),
+    "stiff": _missing("sheared; contacts ten times as stiff, photographed at rest", _sheared(normal_stiffness=2e8)),
+    "stiff_moving": _missing(
+        "the same, photographed while it moves",
+        _sheared(normal_stiffness=2e8, moving=True, unbalance_limit=10.0, damping_ratio=0.4),
+    ),
+    "base_friction": _missing(
+        "sheared on a base with friction of 10 % of the mean force", _sheared(base_friction=150.0)
+    ),
+    "cohesion": _missing("sheared; contacts attract by 10 % of the mean force", _sheared(adhesion=5.0)),
+    "strong_cohesion": _missing("sheared; contacts attract by 40 % of the mean force", _sheared(adhesion=20.0)),
+    "friction_spread": _missing("sheared; friction varies by 40 % between contacts", _sheared(friction_spread=0.4)),
+    "smooth_walls": _missing("sheared; smooth walls stated as rough", _sheared(wall_friction=0.0), state_walls_rough),
+    "inertia": _missing(
+        "sheared fast: forces out of balance by some 10 %, photographed while it moves",
+        _sheared(inertial_number=2e-2, moving=True, unbalance_limit=10.0),
+    ),
+    "rolling": _missing("sheared; rolling resistance of .1", _sheared(rolling_friction=0.1)),
+    "sizes_10": _missing("sheared; radii 1:10", replace(MOVED, sizes=_choose_ten)),
+    "time_reversed": _wrong("photographs in reverse order", reverse_time),
+    "swapped_frames": _wrong("every third pair of photographs swapped", swap_frames),
+    "duplicate_frame": _wrong("one photograph twice", duplicate_frame),
+    "theta_sign": _wrong("rotations with the wrong sign", scale_rotation(-1.0)),
+    "theta_zero": _wrong("rotations stated as zero", scale_rotation(0.0)),
+    "theta_degrees": _wrong("rotations in degrees", scale_rotation(math.degrees(1.0))),
+    "theta_absent": _wrong("rotations unknown", drop_rotation),
+    "mu_01": _wrong("friction stated as .1 instead of .25", misstate_friction(0.1)),
+    "mu_05": _wrong("friction stated as .5 instead of .25", misstate_friction(0.5)),
+    "walls_late": _wrong("walls one photograph late", delay_walls),
+    "top_fixed": _wrong("the plate stated at rest", fix_top),
+    "aspect_03": _wrong("x stretched by .3 %", stretch_picture(0.003)),
+    "aspect_1": _wrong("x stretched by 1 %", stretch_picture(0.01)),
+    "class_2": _wrong("one class of radii 2 % too large", misstate_class),
+    "wrong_class": _wrong("a tenth of the rods stated of another size", confuse_classes),
+    "overhang": _wrong("the plate's wall overhangs by 5 cm at either end", extend_bars),
+    "outliers": _wrong("2 % of the poses displaced by .3 to 2 mm", add_outliers),
+    "missing_poses": _wrong("10 % of the poses missing", lose_poses),
+}  # fmt: skip

@@ -1,1 +1,0 @@
-"""Worlds: simulated truths, and experiment folders that depart from them as those of laboratories do."""

@@ -1,0 +1,1 @@
+"""Poses corrected by hand: correlated from a given pose, stored in the table that the next run applies."""

@@ -1,2 +1,0 @@
-"""Poses mended by hand: correlated again from where a hand puts them, kept in the table that the next run obeys.
-Knows no page; the correlation is the tracker's own."""

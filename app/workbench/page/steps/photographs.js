@@ -1,0 +1,132 @@
+// Step 1: the photographs, their order, their times, and the region that is used.
+
+import { request, chart, colour, digits, fact, h, numberField, parse, sign, notify } from "/page/dom.js";
+import { tableField } from "/page/parts/tables.js";
+
+const SOON = 400; // [ms]
+let soon = 0, cutting = null, masking = null, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
+
+export const photographs = {
+  name: "photographs", title: "Photographs", frames: true,
+  hint: () => (cutting ? "Drag over the region to use" : masking ? `Click the corners of the part to be ignored (${masking.length}); Enter closes it, Esc ends` : ""),
+  keyHelp: [["M", "mask a part: click its corners, Enter closes it"]],
+  key(app, event) {
+    if (event.key === "m") { maskBegins(app); return true; }
+    if (!masking) return false;
+    if (event.key === "Escape") { masking = null; app.tool(null); app.paint(); return true; }
+    if (event.key === "Enter") { maskCloses(app); return true; }
+    return false;
+  },
+  enter: (app) => { measured = null; measureSoon(app); },
+  taken: measureSoon,
+  leave: () => { cutting = null; masking = null; },
+  panel(app) {
+    const { project } = app, section = project.photographs;
+    return [
+      h("p", {}, "They are in the natural order of their names: 2 comes before 10."),
+      fact("photographs", String(project.files.length)),
+      fact("size", project.width ? `${project.width} × ${project.height} px` : "–"),
+      h("div", { class: "field" }, h("label", { htmlFor: "field-name" }, "name"), h("input", { id: "field-name", value: project.name, onchange: (event) => app.change("set_photographs", { name: event.target.value }) })),
+      section.times ? null : numberField("interval", section.interval, "s", (text) => app.queue(async () => {
+        app.change("set_photographs", { interval: parse(text, "interval") });
+      })),
+      tableField(app, "times"),
+      h("div", { class: "field" }, h("label", { htmlFor: "field-channel" }, "channel"), h("select", { id: "field-channel", onchange: (event) => app.change("set_photographs", { channel: event.target.value }) },
+        ["grey", "red", "green", "blue"].map((name) => h("option", { value: name, selected: name === (section.channel ?? "grey") }, name)))),
+      h("div", { class: "row" },
+        h("button", { class: cutting ? "on" : "", id: "cut", onclick: () => { masking = null; cutting = cutting ? null : []; app.tool(cutting ? cutTool(app) : null); app.paint(); } }, section.region ? "Change the region" : "Cut to a region"),
+        section.region ? h("button", { onclick: () => app.change("set_photographs", { region: "all" }) }, "Use all of it") : null,
+        h("button", { class: masking ? "on" : "", id: "mask", title: "M", onclick: () => maskBegins(app) }, "Mask a part"),
+        section.mask?.length ? h("button", { id: "unmask", onclick: () => app.change("set_photographs", { mask: section.mask.slice(0, -1) }) }, `Remove the last of ${section.mask.length} masks`) : null),
+      project.files.length ? [h("h2", {}, "Quality"), quality(app)] : null,
+      h("h2", {}, "Order"),
+      h("div", { class: "list" }, project.files.slice(0, 400).map((name, k) => h("button", { class: k === app.frame ? "here" : "", onclick: () => app.show(k) },
+        h("span", { class: "soft" }, String(k)), h("span", { style: { flex: "1" } }, name), h("span", { class: "soft" }, section.interval ? `${digits(k * section.interval, 4)} s` : "")))),
+      h("div", { class: "row" }, h("button", { id: "duplicate", disabled: project.at === ".", title: "A new experiment beside this one with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment")),
+    ];
+  },
+  draw(app, c, k) {
+    for (const polygon of [...(app.project.photographs.mask ?? []), ...(masking?.length ? [masking] : [])]) {
+      c.beginPath(); polygon.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
+      if (polygon !== masking) { c.closePath(); c.fillStyle = "#000b"; c.fill(); }
+      c.strokeStyle = polygon === masking ? "#f0e442" : colour("accent"); c.lineWidth = 2 / k; c.stroke();
+      if (polygon === masking) for (const [x, y] of polygon) { c.fillStyle = "#f0e442"; c.beginPath(); c.arc(x, y, 4 / k, 0, 7); c.fill(); }
+    }
+    const region = cutting?.length ? cutting : app.project.photographs.region;
+    if (!region) return;
+    const [x0, y0, x1, y1] = region;
+    c.fillStyle = "#000a";
+    c.beginPath(); c.rect(-0.5, -0.5, app.project.width, app.project.height); c.rect(x0, y0, x1 - x0, y1 - y0); c.fill("evenodd");
+    c.strokeStyle = colour("accent"); c.lineWidth = 2 / k; c.strokeRect(x0, y0, x1 - x0, y1 - y0);
+  },
+};
+
+/** Light, noise and pattern are measured in the background, once the photograph is shown. */
+function measureSoon(app) { clearTimeout(soon); soon = setTimeout(() => measure(app), SOON); }
+
+async function measure(app) {
+  const { project } = app;
+  if (!project?.files.length || app.step !== photographs) return;
+  try {
+    const answer = await request("quality", { at: project.at });
+    if (app.project?.at === project.at && app.step === photographs) { measured = { at: project.at, ...answer }; app.paint(); }
+  } catch { measured = null; } // the messages of the step state what is wrong
+}
+
+function quality(app) {
+  if (measured?.at !== app.project.at) return h("p", { id: "measuring", role: "status" }, "Measuring light and pattern …");
+  return [
+    h("div", { class: "messages", id: "quality" }, [["good", measured.facts], ["doubtful", measured.faults]].flatMap(([mark, texts]) => texts.map((text) => h("p", {}, sign(mark), text)))),
+    measured.frame.length > 1 ? [h("span", { class: "soft" }, "light (line) and contrast (dashed) over the photographs [of 255]"), chart(64, "light and contrast over the photographs", (c, width, height) => curves(app, c, width, height))] : null,
+  ];
+}
+
+/** Mean grey level and contrast of the measured photographs; a bar marks the one that is shown. */
+function curves(app, c, width, height) {
+  if (!app.project || !measured) return; // drawn a moment later: somebody may have gone on
+  const { frame, light, contrast } = measured, pad = 30, last = Math.max(app.project.files.length - 1, 1);
+  const high = 1.08 * Math.max(...light, ...contrast, 1), x = (k) => pad + k / last * (width - pad - 8), y = (v) => height - 6 - v / high * (height - 14);
+  c.fillStyle = colour("accent"); c.globalAlpha = 0.18; c.fillRect(x(app.frame) - 3, 2, 6, height - 4); c.globalAlpha = 1;
+  for (const [values, dash] of [[light, []], [contrast, [4, 3]]]) {
+    c.strokeStyle = c.fillStyle = colour("ink"); c.lineWidth = 1.5; c.setLineDash(dash); c.beginPath();
+    values.forEach((v, k) => { if (k) c.lineTo(x(frame[k]), y(v)); else c.moveTo(x(frame[k]), y(v)); });
+    c.stroke(); c.setLineDash([]);
+    values.forEach((v, k) => { c.beginPath(); c.arc(x(frame[k]), y(v), 2, 0, 7); c.fill(); });
+  }
+  c.fillStyle = colour("soft"); c.font = "10.5px system-ui, sans-serif"; c.textAlign = "left";
+  c.fillText(digits(high / 1.08, 3), 3, 13); c.fillText("0", 3, height - 4);
+}
+
+function maskBegins(app) {
+  cutting = null; masking = masking ? null : [];
+  const near = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]) * app.stage.view.k < 10;
+  app.tool(masking ? { cross: true, click: (p) => {
+    if (masking.length > 2 && near(p, masking[0])) { maskCloses(app); return; }
+    masking.push(p); app.paint();
+  } } : null);
+  app.paint();
+}
+
+function maskCloses(app) {
+  if (masking.length < 3) { notify("A mask has three corners or more", true); return; }
+  const mask = [...(app.project.photographs.mask ?? []), masking];
+  masking = null; app.tool(null);
+  app.change("set_photographs", { mask });
+}
+
+function cutTool(app) {
+  const box = (a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])];
+  return {
+    cross: true, down: () => true,
+    drag: (p, event, from) => { cutting = box(from, p); },
+    up: (p, event, from, moved) => {
+      if (!moved) return;
+      const { width, height } = app.project;
+      const [x0, y0, x1, y1] = box(from, p).map(Math.round);
+      const region = [Math.max(x0, 0), Math.max(y0, 0), Math.min(x1, width - 1), Math.min(y1, height - 1)];
+      cutting = null; app.tool(null);
+      if (region[2] - region[0] < 20 || region[3] - region[1] < 20) { notify("That region is too small", true); app.paint(); return; }
+      app.change("set_photographs", { region });
+    },
+  };
+}

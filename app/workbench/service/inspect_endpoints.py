@@ -1,0 +1,67 @@
+"""Endpoints of inspection: one pair or rod in all frames, and the forces without a contact."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...process.errors import InputError
+from ...results.results import Results
+from ...reviewing.rounding import rounded
+from ...tracks import TrackStatus
+from ..inspecting.pair_history import forces_without, pair_history
+from .endpoints import BadRequest, Name, Text, Whole, endpoint
+from .project import Project
+from .workbench import Workbench
+
+
+@endpoint
+def pair(workbench: Workbench, at: Text, i: Name, j: Name) -> dict[str, Any]:
+    """Describe one pair in every photograph up to the last one that is solved; places in pixels."""
+    opened = workbench.project(at)
+    results, first = _results(opened)
+    history = pair_history(results, i, j)
+    if history is None:
+        raise BadRequest(f"there is no pair {i} {j}")
+    scale = opened.scene().scale
+    history["point"] = [None if p is None else scale.to_pixels(p).round(2).tolist() for p in history["point"]]
+    before: list[Any] = [None] * first
+    return {name: before + values for name, values in history.items()}
+
+
+@endpoint
+def without_contact(workbench: Workbench, at: Text, frame: Whole, i: Name, j: Name) -> dict[str, Any]:
+    """Compute the nearest forces of a photograph without a contact; nothing is written."""
+    opened = workbench.project(at)
+    results, first = _results(opened)
+    if not first <= frame < first + len(results.frames):
+        raise InputError(opened.results, f"photograph {frame}", f"is not there: {len(results.frames)} are")
+    answer = forces_without(results, frame - first, i, j)
+    if answer is None:
+        raise InputError(f"{i} - {j}", f"photograph {frame}", "is no contact there")
+    return answer
+
+
+@endpoint
+def rod(workbench: Workbench, at: Text, id: Whole) -> dict[str, Any]:
+    """Describe one rod in every photograph up to the last one that is solved."""
+    results, first = _results(workbench.project(at))
+    tracks = results.tracks
+    rows = (tracks.id == id).nonzero()[0]
+    if len(rows) != 1:
+        raise BadRequest(f"there is no rod {id}")
+    row = int(rows[0])
+    before: list[Any] = [None] * first
+    return {
+        "radius": float(tracks.radius[row]), "zncc": before + rounded(tracks.zncc[:, row]),
+        "sigma": before + rounded(tracks.sigma[:, row]), "rotation": before + rounded(tracks.rotation[:, row]),
+        "status": before + [TrackStatus(each).name.lower() for each in tracks.status[:, row].tolist()],
+        "unbalance": before + rounded([
+            float("nan") if f.grain_unbalance is None else f.grain_unbalance[row] for f in results.frames
+        ]),
+    }  # fmt: skip
+
+
+def _results(opened: Project) -> tuple[Results, int]:
+    """Finished results, and the photograph of their frame 0."""
+    run = opened.reviewed_run()
+    return run.results, run.first_frame

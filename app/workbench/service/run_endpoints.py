@@ -1,0 +1,110 @@
+"""Endpoints of the run: start, pause, resume, cancel; its state and the frames that are solved."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...experiment.plausibility import check_packing
+from ...prediction import describe_prediction, track_first_photographs
+from ...process.errors import InputError
+from ...recording.look.colours import FORCE_RAMP, OPEN, PROBABILITY_RAMP, UNCERTAINTY_RAMP, WEAK
+from ...recording.look.force_style import THICKEST, THINNEST
+from ...run_folder import refuse_foreign_folder
+from ..inspecting.run_data import RunData, contact_history, frame_network, frame_summaries
+from .endpoints import Name, Text, Whole, endpoint
+from .project import Project
+from .workbench import Workbench
+
+
+@endpoint
+def run_start(workbench: Workbench, at: Text, follow: bool = False) -> dict[str, Any]:
+    """Start or resume the run, exactly as `rodsight run` does in this folder."""
+    opened = workbench.project(at)
+    validation = opened.validation()
+    if not validation.ready:
+        missing = [text for step in validation.steps.values() if step.mark == "missing" for text in step.messages]
+        raise InputError("run", "", "cannot begin: " + " ".join([*missing, *validation.other_messages]))
+    assert validation.experiment is not None
+    refuse_foreign_folder(opened.run_folder, validation.experiment)
+    opened.job.start(*(("--follow",) if follow else ()))
+    return opened.job.as_values()
+
+
+@endpoint
+def prediction(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Predict the accuracy of the forces from the first photographs, as `rodsight check` does."""
+    validation = workbench.project(at).validation()
+    if validation.experiment is None or not validation.ready:
+        raise InputError("check", "", "needs a complete set-up: something is still missing")
+    notes: list[str] = []
+    tracks, walls = track_first_photographs(validation.experiment, notify=notes.append)
+    if walls is not None:
+        notes += check_packing(validation.experiment, tracks, walls)
+    sentences, good = describe_prediction(tracks, walls)
+    return {"messages": [*notes, *sentences], "mark": "good" if good else "doubtful"}
+
+
+@endpoint
+def run_pause(workbench: Workbench, at: Text) -> dict[str, Any]:
+    opened = workbench.project(at)
+    opened.job.pause()
+    return opened.job.as_values()
+
+
+@endpoint
+def run_cancel(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """End the run, and remove the frames of its unfinished stage."""
+    opened = workbench.project(at)
+    opened.job.pause(discard=True)
+    return opened.job.as_values()
+
+
+@endpoint
+def run_state(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Describe the run, and the frames that are solved."""
+    opened = workbench.project(at)
+    data = opened.run_data()
+    frames = None if data is None else frame_summaries(data)
+    return {"job": opened.job.as_values(), "frames": frames, "files": opened.photograph_count()}
+
+
+@endpoint
+def force_look(workbench: Workbench) -> dict[str, Any]:
+    """Return colours and widths of forces, as the recording draws them."""
+    ramps = {"force": FORCE_RAMP, "uncertainty": UNCERTAINTY_RAMP, "probability": PROBABILITY_RAMP}
+    single = {"weak": WEAK, "open": OPEN}
+    return {
+        "ramps": {name: ["#" + bytes(each[:3]).hex() for each in ramp.tolist()] for name, ramp in ramps.items()},
+        **{name: f"rgba({red},{green},{blue},{alpha / 255:.2f})" for name, (red, green, blue, alpha) in single.items()},
+        "thinnest": 2.0 * THINNEST, "thickest": 2.0 * THICKEST,
+    }  # fmt: skip
+
+
+@endpoint
+def network(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
+    """Describe contacts, forces and rods of a photograph."""
+    opened = workbench.project(at)
+    return frame_network(_data_with(opened, frame), frame, opened.scene().scale)
+
+
+@endpoint
+def contact(workbench: Workbench, at: Text, i: Name, j: Name) -> dict[str, Any]:
+    """Describe one contact in all frames."""
+    return contact_history(_data(workbench.project(at)), i, j)
+
+
+def _data(opened: Project) -> RunData:
+    data = opened.run_data()
+    if data is None:
+        raise InputError(opened.results, "", "holds no frame yet: run the experiment first")
+    return data
+
+
+def _data_with(opened: Project, frame: int) -> RunData:
+    """The run, where it has a photograph."""
+    data = _data(opened)
+    if frame >= data.stop:
+        raise InputError(opened.results, f"photograph {frame}", f"is not solved yet: {len(data.frames)} are")
+    if frame < data.first:
+        raise InputError(opened.results, f"photograph {frame}", f"is before the run's first one, {data.first}")
+    return data

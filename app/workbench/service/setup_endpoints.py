@@ -1,0 +1,336 @@
+"""Endpoints of the set-up: edits of photographs, scale, walls, rods and material."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, StringConstraints
+
+from ...experiment.experiment import GrainGuess
+from ...process.errors import InputError
+from ...solver.bodies.wall_shapes import STRAIGHT
+from ..setup import circles, edits
+from ..setup.validation import ValidationResult, outside_walls
+from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint
+from .project import Project
+from .workbench import Workbench
+
+Pressure = Annotated[float, Field(ge=1e-3, le=1e11)]
+Three = Annotated[list[Point], Field(min_length=3, max_length=3)]
+Round = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Lens = Annotated[dict[Annotated[str, StringConstraints(max_length=2)], Number], Field(max_length=20)]
+Written = Annotated[str, StringConstraints(max_length=5_000_000)]  # a table of a hundred thousand rows
+LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
+Polygon = Annotated[list[Point], Field(min_length=3, max_length=500)]
+Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
+
+
+@editing_endpoint
+def set_photographs(
+    workbench: Workbench, at: Text, name: Text | None = None, interval: Number | None = None,
+    channel: Literal["grey", "red", "green", "blue"] | None = None, region: Region | Literal["all"] | None = None,
+    mask: list[Polygon] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Set the given values; the others are not changed."""
+    opened = workbench.project(at)
+    keys: dict[str, Any] = {}
+    if name is not None:
+        keys["name"] = name
+    if interval is not None:
+        keys |= {"photographs.interval": interval, "photographs.times": None}
+    if channel is not None:
+        keys["photographs.channel"] = None if channel == "grey" else channel
+    if region is not None:
+        keys["photographs.region"] = None if region == "all" else region
+    if mask is not None:
+        keys["photographs.mask"] = [[_rounded(point) for point in polygon] for polygon in mask] or None
+    opened.draft.set_keys("photographs" if mask is None else "mask", keys)
+    return opened.describe()
+
+
+@endpoint
+def quality(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Measure the quality of the photographs, as `rodsight check` does, and the illumination of some of them."""
+    measured = workbench.project(at).quality()
+    return {
+        "facts": measured.facts(), "faults": measured.faults(), "frame": measured.frame.tolist(),
+        "light": measured.light.tolist(), "contrast": measured.contrast.tolist(),
+    }  # fmt: skip
+
+
+class Measured(Values):
+    """Radius of a rod [m], and of its outline in pixels."""
+
+    radius: Number
+    pixels: Number
+
+
+@editing_endpoint
+def set_scale(
+    workbench: Workbench, at: Text, pixel_size: Number | None = None, line: Line | None = None,
+    metres: Number | None = None, rods: list[Measured] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Set the scale by the size of a pixel, by two points and their distance, or by rods of known radius."""
+    opened = workbench.project(at)
+    if line is not None and metres is not None:
+        keys = {"photographs.distance": {"start": _rounded(line[0]), "end": _rounded(line[1]), "metres": metres}}
+    elif rods:
+        if any(rod.pixels <= 0.0 for rod in rods):
+            raise InputError("scale", "", "a rod of 0 px gives no scale")
+        size = sum(rod.radius for rod in rods) / sum(rod.pixels for rod in rods)
+        keys = {"photographs.pixel_size": float(f"{size:.6g}")}
+    elif pixel_size is not None:
+        keys = {"photographs.pixel_size": pixel_size}
+    else:
+        raise InputError("scale", "", "give the size of a pixel, a line and its length, or rods of known radius")
+    edits.set_scale(opened.draft, keys)
+    return opened.describe()
+
+
+@editing_endpoint
+def set_lens(workbench: Workbench, at: Text, lens: Lens | None = None) -> dict[str, Any]:
+    """Set the coefficients of OpenCV's or of Brown's model; None: the distortion is estimated from the gaps."""
+    opened = workbench.project(at)
+    edits.set_lens(opened.draft, None if lens is None else dict(lens))
+    return opened.describe()
+
+
+@editing_endpoint
+def set_table(
+    workbench: Workbench, at: Text, name: Literal["times", "load", "forces"], table: Written | None = None
+) -> dict[str, Any]:
+    """Set a table of another program: times of photographs, load of walls, forces to compare with; None: remove it."""
+    opened = workbench.project(at)
+    edits.set_table(opened.draft, opened.validation(), name, table)
+    return opened.describe()
+
+
+@endpoint
+def measure_rod(workbench: Workbench, at: Text, x: Number, y: Number, radius: Number) -> dict[str, Any]:
+    """Fit the circle of a rod near a drawn one."""
+    opened = workbench.project(at)
+    free = ValidationResult(opened.validation().steps, {})
+    x, y, radius = edits.fit_rod(opened.photograph(0), free, x, y, max(radius, 3.0))
+    return {"x": x, "y": y, "r": radius}
+
+
+@editing_endpoint
+def draw_wall(
+    workbench: Workbench, at: Text, line: Line, name: Text | None = None, snap: bool = True
+) -> dict[str, Any]:
+    """Draw a new wall, or redraw the named one."""
+    opened = workbench.project(at)
+    found = _scaled(opened)
+    drawn = np.array(line)
+    fraction = 1.0
+    if snap:
+        drawn, fraction = edits.snap_wall(opened.photograph(0), drawn, found)
+    else:
+        drawn = edits.towards_packing(drawn, found)
+    walls = _walls(found)
+    if name is None:
+        name = _name_for(drawn, found)
+        walls.append((name, drawn))
+    else:
+        walls = [(each, drawn if each == name else ends) for each, ends in walls]
+    edits.set_walls(opened.draft, found, walls, f"wall {name}")
+    return opened.describe() | {"snapped": fraction if snap else None, "wall": name}
+
+
+@editing_endpoint
+def find_walls(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Find the bars around the rods."""
+    opened = workbench.project(at)
+    found = _scaled(opened)
+    lines = edits.find_walls(opened.photograph(0), found)
+    names = edits.names_of(lines)
+    edits.set_walls(opened.draft, found, list(zip(names, lines, strict=True)), "walls found")
+    return opened.describe()
+
+
+@editing_endpoint
+def draw_circle(
+    workbench: Workbench, at: Text, points: Three | None = None, place: Round | None = None, name: Text | None = None,
+    side: Literal["in", "out"] = "in", snap: bool = False,
+) -> dict[str, Any]:  # fmt: skip
+    """Draw a circular wall, or redraw the named one: through three points, by its place, or around the rods.
+
+    side: of the packing. place: x, y and radius [px]. snap: move it onto the visible edge beside it.
+    """
+    opened = workbench.project(at)
+    found = _scaled(opened)
+    name = _free("circle", found) if name is None else name
+    if points is not None:
+        circle = circles.circle_through(np.array(points), name, side)
+    elif place is not None:
+        circle = circles.Circle(name, place[0], place[1], place[2], side)
+    else:
+        circle = circles.circle_around(found, name)
+    if not circle.radius > LEAST_CIRCLE:
+        raise InputError("circle", f"radius {circle.radius:.3g} px", "is too small for a wall")
+    fraction = None
+    if snap:
+        circle, fraction = circles.snapped(opened.photograph(0), circle)
+    circles.set_circles(opened.draft, found, circles.with_circle(circles.circles_of(found), circle), f"wall {name}")
+    return opened.describe() | {"wall": name, "snapped": fraction}
+
+
+@editing_endpoint
+def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
+    opened = workbench.project(at)
+    found = _scaled(opened)
+    if any(each.name == name for each in circles.circles_of(found)):
+        left = [each for each in circles.circles_of(found) if each.name != name]
+        circles.set_circles(opened.draft, found, left, f"wall {name} deleted")
+        return opened.describe()
+    edits.set_walls(opened.draft, found, [each for each in _walls(found) if each[0] != name], f"wall {name} deleted")
+    return opened.describe()
+
+
+@editing_endpoint
+def rename_wall(workbench: Workbench, at: Text, name: Text, to: Text) -> dict[str, Any]:
+    opened = workbench.project(at)
+    edits.rename_wall(opened.draft, opened.validation(), name, to)
+    return opened.describe()
+
+
+@editing_endpoint
+def set_plate(
+    workbench: Workbench, at: Text, name: Text, pressure: Pressure | None = None,
+    ends: Literal["auto", "bar", "corner"] = "auto",
+) -> dict[str, Any]:  # fmt: skip
+    """Set pressure and ends of a wall; pressure None: the wall has its measured motion."""
+    opened = workbench.project(at)
+    values = {"pressure": pressure, "ends": None if ends == "auto" else ends}
+    edits.set_plate(opened.draft, opened.validation(), name, values)
+    return opened.describe()
+
+
+@editing_endpoint
+def detect_rods(workbench: Workbench, at: Text, radii: Numbers) -> dict[str, Any]:
+    """Detect the rods of the first photograph; radii [m]: the classes, empty where they are not known."""
+    opened = workbench.project(at)
+    detection = edits.detect(opened.used_photograph(0), opened.validation(), radii)
+    edits.set_rods(opened.draft, f"{detection.count} rods found", edits.as_guess(detection), radii)
+    return opened.describe() | {"quality": np.round(detection.quality, 3).tolist()}
+
+
+@editing_endpoint
+def add_rod(workbench: Workbench, at: Text, x: Number, y: Number, radius: Number) -> dict[str, Any]:
+    """Add a rod at a click; its circle is fitted to the visible rim."""
+    opened = workbench.project(at)
+    found = opened.validation()
+    pose = edits.fit_rod(opened.photograph(0), found, x, y, max(radius, 3.0))
+    edits.set_rods(opened.draft, "rod added", edits.with_rod(found.rods, None, pose))
+    return opened.describe()
+
+
+@editing_endpoint
+def move_rod(workbench: Workbench, at: Text, id: Whole, x: Number, y: Number, radius: Number) -> dict[str, Any]:
+    opened = workbench.project(at)
+    rods = edits.with_rod(opened.validation().rods, id, (x, y, max(radius, 1.0)))
+    edits.set_rods(opened.draft, f"rod {id} moved", rods)
+    return opened.describe()
+
+
+@editing_endpoint
+def delete_rods(workbench: Workbench, at: Text, ids: list[Whole]) -> dict[str, Any]:
+    opened = workbench.project(at)
+    rods = opened.validation().rods
+    for each in ids:
+        rods = edits.with_rod(rods, each, None)
+    if rods is not None:
+        what = f"{len(ids)} rods deleted" if len(ids) > 1 else f"rod {ids[0]} deleted"
+        edits.set_rods(opened.draft, what, rods)
+    return opened.describe()
+
+
+@editing_endpoint
+def drop_outside(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Delete the rods that lie outside the walls."""
+    opened = workbench.project(at)
+    found = opened.validation()
+    outside = outside_walls(found)
+    if found.rods is not None and outside:
+        kept = ~np.isin(found.rods.id, outside)
+        seen = found.rods
+        rods = GrainGuess(seen.id[kept], seen.x[kept], seen.y[kept], seen.radius[kept])
+        edits.set_rods(opened.draft, f"{len(outside)} circles outside the walls dropped", rods)
+    return opened.describe()
+
+
+@endpoint
+def classes(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Find the radius classes [m] of the rods."""
+    found = _scaled(workbench.project(at))
+    if found.rods is None:
+        return {"radii": []}
+    pixel = found.scale.mean_size if found.scale is not None else 1.0
+    return {"radii": [float(f"{each:.4g}") for each in (edits.find_classes(found.rods.radius) * pixel).tolist()]}
+
+
+@editing_endpoint
+def set_classes(workbench: Workbench, at: Text, radii: Numbers) -> dict[str, Any]:
+    """Give every rod the nearest of these radii [m]."""
+    opened = workbench.project(at)
+    found = _scaled(opened)
+    if found.rods is None or found.scale is None or not radii or min(radii) <= 0.0:
+        raise InputError("radii", str(radii), "give at least one radius, and detect the rods first")
+    edits.set_rods(opened.draft, "radius classes", edits.snapped_to(radii, found.rods, found.scale), radii)
+    return opened.describe()
+
+
+@endpoint
+def materials(workbench: Workbench) -> dict[str, Any]:
+    return edits.MATERIALS
+
+
+@editing_endpoint
+def set_material(
+    workbench: Workbench, at: Text, density: Number | None = None, length: Number | None = None,
+    friction: Number | Literal["measured"] | None = None, wall_friction: Number | Literal["same"] | None = None,
+    gravity: Point | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Set the given values; the others are not changed."""
+    opened = workbench.project(at)
+    values = {"density": density, "length": length, "friction": friction, "gravity": gravity}
+    keys: dict[str, Any] = {f"material.{key}": value for key, value in values.items() if value is not None}
+    if wall_friction is not None:
+        keys["material.wall_friction"] = None if wall_friction == "same" else wall_friction
+    opened.draft.set_keys("material", keys)
+    return opened.describe()
+
+
+def _scaled(opened: Project) -> ValidationResult:
+    found = opened.validation()
+    if found.scale is None:
+        raise InputError("scale", "", "is not set: walls and radii are in metres, so it comes first")
+    return found
+
+
+def _walls(found: ValidationResult) -> list[tuple[str, Any]]:
+    if found.walls is None or found.scale is None:
+        return []
+    bars = found.walls.sides == STRAIGHT  # circles have a table of their own
+    ends = found.scale.to_pixels(found.walls.endpoints[0])
+    return [(name, line) for name, line, bar in zip(found.walls.name, ends, bars, strict=True) if bar]
+
+
+def _name_for(line: Any, found: ValidationResult) -> str:
+    """Name of a new wall, by the side of the packing on which it lies."""
+    along = line[1] - line[0]
+    steep = abs(along[1]) > abs(along[0])
+    name = ("right" if along[1] < 0 else "left") if steep else ("bottom" if along[0] > 0 else "top")
+    return _free(name, found)
+
+
+def _free(name: str, found: ValidationResult) -> str:
+    """A free name for a wall: this one, or with a number."""
+    taken = found.walls.name if found.walls is not None else ()
+    return next(each for each in (name, *(f"{name}{k}" for k in range(2, 1000))) if each not in taken)
+
+
+def _rounded(point: list[float]) -> list[float]:
+    """A place in pixels, rounded to the accuracy of a hand."""
+    return [round(each, 2) for each in point]

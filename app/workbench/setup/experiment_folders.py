@@ -1,0 +1,180 @@
+"""Contents of the folder that the workbench was opened on: experiments, other photographs, the sample."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import tomllib
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from ...experiment.experiment import CONFIG_NAME
+from ...experiment.photographs import RAW_SUFFIXES, in_order, natural_key
+from ...process.atomic import write_atomically
+from ...process.errors import InputError
+from ...run_folder import SUMMARY, TRACKS, UNFINISHED
+
+PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
+DEEPEST = 3  # folders below the one that was opened
+SKIPPED = frozenset(("runs", "node_modules", "__pycache__"))
+SAMPLE = "shear"
+
+
+@dataclass(frozen=True, slots=True)
+class ImageSeries:
+    """Photographs in one folder that no experiment names."""
+
+    folder: Path
+    suffix: str
+    files: tuple[Path, ...]
+
+
+def find_experiments(root: Path) -> list[Path]:
+    """Find the folders with an experiment file, in natural order."""
+    return [folder for folder in _folders(root) if (folder / CONFIG_NAME).is_file()]
+
+
+def find_image_series(root: Path) -> list[ImageSeries]:
+    """Find the photographs that no experiment at or above their folder names."""
+    found = []
+    for folder in _folders(root):
+        above = folder.parent
+        if (folder / CONFIG_NAME).is_file() or (above.is_relative_to(root) and folder in _named_folders(above)):
+            continue
+        kinds: dict[str, list[Path]] = {}
+        for file in _listed(folder):
+            if file.suffix.lower() in PICTURES and file.is_file():
+                kinds.setdefault(file.suffix, []).append(file)
+        found += [ImageSeries(folder, suffix, in_order(each)) for suffix, each in sorted(kinds.items())]
+    return found
+
+
+def experiment_place(series: ImageSeries, root: Path) -> tuple[Path, str, str]:
+    """Return folder, pattern of photographs and name of the experiment that a series is made into."""
+    folder = series.folder
+    beside = [each for each in find_image_series(root) if each.folder.parent == folder.parent and each.folder != folder]
+    if folder == root or beside or (folder.parent / CONFIG_NAME).is_file():
+        return folder, f"*{series.suffix}", valid_name(folder.name)
+    return folder.parent, f"{folder.name}/*{series.suffix}", valid_name(folder.parent.name)
+
+
+def find_series(root: Path, folder: str, suffix: str) -> ImageSeries:
+    """Return the series of a folder, by its path from the root; raise InputError where it is not there any more."""
+    for each in find_image_series(root):
+        if each.folder.relative_to(root).as_posix() == folder and each.suffix == suffix:
+            return each
+    raise InputError(root, f"photographs {folder}/*{suffix}", "are not there any more, or belong to an experiment")
+
+
+def _named_folders(folder: Path) -> tuple[Path, ...]:
+    """The folders of the photographs that the experiment of a folder names; all where it cannot be read."""
+    file = folder / CONFIG_NAME
+    if not file.is_file():
+        return ()
+    try:
+        section = tomllib.loads(file.read_text(encoding="utf-8")).get("photographs")
+    except (OSError, ValueError, RecursionError):
+        return tuple(folder.iterdir())
+    pattern = section.get("files") if isinstance(section, dict) else None
+    return ((folder / pattern).parent,) if isinstance(pattern, str) else ()
+
+
+def valid_name(text: str) -> str:
+    """Return a valid name of an experiment, as close to a text as possible."""
+    return re.sub(r"[^\w .+-]", "_", text).strip(" .+-") or "test"
+
+
+def sample_folder() -> Path | None:
+    """Return the folder of the sample in the source; None where only the package is installed."""
+    folder = Path(__file__).resolve().parents[3] / "sample_data" / SAMPLE
+    return folder if (folder / CONFIG_NAME).is_file() else None
+
+
+def copy_sample(root: Path) -> Path:
+    """Copy the sample into the folder."""
+    source, target = sample_folder(), root / SAMPLE
+    if source is None:
+        raise InputError("the sample", "", "is not installed with the package; it comes with the source")
+    if not (target / CONFIG_NAME).is_file():
+        shutil.copytree(source, target, dirs_exist_ok=True)
+    return target
+
+
+def duplicate(folder: Path, root: Path) -> Path:
+    """Copy an experiment into a new folder beside it, with a name of its own; photographs are linked, not copied.
+
+    Raises
+    ------
+    InputError
+        The experiment is the folder that was opened: there is no place beside it.
+    """
+    if folder == root:
+        raise InputError(folder, "", "is the folder that was opened: open the one above it to duplicate the experiment")
+    names = (f"{folder.name} copy", *(f"{folder.name} copy {k}" for k in range(2, 1000)))
+    target = next(folder.with_name(name) for name in names if not folder.with_name(name).exists())
+    part = target.with_name(f".{target.name}.part")
+    shutil.copytree(
+        folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs")
+    )
+    file = part / CONFIG_NAME
+    data = tomllib.loads(file.read_text(encoding="utf-8"))
+    write_atomically(file, tomli_w.dumps(data | {"name": valid_name(target.name)}).encode())
+    part.rename(target)
+    return target
+
+
+def _link_picture(source: str, target: str) -> None:
+    """Link a photograph, which nothing changes; copy any other file."""
+    if Path(source).suffix.lower() in PICTURES:
+        with suppress(OSError):  # another file system, or one without links
+            os.link(source, target)
+            return
+    shutil.copy2(source, target)
+
+
+def run_folder(root: Path, name: str) -> Path:
+    """Return the folder to which `rodsight run`, started in the root, writes its results."""
+    return root / "runs" / name
+
+
+def run_overview(folder: Path) -> dict[str, Any] | None:
+    """Summarise a run for the first page; None where there is none."""
+    unfinished = (folder / UNFINISHED).is_dir()
+    try:
+        summary = json.loads((folder / SUMMARY).read_bytes())
+    except (OSError, ValueError):
+        return {"unfinished": unfinished} if unfinished or (folder / TRACKS).is_file() else None
+    trust = [each for each in summary.get("trust", []) if isinstance(each, int | float)]
+    return {
+        "unfinished": unfinished,
+        "frames": summary.get("frame_count"),
+        "rods": summary.get("grain_count"),
+        "status": summary.get("status_count", {}),
+        "trust": min(trust) if trust else None,
+        "lost": summary.get("lost_grains"),
+        "finished_at": (folder / SUMMARY).stat().st_mtime,
+    }
+
+
+def _listed(folder: Path) -> list[Path]:
+    """Return what a folder holds; nothing where it may not be read."""
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
+
+
+def _folders(root: Path, depth: int = 0) -> Iterator[Path]:
+    yield root
+    if depth == DEEPEST:
+        return
+    for each in sorted(_listed(root), key=natural_key):
+        if each.is_dir() and not each.name.startswith(".") and each.name not in SKIPPED and not each.is_symlink():
+            yield from _folders(each, depth + 1)

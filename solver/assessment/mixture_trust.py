@@ -1,0 +1,182 @@
+"""Trust in the position-only estimate and in mixtures of estimates, and their weights.
+
+Two estimates whose errors have different causes correlate by c = r_1 r_2, the product of their correlations with the
+truth. Neither is then below c, and where c is below the product of both trusts, one of them is too high: that of the
+position-only estimate, which assumes exact radii, friction and elastic law.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .evidence import Evidence
+from .fitted import FITTED
+
+POSTERIOR_CALIBRATION = 0.95  # true over self-estimated correlation of the posterior, where its input is right
+MAX_TRUST = 0.995  # above it a field would have all the weight
+# Largest trust in forces of soft grains from their overlaps.
+MAX_TRUST_MEASURED = 0.96  # the gaps show the overlaps; r .98 to .996 on simulated grains
+MAX_TRUST_STATED = 0.65  # softness is specified and no gap shows it; r .66 to .74 on photoelastic discs
+RELIABILITY_DISAGREEMENT: tuple[float, float] = tuple(FITTED["motion_reliability"]["disagreement"])
+RELIABILITY_CORRECTION: tuple[float, float] = tuple(FITTED["motion_reliability"]["correction"])
+LEAST_WEIGHT: float = FITTED["position_weight"]["least"]  # weights below it are not used
+# Of 1 − R of a sound frame, the fraction that its motion estimate errs by on average (sixteen scenarios, seed 0). A
+# reliability of LOW or less is taken as the expectation itself.
+MEAN_ERROR_FRACTION = 0.45
+LOW, SOUND = 0.6, 0.85
+MAX_TRUST_CORRECTED = 0.9  # errors of centres and radii were separated from overlaps; r .87 to .98
+
+
+def reconcile_trusts(motion_trust: float, posterior_trust: float, agreement: float) -> tuple[float, float]:
+    """Make the trusts of both fields consistent with their agreement.
+
+    Parameters
+    ----------
+    motion_trust, posterior_trust : float
+        Each field's own trust; the motion's may be NaN.
+    agreement : float
+        Correlation c of both fields; NaN: unknown.
+
+    Returns
+    -------
+    tuple of float
+        T_m and T_p of the motion and the posterior, within 0 … 0.995.
+
+    Notes
+    -----
+    T_m = max(motion_trust, c, 0), or 0 where it is NaN; T_p = min(0.95 posterior_trust, max(c, 0)/motion_trust), the
+    latter where both c and motion_trust are known.
+    """
+    claimed = POSTERIOR_CALIBRATION * posterior_trust
+    common = max(agreement, 0.0) if np.isfinite(agreement) else 0.0
+    if not np.isfinite(motion_trust):
+        return 0.0, min(claimed, MAX_TRUST)
+    if np.isfinite(agreement):
+        claimed = min(claimed, common / max(motion_trust, 1e-6))
+    return float(np.clip(max(motion_trust, common), 0.0, MAX_TRUST)), float(np.clip(claimed, 0.0, MAX_TRUST))
+
+
+def compute_position_weight(motion_trust: float, posterior_trust: float, weight: float = 1.0) -> float:
+    """Compute the weight u of the posterior in the mixture; ½ where both trusts are zero.
+
+    Notes
+    -----
+    u = S_p/(S_p + weight S_m), S = T²/(1 − T²): the signal-to-noise ratio of a field of correlation T.
+    """
+    motion, posterior = (trust**2 / (1.0 - trust**2) for trust in (motion_trust, posterior_trust))
+    motion *= weight
+    return posterior / (posterior + motion) if posterior + motion > 0.0 else 0.5
+
+
+def confirmed_trust(motion_trust: float, posterior_trust: float, agreement: float) -> float:
+    """Limit the posterior's trust to its agreement with the motion, beyond it as far as the motion has trust.
+
+    With wrong input both fields are wrong, and only a low trust of the motion shows it.
+    """
+    common = min(max(agreement, 0.0), posterior_trust) if np.isfinite(agreement) else 0.0
+    return common + motion_trust * (posterior_trust - common)
+
+
+def mixture_trust(
+    motion_trust: float,
+    posterior_trust: float,
+    agreement: float,
+    position_weight: float,
+    sds: tuple[np.floating, np.floating],
+) -> float:
+    """Compute the mixture's correlation with the truth from those of both fields."""
+    one, two = (1.0 - position_weight) * float(sds[0]), position_weight * float(sds[1])
+    both = agreement if np.isfinite(agreement) else 0.0
+    size = np.sqrt(max(one**2 + two**2 + 2.0 * one * two * both, 1e-300))
+    return float(np.clip((one * motion_trust + two * posterior_trust) / size, 0.0, MAX_TRUST))
+
+
+def soft_mixture_trust(mixed: float, positions: float, greatest: float, weight: float) -> float:
+    """Compute the trust in a mixture for soft grains.
+
+    Parameters
+    ----------
+    mixed : float
+        Trust of the mixture for hard grains.
+    positions : float
+        Trust of the position-only estimate by itself.
+    greatest : float
+        Largest trust in overlaps.
+    weight : float
+        Weight of motion, 0 where overlaps alone determine the forces.
+    """
+    return weight * mixed + (1.0 - weight) * min(positions, greatest)
+
+
+def motion_reliability(evidence: Evidence) -> float:
+    """Correlation with the truth that the motion estimate claims for its weight beside soft or unscaled positions.
+
+    Notes
+    -----
+    1 − 0.83 D^2.65 − 0.42 ε^0.73, D the disagreement of the members and ε the correction; NaN where either is unknown
+    or no motion leads to the frame.
+    """
+    if not evidence.assessed or math.isnan(evidence.correction) or math.isnan(evidence.disagreement):
+        return math.nan
+    (a, p), (b, q) = RELIABILITY_DISAGREEMENT, RELIABILITY_CORRECTION
+    return float(np.clip(1.0 - a * evidence.disagreement**p - b * max(evidence.correction, 0.0) ** q, 0.0, 1.0))
+
+
+def expected_of_motion(reliability: float, *, scale_known: bool) -> float:
+    """Expected correlation of a motion estimate with a reliability; without a load elastic loading looks accurate.
+
+    Notes
+    -----
+    1 − (1 − R)(1 − s (1 − m)), s rising from 0 at R = .6 to 1 at R = .85, m = .45; R itself without a load.
+    """
+    if not scale_known:
+        return reliability
+    sure = float(np.clip((reliability - LOW) / (SOUND - LOW), 0.0, 1.0))
+    return 1.0 - (1.0 - reliability) * (1.0 - sure * (1.0 - MEAN_ERROR_FRACTION))
+
+
+def evident_position_weight(correction: float, position_agreement: float) -> float:
+    """Weight of the position-only estimate beside a motion estimate of hard grains under a known load.
+
+    Parameters
+    ----------
+    correction : float
+        ε, by which forces must correct the measured motion: what the model lacks, or wrong input.
+    position_agreement : float
+        Correlation of the position-only estimate with the motion-free balance of overlaps: what positions show.
+
+    Returns
+    -------
+    float
+        w = 1/(1 + exp(−(a + b ln ε + c ln(1 − agreement)))), in (0, 1), with a, b, c from fitted.toml.
+    """
+    table = FITTED["position_weight"]
+    known = table["default_correction"] if math.isnan(correction) else correction
+    epsilon = float(np.clip(known, *table["correction_range"]))
+    other = 1.0 - (0.5 if math.isnan(position_agreement) else position_agreement)
+    unclear = float(np.clip(other, *table["unclear_range"]))
+    score = table["constant"] + table["correction"] * math.log(epsilon) + table["unclear"] * math.log(unclear)
+    return 1.0 / (1.0 + math.exp(-score))
+
+
+def fused_trust(first: float, second: float, agreement: float, weight: float) -> float:
+    """Compute the trust of a weighted mean of two estimates with independent errors.
+
+    Parameters
+    ----------
+    first, second : float
+        Correlation of each with the truth; `second` is limited to agreement / first.
+    agreement : float
+        Correlation c of both estimates.
+    weight : float
+        Weight w of the second.
+
+    Returns
+    -------
+    float
+        1 − (1 − w)² (1 − first) − w² (1 − second).
+    """
+    second = min(np.nan_to_num(second, nan=agreement), agreement / max(first, 1e-6))
+    return float(np.clip(1.0 - (1.0 - weight) ** 2 * (1.0 - first) - weight**2 * (1.0 - second), 0.0, 1.0))

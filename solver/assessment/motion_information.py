@@ -1,0 +1,116 @@
+"""Information in the motion that leads to a frame: how much sliding and gaps reveal of its forces.
+
+Agreement of the estimators is no information: where nothing slides, or where noise hides the sliding, all ensemble
+members agree, and nothing contradicts them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies.grains import Array
+from ..bodies.motion import FrameMotion, Snapshot
+from ..bodies.packing import Packing
+from ..bodies.walls import Walls
+from ..contacts.contacts import Contacts
+from ..contacts.kinematics import relative_motion
+from ..detection.displacement import displacement_scale
+
+DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
+STRONG = 0.5  # of the mean force: contacts that surely touch
+ROBUST = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
+
+
+@dataclass(frozen=True, slots=True)
+class MotionInformation:
+    """Information in a frame's motion and gaps. NaN: not known."""
+
+    noise: float  # [m] standard deviation of a position component
+    motion: float  # [m] typical displacement between neighbours since the last photograph, noise subtracted
+    sliding: float  # fraction of the bearing contacts that slide by more than noise
+    slide_signal: float  # rms sliding of the bearing contacts over its noise, noise subtracted
+    gap_error: float  # [m] standard deviation of the gaps of strong contacts, noise subtracted
+    diameter: float  # [m] mean
+    beyond: int  # grains beyond a wall, which touch nothing there
+    soft: bool = False  # gaps are overlaps that forces make
+
+
+NO_INFORMATION = MotionInformation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0)
+
+
+def measure_motion_information(
+    packing: Packing,
+    snapshot: Snapshot,
+    motion: FrameMotion,
+    contacts: Contacts,
+    fn: Array,
+    walls: Walls,
+    *,
+    soft: bool,
+) -> MotionInformation:
+    """Measure the information of one frame.
+
+    Parameters
+    ----------
+    packing : Packing
+    snapshot : Snapshot
+        Positions of the frame.
+    motion : FrameMotion
+        Motion that leads to it.
+    contacts : Contacts
+    fn : ndarray, shape (c,)
+        Normal forces of the reported field [N].
+    walls : Walls
+        As they moved.
+    soft : bool
+        Whether gaps are overlaps that forces make.
+    """
+    grains = packing.grains
+    bearing = fn > 0.0
+    noise = snapshot.sigma
+    sliding = signal = np.nan
+    if bearing.any():
+        moving = motion.grains
+        _, speed = relative_motion(contacts, grains.radius, moving.velocity, moving.spin, walls)
+        slid = (np.abs(speed) * motion.interval)[bearing]
+        slide_sd = noise * np.where(contacts.with_wall[bearing], 2.0, 8.0**0.5)
+        sliding = float((slid > DETECTABLE * slide_sd).mean())
+        signal = float(np.sqrt(max(np.mean(slid**2) / np.mean(slide_sd**2) - 1.0, 0.0)))
+    return MotionInformation(
+        noise, motion_scale(motion, noise), sliding, signal, _gap_error(contacts, fn, noise),
+        2.0 * float(grains.radius.mean()),
+        _count_beyond(packing.walls_of(snapshot), snapshot.position[snapshot.present]), soft,
+    )  # fmt: skip
+
+
+def motion_scale(motion: FrameMotion, noise: float) -> float:
+    """Typical displacement between neighbours since the last photograph [m], noise [m] subtracted; NaN of one grain."""
+    moving = motion.grains
+    if moving.present.sum() < 2:
+        return np.nan
+    after = np.where(moving.present[:, None], moving.position, np.nan)
+    return displacement_scale(after - motion.interval * moving.velocity, after, np.full(len(after), noise))
+
+
+def _gap_error(contacts: Contacts, fn: Array, noise: float) -> float:
+    """Robust standard deviation of the gaps of strong contacts [m], noise subtracted."""
+    bearing = fn > 0.0
+    strong = fn > STRONG * fn[bearing].mean() if bearing.any() else bearing
+    if strong.sum() < 10:
+        return np.nan
+    gap = contacts.gap[strong]
+    variance = (ROBUST * np.median(np.abs(gap - np.median(gap)))) ** 2
+    expected = noise**2 * np.where(contacts.with_wall[strong], 1.0, 2.0).mean()
+    return float(np.sqrt(max(variance - expected, 0.0)))
+
+
+def _count_beyond(walls: Walls, position: Array) -> int:
+    """Number of grains at position (m, 2) [m] whose centre is beyond a wall beside which they are."""
+    offset = position[:, None, :] - walls.endpoints[None, :, 0, :]
+    out = np.einsum("nwk,wk->nw", offset, walls.outward)
+    along = np.einsum("nwk,wk->nw", offset, walls.direction)
+    beside: NDArray[np.bool_] = (along > 0.0) & (along < walls.length[None, :])
+    return int((beside & (out > 0.0)).any(axis=1).sum())

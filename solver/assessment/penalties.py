@@ -1,0 +1,143 @@
+"""Trust of a frame with its reasons in words, the worst first, each with its cure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..convex.friction_check import COVERAGE_FACTOR, FrictionCheck
+from ..frame_forces import FrameForces, FrameStatus
+from ..statistics.sliding import contact_state, sliding_probability_at
+from .evidence import Evidence
+from .expected_correlation import losses
+from .force_intervals import widen_for_friction
+from .trust import Assessment, motion_assessment, unseen_penalty
+
+COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
+SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
+BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
+REPORTED = 0.04  # fraction of the trust above which a penalty is reported in words
+
+
+class Penalty(NamedTuple):
+    """One reason to trust a frame less."""
+
+    fraction: float  # of the trust that is lost
+    words: str  # the cause; the cure
+    counted: bool = False  # in `trust.motion_trust` already
+
+
+def assess(evidence: Evidence) -> Assessment:
+    """Assess a frame.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Of the reported field.
+
+    Returns
+    -------
+    Assessment
+        Expected correlation with the true f_n and its lower bound T in [0, 1]; NaN where not assessed.
+    """
+    expected, bound = motion_assessment(evidence)
+    for each in find_penalties(evidence):
+        if not each.counted:
+            kept = max(1.0 - each.fraction, 0.0)
+            expected, bound = kept * expected, kept * bound
+    return Assessment(expected, bound)
+
+
+def find_penalties(evidence: Evidence) -> list[Penalty]:
+    """All penalties of a frame, the largest first."""
+    found = [_boundary(evidence), _softness(evidence), _unseen(evidence), *_contradictions(evidence)]
+    return sorted((each for each in found if each is not None and each.fraction > 0.0), reverse=True)
+
+
+def describe_penalties(evidence: Evidence) -> str:
+    """Penalties of at least REPORTED in words, the largest first; empty where there is none."""
+    return "; ".join(each.words for each in find_penalties(evidence) if each.fraction >= REPORTED)
+
+
+def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measured: bool = False) -> FrameForces:
+    """Apply the friction check of the whole sequence to one frame.
+
+    Parameters
+    ----------
+    frame : FrameForces
+        As solved.
+    check : FrictionCheck or None
+        Friction coefficient that the motion of all frames shows.
+    measured : bool
+        Whether the coefficient was measured from the motion: its interval then enters the standard deviations.
+
+    Returns
+    -------
+    FrameForces
+        With reasons, sliding probabilities and standard deviations after the check.
+    """
+    if check is None or frame.status is FrameStatus.FAILED:
+        return frame
+    if check.agrees:
+        return widen_for_friction(frame, check.low, check.measured, 1.0 / COVERAGE_FACTOR) if measured else frame
+    words = (
+        f"the motion fits a friction of {check.measured:.2f} ({check.low:.2f} to {check.high:.2f}) better than the "
+        f"given {check.given:g}; smooth walls, a base with friction or a wrong step look the same"
+    )
+    penalised = replace(frame, trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))))
+    if frame.sliding_probability is not None:
+        slides = sliding_probability_at(
+            frame.sliding_probability, check.given, check.measured, 1.0 - frame.position_weight
+        )
+        penalised = replace(penalised, sliding_probability=slides, state=contact_state(frame.fn, slides))
+    return widen_for_friction(penalised, check.given, check.measured)
+
+
+def _contradictions(evidence: Evidence) -> list[Penalty]:
+    """What the expected correlation loses to each measure of the evidence."""
+    if math.isnan(evidence.disagreement) or not evidence.assessed:
+        return []
+    found = evidence.information
+    step = math.degrees(evidence.shear)
+    coarse = (
+        f": photographs are {step:.2g}° of shear apart, take them every .25°" if evidence.shear > COARSE_STEP else ""
+    )
+    words = {
+        "disagreement_of_estimates": f"forces from the motion and from the positions agree by {evidence.agreement:.2f} "
+        "only: camera, radii, walls or friction are wrong, or the packing does what this model lacks",
+        "disagreement_with_either": "forces from the motion agree neither with those from the positions nor with the "
+        f"overlaps by more than {np.fmax(evidence.agreement, evidence.overlap_agreement):.2f}: radii or walls are "
+        "wrong, or noise hides the overlaps",
+        "correction": f"the forces correct the measured motion by ε = {evidence.correction:.2g}: tracks, friction, a "
+        "missing contact",
+        "previous_residual": f"the previous forces leave a residual of ū = {evidence.old_unbalance:.2g}: the packing "
+        f"rearranges, or walls and photographs do not belong together{coarse}",
+        "disagreement_of_members": f"the methods disagree by {100.0 * evidence.disagreement:.0f} % of the forces: "
+        f"noise of {1e6 * found.noise:.3g} µm against {1e6 * found.motion:.3g} µm that neighbours move in a step",
+        "gap_error": f"gaps of strong contacts deviate by {1e6 * found.gap_error:.3g} µm beyond noise: radii or "
+        "centres are wrong, or grains soft; measure radii, or let calibration find them",
+        "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
+    }
+    return [Penalty(loss, words[name], counted=True) for name, loss in losses(evidence).items()]
+
+
+def _boundary(evidence: Evidence) -> Penalty | None:
+    beyond = evidence.information.beyond
+    words = f"{beyond} grains are beyond a wall, which carries no force there: correct the walls' ends or their place"
+    return Penalty(BEYOND_WALL_LOSS * beyond / max(evidence.grains, 1), words)
+
+
+def _softness(evidence: Evidence) -> Penalty | None:
+    if not (evidence.information.soft and math.isnan(evidence.disagreement)):
+        return None
+    return Penalty(
+        SOFT_CHAIN_LOSS, "the grains are soft, which a single chain cannot use: the ensemble reads their overlaps"
+    )
+
+
+def _unseen(evidence: Evidence) -> Penalty | None:
+    words = f"rods that were inferred: {evidence.inferred}"
+    return Penalty(unseen_penalty(evidence), f"{words} (grains are unseen: find them in the photographs)", counted=True)

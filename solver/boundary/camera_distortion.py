@@ -1,0 +1,217 @@
+"""Distortion of the camera from the gaps of touching pairs, for packings without walls.
+
+Surfaces of touching grains meet wherever in the picture they are and in whatever direction they touch. Gaps that grow
+towards the rim of the picture, or that depend on the direction of the pair, show a lens or pixels that are not square.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from ..bodies.grains import Array
+
+MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
+WIDEST = 0.15  # mean diameters: gap of a pair that may touch although it is distorted
+FEWEST_PAIRS = 100  # in a frame
+FIRST_QUANTILE = 0.2  # of all gaps: where touching ones are looked for first
+FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.06, 0.75, 2.0  # mean diameters; factor of a round; robust standard deviations
+ROUNDS = 15
+OVERLAPS = 3.0  # widths: larger overlaps are errors, too
+MAD_TO_SD = 1.4826  # median of the absolute value to the standard deviation of a normal distribution
+SIGNIFICANT = 5.0  # standard errors
+EXPLAINED = 0.9  # greatest ratio of the robust scatter of touching gaps after a correction to that before
+ANISOTROPY, RADIAL = slice(0, 2), slice(2, 3)  # unknowns of the model
+MODELS = {"radial": (2,), "anisotropy": (0, 1), "both": (0, 1, 2)}
+SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared
+UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of its mean over the parts of the picture
+
+
+@dataclass(frozen=True, slots=True)
+class CameraDistortion:
+    """Distortion of the picture about its middle, with lengths over its half-width L.
+
+    Notes
+    -----
+    x_true = x + L [a X + b (Y, X) + k |ξ|² ξ] with ξ = (x − x_0)/L = (X, Y) and a X standing for a (X, −Y).
+    """
+
+    value: Array  # (3,) a, b, k
+    sd: Array  # (3,) standard error, as if errors were the same in all frames
+    middle: Array  # (2,) [m] x_0
+    half_width: float  # [m] L
+    scatter: float  # [m] robust standard deviation of the gaps of candidate pairs as they were measured
+    explained: float  # [m] after the correction; the same without one
+    applied: bool
+    unexplained: float  # [m] range over the picture of the mean touching gap that remains; 0: within its error
+
+    def correct(self, position: Array) -> Array:
+        """Return undistorted positions (…, 2) [m]."""
+        if not self.applied:
+            return position
+        return position + np.tensordot(self.value, _displacements(position, self.middle, self.half_width), 1)
+
+    def describe(self) -> list[str]:
+        """Describe the correction and what remains in sentences for the user."""
+        sentences = []
+        if self.applied:
+            parts = []
+            if self.value[RADIAL].any():
+                parts.append(f"a radial distortion of {100 * float(self.value[2]):.2g} % at the picture's rim")
+            if self.value[ANISOTROPY].any():
+                size = 100 * float(np.hypot(*self.value[ANISOTROPY]))
+                parts.append(f"a stretching of {size:.2g} % along one direction")
+            sentences.append(
+                f"{' and '.join(parts)} was removed, since gaps of near grains then scatter by "
+                f"{1e6 * self.explained:.0f} instead of {1e6 * self.scatter:.0f} µm"
+            )
+        if self.unexplained > 0.0:
+            sentences.append(
+                f"gaps of touching grains depend on their place in the picture by {1e6 * self.unexplained:.0f} µm, "
+                "which neither lens nor pixels explain: calibrate the camera"
+            )
+        return sentences
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """Pairs that may touch, of all frames that are read."""
+
+    gap: Array  # (m,) [m] as measured
+    design: Array  # (m, 3 + q) change of the gap by the unknowns of the camera and by an error of the radii by class
+    middle: Array  # (m, 2) of the pair over the half-width
+    frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    value: Array  # (3 + q,)
+    sd: Array
+    scatter: float  # [m] of the pairs that count as touching
+    misfit: float  # [m] of all pairs, on whose number models compare
+    residual: Array  # (m,) [m]
+    weight: Array  # (m,)
+
+
+def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[np.integer]) -> CameraDistortion | None:
+    """Find the distortion of the camera.
+
+    Parameters
+    ----------
+    position : (f, n, 2)
+        Measured positions [m], NaN where a grain is missing.
+    radius : (n,)
+        Radii [m].
+    size_class : (n,)
+        Class of each grain by its size, from 0; the error of a class's radius is found with the distortion.
+
+    Returns
+    -------
+    CameraDistortion or None
+        None: too few grains are near one another.
+
+    Notes
+    -----
+    Weighted least squares of g + n·(u(x_j) − u(x_i)) − δ_i − δ_j = 0 over pairs, with u the displacement of
+    `CameraDistortion` and δ the error of a class's radius. Weights (1 + (g/s)²)⁻² for positive residuals g, with s
+    shrinking from a fraction of a diameter to twice the robust standard deviation: pairs that do not touch stand apart.
+    The model with the fewest unknowns that reduces the robust scatter of all pairs to 0.9 of that of a simpler one is
+    applied, if its unknowns exceed five standard errors. Forces of soft grains depend on direction and place, too, but
+    do not change the scatter of their gaps so much.
+    """
+    rows = np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))
+    present = position[np.isfinite(position[..., 0])]
+    if not len(present):
+        return None
+    middle = 0.5 * (present.min(axis=0) + present.max(axis=0))
+    half_width = 0.5 * float(np.ptp(present, axis=0).max())
+    pairs = _near_pairs(position[rows], radius, size_class, middle, half_width)
+    if len(pairs.gap) < FEWEST_PAIRS * pairs.frames:
+        return None
+    diameter = 2.0 * float(radius.mean())
+    none = _fit(pairs, (), diameter)
+    best, chosen = none, ()
+    for unknowns in sorted(MODELS.values(), key=len):
+        found = _fit(pairs, unknowns, diameter)
+        significant = np.abs(found.value[list(unknowns)]) > SIGNIFICANT * found.sd[list(unknowns)]
+        if significant.any() and found.misfit < EXPLAINED * best.misfit:
+            best, chosen = found, unknowns
+    value = np.where(np.isin(np.arange(3), chosen), best.value[:3], 0.0)
+    return CameraDistortion(
+        value, best.sd[:3], middle, half_width, none.misfit, best.misfit, bool(chosen), _place_dependence(pairs, best)
+    )
+
+
+def _displacements(position: Array, middle: Array, half_width: float) -> Array:
+    """Displacements (3, …, 2) [m] of points (…, 2) [m] by a unit of each unknown."""
+    x = (position - middle) / half_width
+    square = np.sum(x**2, axis=-1, keepdims=True)
+    return half_width * np.stack([x * np.array([1.0, -1.0]), x[..., ::-1], square * x])
+
+
+def _near_pairs(
+    position: Array, radius: Array, size_class: NDArray[np.integer], middle: Array, half_width: float
+) -> _Pairs:
+    reach, classes = WIDEST * 2.0 * float(radius.mean()), int(size_class.max()) + 1
+    parts = []
+    for place in position:
+        here = np.flatnonzero(np.isfinite(place[:, 0]))
+        i, j = here[KDTree(place[here]).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")].T
+        branch = place[j] - place[i]
+        length = np.linalg.norm(branch, axis=1)
+        gap = length - radius[i] - radius[j]
+        near = (gap < reach) & (length > 0.0)
+        i, j, branch, length, gap = i[near], j[near], branch[near], length[near], gap[near]
+        moved = _displacements(place, middle, half_width)
+        along = np.einsum("pck,ck->cp", moved[:, j] - moved[:, i], branch / length[:, None])
+        own = np.zeros((len(i), classes))
+        for side in (i, j):
+            np.add.at(own, (np.arange(len(i)), size_class[side]), -1.0)
+        parts.append((gap, np.column_stack([along, own]), (0.5 * (place[i] + place[j]) - middle) / half_width))
+    gap, design, centre = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return _Pairs(gap, design, centre, len(position))
+
+
+def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float) -> _Fit:
+    """Fit some unknowns of the camera, and the errors of radii."""
+    count = pairs.design.shape[1]
+    used = [*unknowns, *range(3, count)]
+    design, gap = pairs.design[:, used], pairs.gap
+    value = np.zeros(len(used))
+    value[len(unknowns) :] = 0.5 * np.quantile(gap, FIRST_QUANTILE)
+    width, scatter = FIRST_WIDTH * diameter, 0.0
+    normal, residual, weight = np.eye(len(used)), gap, np.ones(len(gap))
+    for _ in range(ROUNDS):
+        residual = gap + design @ value
+        apart = (1.0 + (residual / width) ** 2) ** -2
+        overlap = 1.0 / (1.0 + (residual / (OVERLAPS * width)) ** 2)
+        weight = np.where(residual > 0.0, apart, overlap)
+        normal = design.T @ (weight[:, None] * design)
+        value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
+        residual = gap + design @ value
+        scatter = MAD_TO_SD * float(np.median(np.abs(residual[weight > 0.5])))
+        width = max(SHRINK * width, LAST_WIDTH * scatter)
+    sd = scatter * np.sqrt(pairs.frames * np.diag(np.linalg.pinv(normal)))
+    full, full_sd = np.zeros(count), np.zeros(count)
+    full[used], full_sd[used] = value, sd
+    return _Fit(full, full_sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight)
+
+
+def _place_dependence(pairs: _Pairs, fit: _Fit) -> float:
+    """Compute the range of the mean touching gap over the picture [m]; 0 where it is within scatter and error."""
+    touching = fit.weight > 0.5
+    x, y = pairs.middle[touching].T
+    ring = np.minimum((np.hypot(x, y) * RINGS).astype(int), RINGS - 1)
+    part = ring * SECTORS + ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * SECTORS).astype(int) % SECTORS
+    count = np.bincount(part, minlength=SECTORS * RINGS)
+    known = count > FEWEST_PAIRS
+    if known.sum() < 2:
+        return 0.0
+    mean = np.bincount(part, fit.residual[touching], minlength=SECTORS * RINGS)[known] / count[known]
+    error = fit.scatter * np.sqrt(pairs.frames / count[known])
+    spread = float(np.ptp(mean))
+    beyond = spread > UNEXPLAINED * fit.scatter and spread > SIGNIFICANT * float(error.max())
+    return spread if beyond else 0.0

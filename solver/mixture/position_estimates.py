@@ -1,0 +1,72 @@
+"""Position-only estimates of a sequence, computed frame by frame on demand.
+
+Gathering the evidence of all frames takes as long as a frame or two; it is done at the first request.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..bodies.motion import Snapshot
+from ..bodies.packing import Packing
+from ..contacts.verdicts import NO_VERDICTS, Verdicts
+from ..posterior.frame_posterior import FramePosterior, infer_frame
+from ..posterior.posterior_settings import PosteriorSettings
+from ..posterior.sequence_evidence import SequenceEvidence, gather_position_evidence
+
+SEED = 0  # of the draws, with the number of the frame: the same bits for any order of requests
+
+
+class PositionEstimates:
+    """Posteriors of the forces of each frame from positions and balance alone."""
+
+    def __init__(
+        self,
+        packing: Packing,
+        snapshots: Sequence[Snapshot],
+        settings: PosteriorSettings,
+        workers: int | None = None,
+        given: Mapping[int, FramePosterior] | None = None,
+    ) -> None:
+        """Prepare the estimates of a sequence.
+
+        Parameters
+        ----------
+        packing : Packing
+        snapshots : sequence of Snapshot
+        settings : PosteriorSettings
+            Settings before the sequence's own standard deviations replace them.
+        workers : int, optional
+            Threads; None: one for every core.
+        given : mapping of int to FramePosterior, optional
+            Posteriors of some frames, used as they are.
+        """
+        self._workers = workers
+        self._packing, self._snapshots, self._settings = packing, snapshots, settings
+        self._evidence: SequenceEvidence | None = None
+        self._known: dict[int, FramePosterior | None] = dict(given or {})
+
+    def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
+        """Return the posterior of frame k with its reviewed pairs; None where no two bodies are near."""
+        if k not in self._known:
+            # Only the last one is kept: a frame is requested again only while it is being solved.
+            self._known = {k: self._infer(k, verdicts)}
+        return self._known[k]
+
+    def _infer(self, k: int, verdicts: Verdicts) -> FramePosterior | None:
+        if self._evidence is None:
+            try:
+                self._evidence = gather_position_evidence(self._packing, self._snapshots, self._settings)
+            except ValueError:  # no two bodies are near
+                return None
+        evidence = self._evidence.of_frame(k, verdicts=verdicts)
+        if evidence.contacts.count == 0:
+            return None
+        return infer_frame(evidence, self._evidence.settings, frame_generator(k), self._workers)
+
+
+def frame_generator(k: int) -> np.random.Generator:
+    """Make the random generator of frame k."""
+    return np.random.default_rng([SEED, k])

@@ -1,1 +1,0 @@
-"""What a solved frame is worth: status, trust, doubts, intervals. Reads forces; never solves."""

@@ -1,0 +1,107 @@
+"""Results whose input, settings, verdicts or code have changed since are marked wherever they are shown."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from rodsight import out_of_date as state
+from rodsight import run_folder
+from rodsight.cli.commands import view_commands
+from rodsight.experiment.experiment import load_experiment
+from rodsight.out_of_date import out_of_date
+from rodsight.verdicts.log import VERDICTS, Entry, Flag, VerdictLog
+from rodsight.workbench.service.project import Project
+from rodsight.workbench.service.workbench import Workbench
+
+from tests.app.experiment.tables import edit
+from tests.app.workbench.conftest import Visitor
+from tests.program import rodsight
+
+FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20", "--sweeps", "none", "--quiet")
+
+
+@pytest.fixture(scope="module")
+def made(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("outdated")
+    shutil.copytree(made_tracks, root / "tracked")
+    assert rodsight("run", root / "tracked", "--out", root / "runs" / "tracked", *FEW) == 0
+    return root
+
+
+@pytest.fixture
+def root(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "root"))
+
+
+def pressure(root: Path) -> None:
+    edit(root / "tracked" / "experiment.toml", "pressure = 50000.0", "pressure = 500000.0")
+
+
+CHANGES = {
+    "experiment.toml has changed": pressure,
+    "walls.csv has changed": lambda root: edit(root / "tracked" / "walls.csv", "0.", "0.0"),
+    "truth_contacts.csv has been removed": lambda root: (root / "tracked" / "truth_contacts.csv").unlink(),
+    "verdicts have changed": lambda root: VerdictLog(root / "runs/tracked" / VERDICTS).append(
+        Entry(3, "anna", flag=Flag.RESET)
+    ),
+}
+
+
+def test_a_finished_run_is_up_to_date_also_with_settings_of_the_command_line(root):
+    assert out_of_date(root / "runs" / "tracked") == []
+    assert json.loads((root / "runs" / "tracked" / "summary.json").read_text())["out_of_date"] == []
+
+
+def test_comments_change_nothing(root):
+    file = root / "tracked" / "experiment.toml"
+    file.write_text("# a comment\n" + file.read_text())
+    assert out_of_date(root / "runs" / "tracked") == []
+
+
+@pytest.mark.parametrize("reason", CHANGES)
+def test_a_change_is_a_reason(root, reason):
+    CHANGES[reason](root)
+    assert reason in out_of_date(root / "runs" / "tracked")
+
+
+def test_other_code_is_a_reason(root, monkeypatch):
+    monkeypatch.setattr(state, "hash_of_code", lambda *_: "other")
+    assert out_of_date(root / "runs" / "tracked") == ["other code or libraries made it"]
+
+
+def test_an_interrupted_run_of_newer_input_leaves_old_results_out_of_date(root):
+    pressure(root)
+    run = run_folder.Run(load_experiment(root / "tracked"), root / "runs" / "tracked")
+    run.write_manifest()
+    assert out_of_date(run.folder) == ["experiment.toml has changed"]
+
+
+def test_it_is_shared_only_with_a_flag(root, capsys):
+    pressure(root)
+    assert rodsight("share", root / "runs" / "tracked") == 2
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert "is out of date: experiment.toml has changed" in printed
+    assert rodsight("share", root / "runs" / "tracked", "--although-out-of-date") == 0
+
+
+def test_the_viewer_is_opened_with_a_line(root, capsys, monkeypatch):
+    monkeypatch.setattr(view_commands, "show", lambda *_: 0)
+    assert rodsight("view", root / "runs" / "tracked") == 0
+    assert "Out of date" not in capsys.readouterr().out
+    pressure(root)
+    assert rodsight("view", root / "runs" / "tracked") == 0
+    assert "Out of date: experiment.toml has changed" in capsys.readouterr().out
+
+
+def test_the_page_shows_it_and_refuses_to_share(root):
+    assert Project(root, root / "tracked").overview()["run"]["out_of_date"] == []
+    pressure(root)
+    project = Project(root, root / "tracked")
+    assert project.overview()["run"]["out_of_date"] == ["experiment.toml has changed"]
+    visitor = Visitor(Workbench(root)).enter()
+    assert visitor.request("project", at="tracked")["run"]["out_of_date"] == ["experiment.toml has changed"]
+    assert "out of date" in visitor.refused("share", at="tracked")

@@ -1,0 +1,44 @@
+"""Errors of the operating system end a command with one line and exit status 1."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.program import rodsight
+
+FEW = ("--set", "solver.estimator=nlgs", "--set", "solver.sweeps=20", "--sweeps", "none", "--quiet")
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES])
+def test_a_file_that_cannot_be_written_is_one_line(tracked, tmp_path, capsys, monkeypatch, number):
+    def refuse(self: Path, content: bytes) -> int:
+        raise OSError(number, os.strerror(number), str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 1
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert os.strerror(number) in printed.err
+    assert str(tmp_path / "out") in printed.err
+    assert not (tmp_path / "out" / "results.h5").exists()
+
+
+def test_a_folder_that_is_a_file_is_one_line(tracked, tmp_path, capsys):
+    (tmp_path / "out").write_text("mine")
+    assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_a_simulation_that_does_not_come_to_rest_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("rodsight.synthetic.dense_packing.LOADING_ROUNDS", 0)
+    assert rodsight("synth", tmp_path / "out", "--grains", "30", "--no-photographs", "--quiet") == 1
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert "did not come to rest" in printed
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,32 @@
+"""Mistyped commands, words of other programs, and help in the forms that people try."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.program import rodsight
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (("runn", "x"), "runn: is not a command: did you mean `rodsight run`?"),
+        (("gui",), "did you mean `rodsight open`?"),
+        (("zzzz",), "is not a command: there are open, init"),
+        (("help", "runn"), "did you mean `rodsight run`?"),
+        (("export", "paraview", "x"), "did you mean `rodsight export vtk RESULTS`?"),
+        (("export", "csv", "x"), "did you mean `rodsight export tables RESULTS`?"),
+        (("export", "hdf5", "x"), "results.h5 is HDF5"),
+        (("export", "tabels", "x"), "did you mean `rodsight export tables`?"),
+    ],
+)
+def test_what_was_meant_is_named_in_one_line(words, hint, capsys):
+    assert rodsight(*words) == 2
+    error = capsys.readouterr().err
+    assert hint in error
+    assert len(error.splitlines()) == 1
+
+
+def test_help_with_a_command_is_the_help_of_the_command(capsys):
+    assert rodsight("help", "check") == 0
+    assert "rodsight check" in capsys.readouterr().out

@@ -1,0 +1,41 @@
+"""Photographs closer together than noise: a stride is advised, and only there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rodsight.inference.correction.close_photographs import advise_stride
+from rodsight.tracks import Tracks, TrackStatus
+
+pytestmark = pytest.mark.unit
+
+SIDE, FRAMES, NOISE = 12, 33, 1e-5
+
+
+def tracks_moving(step: float, noise: float = NOISE) -> Tracks:
+    """Rods that wander apart steadily by `step` [m] a photograph, rms of one component, seen with noise."""
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE))
+    place = 0.016 * np.column_stack([x.ravel(), y.ravel()])
+    n = len(place)
+    velocity = rng.normal(0.0, step, (n, 2))
+    position = place + velocity * np.arange(FRAMES)[:, None, None] + rng.normal(0.0, noise, (FRAMES, n, 2))
+    flat = np.zeros((FRAMES, n))
+    status = np.full((FRAMES, n), TrackStatus.GIVEN, np.uint8)
+    return Tracks(
+        np.arange(n), np.full(n, 0.008), np.arange(FRAMES), position, flat, np.full((FRAMES, n), noise), flat, status
+    )
+
+
+@pytest.mark.parametrize(("step", "stride"), [(7.5e-6, 4), (9.5e-6, 3), (3.4e-6, 8)])
+def test_a_stride_is_advised_where_noise_hides_the_sliding(step: float, stride: int) -> None:
+    sentence = advise_stride(tracks_moving(step))
+    assert f"--frames ::{stride}" in sentence
+    assert "noise is 28 µm" in sentence
+
+
+def test_nothing_is_advised_where_rods_move_enough_or_not_at_all() -> None:
+    assert advise_stride(tracks_moving(7e-5)) == ""
+    assert advise_stride(tracks_moving(7e-5, noise=4e-5)) == ""
+    assert advise_stride(tracks_moving(0.0)) == ""  # no stride would show anything
+    assert advise_stride(tracks_moving(7.5e-6).frames(0, 5)) == ""

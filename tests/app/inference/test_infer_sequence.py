@@ -1,0 +1,135 @@
+"""Every caller infers forces by the same function."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from rodsight.experiment.experiment import load_experiment
+from rodsight.inference import infer_sequence as inference
+from rodsight.inference.frame_store import MemoryStore
+from rodsight.inference.infer_sequence import InferenceObserver, infer_sequence
+from rodsight.inference.inputs import Inputs
+from rodsight.results.results import Results
+from rodsight.robustness.design import Case
+from rodsight.robustness.factors import FIRST_COMPARED
+from rodsight.robustness.study import Nominal, measure_case
+from rodsight.solver.frame_forces import FrameForces, FrameStatus
+from rodsight.synthetic.scenarios.scenario_folder import make_scenario
+
+from tests.app.inference.scenarios import read_inputs
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
+
+FRAMES = 8
+UNCHANGED = 0.999  # factor on κ without a measurable effect
+
+
+@pytest.fixture(scope="module")
+def contradicted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Inputs, Results]:
+    """Inputs whose friction is specified too low, which the motion contradicts, and their results."""
+    folder = make_scenario(tmp_path_factory.mktemp("scenario"), "mu_low", 6, grains=100).folder
+    inputs = read_inputs(load_experiment(folder, ()))
+    inputs = replace(inputs, tracks=inputs.tracks.frames(0, FRAMES), walls=inputs.walls.frames(0, FRAMES))
+    return inputs, infer_sequence(inputs)
+
+
+def test_a_variation_without_effect_has_the_trust_of_the_run(contradicted):
+    inputs, results = contradicted
+    assert results.friction_check is not None
+    assert not results.friction_check.agrees
+    nominal = Nominal.of(inputs, results, None)
+    effect = measure_case(nominal, Case((("kappa", UNCHANGED),)))
+    late = nominal.networks.trust[FIRST_COMPARED:]
+    assert effect.r_fn > 0.9999
+    assert effect.trust == pytest.approx(float(late.mean()), abs=0.005)
+
+
+def test_the_friction_check_widens_the_intervals_of_every_frame(contradicted):
+    inputs, results = contradicted
+    unchecked = infer_sequence(inputs, complete=False)
+    for before, after in zip(unchecked.frames[1:], results.frames[1:], strict=True):
+        assert after.trust == before.trust <= after.expected_correlation  # the frame's own evidence decides
+        assert "the motion fits a friction of" in after.trust_penalties
+        assert (after.fn_sd >= before.fn_sd).all()
+
+
+def test_statistics_have_intervals_in_all_frames_to_which_a_motion_leads(contradicted):
+    _, results = contradicted
+    assert np.isfinite(results.frames[0].trust)
+    assert np.isnan(results.statistics[0].friction_angle_sd)
+    assert all(each.friction_angle_sd > 0.0 for each in results.statistics[1:])
+
+
+def test_every_contact_states_the_coefficient_that_was_used(contradicted):
+    inputs, _ = contradicted
+    smooth = replace(inputs, material=replace(inputs.material, wall_friction=0.05))
+    results = infer_sequence(smooth, complete=False)
+    for k, frame in enumerate(results.frames):
+        expected = np.where(frame.contacts.with_wall, 0.05, inputs.material.friction)
+        np.testing.assert_array_equal(frame.friction, expected)
+        np.testing.assert_array_equal(results.contact_friction(k), expected)
+        assert (np.abs(frame.ft) <= expected * frame.fn * (1 + 1e-6) + 1e-9).all()
+
+
+def test_an_interrupted_sequence_continues_bit_for_bit(contradicted):
+    inputs, results = contradicted
+    whole = MemoryStore()
+    infer_sequence(inputs, store=whole)
+    resumed = infer_sequence(inputs, store=MemoryStore(whole.frames[:5]))
+    for one, other in zip(results.frames, resumed.frames, strict=True):
+        np.testing.assert_array_equal(one.fn, other.fn)
+        assert one.trust == other.trust
+
+
+def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradicted, monkeypatch):
+    inputs, _ = contradicted
+    store, failures = MemoryStore(), []
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("no estimate")
+
+    class Observer(InferenceObserver):
+        def failed(self, stage: str, frame: int, error: Exception) -> None:
+            failures.append((stage, frame, type(error)))
+
+    monkeypatch.setattr(inference, "estimate_first_frame", fail)
+    results = infer_sequence(inputs, Observer(), store)
+    assert failures == [(inference.FIRST_FRAME, 0, ZeroDivisionError)]
+    np.testing.assert_array_equal(results.frames[0].fn, store.frames[0].forces.fn)
+
+
+def test_the_observer_receives_every_frame_once_and_the_progress(contradicted, tmp_path: Path):
+    inputs, _ = contradicted
+    events: list[int] = []
+    steps: list[tuple[int, int]] = []
+
+    class Observer(InferenceObserver):
+        def solved(self, frame: object) -> None:
+            events.append(frame.forces.frame)  # type: ignore[attr-defined]
+
+    infer_sequence(inputs, Observer(lambda stage, done, total: steps.append((done, total))), complete=False)
+    assert events == list(range(FRAMES))
+    assert steps == [(k, FRAMES) for k in range(FRAMES + 1)]
+
+
+def test_a_sequence_without_a_solved_frame_is_neither_estimated_nor_checked(contradicted, monkeypatch):
+    inputs, _ = contradicted
+
+    def unsolvable(*_: object, **options: object) -> Iterator[tuple[FrameForces, object]]:
+        for k in range(FRAMES):
+            yield replace(failed(k), frame=k), None
+
+    def failed(k: int) -> FrameForces:
+        from rodsight.solver.sequence.failure import failed_frame
+
+        return failed_frame(k, "test", inputs.tracks.grain_count, inputs.walls.count)
+
+    monkeypatch.setattr(inference, "solve_sequence", unsolvable)
+    results = infer_sequence(inputs)
+    assert {frame.status for frame in results.frames} == {FrameStatus.FAILED}
+    assert results.friction_check is None

@@ -1,0 +1,87 @@
+"""Poses that jump against their neighbours and return are replaced; real motions are kept."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.inference.correction.outliers import find_outliers, replace_outliers
+from rodsight.tracks import Tracks, TrackStatus
+
+FRAMES, SIDE, PITCH, NOISE = 6, 7, 0.016, 1e-5
+N = SIDE * SIDE
+ROD = SIDE * (SIDE // 2) + SIDE // 2  # in the middle
+
+
+def sheared_tracks(jumps=()):
+    """Rods on a lattice in simple shear with noise; jumps: (frame, rod, displacement [m])."""
+    rng = np.random.default_rng(3)
+    x, y = (each.ravel() * PITCH for each in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
+    shear = 4e-3 * np.arange(FRAMES)
+    position = np.stack([np.column_stack([x + g * y, y]) for g in shear])
+    position += NOISE * rng.standard_normal(position.shape)
+    for frame, rod, move in jumps:
+        position[frame, rod] += move
+    flat = np.full((FRAMES, N), NOISE)
+    return Tracks(
+        np.arange(N), np.full(N, 0.00797), 30.0 * np.arange(FRAMES), position, np.tile(0.1 * shear[:, None], (1, N)),
+        flat, np.full((FRAMES, N), np.nan), np.full((FRAMES, N), TrackStatus.GIVEN, np.uint8),
+    )  # fmt: skip
+
+
+def test_correct_tracks_are_returned_as_they_are():
+    tracks = sheared_tracks()
+    found, remark = replace_outliers(tracks)
+    assert found is tracks
+    assert remark == ""
+
+
+@pytest.mark.parametrize("frame", [2, FRAMES - 1])
+def test_a_jump_for_one_photograph_is_replaced(frame):
+    true = sheared_tracks()
+    tracks = sheared_tracks([(frame, ROD, (6e-4, -5e-4))])
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[frame, ROD]]
+    found, remark = replace_outliers(tracks)
+    assert np.abs(found.position[frame, ROD] - true.position[frame, ROD]).max() < 6 * NOISE
+    assert found.status[frame, ROD] == TrackStatus.SUSPECT
+    others = np.arange(N) != ROD
+    assert np.array_equal(found.position[:, others], true.position[:, others])
+    assert "1 poses in 1 photographs" in remark
+
+
+def test_the_rotation_is_interpolated_too():
+    tracks = sheared_tracks([(2, ROD, (8e-4, 0.0))])
+    rotation = tracks.rotation.copy()
+    rotation[2, ROD] = 3.0
+    found, _ = replace_outliers(replace(tracks, rotation=rotation))
+    assert found.rotation[2, ROD] == pytest.approx(0.5 * (rotation[1, ROD] + rotation[3, ROD]))
+
+
+def test_a_jump_that_no_other_rod_hinders_is_real():
+    tracks = sheared_tracks([(2, ROD, (6e-4, -5e-4))])
+    assert find_outliers(tracks).any()
+    assert not find_outliers(replace(tracks, radius=np.full(N, 0.004))).any()
+
+
+def test_a_rod_that_moves_and_stays_is_no_outlier():
+    moved = sheared_tracks([(k, ROD, (6e-4, 0.0)) for k in range(3, FRAMES)])
+    assert not find_outliers(moved)[:-1].any()
+
+
+def test_jumps_of_many_rods_are_a_rearrangement():
+    some = np.random.default_rng(0).permutation(N)[: N // 4]
+    tracks = sheared_tracks([(2, rod, (1e-3, 5e-4)) for rod in some])
+    assert not find_outliers(tracks)[2].any()
+
+
+def test_a_jump_of_the_whole_picture_is_no_outlier():
+    tracks = sheared_tracks([(2, rod, (1e-3, 0.0)) for rod in range(N)])
+    assert not find_outliers(tracks).any()
+
+
+def test_lost_rods_and_few_frames_are_no_obstacle():
+    tracks = sheared_tracks([(2, ROD, (6e-4, 6e-4))])
+    position = tracks.position.copy()
+    position[3, 0] = np.nan
+    lost = replace(tracks, position=position)
+    assert np.argwhere(find_outliers(lost)).tolist() == [[2, ROD]]
+    assert np.isnan(replace_outliers(lost)[0].position[3, 0]).all()

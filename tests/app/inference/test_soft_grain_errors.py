@@ -1,0 +1,74 @@
+"""Wrong radii of soft rods are corrected by their forces; exact radii stay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from rodsight.experiment.experiment import load_experiment, read_tracks
+from rodsight.inference.corrected_sequence import CorrectedSequence
+from rodsight.inference.correction import soft_grain_errors
+from rodsight.inference.correction.soft_grain_errors import correct_soft_grains
+from rodsight.solver.assessment.mixture_trust import MAX_TRUST_CORRECTED
+from rodsight.solver.sequence.frames import solve_sequence
+from rodsight.study.scenarios.scenario_score import correct_scenario
+from rodsight.synthetic.scenarios.preset_names import ScenarioName
+from rodsight.synthetic.scenarios.scenario_folder import make_scenario
+
+from tests.app.inference.scenarios import agreement, solve
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
+
+
+def corrected(
+    folder: Path, scenario: ScenarioName, seed: int, rods: int
+) -> tuple[CorrectedSequence, np.ndarray, np.ndarray]:
+    """Corrected sequence of a scenario, its stated and its true radii (n,) [m]."""
+    made = make_scenario(folder, scenario, seed, grains=rods)
+    experiment = load_experiment(made.folder, ())
+    return correct_scenario(experiment), read_tracks(experiment).radius, made.truth.radius
+
+
+def test_wrong_radii_are_corrected_by_forces(tmp_path):
+    sequence, stated, true = corrected(tmp_path, "soft_radii_03", 9, 80)
+    assert sequence.settings.soft
+    assert np.std(sequence.tracks.radius - true) < 0.8 * np.std(stated - true)
+    assert sequence.settings.soft_trust == MAX_TRUST_CORRECTED
+    np.testing.assert_array_equal(sequence.packing.grains.radius, sequence.tracks.radius)
+
+
+def test_exact_radii_stay_as_stated(tmp_path):
+    sequence, stated, _ = corrected(tmp_path, "soft", 9, 80)
+    assert sequence.settings.soft
+    np.testing.assert_array_equal(sequence.tracks.radius, stated)
+    assert sequence.settings.soft_trust > MAX_TRUST_CORRECTED
+    hard = replace(sequence, settings=replace(sequence.settings, soft=False))
+    assert correct_soft_grains(hard) is hard
+
+
+def test_the_preliminary_solution_stops_where_the_first_frames_show_no_errors(tmp_path, monkeypatch):
+    solved = []
+
+    def counted(*args, **options):
+        for each in solve_sequence(*args, **options):
+            solved.append(each[0].frame)
+            yield each
+
+    monkeypatch.setattr(soft_grain_errors, "solve_sequence", counted)
+    sequence, stated, _ = corrected(tmp_path, "soft", 1, 150)
+    assert solved == list(range(soft_grain_errors.PRELIMINARY_FRAMES))
+    np.testing.assert_array_equal(sequence.tracks.radius, stated)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scenario", "least"), [("soft_radii_03", 0.95), ("soft_unseen", 0.95)])
+def test_forces_of_soft_rods_are_accurate_despite_wrong_input(tmp_path, scenario, least):
+    solved = solve(tmp_path, scenario, 8, grains=300)
+    found = []
+    for frame in solved.frames[3:]:
+        found.append(agreement(frame, solved.true[frame.frame]))
+        assert frame.trust < found[-1] + 0.03
+    assert np.mean(found) > least

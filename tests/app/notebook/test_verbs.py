@@ -1,0 +1,173 @@
+"""The verbs of the commands in Python: defaults, returned values, refusals, and the tasks of the documentation."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import rodsight
+from rodsight.manual.contents import FOLDER
+from rodsight.solver.contacts.contacts import ContactSource
+
+from tests.program import rodsight as command
+
+FEW = {"solver.sweeps": 20}
+VERBS = {
+    "check", "init", "track", "solve", "run", "open", "follow", "review", "score", "compare", "sensitivity", "what_if",
+    "campaign", "import_table", "export",
+}  # fmt: skip
+MOST_PARAMETERS = 7
+MOST_LINES = 5
+
+
+@pytest.fixture(scope="module")
+def run(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> rodsight.Run:
+    return rodsight.run(made_tracks, out=tmp_path_factory.mktemp("verbs") / "run", settings=FEW)
+
+
+def test_all_verbs_are_public_functions_that_stay_so_whatever_is_imported(run):
+    assert set(rodsight.__all__) >= VERBS
+    for name in VERBS:
+        assert inspect.isfunction(getattr(rodsight, name)), name
+
+
+@pytest.mark.parametrize("name", sorted(VERBS - {"solve"}))
+def test_verbs_have_few_parameters(name):
+    assert len(inspect.signature(getattr(rodsight, name)).parameters) <= MOST_PARAMETERS
+
+
+def test_the_five_tasks_take_at_most_five_lines_each():
+    section = (FOLDER / "python.md").read_text(encoding="utf-8").partition("## Five tasks")[2].partition("\n## ")[0]
+    tasks = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+    assert len(tasks) == 5
+    for task in tasks:
+        lines = [line for line in task.splitlines() if line and not line.startswith("import ")]
+        assert len(lines) <= MOST_LINES
+
+
+def test_bad_input_is_an_input_error_with_one_line(made_tracks):
+    with pytest.raises(rodsight.InputError, match=r"did you mean solver\.kappa"):
+        rodsight.check(made_tracks, settings={"solver.kapa": 1})
+    with pytest.raises(rodsight.InputError, match="has no effect on the ensemble"):
+        rodsight.run(made_tracks, settings={"contacts.threshold": 1e-4})
+    assert issubclass(rodsight.RunError, Exception)
+
+
+def test_check_gives_what_the_command_prints(made_tracks, capsys):
+    found = rodsight.check(made_tracks)
+    assert command("check", str(made_tracks), "--json") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["grains"] == found["grains"] == 40
+    assert printed["expected_correlation"] == found["expected_correlation"]
+    assert printed["prediction"] == list(found["prediction"])
+
+
+def test_tracks_solve_to_the_same_forces(made_tracks, run, tmp_path):
+    tracks = rodsight.track(made_tracks, out=tmp_path / "run")
+    walls = pd.read_csv(made_tracks / "walls.csv")  # those of the run are corrected
+    solved = rodsight.solve(tracks, walls, pressure={"top": 50e3}, settings=FEW)
+    pd.testing.assert_frame_equal(solved.contacts(), run.contacts())
+
+
+def test_score_equals_the_command_and_accepts_a_table(made_tracks, run, capsys):
+    scores = rodsight.score(run)
+    assert command("score", str(run.file.parent), "--json") == 0
+    assert json.loads(capsys.readouterr().out)["r_fn"] == scores["r_fn"].tolist()
+    table = pd.read_csv(made_tracks / "truth_contacts.csv")
+    pd.testing.assert_frame_equal(rodsight.score(run, table), scores)
+    own = rodsight.score(run, run.contacts())  # walls in a column of their own
+    assert own["r_fn"].to_numpy() == pytest.approx(1.0)
+
+
+def test_compare_has_every_contact_of_either(made_tracks, run):
+    both = rodsight.compare(run, pd.read_csv(made_tracks / "truth_contacts.csv"))
+    last = both.query("frame == 4")
+    r = np.corrcoef(last["fn"], last["fn_reference"])[0, 1]
+    assert r == pytest.approx(rodsight.score(run)["r_fn"].iloc[4], abs=1e-6)
+    assert last["fn_reference"].eq(0.0).any()
+    own = run.contacts(4)
+    merged = own.merge(last, on=["i", "j", "wall"])
+    assert len(merged) == len(own)
+    np.testing.assert_array_equal(merged["fn_x"], merged["fn_y"])
+
+
+def test_a_forbidden_contact_bears_nothing_and_the_input_is_used_again(run):
+    strongest = run.contacts(4).query("j >= 0").nlargest(1, "fn")[["i", "j"]].to_numpy()[0].tolist()
+    unchanged = rodsight.what_if(run)
+    pd.testing.assert_frame_equal(unchanged.contacts(), run.contacts())
+    solved = rodsight.what_if(run, 4, forbid=[strongest])
+    pair = "i == {} and j == {}".format(*strongest)
+    assert solved.contacts(4).query(pair)["fn"].sum() == 0.0
+    pd.testing.assert_frame_equal(solved.contacts(2), run.contacts(2))
+    near = rodsight.what_if(run, 4, forbid=[strongest], local=True).contacts(4)
+    assert near.query(pair)["fn"].item() == 0.0
+    assert not np.array_equal(near["fn"], run.contacts(4)["fn"])
+
+
+def test_a_forced_contact_is_listed(run):
+    contacts = run.contacts(4)
+    listed = set(zip(contacts["i"], contacts["j"], strict=True))
+    grains = run.grains(4).set_index("id")[["x", "y", "radius"]]
+    gaps = {
+        (a, b): np.hypot(*(grains.loc[a, ["x", "y"]] - grains.loc[b, ["x", "y"]])) - grains["radius"][[a, b]].sum()
+        for a in grains.index
+        for b in grains.index
+        if a < b and (a, b) not in listed
+    }
+    pair = min(gaps, key=gaps.__getitem__)
+    solved = rodsight.what_if(run, 4, force=[pair])
+    forces = solved.results.frames[4]
+    assert pair in set(zip(solved.contacts(4)["i"], solved.contacts(4)["j"], strict=True))
+    assert ContactSource.FORBIDDEN_BY_REVIEWER not in forces.source
+
+
+def test_moved_grains_and_another_friction_change_the_inputs(run):
+    moved = rodsight.what_if(run, 4, move={7: (2e-5, 0.0)})
+    assert moved.inputs.tracks.position[4, 7, 0] - run.grains(4)["x"][7] == pytest.approx(2e-5, abs=1e-5)
+    assert not np.array_equal(moved.frames()["mean_fn"], run.frames()["mean_fn"])
+    assert rodsight.what_if(run, friction=0.4).results.friction == 0.4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"forbid": [(1, "lid")]}, "'lid' is neither a grain's id nor a wall's name"),
+        ({"force": [(1, 1)]}, "is one body"),
+        ({"move": {999: (0.0, 0.0)}}, "is not the id of a grain"),
+        ({"friction": -1.0}, "is not a coefficient of friction"),
+        ({"local": True, "friction": 0.3}, "applies to forbid only"),
+        ({"frame": 4, "forbid": [(0, 39)], "local": True}, "has no such contact"),
+    ],
+)
+def test_unusable_assumptions_are_named(run, arguments, message):
+    with pytest.raises(rodsight.InputError, match=message):
+        rodsight.what_if(run, **arguments)
+
+
+def test_what_if_refuses_a_run_whose_input_changed(tracked, tmp_path):
+    run = rodsight.run(tracked, out=tmp_path / "run", settings=FEW | {"recording.sweeps": "none"})
+    file = tracked / "tracks.csv"
+    file.write_text(file.read_text() + "\n")
+    with pytest.raises(rodsight.InputError, match=r"tracks\.csv: changed since this run was solved"):
+        rodsight.what_if(run, friction=0.3)
+
+
+def test_verdicts_of_a_table_are_stored(tracked, tmp_path):
+    run = rodsight.run(tracked, out=tmp_path / "run", settings=FEW)
+    table = run.contacts(2).head(2)[["frame", "i", "j", "wall"]].assign(verdict="contact")
+    stored = rodsight.review(run, table, reviewer="anna")
+    assert stored[["frame", "verdict", "reviewer"]].to_numpy().tolist() == [[2, "contact", "anna"]] * 2
+
+
+def test_unknown_options_are_refused(run, tmp_path):
+    with pytest.raises(rodsight.InputError, match="is not an option"):
+        rodsight.export("tables", run, tmp_path, colour="red")  # type: ignore[call-arg]
+    with pytest.raises(rodsight.InputError, match="is not a kind"):
+        rodsight.export("csv", run)  # type: ignore[arg-type]
+    with pytest.raises(rodsight.InputError, match="is not an option"):
+        rodsight.import_table(tmp_path, tmp_path, scale=2.0)  # type: ignore[call-arg]

@@ -1,0 +1,134 @@
+"""Every step, light and dark, by the rules that a script can judge; walls, scale and rods by keyboard alone."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from rodsight.workbench.setup.draft import Draft
+
+from tests.app.workbench.accessibility import CHECK
+from tests.app.workbench.hand import go, idle, opened
+from tests.golden.stored import unpack
+
+pytestmark = pytest.mark.screen
+STEPS = ("photographs", "scale", "walls", "rods", "material", "run", "inspect", "review", "correct", "share")
+
+
+@pytest.fixture
+def solved(made_photographs: Path, photographs_only: Path) -> Path:
+    folder = photographs_only / "my photographs"
+    (folder / "grains.csv").write_bytes((made_photographs / "grains.csv").read_bytes())
+    Draft(folder).set_keys("all", {
+        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
+        "photographs.pixel_size": 2.5e-4, "photographs.grains": "grains.csv",
+    })  # fmt: skip
+    run = photographs_only / "runs" / "mine"
+    run.mkdir(parents=True)
+    unpack(2, run)
+    return photographs_only
+
+
+def enter(tab: Page) -> None:
+    tab.locator(".tile").first.click()
+    idle(tab)
+
+
+def test_every_step_is_readable_and_named(page: Page, solved: Path):
+    with opened(page, solved) as tab:
+        tab.locator(".tile").first.wait_for()
+        assert tab.evaluate(CHECK) == []
+        enter(tab)
+        for scheme in ("dark", "light"):
+            tab.emulate_media(color_scheme=scheme)
+            for step in STEPS:
+                go(tab, step)
+                assert (scheme, step, tab.evaluate(CHECK)) == (scheme, step, [])
+            go(tab, "inspect")
+            tab.evaluate("workbench.show(3)")
+            idle(tab)
+            x, y = tab.evaluate("workbench.stage.toScreen(workbench.step.rodsOfFrame().slice(0, 2))")
+            box = tab.locator("#canvas").bounding_box()
+            assert box is not None
+            tab.mouse.click(box["x"] + x, box["y"] + y)
+            expect(tab.locator("#card")).to_be_visible()
+            idle(tab)
+            assert tab.evaluate(CHECK) == []
+            tab.click("#layers-button")
+            assert tab.evaluate(CHECK) == []
+            tab.click("#layers-button")
+
+
+def test_a_wall_a_length_and_a_rod_are_drawn_by_keyboard(page: Page, solved: Path):
+    with opened(page, solved) as tab:
+        enter(tab)
+        go(tab, "scale")
+        tab.locator("#canvas").focus()
+        draw(tab, right=20)
+        a, b = tab.evaluate("workbench.step.drawn()")
+        assert (b[0] - a[0]) * tab.evaluate("workbench.stage.view.k") == pytest.approx(240.0)
+        assert tab.evaluate("document.activeElement.id") == "field-distance"
+        tab.keyboard.type("60")
+        tab.keyboard.press("Enter")
+        idle(tab)
+        assert tab.evaluate("workbench.project.pixel") == pytest.approx(0.06 / (b[0] - a[0]))
+        go(tab, "walls")
+        tab.locator("#canvas").focus()
+        draw(tab, right=12, down=2)
+        idle(tab)
+        assert tab.evaluate("workbench.project.walls.length") == 1
+        go(tab, "rods")
+        tab.locator("#canvas").focus()
+        tab.keyboard.press("k")
+        for _ in range(3):  # away from all rods: into the margin
+            tab.keyboard.press("ArrowUp")
+        tab.evaluate("workbench.stage.cursor = [14, 14]")
+        tab.keyboard.press("Enter")
+        idle(tab)
+        assert tab.evaluate("workbench.project.rods.id.length") == 31
+
+
+def draw(tab: Page, right: int = 0, down: int = 0) -> None:
+    """Press, move and let go with the keyboard's cursor."""
+    tab.keyboard.press("k")
+    tab.keyboard.press("Enter")
+    for key, count in (("ArrowRight", right), ("ArrowDown", down)):
+        for _ in range(count):
+            tab.keyboard.press(key)
+    tab.keyboard.press("Enter")
+    idle(tab)
+
+
+def test_a_control_keeps_the_focus_when_the_page_is_painted_anew(page: Page, solved: Path):
+    with opened(page, solved) as tab:
+        enter(tab)
+        tab.locator("#step-walls").focus()
+        tab.keyboard.press("Enter")
+        idle(tab)
+        assert tab.evaluate("document.activeElement.id") == "step-walls"
+        go(tab, "material")
+        tab.locator("#panel button").nth(2).focus()
+        tab.keyboard.press("Enter")
+        idle(tab)
+        assert tab.evaluate("[...document.querySelectorAll('#panel button')].indexOf(document.activeElement)") == 2
+        ring = tab.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+        assert ring == "solid"
+
+
+SIZES = """async () => {
+    const { correctDevicePixels } = await import("/page/parts/recording.js");
+    correctDevicePixels();
+    const box = document.createElement("div");
+    Object.assign(box.style, { position: "fixed", width: "100px", height: "60px" });
+    document.body.append(box);
+    const observed = { box: "device-pixel-content-box" };
+    const [entry] = await new Promise((done) => new ResizeObserver(done).observe(box, observed));
+    const [size] = entry.devicePixelContentBoxSize;
+    return [size.inlineSize, size.blockSize, entry instanceof ResizeObserverEntry, size instanceof ResizeObserverSize];
+}"""
+
+
+def test_the_viewer_is_given_the_pixels_of_the_screen(browser: Browser, solved: Path):
+    context = browser.new_context(device_scale_factor=2)
+    with opened(context.new_page(), solved) as tab:
+        assert tab.evaluate(SIZES) == [200, 120, True, True]
+    context.close()

@@ -1,0 +1,104 @@
+"""The workbench touches nothing outside its root, and one bad folder takes no other with it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from rodsight.process.errors import InputError
+from rodsight.workbench.service.project import Project
+from rodsight.workbench.service.workbench import Workbench
+from rodsight.workbench.setup.draft import Draft
+
+from tests.app.experiment.tables import edit
+
+from .conftest import HOST, Visitor
+
+
+@pytest.fixture
+def root(tracked: Path, tmp_path: Path) -> Path:
+    """The root of a workbench with one experiment, beside a file that it must not touch."""
+    (tmp_path / "root").mkdir()
+    shutil.move(tracked, tmp_path / "root" / "tracked")
+    (tmp_path / "secret.csv").write_text("frame,wall,x1,y1,x2,y2\n")
+    return tmp_path / "root"
+
+
+@pytest.mark.parametrize("name", ["../../secret.csv", "link.csv", "linked/secret.csv", "..", "a\0b"])
+def test_no_file_outside_is_read_written_or_deleted(root, name):
+    folder, secret = root / "tracked", root.parent / "secret.csv"
+    (folder / "link.csv").symlink_to(secret)
+    (folder / "linked").symlink_to(root.parent)
+    draft, before = Draft(folder, root=root), secret.read_bytes()
+    for content in (b"written", None):
+        if name == "link.csv" and content is not None:
+            continue
+        with pytest.raises(InputError):
+            draft.write("a change", {name: content})
+    assert secret.read_bytes() == before
+
+
+def test_a_file_of_another_folder_inside_the_root_is_found(root):
+    (root / "shared.csv").write_text("x\n")
+    Draft(root / "tracked", root=root).write("a change", {"../shared.csv": b"y\n"})
+    assert (root / "shared.csv").read_text() == "y\n"
+
+
+@pytest.mark.parametrize("name", ["../../outside", "/tmp/outside", "..", "a/b"])
+def test_the_name_of_an_experiment_leads_nowhere_else(root, name):
+    edit(root / "tracked" / "experiment.toml", 'name = "tracked"', f'name = "{name}"')
+    assert Project(root, root / "tracked").results == root / "runs" / "tracked"
+
+
+def test_a_link_in_the_place_of_the_runs_is_refused(root):
+    (root / "runs").symlink_to(root.parent)
+    with pytest.raises(InputError, match="leads outside"):
+        _ = Project(root, root / "tracked").results
+    assert "leads outside" in Project(root, root / "tracked").overview()["error"]
+
+
+def test_photographs_outside_are_not_served(made_photographs, tmp_path):
+    folder = Path(shutil.copytree(made_photographs, tmp_path / "root" / "mine"))
+    shutil.move(folder / "photos", tmp_path / "elsewhere")
+    (folder / "photos").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="lies outside"):
+        Project(tmp_path / "root", folder).picture(0, 100)
+
+
+BAD = {
+    "nested": b"name = " + b"[" * 20_000,
+    "binary": b"\xff\xfe\x00",
+    "huge key": b"[" + b"a." * 20_000 + b"b]\n",
+}
+
+
+@pytest.mark.parametrize("kind", [*BAD, "not UTF-8", "folder"])
+def test_a_bad_folder_is_shown_as_such_beside_the_others(root, kind):
+    folder = os.fsencode(root) + (b"/b\xff\xfed" if kind == "not UTF-8" else b"/bad")
+    os.mkdir(folder)
+    if kind == "folder":
+        os.mkdir(folder + b"/experiment.toml")
+        os.mkdir(folder + b"/more")
+    else:
+        with open(folder + b"/experiment.toml", "wb") as file:
+            file.write(BAD.get(kind, b'name = "bad"\n'))
+    experiments = Visitor(Workbench(root)).enter().request("home")["experiments"]
+    good = next(each for each in experiments if each["name"] == "tracked")
+    assert "error" not in good
+    if kind != "folder":
+        assert next(each for each in experiments if each is not good)["error"]
+
+
+@pytest.mark.parametrize("at", ["\0", "a\0b", "\ud800", "../..", "x" * 301, "\uffff"])
+def test_hostile_names_are_refused_without_a_traceback(root, at):
+    visitor = Visitor(Workbench(root)).enter()
+    for endpoint in ("project", "run_start", "share", "shared", "stamp"):
+        headers = {"Origin": HOST, "Content-Type": "application/json"}
+        answer = visitor.client.post(f"/api/{endpoint}", content=json.dumps({"at": at}), headers=headers)
+        assert answer.status_code in (400, 422), (endpoint, answer.text)
+    for path in ("photograph", "crop", "shared", "events"):
+        query = {"at": at.encode(errors="replace").decode(), "x": "nan", "y": "1", "width": "10"}
+        assert visitor.client.get(f"/{path}", params=query).status_code in (400, 404, 422), path

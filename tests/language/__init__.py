@@ -1,0 +1,1 @@
+"""Words that the project does not use, and a test that finds them."""

@@ -1,0 +1,48 @@
+"""The mixture of the motion estimate and the position-only estimate."""
+
+from tests.mutation.mutant import mutants_of
+
+TESTS = "tests/solver/mixture"
+
+MUTANTS = [
+    *mutants_of(
+        "solver/mixture/frame_mixture.py",
+        f"{TESTS}/test_frame_mixture.py",
+        ("force, factor = force / factor, 1.0", "force, factor = force, factor"),
+        ("own + weight * (1.0 - weight) * (one - two) ** 2", "own"),
+        ("force * factor ** (weight - 1.0)", "force * factor**weight"),
+        ("motion.fn.sum() / positions.fn.sum()", "positions.fn.sum() / motion.fn.sum()"),
+        ("0.0 if np.isnan(motion_trust) else weight\n", "weight\n"),
+        ("(overlap / (HALF_WEIGHT_OVERLAP * moved)) ** 2", "overlap / (HALF_WEIGHT_OVERLAP * moved)"),
+        ("_mixture_sd(u, motion.ft, factor * other.ft,", "_mixture_sd(u, motion.ft, other.ft,"),
+        ("(1.0 - weight) * one_sd**2 + weight * two_sd**2", "weight * one_sd**2 + (1.0 - weight) * two_sd**2"),
+    ),
+    *mutants_of(
+        "solver/mixture/field_mixing.py",
+        f"{TESTS}/test_field_mixing.py",
+        (
+            "position_weight * placed + (1.0 - position_weight) * moved",
+            "position_weight * moved + (1.0 - position_weight) * placed",
+        ),
+        ("totals[0] * mixed", "totals[1] * mixed"),
+        (
+            "min(posterior.trust, posterior.agreement if np.isfinite(posterior.agreement) else 1.0)",
+            "posterior.trust",
+        ),
+        ("reconcile_trusts(weight * expected, claimed", "reconcile_trusts(weight * motion.trust, claimed"),
+        ("motion.force / totals[0], posterior", "motion.force, posterior"),
+    ),
+    *mutants_of(
+        "solver/mixture/equilibrium_projection.py",
+        f"{TESTS}/test_equilibrium_projection.py",
+        ("fn) <= MAX_CHANGE * sd:", "fn) <= 0.0 * sd:"),
+        ("balance=factor * settings.balance", "balance=settings.balance / factor"),
+        ("fn) <= MAX_CHANGE_RELAXED * sd:", "fn) <= 0.0 * sd:"),
+    ),
+    *mutants_of(
+        "solver/mixture/soft_grains.py",
+        f"{TESTS}/test_soft_grains.py",
+        ("-evidence.touching.offset, evidence", "evidence.touching.offset, evidence"),
+        ("sd > MIN_SD * noise", "True"),
+    ),
+]

@@ -1,0 +1,68 @@
+"""Expected correlation and its bound: monotone in every measure, with the fitted values."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from rodsight.solver.assessment.expected_correlation import (
+    MEASURES,
+    bound_correlation,
+    expect_correlation,
+    losses,
+)
+from rodsight.solver.assessment.fitted import FITTED
+
+from tests.solver.assessment.test_penalties import ASSESSED
+
+BOTH = replace(ASSESSED, agreement=0.9, position_agreement=0.9, overlap_agreement=0.85, force_change=0.05)
+WORSE = {
+    "agreement": 0.3, "correction": 1.0, "old_unbalance": 0.15, "disagreement": 0.8,
+    "force_change": 0.5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WORSE)
+def test_both_measures_fall_with_every_contradiction(name):
+    worse = replace(BOTH, **{name: WORSE[name]})
+    assert expect_correlation(worse) < expect_correlation(BOTH)
+    assert bound_correlation(worse) < bound_correlation(BOTH)
+
+
+def test_the_bound_is_below_the_expectation_and_the_gap_widens():
+    bad = replace(BOTH, agreement=0.5, correction=0.5)
+    for each in (BOTH, bad):
+        assert 0.0 <= bound_correlation(each) < expect_correlation(each) < 1.0
+    assert expect_correlation(bad) - bound_correlation(bad) > expect_correlation(BOTH) - bound_correlation(BOTH)
+
+
+def test_every_table_is_monotone_and_the_score_is_their_sum():
+    for title in ("both", "motion"):
+        table = FITTED["expected_correlation"][title]
+        terms = {name: each for name, each in table.items() if isinstance(each, dict)}
+        assert terms.keys() <= MEASURES.keys()
+        for each in terms.values():
+            assert each["at"] == sorted(each["at"])
+            assert each["value"] == sorted(each["value"], reverse=True)
+    # at knots of the tables no interpolation is needed
+    table = FITTED["expected_correlation"]["motion"]
+    correction, members = table["correction"], table["disagreement_of_members"]
+    alone = replace(
+        ASSESSED, correction=correction["at"][3], disagreement=members["at"][2], old_unbalance=math.nan,
+        force_change=math.nan, information=replace(ASSESSED.information, gap_error=math.nan),
+    )  # fmt: skip
+    score = table["constant"] + correction["value"][3] + members["value"][2]
+    assert expect_correlation(alone) == pytest.approx(math.tanh(score))
+    margin = table["margin"] + table["slope"] * max(table["start"] - score, 0.0)
+    assert bound_correlation(alone) == pytest.approx(max(math.tanh(score - margin), 0.0))
+
+
+def test_one_confirmation_of_the_motion_suffices_in_part():
+    confirmed = replace(BOTH, agreement=0.4, overlap_agreement=0.9)
+    alone = replace(BOTH, agreement=0.4, overlap_agreement=0.4)
+    assert expect_correlation(alone) < expect_correlation(confirmed) < expect_correlation(BOTH)
+
+
+def test_losses_name_what_lowers_the_bound():
+    found = losses(replace(BOTH, correction=1.9))
+    assert max(found, key=found.__getitem__) == "correction"
+    assert all(value >= 0.0 for value in found.values())

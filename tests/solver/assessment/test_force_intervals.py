@@ -1,0 +1,178 @@
+"""Calibrated standard deviations of forces: groups of contacts, terms of the frame, wrong friction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.solver.assessment.force_intervals import (
+    FIRST_SCALE,
+    FLOOR,
+    HIGH_FRICTION,
+    MIN_FRICTION,
+    SLOPE,
+    USUAL_CHANGE,
+    EvidenceSource,
+    Group,
+    Term,
+    calibrate_sd,
+    evidence_source_of,
+    formula_sd_of,
+    groups_of,
+    interval_factors,
+    relative_friction,
+    source_of_frame,
+    terms_of,
+    widen_for_friction,
+)
+
+from tests.app.recording.fake_results import make_results
+
+
+@pytest.fixture(scope="module")
+def frame():
+    one = make_results(1, 8, 7, sweeps=2).frames[0]
+    c = one.contacts.count
+    fn = np.linspace(0.0, 2.0, c) * 30.0
+    return replace(
+        one, frame=3, fn=fn, fn_sd=0.1 * fn, ft_sd=0.03 * fn, trust=0.9, position_weight=0.0,
+        bearing_probability=np.where(np.arange(c) % 7 == 0, 0.5, 1.0), sliding_probability=np.zeros(c),
+    )  # fmt: skip
+
+
+def test_the_last_group_that_applies_is_assigned(frame):
+    group = groups_of(frame)
+    wall, uncertain = frame.contacts.with_wall, frame.bearing_probability < 0.9
+    mean = frame.fn[frame.fn > 0].mean()
+    assert (group[uncertain] == Group.UNCERTAIN).all()
+    assert (group[wall & ~uncertain] == Group.WALL).all()
+    plain = ~wall & ~uncertain
+    assert (group[plain & (frame.fn < 0.49 * mean)] == Group.WEAK).all()
+    assert (group[plain & (frame.fn > 1.51 * mean)] == Group.STRONG).all()
+    assert {Group.WEAK, Group.MEAN, Group.STRONG, Group.WALL, Group.UNCERTAIN} == set(group.tolist())
+    slides = replace(frame, sliding_probability=np.ones(len(frame.fn)))
+    assert (groups_of(slides)[plain] == Group.SLIDING).all()
+
+
+def test_the_evidence_source_follows_the_position_weight():
+    assert [evidence_source_of(weight) for weight in (0.0, 0.5, 1.0)] == [
+        EvidenceSource.MOTION,
+        EvidenceSource.BOTH,
+        EvidenceSource.POSITIONS,
+    ]
+
+
+def test_soft_grains_are_a_separate_source_whose_intervals_widen_with_the_penalty(frame):
+    soft = replace(frame, soft=1, position_weight=0.7)
+    assert source_of_frame(soft) == EvidenceSource.SOFT
+    assert source_of_frame(replace(soft, frame=0)) == EvidenceSource.SOFT_FIRST
+    sure, penalised = (interval_factors(replace(soft, trust=trust)) for trust in (0.98, 0.93))
+    assert (penalised > 1.2 * sure).all()
+
+
+def test_the_formula_sd_is_recovered_from_the_calibrated_one(frame):
+    calibrated = calibrate_sd(frame)
+    recovered = formula_sd_of(calibrated)
+    mean = frame.fn[frame.fn > 0].mean()
+    known = frame.fn_sd > 0
+    formula, force = (np.column_stack(each) / mean for each in ((frame.fn_sd, frame.ft_sd), (frame.fn, frame.ft)))
+    unloaded = 1.0 - frame.bearing_probability[:, None]
+    expected = np.sqrt(formula**2 + FLOOR**2 + unloaded * force**2)
+    assert recovered[known] == pytest.approx(expected[known])
+    assert (calibrated.fn_sd[~known] == 0).all()
+
+
+def test_a_penalty_widens_the_intervals_of_motion(frame):
+    sure, penalised = (calibrate_sd(replace(frame, trust=trust)).fn_sd[-1] for trust in (0.95, 0.7))
+    assert penalised > 1.1 * sure
+
+
+def test_new_forces_widen_the_intervals_of_mixtures_but_not_of_motion(frame):
+    for weight, widens in ((0.5, True), (0.0, False)):
+        same, new = (
+            calibrate_sd(replace(frame, position_weight=weight, force_change=change)).fn_sd[-1]
+            for change in (0.02, 0.3)
+        )
+        assert (new > 1.1 * same) == widens
+    unknown, usual = (interval_factors(replace(frame, position_weight=0.5, force_change=change))
+                      for change in (np.nan, USUAL_CHANGE))  # fmt: skip
+    assert unknown == pytest.approx(usual)
+
+
+def test_intervals_of_motion_widen_with_the_number_of_contacts(frame):
+    half = np.arange(len(frame.fn)) % 2 == 0
+    fewer = replace(frame, fn=np.where(half, 0.0, frame.fn))
+    difference = terms_of(frame)[Term.SIZE] - terms_of(fewer)[Term.SIZE]
+    assert difference == pytest.approx(np.log((frame.fn > 0).sum() / (fewer.fn > 0).sum()))
+    assert SLOPE[EvidenceSource.MOTION, Term.SIZE, 0] > 0.05
+    assert np.isfinite(terms_of(replace(frame, fn=0.0 * frame.fn))[Term.SIZE])
+
+
+def test_unseen_rods_lower_the_trust_but_do_not_widen_the_intervals_of_reported_forces(frame):
+    whole = replace(frame, trust=0.96)
+    hidden = replace(frame, trust=0.96 * 0.9, unseen_penalty=0.1)
+    assert interval_factors(hidden) == pytest.approx(interval_factors(whole))
+    assert (interval_factors(replace(frame, trust=0.96 * 0.9)) > 1.2 * interval_factors(whole)).all()
+    assert terms_of(replace(hidden, unseen_penalty=1.0))[Term.PENALTY] == 0.0  # the whole trust: no division by zero
+
+
+def test_penalties_beyond_the_range_of_the_fit_do_not_widen_the_intervals_of_motion(frame):
+    trusts = (0.9, 0.6)
+    one, other = (calibrate_sd(replace(frame, trust=trust)) for trust in trusts)
+    assert other.fn_sd == pytest.approx(one.fn_sd)
+
+
+def test_uncertain_contacts_and_the_first_frame_have_errors_proportional_to_the_force(frame):
+    sure = replace(frame, bearing_probability=np.ones(len(frame.fn)))
+    uncertain = replace(frame, bearing_probability=np.full(len(frame.fn), 0.95))  # the same group
+    mean = frame.fn[frame.fn > 0].mean()
+    before, after = (formula_sd_of(calibrate_sd(each))[-1, 0] for each in (sure, uncertain))
+    assert after**2 - before**2 == pytest.approx(0.05 * (frame.fn[-1] / mean) ** 2)
+    first = formula_sd_of(calibrate_sd(replace(sure, frame=0)))[-1, 0]
+    assert first**2 - before**2 == pytest.approx((FIRST_SCALE * frame.fn[-1] / mean) ** 2)
+
+
+def test_intervals_of_the_first_frame_widen_with_its_friction(frame):
+    first = replace(frame, frame=0)
+    assert (source_of_frame(first), source_of_frame(frame)) == (EvidenceSource.FIRST, EvidenceSource.MOTION)
+    little, much = (interval_factors(replace(first, ft=ratio * first.fn))[-1] for ratio in (0.02, 0.1))
+    ratio = (0.1 + MIN_FRICTION) / (0.02 + MIN_FRICTION)
+    assert much / little == pytest.approx(ratio ** SLOPE[EvidenceSource.FIRST, Term.FRICTION])
+    assert relative_friction(frame) == 1.0
+
+
+def test_a_wrong_friction_widens_by_fractions_of_the_force_and_of_the_mean(frame):
+    widened = widen_for_friction(frame, 0.2, 0.26)
+    mean = frame.fn[frame.fn > 0].mean()
+    added = np.sqrt(widened.fn_sd**2 - frame.fn_sd**2) / np.log(1.3)
+    assert added[-1] == pytest.approx(np.hypot(0.5 * frame.fn[-1], 0.4 * mean))
+    assert added[1] > 0.4 * mean
+    assert added[0] == 0.0  # a zero standard deviation stays zero
+    tangential = np.sqrt(widened.ft_sd**2 - frame.ft_sd**2) / np.log(1.3)
+    assert tangential[-1] == pytest.approx(0.26 * np.hypot(0.6 * frame.fn[-1], 0.4 * mean))
+    assert (widen_for_friction(frame, 0.25, 0.25).ft_sd == frame.ft_sd).all()
+    high = widen_for_friction(frame, 0.26, 0.2)
+    assert np.hypot(frame.fn_sd[1:], HIGH_FRICTION * np.log(1.3) * added[1:]) == pytest.approx(high.fn_sd[1:])
+    alone = replace(frame, position_weight=1.0)  # forces from positions do not depend on sliding
+    assert (widen_for_friction(alone, 0.2, 0.26).fn_sd == alone.fn_sd).all()
+
+
+def test_standard_deviations_are_what_was_fitted(frame):
+    """Of the motion, T = 0.9: factor of the group · exp(6.79 · 0.1 + 0.10 ln(c/500)) · 0.2 (s/0.2)^0.89, and of f_t."""
+    mean = frame.fn[frame.fn > 0].mean()
+    size = np.log((frame.fn > 0).sum() / 500.0)
+    plain = ~frame.contacts.with_wall & (frame.bearing_probability == 1.0)
+    calibrated = calibrate_sd(frame)
+    for group, fn_factor, ft_factor in ((Group.MEAN, 0.57, 0.66), (Group.STRONG, 0.52, 0.69)):
+        row = np.flatnonzero(plain & (groups_of(frame) == group))[-1]
+        s = np.hypot(0.1 * frame.fn[row] / mean, 0.02)
+        expected = mean * fn_factor * np.exp(6.79 * 0.1 + 0.10 * size) * 0.2 * (s / 0.2) ** 0.89
+        assert calibrated.fn_sd[row] == pytest.approx(expected)
+        s = np.hypot(0.03 * frame.fn[row] / mean, 0.006)
+        expected = mean * ft_factor * np.exp(5.82 * 0.1 + 0.07 * size) * 0.06 * (s / 0.06) ** 0.75
+        assert calibrated.ft_sd[row] == pytest.approx(expected)
+
+
+def test_a_fraction_of_the_step_between_two_frictions_widens_by_that_fraction(frame):
+    whole, half = (widen_for_friction(frame, 0.2, 0.26, fraction) for fraction in (1.0, 0.5))
+    added = [np.sqrt(each.fn_sd[1:] ** 2 - frame.fn_sd[1:] ** 2) for each in (whole, half)]
+    assert added[1] == pytest.approx(0.5 * added[0], rel=1e-5)

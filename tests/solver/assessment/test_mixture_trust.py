@@ -1,0 +1,94 @@
+"""Trust in mixtures of estimates, beside the correlations of simulated ones."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.solver.assessment.mixture_trust import (
+    MAX_TRUST,
+    compute_position_weight,
+    confirmed_trust,
+    evident_position_weight,
+    expected_of_motion,
+    fused_trust,
+    mixture_trust,
+    motion_reliability,
+    reconcile_trusts,
+    soft_mixture_trust,
+)
+
+from tests.solver.assessment.test_status import SOUND
+
+COUNT = 200_000
+
+
+def correlation(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def test_the_weight_follows_the_signal_to_noise_ratios():
+    # T²/(1 − T²): 0.36/0.64 = 0.5625 and 0.64/0.36 = 16/9
+    assert compute_position_weight(0.6, 0.8) == pytest.approx((16 / 9) / (16 / 9 + 0.5625))
+    assert compute_position_weight(0.6, 0.8, 0.5) == pytest.approx((16 / 9) / (16 / 9 + 0.28125))
+    assert compute_position_weight(0.6, 0.8, 0.0) == 1.0
+
+
+def test_a_mixture_correlates_as_its_trust_states():
+    rng = np.random.default_rng(2)
+    truth = rng.normal(size=COUNT)
+    one, two = (truth + error * rng.normal(size=COUNT) for error in (0.5, 0.8))
+    for weight in (0.2, 0.5, 0.8):
+        mixed = (1.0 - weight) * one + weight * two
+        expected = mixture_trust(
+            correlation(one, truth), correlation(two, truth), correlation(one, two), weight, (one.std(), two.std())
+        )
+        assert correlation(mixed, truth) == pytest.approx(expected, abs=0.003)
+    assert mixture_trust(1.0, 1.0, 1.0, 0.5, (np.float64(1.0), np.float64(1.0))) == MAX_TRUST
+
+
+def test_both_trusts_are_consistent_with_the_agreement():
+    # c = 0.45 with T_m = 0.9: the posterior's trust is 0.5
+    assert reconcile_trusts(0.9, 0.95, 0.45) == pytest.approx((0.9, 0.5))
+    # both agree by more than the motion's bound: so does the motion with the truth
+    assert reconcile_trusts(0.5, 1.0, 0.7)[0] == pytest.approx(0.7)
+    assert reconcile_trusts(np.nan, 1.0, 0.7) == pytest.approx((0.0, 0.95))
+
+
+def test_the_posterior_is_trusted_beyond_the_agreement_as_far_as_the_motion_is():
+    assert confirmed_trust(0.0, 0.9, 0.4) == pytest.approx(0.4)
+    assert confirmed_trust(0.5, 0.9, 0.4) == pytest.approx(0.65)
+    assert confirmed_trust(0.5, 0.9, np.nan) == pytest.approx(0.45)
+    assert confirmed_trust(0.5, 0.6, 0.8) == pytest.approx(0.6)
+
+
+def test_independent_errors_average_in_the_square_of_the_weights():
+    assert fused_trust(0.9, 0.8, 0.99, 0.25) == pytest.approx(1.0 - 0.5625 * 0.1 - 0.0625 * 0.2)
+    assert fused_trust(0.9, np.nan, 0.63, 0.5) == pytest.approx(1.0 - 0.25 * 0.1 - 0.25 * 0.37)
+    assert fused_trust(0.9, 0.95, 0.45, 0.5) == pytest.approx(1.0 - 0.25 * 0.1 - 0.25 * 0.5)
+
+
+def test_trust_in_overlaps_is_limited():
+    assert soft_mixture_trust(0.9, 0.98, 0.6, 0.0) == pytest.approx(0.6)
+    assert soft_mixture_trust(0.9, 0.5, 0.6, 0.25) == pytest.approx(0.25 * 0.9 + 0.75 * 0.5)
+
+
+def test_without_a_load_the_bound_is_the_expectation():
+    assert expected_of_motion(0.9, scale_known=False) == 0.9
+    assert expected_of_motion(0.9, scale_known=True) == pytest.approx(1.0 - 0.1 * 0.45)
+    assert expected_of_motion(0.725, scale_known=True) == pytest.approx(1.0 - 0.275 * (1.0 - 0.5 * 0.55))
+
+
+def test_the_reliability_of_motion_has_its_fitted_values():
+    evidence = replace(SOUND, correction=0.1, disagreement=0.2)
+    assert motion_reliability(evidence) == pytest.approx(1.0 - 0.83 * 0.2**2.65 - 0.42 * 0.1**0.73)
+    for unknown in ({"assessed": False}, {"correction": math.nan}, {"disagreement": math.nan}):
+        assert math.isnan(motion_reliability(replace(evidence, **unknown)))
+
+
+def test_positions_weigh_more_where_forces_correct_the_motion_and_overlaps_are_clear():
+    weight = evident_position_weight(0.1, 0.9)
+    assert weight == pytest.approx(1.0 / (1.0 + math.exp(0.899 - 1.145 * math.log(0.1) + 1.3 * math.log(0.1))))
+    assert evident_position_weight(0.4, 0.9) > weight > evident_position_weight(0.1, 0.6)
+    assert evident_position_weight(9.0, 0.9) == evident_position_weight(2.0, 0.9)  # the range of the fit
+    assert evident_position_weight(math.nan, math.nan) == evident_position_weight(0.1, 0.5)

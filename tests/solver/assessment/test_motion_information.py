@@ -1,0 +1,94 @@
+"""Information that sliding and gaps carry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.solver.assessment.motion_information import MotionInformation, measure_motion_information, motion_scale
+from rodsight.solver.bodies.motion import FrameMotion, no_motion
+from rodsight.solver.contacts.contacts import Contacts, detect_contacts
+
+from tests.solver.posterior.test_sequence_evidence import RADIUS, lattice_sequence
+
+NOISE = 1e-5  # [m]
+INTERVAL = 20.0  # [s]
+
+
+@pytest.fixture(scope="module")
+def lattice():
+    packing, snapshots = lattice_sequence(0.0)
+    snapshot = replace(snapshots[0], sigma=NOISE)
+    walls = packing.walls_of(snapshot)
+    contacts = detect_contacts(packing.grains, snapshot.position, snapshot.present, walls, 1e-6)
+    assert contacts.with_wall.any()
+    return packing, snapshot, walls, contacts
+
+
+def rolling(snapshot, distance: float) -> FrameMotion:
+    """All rods turn alike, so that each slides by `distance` [m] at a wall and by twice that at another rod."""
+    still = no_motion(snapshot)
+    spin = np.full(len(snapshot.present), distance / RADIUS / INTERVAL)
+    return replace(still, interval=INTERVAL, grains=replace(still.grains, spin=spin), ends_here=True)
+
+
+def measure(lattice, motion: FrameMotion, contacts: Contacts | None = None, fn=None) -> MotionInformation:
+    packing, snapshot, walls, known = lattice
+    contacts = known if contacts is None else contacts
+    fn = np.ones(contacts.count) if fn is None else fn
+    return measure_motion_information(packing, snapshot, motion, contacts, fn, walls, soft=False)
+
+
+def test_sliding_counts_beyond_three_standard_deviations_of_its_noise(lattice):
+    """At a wall only the two components of one rod have noise, at a pair twice as many: 2 σ and √8 σ."""
+    _, snapshot, _, contacts = lattice
+    between = float((~contacts.with_wall).mean())
+    for distance, expected in ((3.5, 0.0), (4.5, between), (6.5, 1.0)):
+        assert measure(lattice, rolling(snapshot, distance * NOISE)).sliding == pytest.approx(expected)
+
+
+def test_the_signal_is_the_sliding_over_its_noise_less_the_noise(lattice):
+    _, snapshot, _, contacts = lattice
+    wall = contacts.with_wall
+    slid, noise = np.where(wall, 5.0, 10.0), np.where(wall, 4.0, 8.0)
+    expected = np.sqrt(np.mean(slid**2) / noise.mean() - 1.0)
+    assert measure(lattice, rolling(snapshot, 5.0 * NOISE)).slide_signal == pytest.approx(expected)
+    assert measure(lattice, rolling(snapshot, 0.0)).slide_signal == 0.0
+    none = measure(lattice, rolling(snapshot, 0.0), fn=np.zeros(contacts.count))
+    assert np.isnan([none.slide_signal, none.sliding, none.gap_error]).all()
+
+
+def test_the_error_of_gaps_is_that_of_strong_contacts_without_noise(lattice):
+    _, snapshot, _, contacts = lattice
+    rng, error = np.random.default_rng(3), 2e-5
+    noise = NOISE * np.where(contacts.with_wall, 1.0, np.sqrt(2.0))
+    gap = rng.normal(0.0, np.hypot(noise, error))
+    fn = np.where(rng.random(contacts.count) < 0.3, 0.1, 1.0)
+    gap[fn < 0.5] += 1e-3 * rng.random((fn < 0.5).sum())  # weak contacts may be open
+    found = measure(lattice, rolling(snapshot, 0.0), replace(contacts, gap=gap), fn)
+    assert found.gap_error == pytest.approx(error, rel=0.1)
+    exact = replace(contacts, gap=rng.normal(0.0, 0.5 * noise))
+    assert measure(lattice, rolling(snapshot, 0.0), exact, fn).gap_error == 0.0
+
+
+def test_displacements_are_those_of_the_whole_interval(lattice):
+    _, snapshot, _, _ = lattice
+    rng = np.random.default_rng(4)
+    motion = rolling(snapshot, 0.0)
+    velocity = rng.normal(0.0, 1e-4 / INTERVAL, snapshot.position.shape)
+    moving = replace(motion, grains=replace(motion.grains, velocity=velocity))
+    assert motion_scale(moving, NOISE) == pytest.approx(1e-4, rel=0.3)
+    alone = replace(moving, grains=replace(moving.grains, present=np.arange(len(velocity)) == 3))
+    assert np.isnan(motion_scale(alone, NOISE))
+
+
+def test_only_grains_beside_a_wall_can_be_beyond_it(lattice):
+    packing, snapshot, walls, contacts = lattice
+    right, top = walls.endpoints[:, :, 0].max(), walls.endpoints[:, :, 1].max()
+    position = snapshot.position.copy()
+    position[0] = right + RADIUS, 0.5 * top
+    position[1] = right + RADIUS, top + RADIUS  # beyond the corner, beside no wall
+    moved = packing, replace(snapshot, position=position), walls, contacts
+    assert measure(moved, rolling(snapshot, 0.0)).beyond == 1
+    assert measure(lattice, rolling(snapshot, 0.0)).beyond == 0

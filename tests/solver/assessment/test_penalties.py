@@ -1,0 +1,150 @@
+"""Penalties on the trust of a frame: size, words, and the friction check."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.solver.assessment.force_intervals import FRICTION_ERROR
+from rodsight.solver.assessment.motion_information import MotionInformation
+from rodsight.solver.assessment.penalties import (
+    BEYOND_WALL_LOSS,
+    COARSE_STEP,
+    SOFT_CHAIN_LOSS,
+    assess,
+    describe_penalties,
+    find_penalties,
+    penalise_friction,
+)
+from rodsight.solver.assessment.trust import motion_assessment
+from rodsight.solver.contacts.contacts import ContactState
+from rodsight.solver.convex.friction_check import FrictionCheck
+from rodsight.solver.frame_forces import FrameStatus
+from rodsight.solver.sequence.failure import failed_frame
+
+from tests.app.recording.fake_results import make_results
+from tests.solver.assessment.test_status import SOUND
+
+CLEAR = MotionInformation(
+    noise=1e-5, motion=1e-4, sliding=0.25, slide_signal=4.0, gap_error=0.0, diameter=0.016, beyond=0, soft=False
+)
+ASSESSED = replace(SOUND, information=CLEAR, grains=400)
+
+
+def with_information(**changes):
+    return replace(ASSESSED, information=replace(CLEAR, **changes))
+
+
+def test_without_further_penalties_the_assessment_is_that_of_the_evidence():
+    assert assess(ASSESSED) == motion_assessment(ASSESSED)
+    assert describe_penalties(replace(ASSESSED, correction=0.01, disagreement=0.05)) == ""
+
+
+@pytest.mark.parametrize(
+    ("evidence", "word"),
+    [
+        (replace(ASSESSED, agreement=0.4), "agree by 0.40"),
+        (replace(ASSESSED, agreement=0.3, overlap_agreement=0.2), "by more than 0.30"),
+        (replace(ASSESSED, correction=0.8), "ε = 0.8"),
+        (replace(ASSESSED, disagreement=0.6), "disagree by 60 %"),
+        (with_information(beyond=9), "9 grains are beyond a wall"),
+        (replace(with_information(soft=True), disagreement=math.nan), "soft"),
+    ],
+)
+def test_every_penalty_lowers_the_trust_and_states_cause_and_cure(evidence, word):
+    if evidence.agreement > 0:
+        sound = assess(replace(ASSESSED, agreement=0.95, position_agreement=0.95))
+    elif math.isnan(evidence.disagreement):  # a single chain
+        sound = motion_assessment(evidence)
+    else:
+        sound = assess(ASSESSED)
+    assert assess(evidence).trust < sound.trust - 0.01
+    words = describe_penalties(evidence)
+    assert word in words
+    assert ":" in words or "(" in words  # the cure
+
+
+def test_a_wide_step_is_named_where_the_force_pattern_is_new():
+    wide = replace(ASSESSED, shear=4 * COARSE_STEP, force_change=0.5)
+    assert "1° of shear apart" in describe_penalties(wide)
+    assert "of shear apart" not in describe_penalties(replace(wide, shear=COARSE_STEP))
+
+
+def test_penalties_beside_the_evidence_have_their_size():
+    assert assess(with_information(beyond=4)).trust == pytest.approx(
+        motion_assessment(ASSESSED).trust * (1.0 - BEYOND_WALL_LOSS * 4 / 400)
+    )
+    chain = replace(with_information(soft=True), disagreement=math.nan)
+    assert assess(chain).trust == pytest.approx(motion_assessment(chain).trust * (1.0 - SOFT_CHAIN_LOSS))
+
+
+def test_no_constant_caps_the_trust_of_a_suspect_frame():
+    suspect = replace(ASSESSED, pressure_jump=0.9)
+    assert assess(suspect) == assess(ASSESSED)
+    assert assess(replace(suspect, agreement=0.2)).trust < assess(replace(suspect, agreement=0.9)).trust
+
+
+def test_an_unassessed_frame_stays_unassessed():
+    assert math.isnan(assess(replace(ASSESSED, assessed=False)).trust)
+
+
+def test_the_largest_penalty_comes_first():
+    evidence = replace(with_information(beyond=9, noise=1e-4), correction=0.2, inferred=2)
+    fractions = [each.fraction for each in find_penalties(evidence)]
+    assert fractions == sorted(fractions, reverse=True)
+    assert len(fractions) >= 3
+
+
+def check(measured, low, high, *, enclosed=True):
+    return FrictionCheck(0.25, measured, low, high, 1, 3, enclosed, np.ones(1), np.ones(1))
+
+
+def test_a_contradicted_friction_is_reported_with_what_else_looks_like_it():
+    frame = replace(failed_frame(3, "", 4, 4), status=FrameStatus.SETTLED, trust=0.9, trust_penalties="noise")
+    low = penalise_friction(frame, check(0.40, 0.34, 0.46))
+    assert low.trust == 0.9  # the evidence of each frame counts, not the suspected cause
+    assert low.trust_penalties.startswith(
+        "the motion fits a friction of 0.40 (0.34 to 0.46) better than the given 0.25"
+    )
+    assert "smooth walls" in low.trust_penalties
+    assert low.trust_penalties.endswith("; noise")
+    for agrees in (None, check(0.26, 0.22, 0.30), check(0.40, 0.34, 0.46, enclosed=False)):
+        assert penalise_friction(frame, agrees) is frame
+    failed = replace(frame, status=FrameStatus.FAILED)
+    assert penalise_friction(failed, check(0.40, 0.34, 0.46)) is failed
+
+
+def test_sliding_follows_the_measured_friction():
+    frame = make_results(1, 8, 7, sweeps=2).frames[0]
+    c = len(frame.fn)
+    before = np.linspace(0.0, 1.0, c)
+    frame = replace(frame, fn=np.ones(c), sliding_probability=before)
+    for mu, more in ((0.40, False), (0.16, True)):
+        penalised = penalise_friction(frame, check(mu, mu - 0.02, mu + 0.02))
+        slides = penalised.sliding_probability
+        assert slides is not None
+        assert ((slides > before)[1:-1] == more).all()
+        assert slides[[0, -1]] == pytest.approx([0.0, 1.0], abs=1e-6)
+        assert ((penalised.state == ContactState.SLIDING) == (slides > 0.5)).all()
+
+
+def test_the_interval_of_a_measured_friction_enters_the_standard_deviations():
+    frame = make_results(1, 8, 7, sweeps=2).frames[0]
+    penalised = penalise_friction(frame, check(0.26, 0.22, 0.30), measured=True)
+    of_force, of_mean = FRICTION_ERROR[0]
+    mean = np.where(frame.fn_sd > 0, frame.fn[frame.fn > 0].mean(), 0.0)
+    expected = 0.5 * math.log(0.26 / 0.22) * np.hypot(of_force * np.maximum(frame.fn, 0.0), of_mean * mean)
+    assert np.sqrt(penalised.fn_sd**2 - frame.fn_sd**2) == pytest.approx(expected, rel=1e-3, abs=1e-4)
+    assert penalised.trust == frame.trust
+
+
+def test_positions_do_not_depend_on_a_friction_that_the_motion_contradicts():
+    frame = replace(make_results(1, 8, 7, sweeps=2).frames[0], trust=0.9, status=FrameStatus.SETTLED)
+    half = replace(frame, sliding_probability=np.full(len(frame.fn), 0.4))
+    odds = []
+    for weight in (0.0, 0.5, 1.0):
+        penalised = penalise_friction(replace(half, position_weight=weight), check(0.40, 0.34, 0.46))
+        assert penalised.sliding_probability is not None
+        odds.append(np.log(penalised.sliding_probability[0] / (1.0 - penalised.sliding_probability[0]) / (0.4 / 0.6)))
+    assert odds == pytest.approx([odds[0], 0.5 * odds[0], 0.0], abs=1e-9)
+    assert odds[0] < -0.1

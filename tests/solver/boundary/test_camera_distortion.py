@@ -1,0 +1,86 @@
+"""The camera's distortion from touching pairs: found where it explains the gaps, left alone where it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rodsight.solver.boundary.camera_distortion import find_camera_distortion
+
+pytestmark = pytest.mark.unit
+
+R, COUNT, FRAMES, NOISE = 5e-3, 24, 4, 2e-5
+SIDE = 2.0 * R * COUNT
+
+
+def lattice(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Discs of two sizes in rows that touch, with some pairs apart, in a few photographs (f, n, 2); and radii."""
+    rng = np.random.default_rng(seed)
+    small = np.arange(COUNT * COUNT) % 2 == 0
+    x, y = np.meshgrid(np.arange(COUNT), np.arange(COUNT))
+    place = 2.0 * R * np.column_stack([(x + 0.5 * (y % 2)).ravel(), np.sqrt(0.75) * y.ravel()])
+    loose = rng.random(len(place)) < 0.15
+    frames = []
+    for _ in range(FRAMES):
+        moved = np.where(loose[:, None], rng.uniform(-6e-4, 6e-4, place.shape), 0.0)
+        frames.append(place + moved + rng.normal(0.0, NOISE, place.shape))
+    return np.stack(frames), np.where(small, 0, 1)
+
+
+def distort(position: np.ndarray, radial: float, stretch: float) -> np.ndarray:
+    """Move points as a lens and non-square pixels do."""
+    middle = 0.5 * (position.min(axis=(0, 1)) + position.max(axis=(0, 1)))
+    offset = (position - middle) / (0.5 * SIDE)
+    square = np.sum(offset**2, axis=-1, keepdims=True)
+    return position + 0.5 * SIDE * (radial * square * offset + stretch * offset * [1.0, -1.0])
+
+
+def gap_range(position: np.ndarray) -> float:
+    """Greatest less least distance of neighbours in the rows of the first photograph."""
+    grid = position[0].reshape(COUNT, COUNT, 2)
+    length = np.linalg.norm(np.diff(grid, axis=1), axis=-1)
+    return float(np.percentile(length, 90) - np.percentile(length, 10))
+
+
+@pytest.mark.parametrize(("radial", "stretch"), [(0.05, 0.0), (-0.03, 0.0), (0.0, 0.02), (0.05, 0.02)])
+def test_a_distortion_is_found_and_removed(radial: float, stretch: float) -> None:
+    position, size_class = lattice()
+    radius = np.full(position.shape[1], R)
+    seen = distort(position, radial, stretch)
+    found = find_camera_distortion(seen, radius, size_class)
+    assert found is not None
+    assert found.applied
+    assert found.explained < 0.6 * found.scatter  # loose pairs stay apart
+    assert found.unexplained == 0.0
+    # Pairs in three directions have the same distance again, up to a common scale.
+    before, after, true = gap_range(seen), gap_range(found.correct(seen)), gap_range(position)
+    assert after - true < 0.15 * (before - true) + 2e-5
+    assert len(found.describe()) == 1
+    assert ("radial" in found.describe()[0]) == (radial != 0.0)
+    assert ("stretching" in found.describe()[0]) == (stretch != 0.0)
+
+
+def test_nothing_is_corrected_where_gaps_do_not_depend_on_place() -> None:
+    position, size_class = lattice(1)
+    for radius in (R, 0.98 * R):  # radii that are all too small are no distortion
+        found = find_camera_distortion(position, np.full(position.shape[1], radius), size_class)
+        assert found is not None
+        assert not found.applied
+        assert found.describe() == []
+        assert found.correct(position) is position
+
+
+def test_a_dependence_on_place_that_no_camera_has_is_reported() -> None:
+    position, size_class = lattice(2)
+    left = position.copy()
+    left += 0.02 * np.where(position[..., :1] < 0.5 * SIDE, position - 0.5 * SIDE, 0.0)  # larger in the left half
+    found = find_camera_distortion(left, np.full(position.shape[1], R), size_class)
+    assert found is not None
+    assert found.unexplained > 5e-5
+    assert "calibrate the camera" in found.describe()[-1]
+
+
+def test_few_discs_show_nothing() -> None:
+    position, size_class = lattice()
+    few = position[:, :9]
+    assert find_camera_distortion(few, np.full(9, R), size_class[:9]) is None
+    assert find_camera_distortion(np.full((2, 3, 2), np.nan), np.full(3, R), np.zeros(3, int)) is None

@@ -1,0 +1,105 @@
+"""Projection of a mixed field onto equilibrium, as strict as its standard deviations allow."""
+
+import numpy as np
+import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.bodies.walls import Walls
+from rodsight.solver.contacts.contacts import detect_contacts
+from rodsight.solver.convex.program import (
+    ConvexSettings,
+    assemble_balance,
+    project_onto_equilibrium,
+    solve_convex_member,
+)
+from rodsight.solver.mixture import equilibrium_projection
+from rodsight.solver.mixture.equilibrium_projection import (
+    MAX_CHANGE,
+    MAX_CHANGE_RELAXED,
+    RELAXATION,
+    project_mixed_field,
+)
+
+UNIT = 20.0  # N
+RADIUS = 0.01  # m
+
+
+def lattice(left_out=0):
+    """Make a triangular packing under a plate without some contacts: true f_n, f_t (c,) and the balance."""
+    position = np.array(
+        [
+            [RADIUS * (2 * q + 1 + row % 2), RADIUS * (1 + np.sqrt(3) * row)]
+            for row in range(7)
+            for q in range(6 - row % 2)
+        ]
+    )
+    grains = Grains.of_rods(np.full(len(position), RADIUS), density=2700.0, length=0.06)
+    width, height = 12 * RADIUS, RADIUS * (2 + np.sqrt(3) * 6)
+    corner = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=float)
+    endpoints = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    walls = Walls(endpoints, np.zeros((4, 2, 2)), np.array([np.nan, np.nan, 60.0, np.nan]))
+    contacts = detect_contacts(grains, position, np.ones(len(position), bool), walls, 1e-9)
+
+    def balance_of(listed):
+        return assemble_balance(
+            listed, grains, walls, present=np.ones(grains.count, bool), friction=np.full(listed.count, 0.25),
+            force_unit=UNIT,
+        )  # fmt: skip
+
+    none = np.zeros(contacts.count)
+    true = solve_convex_member(balance_of(contacts), none, none + 1.0, none, none)
+    strong = np.argsort(true.fn * ~contacts.with_wall)[::-1][:left_out]
+    kept = np.setdiff1d(np.arange(contacts.count), strong)
+    return true.fn[kept], true.ft[kept], balance_of(contacts.select(kept))
+
+
+def change(found, fn, fn_sd):
+    return np.sqrt(np.mean((found.fn - fn) ** 2) / np.mean(fn_sd**2))
+
+
+def test_consistent_field_is_projected_strictly():
+    fn, ft, balance = lattice()
+    noisy = fn * (1 + 0.1 * np.random.default_rng(5).normal(size=len(fn)))
+    found = project_mixed_field(balance, noisy, ft, 0.2 * fn, ConvexSettings())
+    np.testing.assert_array_equal(found.fn, project_onto_equilibrium(balance, noisy, ft).fn)
+
+
+@pytest.mark.parametrize("left_out", [4, 8])
+def test_missing_pairs_do_not_remove_the_forces_around_them(left_out):
+    fn, ft, balance = lattice(left_out)
+    fn_sd = np.full(len(fn), 0.1 * fn.mean())
+    strict = project_onto_equilibrium(balance, fn, ft)
+    assert change(strict, fn, fn_sd) > MAX_CHANGE
+    found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
+    assert change(found, fn, fn_sd) < 0.7 * change(strict, fn, fn_sd)
+    assert np.corrcoef(found.fn, fn)[0, 1] > np.corrcoef(strict.fn, fn)[0, 1]
+    assert np.all(np.abs(found.ft) <= 0.25 * found.fn)
+
+
+def test_change_of_few_standard_deviations_is_no_missing_pair():
+    fn, ft, balance = lattice(left_out=4)
+    strict = project_onto_equilibrium(balance, fn, ft)
+    fn_sd = np.full(len(fn), 1.2 * np.sqrt(np.mean((strict.fn - fn) ** 2)) / MAX_CHANGE)
+    np.testing.assert_array_equal(project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings()).fn, strict.fn)
+    certain = project_mixed_field(balance, fn, ft, fn_sd / 2.0, ConvexSettings())
+    assert change(certain, fn, fn_sd) < change(strict, fn, fn_sd)
+
+
+def test_equilibrium_is_relaxed_no_further_than_necessary(monkeypatch):
+    fn, ft, balance = lattice(left_out=4)
+    price = ConvexSettings().balance
+    relaxed = [
+        project_onto_equilibrium(balance, fn, ft, ConvexSettings(balance=factor * price)).fn for factor in RELAXATION
+    ]
+    size = [np.sqrt(np.mean((each - fn) ** 2)) for each in relaxed]
+    assert size == sorted(size, reverse=True)
+    monkeypatch.setattr(equilibrium_projection, "MAX_CHANGE", 0.0)  # strict equilibrium is never accepted
+    fn_sd = np.full(len(fn), 1.01 * size[2] / MAX_CHANGE_RELAXED)
+    found = project_mixed_field(balance, fn, ft, fn_sd, ConvexSettings())
+    np.testing.assert_array_equal(found.fn, relaxed[2])
+
+
+def test_without_contacts_the_projection_is_empty():
+    _, _, balance = lattice()
+    empty = np.empty(0)
+    nothing = balance.__class__(balance.matrix[:, :0], balance.load, empty, UNIT, balance.grains)
+    assert len(project_mixed_field(nothing, empty, empty, empty, ConvexSettings()).fn) == 0

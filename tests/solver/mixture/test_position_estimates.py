@@ -1,0 +1,35 @@
+"""Position-only estimates of a sequence on demand."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+from rodsight.solver.mixture.position_estimates import PositionEstimates
+from rodsight.solver.posterior.posterior_settings import PosteriorSettings
+
+from tests.solver.posterior.simulated import SimulatedShear, simulate_shear
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
+
+FEW_SWEEPS = PosteriorSettings(annealing=20, burn_in=5, kept=10)
+
+
+@pytest.fixture(scope="module")
+def soft() -> SimulatedShear:
+    return simulate_shear(0.25, 6, normal_stiffness=2e5)
+
+
+def test_estimate_does_not_depend_on_the_order_of_requests(soft) -> None:
+    one, two = (PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS) for _ in range(2))
+    two.at(4)
+    first, second = one.at(2), two.at(2)
+    assert first is not None
+    assert second is not None
+    assert np.array_equal(first.fn, second.fn)
+
+
+def test_given_posteriors_are_used_as_they_are(soft) -> None:
+    given = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS).at(0)
+    assert given is not None
+    assert PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS, given={0: given}).at(0) is given

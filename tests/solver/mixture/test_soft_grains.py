@@ -1,0 +1,47 @@
+"""Detection of soft grains, as distinct from hard ones with wrong radii, centres or scale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+from rodsight.solver.bodies.grains import Grains
+from rodsight.solver.mixture.soft_grains import find_soft_overlap
+
+from tests.solver.posterior.simulated import NOISE, SimulatedShear, simulate_shear
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs the compiled kernels")
+
+
+@pytest.fixture(scope="module")
+def hard() -> SimulatedShear:
+    return simulate_shear(0.25, 6)
+
+
+@pytest.fixture(scope="module")
+def soft() -> SimulatedShear:
+    return simulate_shear(0.25, 6, normal_stiffness=2e5)
+
+
+def test_soft_grains_are_found_and_hard_ones_are_not(hard, soft) -> None:
+    assert find_soft_overlap(hard.packing, hard.snapshots) == 0.0
+    assert find_soft_overlap(soft.packing, soft.snapshots) > 1e-4
+
+
+@pytest.mark.parametrize("error", ["radii", "all radii alike"])
+def test_wrong_radii_of_hard_grains_are_no_softness(hard, error) -> None:
+    rng = np.random.default_rng(1)
+    radius = hard.packing.grains.radius
+    wrong = radius * (1.0 + 0.01 * rng.normal(size=len(radius))) if error == "radii" else radius + 2.5e-4
+    packing = replace(hard.packing, grains=Grains.of_rods(wrong, density=2700.0, length=0.06))
+    assert find_soft_overlap(packing, hard.snapshots) == 0.0
+
+
+def test_an_overlap_without_variance_of_its_own_is_no_softness(hard) -> None:
+    """All radii are too large by 1.5 σ: the overlap is twice the standard deviation of the gaps, which is the noise."""
+    packing = replace(
+        hard.packing, grains=Grains.of_rods(hard.packing.grains.radius + 1.5 * NOISE, density=2700.0, length=0.06)
+    )
+    assert find_soft_overlap(packing, hard.snapshots) == 0.0
