@@ -27,6 +27,7 @@ class TrackStatus(IntEnum):
     OUT_OF_FRAME = 5  # its patch reaches beyond the photograph: no pose
     GIVEN = 6  # read from a table
     INFERRED = 7  # no photograph shows this rod: its position is inferred from its neighbours
+    INTERPOLATED = 8  # lost in this photograph: interpolated between those before and after
 
     @property
     def has_pose(self) -> bool:
@@ -112,11 +113,12 @@ class Tracks:
 
         Notes
         -----
-        √(⟨σ²⟩ + ⟨σ_c²⟩), σ over the present grains, σ_c the standard deviation of a centre's constant error.
+        √(⟨σ²⟩ + ⟨σ_c²⟩), σ over the grains that were measured, σ_c the standard deviation of a centre's constant error.
         """
         fixed = 0.0 if self.centre_sigma is None else float(np.mean(self.centre_sigma**2))
-        variance = np.where(self.present, self.sigma**2, 0.0).sum(axis=1)
-        return np.sqrt(variance / np.maximum(self.present.sum(axis=1), 1) + fixed)
+        measured = self.present & ~self.interpolated
+        variance = np.where(measured, self.sigma**2, 0.0).sum(axis=1)
+        return np.sqrt(variance / np.maximum(measured.sum(axis=1), 1) + fixed)
 
     @property
     def failed(self) -> dict[int, str]:
@@ -137,9 +139,14 @@ class Tracks:
 
     @property
     def lost(self) -> NDArray[np.bool_]:
-        """Whether a visible grain was not found (f, n); inferred grains are not counted."""
-        missing = ~self.present & ~self.out_of_frame
+        """Whether a visible grain was not found (f, n), interpolated or not; inferred grains are not counted."""
+        missing = (~self.present & ~self.out_of_frame) | self.interpolated
         return missing if self.inferred is None else missing & ~self.inferred
+
+    @property
+    def interpolated(self) -> NDArray[np.bool_]:
+        """Whether a lost pose was interpolated (f, n): it is none that was measured."""
+        return self.present & (self.status == TrackStatus.INTERPOLATED)
 
     @property
     def out_of_frame(self) -> NDArray[np.bool_]:
@@ -150,6 +157,8 @@ class Tracks:
         """Describe the missing poses in words: lost, cut and inferred ones."""
         cut = self.out_of_frame
         parts = [f"{_counted(self.lost, 'pose')} lost"]
+        if self.interpolated.any():
+            parts[0] += f" ({int(self.interpolated.sum())} of them interpolated)"
         if cut.any():
             parts.append(f"{_counted(cut.any(axis=0), 'rod')} cut by the picture's border ({_counted(cut, 'pose')})")
         if self.inferred is not None and self.inferred.any():

@@ -10,11 +10,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ..process.progress import Progress, no_progress
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..solver.assessment.penalties import penalise_friction
 from ..solver.assessment.statistic_intervals import widen_for_friction, with_sd
+from ..solver.contacts.contacts import ContactSource
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.parallel import prefetch
@@ -123,7 +126,7 @@ def _solve_missing_frames(sequence: CorrectedSequence, store: FrameStore, observ
             reason = f"its statistics could not be computed ({describe_error(error)})"
             members = sequence.settings.keep_members
             forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
-        frame = SolvedFrame(_with_noise_remark(sequence, forces), statistics, state)
+        frame = SolvedFrame(_with_remarks(sequence, forces), statistics, state)
         store.save(frame)
         observer.solved(frame)
         observer.progress("solving", forces.frame + 1, total)
@@ -145,7 +148,7 @@ def _with_first_frame(
             sequence.packing, sequence.snapshots, sequence.settings, posterior, reason,
             verdicts=sequence.verdicts, failed=sequence.failed,
         )  # fmt: skip
-        forces = _limit_by_second(_with_noise_remark(sequence, forces), frames)
+        forces = _limit_by_second(_with_remarks(sequence, forces), frames)
         summary = _summarise(sequence, forces)
     except MemoryError:  # no fault of the frame
         raise
@@ -170,11 +173,18 @@ def _limit_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> Fram
     )  # fmt: skip
 
 
-def _with_noise_remark(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
-    """Report the measured noise of all frames with the first."""
-    if forces.frame != 0 or not sequence.noise_remark:
+def _with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
+    """Report the measured noise of all frames with the first, and which contacts belong to interpolated rods."""
+    if forces.frame == 0 and sequence.noise_remark:
+        forces = replace(forces, reason=f"{sequence.noise_remark}; {forces.reason}")
+    interpolated = sequence.tracks.interpolated[forces.frame]
+    if not interpolated.any():
         return forces
-    return replace(forces, reason=f"{sequence.noise_remark}; {forces.reason}")
+    contacts, padded = forces.contacts, np.append(interpolated, False)
+    theirs = padded[contacts.i] | padded[np.minimum(contacts.j, len(interpolated))]
+    theirs &= forces.source == ContactSource.DETECTED
+    source = np.where(theirs, np.uint8(ContactSource.INTERPOLATED), forces.source)
+    return replace(forces, source=source, reason=f"{interpolated.sum()} lost rods are interpolated; {forces.reason}")
 
 
 def _summarise(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatistics:

@@ -25,7 +25,7 @@ def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
 
 def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:
     """The same as what calibration reads."""
-    present = tracks.present
+    present = tracks.present & ~tracks.interpolated
     rotation = _rotations(tracks, walls)
     sigma = tracks.sigma.copy()
     sigma[~present] = 0.0

@@ -58,18 +58,19 @@ def bound_correlation(evidence: Evidence) -> float:
     T = tanh(g − s_0 − s_1 max(2.6 − g, 0)) with g the argument of `expect_correlation`: the less is expected, the less
     certain it is.
     """
-    table = _table(evidence)
-    margin, slope, start = (float(table[name]) for name in ("margin", "slope", "start"))
-    score = _score(evidence)
-    return max(math.tanh(score - margin - slope * max(start - score, 0.0)), 0.0)
+    return _bound(_score(evidence), _table(evidence))
 
 
 def losses(evidence: Evidence) -> dict[str, float]:
     """By how much the bound would rise if one measure were at its best, for each known measure."""
     table, score = _table(evidence), _score(evidence)
     best = {name: float(each["value"][0]) - _term(each, MEASURES[name](evidence)) for name, each in _terms(table)}
-    now = math.tanh(score - table["margin"])
-    return {name: math.tanh(score + rise - table["margin"]) - now for name, rise in best.items()}
+    return {name: _bound(score + rise, table) - _bound(score, table) for name, rise in best.items()}
+
+
+def _bound(score: float, table: dict[str, Any]) -> float:
+    margin, slope, start = (float(table[name]) for name in ("margin", "slope", "start"))
+    return max(math.tanh(score - margin - slope * max(start - score, 0.0)), 0.0)
 
 
 def _score(evidence: Evidence) -> float:

@@ -226,3 +226,4 @@ class ContactSource(IntEnum):
     ADDED_BY_REVIEWER = 1
     FORBIDDEN_BY_REVIEWER = 2
     FROM_BALANCE = 3  # not detected: added because the forces around it contradict the motion without it
+    INTERPOLATED = 4  # of a rod that was lost in this photograph and stands where it must have been

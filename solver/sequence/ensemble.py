@@ -129,9 +129,8 @@ def solve_ensemble(
     problem: FrameProblem,
     state: EnsembleState,
     positions: FramePosterior | None = None,
-    missing: MissingContacts = NO_MISSING,
 ) -> EnsembleForces:
-    """Solve one frame of a sequence with all members.
+    """Solve one frame of a sequence with all members; missing contacts are searched for in up to ROUNDS rounds.
 
     Parameters
     ----------
@@ -140,9 +139,8 @@ def solve_ensemble(
         Of the previous frame.
     positions : FramePosterior, optional
         Position-only estimate, whose bearing pairs are offered to the members.
-    missing : MissingContacts
-        Missing contacts that are known already; further ones are searched for in up to ROUNDS rounds.
     """
+    missing = NO_MISSING
     touching, chains, balance, members = _solve_members(problem, state, positions, missing)
     for _ in range(ROUNDS):
         more = find_missing_contacts(problem, touching.contacts, balance, members.convex)

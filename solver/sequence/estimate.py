@@ -28,7 +28,7 @@ from ..statistics.agreement import pearson
 from ..statistics.balance import worst_force_residual
 from ..statistics.stress import love_weber_stress, packing_area
 from .ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
-from .frame_problem import FrameProblem
+from .frame_problem import FrameProblem, PositionEstimates
 from .missing_contacts import NO_MISSING, MissingContacts
 from .state import SequenceState
 
@@ -83,20 +83,20 @@ def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimat
         return _motion_estimate(problem, state)
     if not _always_uses_positions(problem):
         alone, evidence = _motion_estimate(problem, state)
-        return _combine(problem, alone, evidence, state) if alone.fn.any() else (alone, evidence)
+        return _combine(problem, positions, alone, evidence, state) if alone.fn.any() else (alone, evidence)
     posterior = positions.at(problem.k, problem.verdicts)
     if posterior is not None and posterior.fn.any():
-        offered = _estimate_by_ensemble(problem, state, posterior, NO_MISSING)
+        offered = _estimate_by_ensemble(problem, state, posterior)
         if offered.fn.any():
-            found = _Agreement.of(problem, offered, posterior)
-            evidence = gather_evidence(problem, offered, state, found)
+            evidence = gather_evidence(problem, offered, state)
+            evidence = _with_agreements(problem, evidence, offered, posterior)
             mixed = _mix(problem, offered, posterior, motion_reliability(evidence))
-            return mixed, gather_evidence(problem, mixed, state, found)
+            return mixed, _evidence_of_mixture(problem, mixed, evidence, state)
     return _motion_estimate(problem, state)
 
 
 def _combine(
-    problem: FrameProblem, alone: Estimate, evidence: Evidence, state: SequenceState
+    problem: FrameProblem, positions: PositionEstimates, alone: Estimate, evidence: Evidence, state: SequenceState
 ) -> tuple[Estimate, Evidence]:
     """Compare the motion estimate of hard grains with the position-only estimate; mix both as the evidence weighs them.
 
@@ -104,48 +104,60 @@ def _combine(
     """
     before = state.evidence
     if not np.isnan(before.agreement) and before.agreement_age + 1 < STEADY_FRAMES:
-        found = _Agreement.carried(before)
-        carried = gather_evidence(problem, alone, state, found)
+        carried = _with_agreements_of(evidence, before)
         weight = evident_position_weight(carried.correction, carried.position_agreement)
         if weight < LEAST_WEIGHT and expect_correlation(carried) > STEADY and before.position_weight == 0.0:
             return alone, carried
-    assert problem.sequence.positions is not None
-    posterior = problem.sequence.positions.at(problem.k, problem.verdicts)
+    posterior = positions.at(problem.k, problem.verdicts)
     if posterior is None or not posterior.fn.any():
         return alone, evidence
-    found = _Agreement.of(problem, alone, posterior)
-    evidence = gather_evidence(problem, alone, state, found)
+    evidence = _with_agreements(problem, evidence, alone, posterior)
     weight = evident_position_weight(evidence.correction, evidence.position_agreement)
     if weight < LEAST_WEIGHT:
         return alone, evidence
     mixed = _mix(problem, alone, posterior, motion_reliability(evidence), position_weight=weight)
-    return mixed, gather_evidence(problem, mixed, state, found)
+    return mixed, _evidence_of_mixture(problem, mixed, evidence, state)
 
 
-@dataclass(frozen=True, slots=True)
-class _Agreement:
-    """Correlations of f_n between the estimates of a frame, over the contacts of either."""
+def _evidence_of_mixture(problem: FrameProblem, mixed: Estimate, alone: Evidence, state: SequenceState) -> Evidence:
+    """Evidence of the mixed field, with the agreements that the motion estimate has."""
+    return replace(
+        gather_evidence(problem, mixed, state),
+        agreement=alone.agreement,
+        position_agreement=alone.position_agreement,
+        overlap_agreement=alone.overlap_agreement,
+        agreement_age=alone.agreement_age,
+    )
 
-    estimates: float = np.nan  # motion and positions
-    positions: float = np.nan  # positions and the balance of overlaps
-    overlaps: float = np.nan  # motion and the balance of overlaps
-    age: int = 0  # frames since they were computed
 
-    @classmethod
-    def of(cls, problem: FrameProblem, estimate: Estimate, posterior: FramePosterior) -> _Agreement:
-        sequence, overlap = problem.sequence, problem.settings.overlap
-        assert overlap is not None
-        noise = float(np.hypot(problem.snapshot.sigma, overlap))  # surfaces are no smoother than that
-        contacts, force = overlap_balance(problem.packing, sequence.snapshots, problem.k, noise)
-        motion, geometry = (estimate.contacts.key, estimate.fn), (posterior.contacts.key, posterior.fn)
-        balance = contacts.key, force[:, 0]
-        return cls(_agree(motion, geometry), _agree(geometry, balance), _agree(motion, balance))
+def _with_agreements(
+    problem: FrameProblem, evidence: Evidence, estimate: Estimate, posterior: FramePosterior
+) -> Evidence:
+    """Add the correlations of f_n between the estimates of a frame, over the contacts of either."""
+    sequence, overlap = problem.sequence, problem.settings.overlap
+    assert overlap is not None
+    noise = float(np.hypot(problem.snapshot.sigma, overlap))  # surfaces are no smoother than that
+    contacts, force = overlap_balance(problem.packing, sequence.snapshots, problem.k, noise)
+    motion, geometry = (estimate.contacts.key, estimate.fn), (posterior.contacts.key, posterior.fn)
+    balance = contacts.key, force[:, 0]
+    return replace(
+        evidence,
+        agreement=_agree(motion, geometry),
+        position_agreement=_agree(geometry, balance),
+        overlap_agreement=_agree(motion, balance),
+        agreement_age=0,
+    )
 
-    @classmethod
-    def carried(cls, evidence: Evidence) -> _Agreement:
-        return cls(
-            evidence.agreement, evidence.position_agreement, evidence.overlap_agreement, evidence.agreement_age + 1
-        )
+
+def _with_agreements_of(evidence: Evidence, before: Evidence) -> Evidence:
+    """Carry the agreements of the previous frame on."""
+    return replace(
+        evidence,
+        agreement=before.agreement,
+        position_agreement=before.position_agreement,
+        overlap_agreement=before.overlap_agreement,
+        agreement_age=before.agreement_age + 1,
+    )
 
 
 def _agree(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
@@ -154,15 +166,13 @@ def _agree(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
 
 
 def _motion_estimate(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
-    estimate = _estimate_by_ensemble(problem, state, None, NO_MISSING)
+    estimate = _estimate_by_ensemble(problem, state, None)
     return estimate, gather_evidence(problem, estimate, state)
 
 
 def _always_uses_positions(problem: FrameProblem) -> bool:
     """Whether the position-only estimate is used whatever the motion shows."""
     settings = problem.settings
-    if problem.sequence.positions is None:
-        return False
     if settings.positions == "always" or settings.soft or not problem.motion.ends_here:
         return True
     # Loading without sliding looks like agreement, and no load contradicts it.
@@ -217,11 +227,8 @@ def mean_stress(problem: FrameProblem, estimate: Estimate) -> float:
     return 0.5 * float(np.trace(stress))
 
 
-def gather_evidence(
-    problem: FrameProblem, estimate: Estimate, state: SequenceState, agreement: _Agreement | None = None
-) -> Evidence:
+def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceState) -> Evidence:
     """Gather the evidence of the reported field; ε and ū are those of the recorded chain."""
-    agreement = _Agreement() if agreement is None else agreement
     packing, snapshot, step = problem.packing, problem.snapshot, estimate.step
     pressure = mean_stress(problem, estimate)
     load = packing.mean_pressure(snapshot)
@@ -256,10 +263,6 @@ def gather_evidence(
         information=measure_motion_information(
             packing, snapshot, problem.motion, estimate.contacts, estimate.fn, step.walls, soft=problem.settings.soft
         ),
-        agreement=agreement.estimates,
-        position_agreement=agreement.positions,
-        overlap_agreement=agreement.overlaps,
-        agreement_age=agreement.age,
         force_change=_force_change(estimate, state),
     )
 
@@ -310,10 +313,8 @@ def _advance_chain(problem: FrameProblem, state: SequenceState, reach: float, th
     )
 
 
-def _estimate_by_ensemble(
-    problem: FrameProblem, state: SequenceState, positions: FramePosterior | None, missing: MissingContacts
-) -> Estimate:
-    found = solve_ensemble(problem, state.members, positions, missing)
+def _estimate_by_ensemble(problem: FrameProblem, state: SequenceState, positions: FramePosterior | None) -> Estimate:
+    found = solve_ensemble(problem, state.members, positions)
     friction = problem.packing.material.friction_at(found.step.contacts.with_wall)
     return Estimate(
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,

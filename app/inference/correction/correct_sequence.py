@@ -19,6 +19,7 @@ from .close_photographs import advise_stride
 from .friction import measure_friction, measure_friction_of_walls, tuned_radii
 from .outliers import replace_outliers
 from .radii import calibrate_with_radii
+from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
 from .softness import find_softness
 from .unseen import add_unseen
@@ -51,6 +52,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     """
     walls, settings = inputs.walls, inputs.settings
     tracks, outlier_remark = replace_outliers(inputs.tracks)
+    tracks, gap_remark = interpolate_short_gaps(tracks)
     given = make_snapshots(tracks, walls)
     failed = find_unseen(given) | tracks.failed
     nothing_seen = len(failed) == tracks.frame_count
@@ -62,13 +64,13 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         )
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
-    remarks = [outlier_remark, "", "", ""]
+    remarks = [outlier_remark, gap_remark, "", "", ""]
     if settings.boundary is not None:
         if settings.boundary.camera:
-            tracks, remarks[1] = correct_camera(tracks, walls)
+            tracks, remarks[2] = correct_camera(tracks, walls)
         if settings.sequence.measure_precision:
-            tracks, remarks[2] = measure_noise(tracks, walls)
-        remarks[3] = advise_stride(tracks)
+            tracks, remarks[3] = measure_noise(tracks, walls)
+        remarks[4] = advise_stride(tracks)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
     if settings.calibration is not None:
         sequence = find_softness(inputs.material, settings.sequence, tracks, walls, failed)

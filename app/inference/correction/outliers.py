@@ -12,11 +12,12 @@ from ...solver.bodies.grains import Array
 from ...tracks import Tracks, TrackStatus
 
 NEIGHBOURS = 8  # whose median motion a rod is compared with
-JUMP = 8.0  # robust standard deviations of a rod's deviation from its neighbours beyond which it jumps …
-NOISE = 8.0  # … and standard deviations of a position
+JUMP = 6.0  # robust standard deviations of a rod's deviation from its neighbours beyond which it jumps …
+NOISE = 6.0  # … and standard deviations of a position
 RETURN = 0.5  # a jump that is undone leaves at most this fraction of it
 ONE_SIDED = 1.2  # times the least jump, where no later photograph shows the return
 PENETRATION = 0.15  # of the jump: a wrong pose overlaps a neighbour by more of it, a rod that really moved does not
+PASSES = 3  # an outlier hides the one before or after it until it is interpolated
 MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
 ROBUST = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
 
@@ -39,13 +40,18 @@ def replace_outliers(tracks: Tracks) -> tuple[Tracks, str]:
     Notes
     -----
     With d_k the displacement of a rod in step k less the median of its neighbours', its deviation in photograph k is
-    e = (d_k − d_{k+1})/2. It is an outlier if |e| > max(8 s, 8 σ), s the robust standard deviation of e over the rods,
+    e = (d_k − d_{k+1})/2. It is an outlier if |e| > max(6 s, 6 σ), s the robust standard deviation of e over the rods,
     |d_k + d_{k+1}| < |e|, so that the jump is undone, and the rod would overlap a neighbour by 0.15 |e| more than
     without the jump: rods that really jump, as rattlers do, cannot penetrate others. In the last photograph
     e = d_k − d_{k−1}, and 1.2 times as much is needed.
     """
-    outlier = find_outliers(tracks)
-    position = _interpolate(tracks, outlier)
+    outlier, position = np.zeros(tracks.status.shape, np.bool_), tracks.position
+    for _ in range(PASSES):
+        more = find_outliers(replace(tracks, position=position)) & ~outlier
+        if not more.any():
+            break
+        outlier |= more
+        position = _interpolate(replace(tracks, position=position), more)
     count = int(outlier.sum())
     if not count:
         return tracks, ""
@@ -115,7 +121,7 @@ def _interpolate(tracks: Tracks, outlier: NDArray[np.bool_]) -> Array:
     position = tracks.position.copy()
     for k in np.flatnonzero(outlier.any(axis=1)):
         rows, last = np.flatnonzero(outlier[k]), k == tracks.frame_count - 1
-        neighbours = _neighbours(tracks.position[k - 1], np.flatnonzero(~outlier[k]), rows)
+        neighbours = neighbour_rows(tracks.position[k - 1], np.flatnonzero(~outlier[k]), rows)
         middle = tracks.position[k - 1] if last else 0.5 * (tracks.position[k - 1] + tracks.position[k + 1])
         position[k, rows] = middle[rows] + np.nanmedian(tracks.position[k][neighbours] - middle[neighbours], axis=1)
     return position
@@ -128,13 +134,13 @@ def _relative_step(tracks: Tracks, k: int) -> Array:
     if len(known) <= NEIGHBOURS:
         return np.full_like(step, np.nan)
     relative = np.full_like(step, np.nan)
-    near = _neighbours(tracks.position[k - 1], known, known)
+    near = neighbour_rows(tracks.position[k - 1], known, known)
     relative[known] = step[known] - np.median(step[near], axis=1)
     return relative
 
 
-def _neighbours(position: Array, among: NDArray[np.int64], of: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Rows of the nearest of `among` for each of `of` (m, NEIGHBOURS), itself left out."""
+def neighbour_rows(position: Array, among: NDArray[np.int64], of: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Rows of the nearest of `among` for each of `of` (m, NEIGHBOURS), itself left out; position (n, 2) [m]."""
     finite = among[np.isfinite(position[among, 0])]
     _, near = KDTree(position[finite]).query(position[of], k=NEIGHBOURS + 1)
     rows = finite[near]

@@ -21,6 +21,7 @@ from itertools import chain
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pandas as pd
 import pytest
 from rodsight.recording.viewing import open_viewer, recording_server
@@ -159,9 +160,23 @@ def _write_foreign_files(folder: Path) -> None:
     balls = "".join(f"{x}\t{y}\t0\t0.008\n" for x, y in zip(frame.x, frame.y, strict=True))
     (folder / "spheres.txt").write_text(f"#format x_y_z_r\n{balls}")
     assert rodsight("export", "dic", "runs/shear", "--out", "folder") == 0
+    for file in (folder / "folder").glob("dic_out_*.txt"):
+        _add_corners(file)
     (folder / "solved").mkdir()
     for stem in ("DSC9_solved", "DSC10_solved"):
         write_frame(folder / "solved", stem)
+
+
+def _add_corners(file: Path) -> None:
+    """Add the corners of the frame, as rows of radius 1, to the poses of a photograph."""
+    rows = np.loadtxt(file, skiprows=1)
+    reach = rows[:, 3].max()
+    (left, top), (right, bottom) = rows[:, :2].min(axis=0) - reach, rows[:, :2].max(axis=0) + reach
+    corners = np.zeros((4, rows.shape[1]))
+    corners[:, :2] = [(left, bottom), (right, bottom), (right, top), (left, top)]  # y down
+    corners[:, 3], corners[:, -3:] = 1.0, 1.0
+    table = np.vstack([rows, corners])
+    file.write_text("\n".join([str(len(table)), *(" ".join(map(repr, row)) for row in table.tolist()), ""]))
 
 
 @pytest.fixture
