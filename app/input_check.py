@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from . import pipeline
-from .inference.predicted_accuracy import EXAMINED_PHOTOGRAPHS, measure_data_quality
-from .prediction import describe_photographs, describe_prediction
+from .inference.trial import TRIAL_PHOTOGRAPHS
+from .prediction import Prediction, describe_photographs, predict_accuracy
+from .results.finding import Finding
 from .run_folder import Run
 from .tracks import Tracks, WallTracks
 
@@ -25,13 +26,14 @@ class InputReport:
     grains: int | None  # None: not detected yet
     walls: tuple[str, ...]
     boundaries: str  # in a phrase
-    expected_correlation: float = UNKNOWN  # of the normal forces, at settled frames; NaN: not predicted
+    expected_correlation: float = UNKNOWN  # of the normal forces; NaN: not predicted
     expected_low: float = UNKNOWN  # with `expected_high`, an interval with a coverage of two thirds
     expected_high: float = UNKNOWN
-    sufficient: bool | None = None  # whether the motion determines the forces; None: not predicted
+    sufficient: bool | None = None  # whether forces with r >= .9 are expected; None: not predicted
     notes: tuple[str, ...] = field(default_factory=tuple)  # remarks on the input
+    diagnosis: tuple[Finding, ...] = field(default_factory=tuple)  # causes of what contradicts the forces
     unused: tuple[str, ...] = field(default_factory=tuple)  # columns of tables that are not used
-    prediction: tuple[str, ...] = field(default_factory=tuple)  # sentences on the expected accuracy
+    prediction: tuple[str, ...] = field(default_factory=tuple)  # the verdict, then sentences on the data
 
     def content(self) -> str:
         """Describe the content of the experiment in a phrase."""
@@ -54,7 +56,7 @@ def check_input(run: Run, *, predict: bool = True) -> InputReport:
     run : Run
         Its folder is not used.
     predict : bool
-        Track the first three photographs, or use the first frames of given tracks.
+        Track the first photographs, or use the first frames of given tracks, and solve them on a trial basis.
 
     Raises
     ------
@@ -64,25 +66,22 @@ def check_input(run: Run, *, predict: bool = True) -> InputReport:
     tracks, walls = pipeline.check(run)
     photographed = run.experiment.config.photographs is not None
     count = len(run.experiment.photographs()) if tracks is None else tracks.frame_count
-    first, first_walls, sentences = tracks, walls, []
+    first, first_walls, found = tracks, walls, Prediction(None, None)
     if first is None:  # rods and walls that run would refuse are refused here
-        first, first_walls = pipeline.check_first_photographs(run, EXAMINED_PHOTOGRAPHS if predict else 1)
+        first, first_walls = pipeline.check_first_photographs(run, TRIAL_PHOTOGRAPHS if predict else 1)
+    sentences: list[str] = []
     if predict:
-        if tracks is None:
-            sentences = describe_photographs(run.experiment)
-        assert first is not None
-        sentences += describe_prediction(first, first_walls)[0]
+        found = predict_accuracy(run.experiment.config, first, first_walls, run.progress)
+        sentences = found.describe() + (describe_photographs(run.experiment) if tracks is None else [])
     unused = tuple(
         f"{file}: columns that are not used: {', '.join(names)}."
         for file, names in run.experiment.inputs.unused_columns.items()
         if names
     )
-    quality = measure_data_quality(first, first_walls) if predict and first is not None else None
-    r, low, high = (UNKNOWN,) * 3 if quality is None else quality.expected
     return InputReport(
-        run.experiment.name, count, photographed, None if first is None else first.grain_count,
-        () if walls is None else walls.name, _describe_boundaries(tracks, walls), r, low, high,
-        None if quality is None else quality.suffices, tuple(run.notes), unused, tuple(sentences),
+        run.experiment.name, count, photographed, first.grain_count,
+        () if walls is None else walls.name, _describe_boundaries(tracks, walls), *found.expected,
+        found.good if found.trial is not None else None, tuple(run.notes), found.diagnosis, unused, tuple(sentences),
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
 from .inference.corrected_sequence import CorrectedSequence
+from .inference.diagnosis.diagnose import diagnose_solved
 from .inference.frame_store import CheckpointStore, FrameStore, SolvedFrame
 from .inference.infer_sequence import FIRST_FRAME, InferenceObserver, infer_sequence
 from .inference.inference_settings import material_of, settings_of
@@ -264,6 +265,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
         log_file = f"; see {run.file(FAILURES)}" if run.file(FAILURES).exists() else ""
         first = results.frames[0].reason
         raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {first}{log_file}")
+    results = replace(results, diagnosis=tuple(diagnose_solved(inputs, results, run.progress)))
     results = _store(run, _named(run, results), origin, log)
     store.checkpoint.clear()
     run.timings.add("solving", since)

@@ -2,18 +2,105 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .experiment.config.experiment_file import ExperimentFile
 from .experiment.experiment import Experiment, GrainGuess, read_grain_guess
-from .inference.predicted_accuracy import EXAMINED_PHOTOGRAPHS, NOT_PREDICTED, measure_data_quality
+from .inference.data_quality import DataQuality, measure_data_quality
+from .inference.diagnosis.diagnose import diagnose
+from .inference.infer_sequence import InferenceObserver
+from .inference.inference_settings import material_of, settings_of
+from .inference.inputs import Inputs
+from .inference.trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial
+from .process.errors import UndeterminedError
 from .process.progress import Progress, no_progress
+from .results.finding import Finding
 from .tracks import Tracks, WallTracks
 
 if TYPE_CHECKING:
     from .tracking.picture_quality import PictureQuality
+
+GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
+DOUBTFUL = 0.97  # expected r(f_n) below which rival inputs are compared
+NOT_PREDICTED = (
+    "The accuracy of the forces is not predicted: a prediction needs grains and walls seen in two consecutive "
+    "photographs."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Accuracy of the forces by the first photographs, solved as a run solves them."""
+
+    quality: DataQuality | None  # None: cannot be measured
+    trial: Trial | None  # None: there are no forces
+    remark: str = ""  # why there are none
+    diagnosis: tuple[Finding, ...] = ()  # causes of what contradicts the forces
+
+    @property
+    def expected(self) -> tuple[float, float, float]:
+        """Expected r(f_n), and an interval with a coverage of two thirds; NaN where there is no trial."""
+        return (math.nan,) * 3 if self.trial is None else self.trial.expected
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing speaks against the forces."""
+        return self.expected[0] >= GOOD and not self.diagnosis
+
+    def verdict(self) -> str:
+        """State the prediction in a sentence."""
+        r, low, high = self.expected
+        if self.trial is None or math.isnan(r):
+            return self.remark or NOT_PREDICTED
+        number = f"expected r(f_n) {r:.2f} ({low:.2f} to {high:.2f})"
+        if self.trial.stride > 1:
+            number += f" from every {_ordinal(self.trial.stride)} photograph, --frames ::{self.trial.stride}"
+        obstacle = "" if self.quality is None else self.quality.obstacle
+        if self.diagnosis:
+            return f"Something is wrong: {number}. {' '.join(each.sentence() for each in self.diagnosis)}"
+        if r >= GOOD:
+            return f"The forces can be found: {number}."
+        if r < POOR and obstacle:
+            return f"These data cannot carry forces: {obstacle}; {number}."
+        reason = obstacle or self.trial.worst
+        if r < POOR:
+            return f"Something is wrong: {number}; {reason}."
+        return f"The forces are uncertain: {number}; {reason}."
+
+    def describe(self) -> list[str]:
+        """State the prediction, then what the data are like."""
+        return [self.verdict(), *([] if self.quality is None else self.quality.describe())]
+
+
+def predict_accuracy(
+    config: ExperimentFile, tracks: Tracks, walls: WallTracks | None, progress: Progress = no_progress
+) -> Prediction:
+    """Predict the accuracy of the forces by a trial solution of the first photographs.
+
+    Parameters
+    ----------
+    config : ExperimentFile
+        Material and settings.
+    tracks, walls : Tracks, WallTracks or None
+        Of the whole test or of its first photographs.
+    progress : callable
+        Called after every frame.
+    """
+    quality = measure_data_quality(tracks, walls)
+    if walls is None:
+        return Prediction(quality, None)
+    inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
+    try:
+        trial = solve_trial(inputs, observer=InferenceObserver(progress))
+        doubted = trial if trial is not None and trial.expected[0] < DOUBTFUL else None
+        return Prediction(quality, trial, diagnosis=tuple(diagnose(inputs, doubted, progress)))
+    except UndeterminedError as error:
+        return Prediction(quality, None, f"The first photographs alone do not determine everything: {error}.")
 
 
 def track_first_photographs(
@@ -22,7 +109,7 @@ def track_first_photographs(
     """Track the first photographs without storing the result. Raises InputError where no grain is found."""
     from .tracking.stage import track_first  # imported late: given tracks do not need it
 
-    return track_first(experiment, EXAMINED_PHOTOGRAPHS, progress, notify)
+    return track_first(experiment, TRIAL_PHOTOGRAPHS, progress, notify)
 
 
 def measure_photographs(experiment: Experiment, rods: GrainGuess | None) -> PictureQuality:
@@ -43,7 +130,5 @@ def describe_photographs(experiment: Experiment) -> list[str]:
     return [*measured.facts(), *measured.faults()]
 
 
-def describe_prediction(tracks: Tracks, walls: WallTracks | None) -> tuple[list[str], bool]:
-    """Describe the expected accuracy of the forces from the first frames of tracks, and whether the data suffice."""
-    quality = measure_data_quality(tracks, walls)
-    return ([NOT_PREDICTED], False) if quality is None else (quality.describe(), quality.suffices)
+def _ordinal(number: int) -> str:
+    return {2: "second", 3: "third"}.get(number, f"{number}th")

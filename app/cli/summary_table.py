@@ -64,8 +64,16 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
             f"Trust (lower bound of the correlation with the true forces): {min(trusted):.2f} to "
             f"{max(trusted):.2f} over settled frames."
         )
+    lines += [
+        "[bold red]Something is wrong:[/] "
+        + escape(f"{each['cause'].replace('_', ' ')}: {each['evidence']}; {each['effect']}. Cure: {each['cure']}.")
+        for each in summary.get("diagnosis", [])
+    ]
     lines += _sd_line(summary) + budget_lines(summary) + _penalty_line(summary)
-    if not summary["loaded_walls"]:
+    lines += [_load_line(each) for each in summary.get("loads", [])]
+    if summary.get("weight") and not summary["loaded_walls"]:
+        lines.append(f"No wall has a given load: the weight of the rods, {summary['weight']:.3g} N, sets the scale.")
+    elif not summary["loaded_walls"]:
         lines.append(
             "[bold]No wall has a given pressure:[/] forces are known up to a scale, which differs between frames."
         )
@@ -152,6 +160,16 @@ def budget_lines(summary: dict[str, Any]) -> list[str]:
         f"Error budget: the forces have an error of {error:.0f} % (relative L2); of the variance {causes}.",
         f"Halving the error of {LARGEST_CAUSE[worst]} would reduce it to {after:.1f} % from {error:.1f} %.",
     ]
+
+
+def _load_line(load: dict[str, Any]) -> str:
+    """State the load on a wall in newtons, which sets the scale of the forces."""
+    wall, force = escape(load["wall"]), load["force"]
+    if load["pressure"] is None:
+        low, high = load["range"]
+        return f"Load on '{wall}', measured: {force:.4g} N in the mean ({low:.4g} to {high:.4g} N)."
+    parts = f"{load['pressure'] / 1e3:.4g} kPa × {load['width']:.4g} m × {load['length']:.3g} m"
+    return f"Load on '{wall}': {parts} = {force:.4g} N; it sets the scale of all forces."
 
 
 def _penalty_line(summary: dict[str, Any]) -> list[str]:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..solver.bodies.grains import Array
 from ..solver.bodies.motion import Snapshot
 from ..solver.calibration.gaps import MeasuredSequence
 from ..solver.inferred.unknown_rotations import fill_unknown_rotations
 from ..tracks import Tracks, WallTracks
+
+INTERPOLATED_SIGMAS = (
+    10.0  # standard deviations of an interpolated pose over those of a measured one: a weak measurement
+)
 
 
 def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
@@ -27,8 +33,8 @@ def measure_sequence(tracks: Tracks, walls: WallTracks) -> MeasuredSequence:
     """The same as what calibration reads."""
     present = tracks.present & ~tracks.interpolated
     rotation = _rotations(tracks, walls)
-    sigma = tracks.sigma.copy()
-    sigma[~present] = 0.0
+    sigma = np.where(tracks.interpolated, INTERPOLATED_SIGMAS * tracks.sigma, tracks.sigma)
+    sigma[~tracks.present] = 0.0
     return MeasuredSequence(
         tracks.radius, tracks.position, rotation, present, walls.endpoints, sigma, walls.side, walls.cell
     )

@@ -18,6 +18,7 @@ from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces
 from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import Tracks, WallTracks
+from .finding import Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,7 @@ class Results:
     friction_check: FrictionCheck | None = None
     radius_tuning: RadiusTuning | None = None  # None: not requested
     boundary: Boundary | None = None  # None: used as given
+    diagnosis: tuple[Finding, ...] = ()  # causes of wrong forces that the evidence supports
     ensemble_size: int = 0  # resampled sequences behind the standard deviations of the forces; 0: free formula
 
     def contact_friction(self, frame: int) -> Array:

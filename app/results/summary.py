@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from jaxtyping import Float
 
 from ..process.atomic import write_atomically
 from ..solver.assessment.statistic_intervals import CONSTANT
+from ..solver.bodies.walls import Walls
 from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ..solver.statistics.agreement import Agreement
 from ..solver.statistics.frame_statistics import FrameStatistics
@@ -119,6 +121,9 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         },
         "error_budget": _error_budget(frames),
         "fn_deviation": _plain([frame.fn_deviation for frame in frames]),
+        "loads": _loads(results),
+        "weight": _weight(results),
+        "diagnosis": [each.as_plain() for each in results.diagnosis],
         "friction": _friction(results),
         "wall_force_error": _wall_force_error(results, settled),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
@@ -195,6 +200,35 @@ def _friction(results: Results) -> dict[str, Any] | None:
         "walls": _plain([check.wall_measured, check.wall_low, check.wall_high]),
         "agrees": check.agrees if check.enclosed else None,  # None: undetermined
     }
+
+
+def _loads(results: Results) -> list[dict[str, Any]]:
+    """Return the load on every plate [N] with what it follows from; measured ones as mean and range."""
+    walls, length, found = results.walls, _material(results).get("length"), []
+    width = Walls.at_rest(walls.endpoints[0], side=walls.side).face
+    for w, name in enumerate(walls.name):
+        measured = np.empty(0) if walls.load is None else walls.load[:, w][np.isfinite(walls.load[:, w])]
+        pressure = float(walls.pressure[w])
+        known: dict[str, Any] = {"wall": name, "width": float(width[w]), "length": length, "pressure": None}
+        if len(measured):
+            limits = [float(measured.min()), float(measured.max())]
+            found.append(known | {"force": float(measured.mean()), "range": limits})
+        elif np.isfinite(pressure) and length is not None:
+            found.append(known | {"pressure": pressure, "force": pressure * float(width[w]) * length})
+    return found
+
+
+def _weight(results: Results) -> float | None:
+    """Return the weight of all rods [N]; None without gravity."""
+    x, y = _material(results).get("gravity", (0.0, 0.0))
+    total = results.grains.weight((float(x), float(y))).sum(axis=0)
+    return float(np.linalg.norm(total)) if total.any() else None
+
+
+def _material(results: Results) -> dict[str, Any]:
+    """Return the material of the resolved configuration; empty where results have none."""
+    section = tomllib.loads(results.configuration).get("material", {})
+    return section if isinstance(section, dict) else {}
 
 
 def _finite(value: Any) -> Any:

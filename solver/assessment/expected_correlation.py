@@ -26,6 +26,7 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "gap_error": lambda e: e.information.gap_error / e.information.diameter,
     "force_change": lambda e: e.force_change,
 }
+ONE_SIDED = 1.645  # standard deviations of a normal distribution that 5 % are beyond, on one side
 LEAST = 1e-4  # of a measure: its logarithm is taken
 
 
@@ -47,7 +48,7 @@ def expect_correlation(evidence: Evidence) -> float:
     r = tanh(b + Σ h_j(ln x_j)) with non-increasing, piecewise linear h_j of the measures x_j, fitted on simulated
     packings (fitted.toml). A measure that is not known adds nothing.
     """
-    return max(math.tanh(_score(evidence)), 0.0)
+    return max(math.tanh(correlation_score(evidence)), 0.0)
 
 
 def bound_correlation(evidence: Evidence) -> float:
@@ -58,22 +59,39 @@ def bound_correlation(evidence: Evidence) -> float:
     T = tanh(g − s_0 − s_1 max(2.6 − g, 0)) with g the argument of `expect_correlation`: the less is expected, the less
     certain it is.
     """
-    return _bound(_score(evidence), _table(evidence))
+    return _bound(correlation_score(evidence), _table(evidence))
+
+
+def expected_interval(evidence: Evidence) -> tuple[float, float, float]:
+    """Expected correlation, and an interval that holds two thirds of the true ones.
+
+    Notes
+    -----
+    The bound is 1.64 standard deviations of a normal distribution of g below the expected one.
+    """
+    score, table = correlation_score(evidence), _table(evidence)
+    sd = _margin(score, table) / ONE_SIDED
+    return tuple(max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
 
 
 def losses(evidence: Evidence) -> dict[str, float]:
     """By how much the bound would rise if one measure were at its best, for each known measure."""
-    table, score = _table(evidence), _score(evidence)
+    table, score = _table(evidence), correlation_score(evidence)
     best = {name: float(each["value"][0]) - _term(each, MEASURES[name](evidence)) for name, each in _terms(table)}
     return {name: _bound(score + rise, table) - _bound(score, table) for name, rise in best.items()}
 
 
 def _bound(score: float, table: dict[str, Any]) -> float:
+    return max(math.tanh(score - _margin(score, table)), 0.0)
+
+
+def _margin(score: float, table: dict[str, Any]) -> float:
     margin, slope, start = (float(table[name]) for name in ("margin", "slope", "start"))
-    return max(math.tanh(score - margin - slope * max(start - score, 0.0)), 0.0)
+    return margin + slope * max(start - score, 0.0)
 
 
-def _score(evidence: Evidence) -> float:
+def correlation_score(evidence: Evidence) -> float:
+    """Argument g of the expected correlation tanh(g), which may be negative."""
     table = _table(evidence)
     return float(table["constant"]) + sum(_term(each, MEASURES[name](evidence)) for name, each in _terms(table))
 

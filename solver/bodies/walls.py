@@ -16,6 +16,10 @@ from .cell import Cell
 from .grains import Array
 from .wall_shapes import STRAIGHT, Sides, all_sides, wall_distance
 
+PARALLEL = 0.1  # sine of the angle between two walls below which they do not bound each other
+BEYOND_END = 0.2  # of a wall's length: so far beyond its ends it still bounds another one
+NEGLIGIBLE_OVERHANG = 1e-3  # of the length: within the precision of ends
+
 
 @dataclass(frozen=True, slots=True)
 class Walls:
@@ -77,8 +81,34 @@ class Walls:
 
     @property
     def face(self) -> Array:
-        """Length of the surface of every wall: of the segment, or the circumference (w,) [m]."""
-        return np.where(self.curved, np.pi, 1.0) * self.length
+        """Length of the surface of every wall that rods can touch (w,) [m].
+
+        Of a circle the circumference; of a segment the part between its neighbours, which it may overhang.
+        """
+        return np.where(self.curved, np.pi * self.length, self.length - self._overhang())
+
+    def _overhang(self) -> Array:
+        """Length of every segment that lies outside of the walls crossing it (w,) [m]."""
+        start, along, length = self.endpoints[:, 0], self.direction, self.length
+        straight = np.flatnonzero(~self.curved)
+        begin, end = np.zeros(self.count), length.copy()
+        for w in straight.tolist():
+            for v in straight.tolist():
+                crossing = along[v, 0] * along[w, 1] - along[v, 1] * along[w, 0]
+                if v == w or abs(crossing) < PARALLEL:
+                    continue
+                apart = start[w] - start[v]
+                here = -(along[v, 0] * apart[1] - along[v, 1] * apart[0]) / crossing  # [m] along w
+                there = (along[w, 1] * apart[0] - along[w, 0] * apart[1]) / crossing  # [m] along v
+                if not (0.0 < here < length[w] and abs(there / length[v] - 0.5) < 0.5 + BEYOND_END):
+                    continue
+                # the packing is to the left of v: towards the end of w, or towards its beginning
+                if crossing > 0.0:
+                    begin[w] = max(begin[w], here)
+                else:
+                    end[w] = min(end[w], here)
+        overhang = length - (end - begin)
+        return np.where((end > begin) & (overhang > NEGLIGIBLE_OVERHANG * length), overhang, 0.0)
 
     @property
     def centre(self) -> Array:

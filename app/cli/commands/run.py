@@ -138,7 +138,7 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
-    """Validate an experiment, and predict the accuracy of its forces from three photographs or their tracks.
+    """Validate an experiment, and predict the accuracy of its forces from its first photographs.
 
     Example: rodsight check sample_data/shear
     """
@@ -151,8 +151,10 @@ def check(
         print(json.dumps(report.as_plain(), indent=1))
         return 0
     console = request.console
+    for verdict in report.prediction[:1]:
+        print_line(console, verdict)
     console.print(f"{report.name}: the input is valid: {report.content()}.", highlight=False)
-    for sentence in (*report.notes, *report.unused, *report.prediction):
+    for sentence in (*report.notes, *report.unused, *report.prediction[1:]):
         print_line(console, sentence)
     return 0
 

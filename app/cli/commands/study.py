@@ -84,7 +84,7 @@ def study(
     jobs: Annotated[int, tyro.conf.arg(metavar="N", help="worlds, trust: processes")] = 1,
     fit: Annotated[
         tuple[int, ...],
-        tyro.conf.arg(metavar="SEED", help="trust, intervals, numbers, budget: also fit the constants on these seeds"),
+        tyro.conf.arg(metavar="SEED", help="trust, intervals, numbers: also fit the constants on these seeds"),
     ] = (),
     settings: Settings = (),
     out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="cache of simulated truths and scores")] = Path(
@@ -138,7 +138,7 @@ def study(
     if subject == "intervals":
         return _study_intervals(request, fit=fit, members=ensemble or 0)
     if subject == "budget":
-        return _study_budget(request, fit=fit)
+        return _study_budget(request)
     for option, given in (("--worlds", scenarios), ("--jobs", jobs != 1), ("--set", settings), ("--json", as_json)):
         if given:
             raise InputError("study", f"{option} with {subject}", "applies to worlds only")
@@ -311,15 +311,12 @@ def _study_intervals(request: _StudyRequest, *, fit: tuple[int, ...], members: i
     return 0
 
 
-def _study_budget(request: _StudyRequest, *, fit: tuple[int, ...]) -> int:
+def _study_budget(request: _StudyRequest) -> int:
     from ...study.scenarios import predictions
 
     console = table_console()
     scenarios = request.scenarios or predictions.COMPARED_SCENARIOS
     with progress_of(request.quiet) as progress:
-        if fit:
-            found = predictions.fit_prediction(predictions.study_predictions(request.plan, scenarios, fit, progress))
-            console.print(f"Fitted on seeds {' '.join(map(str, fit))}: {found}", highlight=False)
         outcomes = predictions.study_predictions(request.plan, scenarios, request.seeds, progress)
     predictions.print_predictions(console, outcomes)
     return 0

@@ -22,6 +22,19 @@ def advise_stride(tracks: Tracks) -> str:
     -------
     str
         A sentence for the user; empty: the photographs are far enough apart, or too few.
+    """
+    stride = sufficient_stride(tracks)
+    if stride == 1:
+        return ""
+    return (
+        "photographs follow one another so closely that noise hides the sliding between them "
+        f"({1e6 * _displacement(tracks, 1):.0f} µm where noise is {1e6 * _noise(tracks):.0f} µm): compare the forces "
+        f"from one photograph in {stride}, --frames ::{stride}"
+    )
+
+
+def sufficient_stride(tracks: Tracks) -> int:
+    """Number of photographs over which sliding exceeds noise; 1: neighbouring ones do, or there are too few.
 
     Notes
     -----
@@ -30,21 +43,21 @@ def advise_stride(tracks: Tracks) -> str:
     interval once, but sliding grows with its length. Smoothing the positions instead would make the errors of
     neighbouring photographs alike.
     """
-    present, frames = tracks.present, tracks.frame_count
-    if frames < 2 * LEAST_INTERVALS or not present.any():
-        return ""
-    noise = SLIP_SIGMAS * float(np.sqrt(np.mean(tracks.sigma[present] ** 2)))
-    first = _displacement(tracks, 1)
-    if not first < HIDDEN * noise:
-        return ""
+    frames = tracks.frame_count
+    if frames < 2 * LEAST_INTERVALS or not tracks.present.any():
+        return 1
+    noise = _noise(tracks)
+    if not _displacement(tracks, 1) < HIDDEN * noise:
+        return 1
     for stride in range(2, min(MOST_STRIDE, (frames - 1) // LEAST_INTERVALS) + 1):
         if _displacement(tracks, stride) >= VISIBLE * noise:
-            return (
-                "photographs follow one another so closely that noise hides the sliding between them "
-                f"({1e6 * first:.0f} µm where noise is {1e6 * noise:.0f} µm): compare the forces from one photograph "
-                f"in {stride}, --frames ::{stride}"
-            )
-    return ""
+            return stride
+    return 1
+
+
+def _noise(tracks: Tracks) -> float:
+    """Standard deviation of a measured sliding [m]."""
+    return SLIP_SIGMAS * float(np.sqrt(np.mean(tracks.sigma[tracks.present] ** 2)))
 
 
 def _displacement(tracks: Tracks, stride: int) -> float:

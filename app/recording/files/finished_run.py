@@ -131,6 +131,7 @@ def write_recording(
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, survey.force_range), truth, options.tolerance, results.radius_tuning,
+        tuple(each.sentence() for each in results.diagnosis),
     )  # fmt: skip
     run = _Run(results, survey, scene, photograph, options.active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]

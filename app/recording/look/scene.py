@@ -37,6 +37,7 @@ class Scene:
     truth: TruthContacts | None = None
     tolerance: float | None = None  # stopping level of the residual
     radius_tuning: RadiusTuning | None = None
+    diagnosis: tuple[str, ...] = ()  # sentences
 
     @property
     def rod_length(self) -> float:

@@ -85,6 +85,7 @@ def write_summary(scene: Scene, frames: list[FrameSummary], clipped: int, total:
         for part in (
             f"# {scene.name}",
             _counts(scene, frames),
+            _diagnosis(scene),
             _trust(frames),
             _trust_penalties(frames),
             _accuracy(frames),
@@ -137,6 +138,13 @@ def _trust(frames: list[FrameSummary]) -> str:
         "wrong friction coefficient, wrong radii or a missed contact. Read forces of frames that are not *settled* "
         "with care."
     )
+
+
+def _diagnosis(scene: Scene) -> str:
+    """Return what makes the forces wrong; empty where nothing contradicts the model."""
+    if not scene.diagnosis:
+        return ""
+    return "\n".join(["## Something is wrong", "", *(f"- {printable(each)}" for each in scene.diagnosis)])
 
 
 def _trust_penalties(frames: list[FrameSummary]) -> str:

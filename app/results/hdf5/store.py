@@ -23,6 +23,7 @@ from ...process.errors import InputError
 from ...process.frame_range import FrameRange
 from ...solver.sequence.ensemble import MEMBERS
 from ...tracks import Tracks, WallTracks
+from ..finding import Finding
 from ..manifest import MANIFEST, Manifest
 from ..results import Results
 from ..schema import DEVIATIONS, SCHEMA, SCHEMA_VERSION
@@ -72,6 +73,7 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         _write_origin(store, results.name, origin)
         store.attrs["configuration"] = results.configuration
         store.attrs["friction"] = results.friction
+        store.attrs["diagnosis"] = json.dumps([each.as_plain() for each in results.diagnosis])
         write_results(store, results)
         for path in DEVIATIONS:
             store[path].attrs["source"] = _source_of_deviation(results.ensemble_size)
@@ -100,6 +102,7 @@ def load_results(file: Path) -> Results:
             boundary=stored.part("boundary"),
             friction_check=stored.part("friction_check"),
             radius_tuning=stored.part("radius_tuning"),
+            diagnosis=tuple(Finding(**each) for each in json.loads(str(store.attrs.get("diagnosis", "[]")))),
             ensemble_size=_ensemble_size(store),
         )
 

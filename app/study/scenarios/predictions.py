@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
+from scipy.stats import spearmanr
 
 from ...experiment.experiment import load_experiment
-from ...inference.predicted_accuracy import REFERENCE_STEP, AccuracyFit, DataQuality, measure_data_quality
+from ...inference.data_quality import REFERENCE_STEP
+from ...prediction import Prediction, predict_accuracy
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...synthetic.scenarios.preset_names import ScenarioName
@@ -23,53 +24,39 @@ from .score_table import describe_seeds, score_scenarios
 
 COMPARED_SCENARIOS: tuple[ScenarioName, ...] = (
     "shear", "sheared", "biaxial", "isotropic", "unseen", "centres", "radii_03", "radii_1", "step_05", "step_1",
-    "ten_frames", "outer", "soft", "mu_low", "mu_high",
+    "ten_frames", "outer", "soft", "mu_low", "mu_high", "loose", "noise_40", "stiff", "base_friction", "smooth_walls",
+    "cohesion", "inertia", "time_reversed", "theta_degrees", "mu_01", "top_fixed", "aspect_1", "class_2", "wrong_class",
 )  # fmt: skip
-MIN_TESTS = 4  # to fit three numbers
-MIN_ERROR = 1e-3  # 1 − r, lower bound in the fit
+HIGH, POOR_RESULT = 0.95, 0.9  # predicted r above which no test may reach less than the second
 
 
 @dataclass(frozen=True, slots=True)
 class PredictionOutcome:
-    """One scenario and seed: the budget of its first photographs, and the score of the whole test."""
+    """One scenario and seed: what its first photographs predict, and the score of the whole test."""
 
     score: ScenarioScore
-    quality: DataQuality | None  # None: no prediction is possible
+    prediction: Prediction | None  # None: the input was refused
+
+    @property
+    def expected(self) -> tuple[float, float, float]:
+        """Expected r and its interval; NaN where nothing is predicted."""
+        return (math.nan,) * 3 if self.prediction is None else self.prediction.expected
 
     @property
     def inside(self) -> bool | None:
         """Whether r lies in the interval; None where one of them is missing."""
-        if self.quality is None or self.score.r_late is None:
+        r, low, high = self.expected
+        if math.isnan(r) or self.score.r_late is None:
             return None
-        _, low, high = self.quality.expected
         return low <= self.score.r_late <= high
 
 
 def study_predictions(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
 ) -> list[PredictionOutcome]:
-    """Score every scenario of every seed and measure the budget of its first photographs."""
+    """Score every scenario of every seed, and predict its accuracy from its first photographs."""
     scores = score_scenarios(plan, scenarios, seeds, progress=progress)
-    return [PredictionOutcome(score, _measure_quality(plan, score.scenario, score.seed)) for score in scores]
-
-
-def fit_prediction(outcomes: Sequence[PredictionOutcome]) -> AccuracyFit:
-    """Fit ln(1 − r) on noise and step. Raises InputError with fewer than MIN_TESTS tests to fit on."""
-    known = [
-        (each.quality, each.score.r_late) for each in outcomes
-        if each.quality is not None and each.score.r_late is not None and not each.quality.gaps_unclear
-    ]  # fmt: skip
-    if len(known) < MIN_TESTS:
-        raise InputError(
-            "study budget", f"--fit with {len(known)} tests", f"needs {MIN_TESTS} or more tests with a prediction"
-        )
-    rows = np.array([[1.0, *quality.predictors] for quality, _ in known])
-    error = np.log([max(1.0 - r, MIN_ERROR) for _, r in known])
-    found, _, rank, _ = np.linalg.lstsq(rows, error, rcond=None)
-    freedom = max(len(known) - int(rank), 1)
-    deviation = math.sqrt(float(np.sum((rows @ found - error) ** 2)) / freedom)
-    a, b, c = found.tolist()
-    return AccuracyFit(a, b, c, deviation)
+    return [PredictionOutcome(score, _predict(plan, score.scenario, score.seed)) for score in scores]
 
 
 def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -> None:
@@ -80,17 +67,21 @@ def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -
     for each in outcomes:
         table.add_row(each.score.scenario, str(each.score.seed), *_cells(each))
     console.print(table)
-    inside = [each.inside for each in outcomes if each.inside is not None]
+    known = [each for each in outcomes if each.inside is not None]
+    reached, expected = [each.score.r_late for each in known], [each.expected[0] for each in known]
+    excessive = sum(r < POOR_RESULT and e > HIGH for r, e in zip(reached, expected, strict=True) if r is not None)
+    rank = float(spearmanr(reached, expected).statistic) if len(set(expected)) > 2 else math.nan
     console.print(
-        f"{sum(inside)} of {len(inside)} are in their interval, which should hold two of three. gaps: standard "
-        f"deviation of the gaps of touching grains over a diameter. Reference step: "
-        f"{math.degrees(REFERENCE_STEP):.2g}°. Seeds "
+        f"{sum(bool(each.inside) for each in known)} of {len(known)} are in their interval, which should hold two of "
+        f"three; rank correlation of prediction and result {rank:.2f}; {excessive} predictions above {HIGH} of those "
+        f"that reached less than {POOR_RESULT}. gaps: standard deviation of the gaps of touching grains over a "
+        f"diameter. Reference step: {math.degrees(REFERENCE_STEP):.2g}°. Seeds "
         + describe_seeds([each.score for each in outcomes]),
         highlight=False, soft_wrap=True,
     )  # fmt: skip
 
 
-def _measure_quality(plan: StudyPlan, scenario: ScenarioName, seed: int) -> DataQuality | None:
+def _predict(plan: StudyPlan, scenario: ScenarioName, seed: int) -> Prediction | None:
     with TemporaryDirectory() as folder:
         made = make_scenario(Path(folder), scenario, seed, grains=plan.grains, cache=plan.folder / "kept")
         experiment = load_experiment(made.folder, plan.settings)
@@ -98,20 +89,16 @@ def _measure_quality(plan: StudyPlan, scenario: ScenarioName, seed: int) -> Data
             tracks, walls = read_scenario(experiment)
         except InputError:
             return None
-    return measure_data_quality(tracks, walls)
+    return predict_accuracy(experiment.config, tracks, walls)
 
 
 def _cells(each: PredictionOutcome) -> list[str]:
-    quality, r = each.quality, each.score.r_late
-    reached = "–" if r is None else f"{r:.3f}"
-    if quality is None:
-        return ["–", "–", "–", "–", "–", "–", reached, "no prediction"]
-    remark = {True: "", False: "outside", None: "refused"}[each.inside]
-    return [
-        f"{quality.noise_ratio:.3f}",
-        f"{math.degrees(quality.shear):.2f}",
-        f"{100.0 * quality.gap_sd / quality.diameter:.2f}",
-        *(f"{value:.3f}" for value in quality.expected),
-        reached,
-        remark,
-    ]
+    quality = None if each.prediction is None else each.prediction.quality
+    r = each.score.r_late
+    data = ["–"] * 3
+    if quality is not None:
+        step, gaps = math.degrees(quality.shear), 100.0 * quality.gap_sd / quality.diameter
+        data = [f"{quality.noise_ratio:.3f}", f"{step:.2f}", f"{gaps:.2f}"]
+    expected = ["–" if math.isnan(value) else f"{value:.3f}" for value in each.expected]
+    remark = {True: "", False: "outside", None: "refused" if each.prediction is None else "no prediction"}[each.inside]
+    return [*data, *expected, "–" if r is None else f"{r:.3f}", remark]

@@ -159,7 +159,8 @@ def _bytes_of(forces: FrameForces) -> int:
 def frame_summaries(data: RunData) -> dict[str, Any]:
     """Summarise every photograph up to the last one that is solved; None for those before the run."""
     tracks, count = data.tracks, len(data.frames)
-    lost = np.isin(tracks.status, (TrackStatus.LOST, TrackStatus.OUT_OF_FRAME)).sum(axis=1)
+    missing = (TrackStatus.LOST, TrackStatus.OUT_OF_FRAME, TrackStatus.INTERPOLATED)
+    lost = np.isin(tracks.status, missing).sum(axis=1)
     suspect = (tracks.status == TrackStatus.SUSPECT).sum(axis=1)
     summaries = _summaries(data)
     before: list[Any] = [None] * data.first
@@ -170,6 +171,7 @@ def frame_summaries(data: RunData) -> dict[str, Any]:
         **{name: before + rounded([getattr(each, name) for each in summaries]) for name in NUMBERS},
         "lost": before + lost.tolist(), "suspect_poses": before + suspect.tolist(),
         "time": before + tracks.time[:count].tolist(),
+        "diagnosis": [] if data.results is None else [each.sentence() for each in data.results.diagnosis],
     }  # fmt: skip
 
 

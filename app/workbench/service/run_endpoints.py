@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...experiment.plausibility import check_packing
-from ...prediction import describe_prediction, track_first_photographs
+from ...prediction import predict_accuracy, track_first_photographs
 from ...process.errors import InputError
 from ...recording.look.colours import FORCE_RAMP, OPEN, PROBABILITY_RAMP, UNCERTAINTY_RAMP, WEAK
 from ...recording.look.force_style import THICKEST, THINNEST
@@ -40,8 +40,9 @@ def prediction(workbench: Workbench, at: Text) -> dict[str, Any]:
     tracks, walls = track_first_photographs(validation.experiment, notify=notes.append)
     if walls is not None:
         notes += check_packing(validation.experiment, tracks, walls)
-    sentences, good = describe_prediction(tracks, walls)
-    return {"messages": [*notes, *sentences], "mark": "good" if good else "doubtful"}
+    found = predict_accuracy(validation.experiment.config, tracks, walls)
+    verdict, *details = found.describe()
+    return {"messages": [verdict, *notes, *details], "mark": "good" if found.good else "doubtful"}
 
 
 @endpoint

@@ -1,4 +1,4 @@
-"""Predicted accuracy is compared with the result of a test, and its constants are fitted to results."""
+"""Predictions of `check` are compared with the results of whole tests."""
 
 import io
 import math
@@ -6,56 +6,63 @@ from dataclasses import replace
 
 import pytest
 from rich.console import Console
-from rodsight.inference.predicted_accuracy import ACCURACY_FIT, REFERENCE_STEP, DataQuality
-from rodsight.process.errors import InputError
-from rodsight.study.scenarios.predictions import PredictionOutcome, fit_prediction, print_predictions
+from rodsight.inference.trial import Trial
+from rodsight.prediction import Prediction
+from rodsight.solver.assessment.evidence import Evidence
+from rodsight.solver.assessment.expected_correlation import bound_correlation, expected_interval
+from rodsight.study.scenarios.predictions import PredictionOutcome, print_predictions
 from rodsight.study.scenarios.scenario_score import ScenarioScore
 
-GOOD = DataQuality(3, 1e-5, 1e-5, 1.2e-4, REFERENCE_STEP, 0.2, 0.1, -5e-6, 1.4e-5, 0.016)
-QUALITIES = [
-    replace(GOOD, noise=noise, shear=step * REFERENCE_STEP) for noise in (1e-5, 2e-5, 5e-5) for step in (1.0, 2.0, 4.0)
-]
+from ..inference.test_data_quality import GOOD
+
+SOUND = Evidence(False, 0.05, 0.1, 0.01, 0.01, 1.0, 1e-3, 4e-3, 5, agreement=0.96, overlap_agreement=0.9)
+WRONG = replace(SOUND, correction=2.0, old_unbalance=0.15, agreement=0.1, overlap_agreement=0.1)
 
 
-def outcome(quality: DataQuality | None, r: float | None) -> PredictionOutcome:
-    return PredictionOutcome(ScenarioScore("shear", 2, "", r=(None, None, None, r)), quality)
+def predicted(evidence: Evidence | None) -> Prediction:
+    return Prediction(GOOD, None if evidence is None else Trial((evidence,), 1))
 
 
-def test_the_fit_recovers_the_constants_behind_r():
-    def error(quality: DataQuality, sign: int) -> float:
-        noise, step = quality.predictors
-        return math.exp(-3.0 + 0.3 * noise + 0.5 * step + 0.2 * sign)
-
-    found = fit_prediction([outcome(each, 1.0 - error(each, sign)) for each in QUALITIES for sign in (-1, 1)])
-    assert (found.a, found.b, found.c) == pytest.approx((-3.0, 0.3, 0.5))
-    assert found.sd == pytest.approx(0.2 * math.sqrt(18 / 15))
+def outcome(prediction: Prediction | None, r: float | None) -> PredictionOutcome:
+    return PredictionOutcome(ScenarioScore("shear", 2, "", r=(None, None, None, r)), prediction)
 
 
-def test_tests_without_result_or_prediction_are_not_fitted():
-    with pytest.raises(InputError, match="needs 4"):
-        fit_prediction(
-            [outcome(QUALITIES[0], 0.9), outcome(None, 0.9), outcome(QUALITIES[1], None), outcome(QUALITIES[2], 0.9)]
-        )
+def test_the_prediction_is_the_expected_correlation_of_the_first_photographs():
+    assert predicted(SOUND).expected == pytest.approx(expected_interval(SOUND))
+    r, low, high = predicted(SOUND).expected
+    assert bound_correlation(SOUND) < low < r < high < 1.0
+
+
+def test_the_verdict_names_what_contradicts_the_forces():
+    assert predicted(SOUND).good
+    assert predicted(SOUND).verdict().startswith("The forces can be found: expected r(f_n) 0.9")
+    assert not predicted(WRONG).good
+    verdict = predicted(WRONG).verdict()
+    assert verdict.startswith("Something is wrong: expected r(f_n) 0.")
+    assert "agree" in verdict or "correct the measured motion" in verdict
+    hidden = Prediction(replace(GOOD, noise=1.2e-4), Trial((WRONG,), 1))
+    assert hidden.verdict().startswith("These data cannot carry forces: noise is 1.0 of the motion")
+    assert "every third photograph, --frames ::3" in Prediction(GOOD, Trial((SOUND,), 3)).verdict()
+    assert predicted(None).verdict().startswith("The accuracy of the forces is not predicted")
 
 
 def test_results_outside_the_predicted_interval_are_marked():
-    r, low, high = GOOD.expected
+    r, low, high = predicted(SOUND).expected
     cases = [
-        outcome(GOOD, r),
-        outcome(GOOD, low - 0.01),
-        outcome(GOOD, high + 1e-3),
+        outcome(predicted(SOUND), r),
+        outcome(predicted(SOUND), low - 0.01),
+        outcome(predicted(SOUND), 1.0),
         outcome(None, 0.5),
-        outcome(GOOD, None),
+        outcome(predicted(None), 0.5),
+        outcome(predicted(SOUND), None),
     ]
-    assert [each.inside for each in cases] == [True, False, False, None, None]
+    assert high < 1.0
+    assert [each.inside for each in cases] == [True, False, False, None, None, None]
+    assert math.isnan(cases[3].expected[0])
     printed = io.StringIO()
     print_predictions(Console(file=printed, width=200), cases)
-    assert printed.getvalue().count("outside") == 2
-    assert "1 of 3 are in their interval" in printed.getvalue()
-    assert "no prediction" in printed.getvalue()
-
-
-def test_the_constants_in_use_lower_r_for_more_noise_and_larger_steps():
-    assert ACCURACY_FIT.b > 0.0
-    assert ACCURACY_FIT.c > 0.0
-    assert 0.1 < ACCURACY_FIT.sd < 1.0
+    text = printed.getvalue()
+    assert text.count("outside") == 2
+    assert "1 of 3 are in their interval" in text
+    assert "no prediction" in text
+    assert "refused" in text

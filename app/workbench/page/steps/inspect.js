@@ -30,6 +30,7 @@ export const inspect = {
     if (!facts) return [h("p", {}, "There are no forces yet: run the experiment first."), h("button", { class: "primary", onclick: () => app.goTo("run") }, "To the run")];
     if (facts.provisional) return h("p", {}, "The run is not finished: step 6 shows the frames that are solved.");
     return [
+      chosen ? null : facts.diagnosis.map((text) => h("p", { class: "diagnosis" }, sign("doubtful"), text)),
       h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", onchange: (event) => { by = event.target.value; app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === by }, how.words)))),
       h("div", { class: "row" }, h("button", { class: recording ? "on" : "", id: "show-recording", onclick: () => toggleRecording(app), title: "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null),
       net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table")) : null,

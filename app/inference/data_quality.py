@@ -1,8 +1,4 @@
-"""Accuracy predicted from the first photographs: whether their motion determines the forces.
-
-Noise over motion, ambiguous pairs, sliding and gaps are measured on two or three photographs; the correlation r that
-they lead to was fitted on simulated scenarios (`rodsight study budget --fit` repeats the fit).
-"""
+"""Quality of the data, by the first photographs: noise over motion, sliding, ambiguous pairs and gaps."""
 
 from __future__ import annotations
 
@@ -28,40 +24,17 @@ from ..tracks import Tracks, WallTracks
 from .snapshots import make_snapshots
 
 EXAMINED_PHOTOGRAPHS = 3
-NOT_PREDICTED = (
-    "The accuracy of the forces is not predicted: a prediction needs grains and walls seen in two consecutive "
-    "photographs, and no periodic cell."
-)
-# A large standard deviation of the gaps of touching grains hides the contacts, whatever the motion: its values over the
-# mean diameter, and 1 − r, for simulated discs, for photoelastic discs, and for a ring of these.
-GAP_SD = (0.009, 0.0125, 0.05)
-GAP_ERROR = (0.05, 0.26, 0.85)
+UNCLEAR_GAPS = 0.009  # standard deviation of the gaps of touching grains over a diameter that hides the contacts
 VISIBLE_OFFSET = 0.015  # mean gap of touching grains over the mean diameter, above which it is reported
-NOISE_RATIOS = (0.05, 1.0)  # noise over motion, range of the fit
 REFERENCE_STEP = math.radians(0.25)
 HIDING_NOISE = 0.5  # noise over motion above which the motion has almost no information
 SUFFICIENT_NOISE = 0.25  # the same below which it has enough
 NO_SLIDING = 0.02  # fraction of sliding contacts below which the motion does not determine forces
 COARSE_STEPS = 2.0  # reference steps beyond which forces cannot be followed
-MANY_AMBIGUOUS = 0.5  # fraction of ambiguous pairs above which radii or centres must be found first
 AMBIGUOUS = (0.05, 0.95)  # P(touch) between which a pair is ambiguous
 TOUCHING = 0.5  # P(touch)
 DETECTABLE = 3.0  # standard deviations of a measured sliding beyond which it is detected
 SLIDING_SIGMAS = 2.8  # sd of a sliding over that of a position: two grains, translation and rotation, two photographs
-
-
-@dataclass(frozen=True, slots=True)
-class AccuracyFit:
-    """Fit of ln(1 − r) = a + b ln(noise / motion) + c ln(max(step / .25°, 1)), and its standard deviation."""
-
-    a: float
-    b: float
-    c: float
-    sd: float
-
-
-# Fitted on simulated scenarios, seeds 0, 1 and 3, with 10 to 100 µm of noise.
-ACCURACY_FIT = AccuracyFit(-3.29, 0.235, 0.424, 0.45)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,39 +58,12 @@ class DataQuality:
         return self.noise / self.motion if self.motion > 0.0 else math.inf
 
     @property
-    def expected(self) -> tuple[float, float, float]:
-        """Expected r of the normal forces, by the fit, and the ends of an interval with a coverage of two thirds."""
-        noise, steps = self.predictors
-        error = ACCURACY_FIT.a + ACCURACY_FIT.b * noise + ACCURACY_FIT.c * steps
-        if self.gaps_unclear:
-            error = max(error, self._error_of_gaps)
-        r, low, high = (max(1.0 - math.exp(error + k * ACCURACY_FIT.sd), 0.0) for k in (0.0, 1.0, -1.0))
-        return r, low, high
-
-    @property
-    def predictors(self) -> tuple[float, float]:
-        """ln(noise / motion) and ln(step / .25°), limited to the range of the fit."""
-        noise = math.log(float(np.clip(self.noise_ratio, *NOISE_RATIOS)))
-        return noise, math.log(max(self.shear / REFERENCE_STEP, 1.0))
-
-    @property
     def gaps_unclear(self) -> bool:
         """Whether the gaps of touching grains vary so much that contacts cannot be detected."""
-        return self.gap_sd > GAP_SD[0] * self.diameter
-
-    @property
-    def suffices(self) -> bool:
-        """Whether the motion determines the forces."""
-        return self.noise_ratio < HIDING_NOISE and not self.sliding < NO_SLIDING and not self.gaps_unclear
-
-    @property
-    def _error_of_gaps(self) -> float:
-        """ln(1 − r) by the standard deviation of the gaps."""
-        ratio = math.log(self.gap_sd / self.diameter)
-        return float(np.interp(ratio, np.log(GAP_SD), np.log(GAP_ERROR)))
+        return self.gap_sd > UNCLEAR_GAPS * self.diameter
 
     def describe(self) -> list[str]:
-        """Describe the quality of the data and the expected accuracy in two or three sentences."""
+        """Describe noise, motion and gaps in one to three sentences."""
         step = math.degrees(self.shear)
         stated = "" if self.noise == self.stated_noise else f" (stated: {1e6 * self.stated_noise:.3g} µm)"
         lines = [
@@ -132,32 +78,25 @@ class DataQuality:
                 f"{_percent(self.gap_offset / self.diameter)} of a diameter: all radii are "
                 f"{0.5e6 * self.gap_offset:.3g} µm too small, or the pixel size is too large."
             )
-        r, low, high = self.expected
-        expected = f"expected r(f_n) {r:.2f} ({low:.2f} to {high:.2f})"
+        if self.shear > COARSE_STEPS * REFERENCE_STEP:
+            lines.append(f"In steps of {math.degrees(REFERENCE_STEP):.2g}° forces could be followed between frames.")
+        return lines
+
+    @property
+    def obstacle(self) -> str:
+        """Why the motion does not determine the forces, with the cure; empty: it does."""
         if self.gaps_unclear:
-            return [
-                *lines,
-                "These data hardly show which grains touch: the gaps of touching grains have a standard deviation of "
-                f"{100.0 * self.gap_sd / self.diameter:.1f} % of a diameter, by noise or errors of centres and radii; "
-                f"{expected}.",
-            ]
-        if self.suffices:
-            return [*lines, f"The motion determines the forces: {expected}{self._advice()}."]
+            return (
+                "the gaps of touching grains have a standard deviation of "
+                f"{100.0 * self.gap_sd / self.diameter:.1f} % of a diameter, by noise or errors of centres and radii: "
+                "they hardly show which grains touch"
+            )
         if self.noise_ratio >= HIDING_NOISE:
-            why = (
+            return (
                 f"noise is {self.noise_ratio:.1f} of the motion between neighbours; use a step "
                 f"{self.noise_ratio / SUFFICIENT_NOISE:.2g} times as large"
             )
-        else:
-            why = "almost nothing slides; use a step with more shear"
-        return [*lines, f"The motion alone does not determine the forces: {why}. Positions are used as well."]
-
-    def _advice(self) -> str:
-        if self.shear > COARSE_STEPS * REFERENCE_STEP:
-            return f"; in steps of {math.degrees(REFERENCE_STEP):.2g}° forces could be followed from frame to frame"
-        if self.ambiguous > MANY_AMBIGUOUS:
-            return "; radii or centres are wrong by more than noise: calibration on all photographs can find the errors"
-        return ""
+        return "almost nothing slides; use a step with more shear" if self.sliding < NO_SLIDING else ""
 
 
 def measure_data_quality(tracks: Tracks, walls: WallTracks | None) -> DataQuality | None:

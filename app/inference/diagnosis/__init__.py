@@ -1,0 +1,1 @@
+"""Diagnosis: which error of the input, or which physics, explains what contradicts the forces."""

@@ -1,0 +1,62 @@
+"""Names of the causes that a diagnosis can give, with their effect and cure. The documentation lists this table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...results.finding import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Something that makes forces wrong."""
+
+    effect: str
+    cure: str
+
+
+CAUSES: dict[str, Cause] = {
+    "photographs_reversed": Cause(
+        "friction acts in the direction of sliding instead of against it", "turn the order of the photographs round"
+    ),
+    "photographs_swapped": Cause(
+        "the motion goes to and fro where the packing did not", "put the photographs in the order of their times"
+    ),
+    "photograph_repeated": Cause(
+        "no motion leads to the second of both, and its forces rest on the positions alone", "leave one of them out"
+    ),
+    "rotation_sign": Cause("rolling is taken for sliding", "give theta counter-clockwise with y up: change its sign"),
+    "rotation_in_degrees": Cause("rolling is taken for sliding", "give theta in radians"),
+    "rotation_zero": Cause(
+        "rolling is taken for sliding", "leave theta out where it was not measured: it is then unknown, not zero"
+    ),
+    "friction": Cause(
+        "tangential forces are limited wrongly, and with them the normal forces",
+        'set material.friction to the value found, or to "measured"',
+    ),
+    "wall_friction": Cause(
+        "tangential forces at the walls are limited wrongly", "set material.wall_friction to the value found"
+    ),
+    "walls_shifted": Cause(
+        "rods seem to penetrate walls or to leave them", "give the walls at the times of the photographs"
+    ),
+    "wall_at_rest": Cause(
+        "rods seem to penetrate the wall or to leave it", "give the motion of the wall in every photograph"
+    ),
+    "stretched_picture": Cause(
+        "rods that touch seem apart in one direction and overlap in the other",
+        "calibrate the camera: x and y have different scales",
+    ),
+    "class_radii": Cause("contacts of one size of rods are lost or invented", "measure the radii of every size anew"),
+    "not_explained": Cause(
+        "the forces contradict the motion, the positions or one another",
+        "check radii, walls, pixel size and tracks; the packing may do what this model lacks, such as cohesion, "
+        "friction on the base, or inertia",
+    ),
+}
+
+
+def finding(cause: str, evidence: str) -> Finding:
+    """Return a finding with the documented effect and cure of its cause."""
+    known = CAUSES[cause]
+    return Finding(cause, evidence, known.effect, known.cure)

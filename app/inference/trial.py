@@ -1,0 +1,96 @@
+"""Trial solution: the forces of the first photographs, solved as a run does, and what their evidence leads to expect.
+
+A prediction that does not solve anything cannot see wrong input; the evidence of solved frames can.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..solver.assessment.evidence import Evidence
+from ..solver.assessment.expected_correlation import correlation_score, expected_interval
+from ..solver.assessment.penalties import assess, find_penalties
+from .correction.close_photographs import sufficient_stride
+from .frame_store import MemoryStore
+from .infer_sequence import InferenceObserver, infer_sequence
+from .inputs import Inputs
+
+TRIAL_PHOTOGRAPHS = 6
+SETTLED = 2  # frames from which on a trial is judged: earlier ones lack a history
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """Evidence of the first frames of a sequence, solved on a trial basis."""
+
+    evidence: tuple[Evidence, ...]  # of the judged frames
+    stride: int  # between the photographs that were solved
+
+    @property
+    def expected(self) -> tuple[float, float, float]:
+        """Expected r(f_n), mean over the judged frames, and an interval with a coverage of two thirds."""
+        found = [
+            np.array(expected_interval(each)) * _kept(each)
+            for each in self.evidence
+            if not math.isnan(each.disagreement)
+        ]
+        if not found:
+            return math.nan, math.nan, math.nan
+        r, low, high = np.mean(found, axis=0).tolist()
+        return r, low, high
+
+    @property
+    def score(self) -> float:
+        """Mean arctanh of the expected r(f_n), by which trials are compared; −∞ without forces."""
+        found = [correlation_score(each) for each in self.evidence if not math.isnan(each.disagreement)]
+        return float(np.mean(found)) if found else -math.inf
+
+    @property
+    def worst(self) -> str:
+        """The weightiest reason against the forces, in words; empty: none."""
+        found = [each for evidence in self.evidence for each in find_penalties(evidence)[:1]]
+        return max(found).words if found else ""
+
+
+def solve_trial(
+    inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, observer: InferenceObserver | None = None, *, first: int = 0
+) -> Trial | None:
+    """Solve the first photographs of a sequence as a run would.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Of the whole test, or of its first photographs.
+    photographs : int
+        How many are solved. Where noise hides the sliding between neighbouring ones, one in several is taken.
+    observer : InferenceObserver, optional
+        Receives the progress.
+    first : int
+        First photograph.
+
+    Returns
+    -------
+    Trial or None
+        None: fewer than two photographs, no walls, or no forces.
+    """
+    stride = sufficient_stride(inputs.tracks)
+    part = (first, min(first + stride * (photographs - 1) + 1, inputs.tracks.frame_count), stride)
+    tracks, walls = inputs.tracks.frames(*part), inputs.walls.frames(*part)
+    if tracks.frame_count < 2:
+        return None
+    store = MemoryStore()
+    settings = inputs.settings.without_sweeps()
+    given = replace(inputs, tracks=tracks, walls=walls, settings=settings)
+    infer_sequence(given, observer, store, complete=False)
+    judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
+    evidence = tuple(each.state.evidence for each in judged if each.state.evidence.assessed)
+    return Trial(evidence, stride) if evidence else None
+
+
+def _kept(evidence: Evidence) -> float:
+    """Fraction of the expected correlation that is left by penalties outside of the fitted model."""
+    expected = expected_interval(evidence)[0]
+    return assess(evidence).expected_correlation / expected if expected > 0.0 else 0.0

@@ -1,0 +1,24 @@
+"""One cause that a diagnosis found, as results and summaries hold it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A cause of wrong forces that the evidence supports."""
+
+    cause: str  # a name of the documented list
+    evidence: str  # in a clause
+    effect: str
+    cure: str
+
+    def sentence(self) -> str:
+        """State cause, evidence, effect and cure."""
+        name = self.cause.replace("_", " ")
+        return f"{name[0].upper()}{name[1:]}: {self.evidence}; {self.effect}. Cure: {self.cure}."
+
+    def as_plain(self) -> dict[str, str]:
+        """Return the values of summary.json."""
+        return asdict(self)
