@@ -23,7 +23,7 @@ VALIDATED = "experiment/config/"  # folder where a ValueError reports a wrong ke
 # Functions whose texts are warnings of a frame, a run or an experiment.
 WARNINGS = {
     "solver/assessment/penalties.py": (
-        "_sliding", "_noise", "_spacing", "_radii", "_boundary", "_softness", "_unseen", "_disagreement",
+        "_sliding", "_noise", "_spacing", "_radii", "_boundary", "_softness", "_unseen", "_size", "_disagreement",
         "_correction", "penalise_friction",
     ),
     "solver/assessment/status.py": ("decide_status", "_decide", "find_faults", "_describe_change"),

@@ -26,6 +26,7 @@ class Evidence:
     holes: int = 0  # gaps inside the walls that a rod would fit into
     inferred: int = 0  # grains that no photograph shows
     grains: int = 0  # present in the frame
+    interior: float = math.inf  # grains with neighbours all around: neither at a wall nor on the convex hull
     reach: float = 0.0  # gap threshold of a single chain over the mean diameter
     assessed: bool = True  # False: no motion leads to the frame
     mixed_trust: float = math.nan  # expected correlation of the mixed field; NaN: not mixed

@@ -14,7 +14,7 @@ from ..statistics.sliding import contact_state, sliding_probability_at
 from .evidence import Evidence
 from .expected_correlation import losses
 from .force_intervals import widen_for_friction
-from .trust import Assessment, motion_assessment, unseen_penalty
+from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 
 COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
 SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
@@ -53,7 +53,7 @@ def assess(evidence: Evidence) -> Assessment:
 
 def find_penalties(evidence: Evidence) -> list[Penalty]:
     """All penalties of a frame, the largest first."""
-    found = [_boundary(evidence), _softness(evidence), _unseen(evidence), *_contradictions(evidence)]
+    found = [_boundary(evidence), _softness(evidence), _unseen(evidence), _size(evidence), *_contradictions(evidence)]
     return sorted((each for each in found if each is not None and each.fraction > 0.0), reverse=True)
 
 
@@ -136,6 +136,15 @@ def _softness(evidence: Evidence) -> Penalty | None:
     return Penalty(
         SOFT_CHAIN_LOSS, "the grains are soft, which a single chain cannot use: the ensemble reads their overlaps"
     )
+
+
+def _size(evidence: Evidence) -> Penalty | None:
+    limit = interior_limit(evidence)
+    words = (
+        f"only {evidence.interior} grains have neighbours all around: too few to judge their forces; photograph "
+        "a larger part of the packing"
+    )
+    return Penalty(1.0 - limit, words, counted=True) if limit < 1.0 else None
 
 
 def _unseen(evidence: Evidence) -> Penalty | None:

@@ -22,6 +22,7 @@ from .fitted import FITTED
 CHAIN_CORRECTION: tuple[float, float] = tuple(FITTED["trust"]["single_chain_correction"])
 CHAIN_REACH: float = FITTED["trust"]["single_chain_reach"]
 INFERRED_PENALTY: float = FITTED["trust"]["inferred_penalty"]
+TRUST_PER_INTERIOR_GRAIN = 0.05  # few grains agree by chance, and most of their forces follow from the boundary
 MAX_UNSEEN_FRACTION = 0.2  # of the grains; a tracker rarely loses more than one in ten
 
 
@@ -64,6 +65,11 @@ def motion_assessment(evidence: Evidence) -> Assessment:
     return Assessment(*(_reduce_for_unseen(each, evidence) for each in found))
 
 
+def interior_limit(evidence: Evidence) -> float:
+    """Greatest trust in a packing with so few interior grains; at least 1 with twenty of them."""
+    return TRUST_PER_INTERIOR_GRAIN * evidence.interior
+
+
 def unseen_penalty(evidence: Evidence) -> float:
     """Fraction of the trust lost to inferred grains, which no photograph shows."""
     return INFERRED_PENALTY * evidence.inferred / max(evidence.grains, 1)
@@ -75,6 +81,7 @@ def hidden_fraction(fn: Array, shown: NDArray[np.bool_]) -> float:
 
 
 def _reduce_for_unseen(trust: float, evidence: Evidence) -> float:
+    trust = min(trust, interior_limit(evidence))
     if evidence.unseen_fraction > MAX_UNSEEN_FRACTION:
         trust *= 1.0 - evidence.unseen_fraction
     seen = max(1.0 - unseen_penalty(evidence), 0.0)

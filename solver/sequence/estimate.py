@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from ..assessment.evidence import Evidence
 from ..assessment.expected_correlation import expect_correlation
@@ -36,6 +37,7 @@ NEGLIGIBLE_KAPPA = 1e-5  # below it the measured motion does not influence the f
 # A frame is steady where so much is expected of it; agreements then hold for so many frames.
 STEADY = 0.97
 STEADY_FRAMES = 4
+MIN_OF_HULL = 3  # points that a convex hull needs more than
 WIDER = 1.5  # threshold of the second attempt at a suspect frame
 
 
@@ -255,6 +257,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         start_forgotten=estimate.members.start_forgotten,
         holes=len(find_holes(packing.grains, snapshot.position, snapshot.present, step.walls)),
         grains=int(snapshot.present.sum()),
+        interior=_count_interior(problem, estimate),
         reach=estimate.threshold / (2.0 * float(packing.grains.radius.mean())),
         assessed=problem.motion.ends_here,
         mixed_trust=np.nan if estimate.mixture is None else estimate.mixture.trust,
@@ -265,6 +268,19 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         ),
         force_change=_force_change(estimate, state),
     )
+
+
+def _count_interior(problem: FrameProblem, estimate: Estimate) -> int:
+    """Number of free grains that neither touch a wall nor are vertices of the convex hull."""
+    packing, snapshot, contacts = problem.packing, problem.snapshot, estimate.contacts
+    inside = snapshot.present & packing.grains.free
+    if estimate.step.walls.cell is not None:
+        return int(inside.sum())
+    inside[contacts.i[contacts.with_wall]] = False
+    here = np.flatnonzero(snapshot.present)
+    if len(here) > MIN_OF_HULL:
+        inside[here[ConvexHull(snapshot.position[here]).vertices]] = False
+    return int(inside.sum())
 
 
 def _force_change(estimate: Estimate, state: SequenceState) -> float:

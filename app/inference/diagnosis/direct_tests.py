@@ -16,7 +16,8 @@ AGREES = 0.25  # rank correlation of stated and inferred rotations beyond which 
 SIGMAS = 5.0  # … and standard deviations of that of unrelated ones
 DEGREES = 10.0  # ratio of stated to inferred rotations: degrees are 57 times radians
 SHORTER = 0.75  # path through the photographs in another order over the given one, below which that order is right
-REPEATED = 0.1  # displacement of a step over the median step below which a photograph is repeated
+REPEATED = 0.1  # displacement of a step over the median step below which a photograph is repeated …
+STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
@@ -71,7 +72,9 @@ def examine_order(tracks: Tracks) -> list[Finding]:
     if swapped:
         pairs = ", ".join(f"{k} and {k + 1}" for k in swapped[:4]) + ("…" if len(swapped) > 4 else "")
         found.append(finding("photographs_swapped", f"the motion is shorter with photographs {pairs} swapped"))
-    repeated = np.flatnonzero(step < REPEATED * usual) if usual > MOVES * noise else np.empty(0, np.int64)
+    repeated = (
+        np.flatnonzero(step < max(REPEATED * usual, STILL * noise)) if usual > MOVES * noise else np.empty(0, np.int64)
+    )
     if len(repeated):
         words = ", ".join(f"{k + 1}" for k in repeated[:4].tolist())
         found.append(finding("photograph_repeated", f"nothing moves from the photograph before to photograph {words}"))

@@ -18,6 +18,7 @@ from rodsight.results.results import Results
 from rodsight.robustness.design import Case
 from rodsight.robustness.factors import FIRST_COMPARED
 from rodsight.robustness.study import Nominal, measure_case
+from rodsight.solver.contacts.contacts import ContactSource
 from rodsight.solver.frame_forces import FrameForces, FrameStatus
 from rodsight.synthetic.scenarios.scenario_folder import make_scenario
 
@@ -133,3 +134,18 @@ def test_a_sequence_without_a_solved_frame_is_neither_estimated_nor_checked(cont
     results = infer_sequence(inputs)
     assert {frame.status for frame in results.frames} == {FrameStatus.FAILED}
     assert results.friction_check is None
+
+
+def test_contacts_of_an_interpolated_rod_bear_force_and_are_marked(contradicted):
+    inputs, results = contradicted
+    frame, load = 4, np.bincount(results.frames[4].contacts.i, results.frames[4].fn)
+    rod = int(np.argmax(load))
+    position = inputs.tracks.position.copy()
+    position[frame, rod] = np.nan
+    found = infer_sequence(replace(inputs, tracks=replace(inputs.tracks, position=position)), complete=False)
+    forces = found.frames[frame]
+    theirs = (forces.contacts.i == rod) | (forces.contacts.j == rod)
+    assert forces.fn[theirs].sum() > 0.5 * load[rod]
+    assert (forces.source[theirs] == ContactSource.INTERPOLATED).all()
+    assert (forces.source[~theirs] != ContactSource.INTERPOLATED).all()
+    assert found.tracks.lost[frame].sum() == 1

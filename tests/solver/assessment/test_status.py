@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.formula_sd import normal_sd, tangential_sd
+from rodsight.solver.assessment.penalties import describe_penalties
 from rodsight.solver.assessment.status import (
     CHAIN_UNBALANCED,
     LOAD_FRACTIONS,
@@ -211,3 +212,10 @@ def test_a_chain_without_correction_has_no_trust():
 def test_without_a_motion_nothing_is_assessed():
     assert math.isnan(trust(replace(SOUND, assessed=False)))
     assert trust(replace(SOUND, assessed=False, mixed_trust=0.8)) == 0.8
+
+
+@pytest.mark.parametrize(("interior", "most"), [(1, 0.05), (5, 0.25), (10, 0.5)])
+def test_few_interior_grains_limit_the_trust_and_are_reported(interior, most):
+    few = replace(SOUND, interior=interior)
+    assert trust(few) <= most < trust(SOUND)
+    assert f"only {interior} grains" in describe_penalties(few)

@@ -188,3 +188,16 @@ def test_grain_rolling_on_a_rotating_core_does_not_slide():
     un, ut = relative_motion(contacts, np.array([RADIUS]), rolled.velocity, rolled.spin, walls)
     assert un == pytest.approx([0.0], abs=ROUNDING)
     assert ut == pytest.approx([0.0], abs=1e-8)
+
+
+@pytest.mark.parametrize("overhang", [0.0, 1e-5, 0.05, 0.4])
+def test_rods_touch_a_bar_between_its_neighbours(overhang):
+    box = np.array(
+        [
+            [[0.0, 0.0], [1.0, 0.0]],
+            [[1.0, 0.0], [1.1, 0.5]],
+            [[1.1 + overhang, 0.5], [0.1 - overhang, 0.5]],
+            [[0.1, 0.5], [0.0, 0.0]],
+        ]
+    )
+    assert Walls.at_rest(box).face == pytest.approx(Walls.at_rest(box).length - [0, 0, 2 * overhang, 0], abs=3e-5)

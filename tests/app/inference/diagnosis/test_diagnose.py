@@ -1,0 +1,75 @@
+"""A cause is named only where its rival clearly wins."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.inference.diagnosis import diagnose as module
+from rodsight.inference.diagnosis.causes import CAUSES
+from rodsight.inference.diagnosis.diagnose import diagnose
+from rodsight.inference.diagnosis.rivals import rivals_of
+from rodsight.inference.inputs import Inputs
+from rodsight.inference.trial import Trial
+from rodsight.solver.bodies.rods import RodMaterial
+
+from ...study.test_predictions import SOUND, WRONG
+from .test_direct_tests import box, rolling_tracks
+
+INPUTS = Inputs(rolling_tracks(), box(), RodMaterial())
+INPUTS = replace(INPUTS, tracks=replace(INPUTS.tracks, rotation=np.full_like(INPUTS.tracks.rotation, np.nan)))
+
+
+@pytest.fixture
+def scores(monkeypatch):
+    """Scores of rivals by their cause over that of the given input, instead of solving them."""
+    rises: dict[str, float] = {}
+    given = Trial((WRONG,), 1).score
+    by_input = {}
+
+    def rivals(inputs):
+        for each in rivals_of(inputs):
+            changed = each.change(inputs)
+            by_input[id(changed)] = (changed, each.cause)
+            yield replace(each, change=lambda _, changed=changed: changed)
+
+    monkeypatch.setattr(module, "rivals_of", rivals)
+    monkeypatch.setattr(module, "_score", lambda inputs, _: given + rises.get(by_input[id(inputs)][1], 0.0))
+    return rises
+
+
+def causes(trial=WRONG):
+    return [each.cause for each in diagnose(INPUTS, Trial((trial,), 1))]
+
+
+def test_the_clear_winner_is_named_with_effect_and_cure(scores):
+    scores["photographs_reversed"] = 0.8
+    (found,) = diagnose(INPUTS, Trial((WRONG,), 1))
+    assert found.cause == "photographs_reversed"
+    assert found.effect == CAUSES["photographs_reversed"].effect
+    assert "Cure: turn the order" in found.sentence()
+
+
+@pytest.mark.parametrize("rises", [{"friction": 0.15}, {"friction": 0.5, "wall_friction": 0.45}, {}])
+def test_without_a_clear_winner_nothing_is_blamed(scores, rises):
+    scores.update(rises)
+    assert causes() == ["not_explained"]
+    assert causes(SOUND) == []
+
+
+def test_every_rival_has_a_documented_cause_and_changes_the_input():
+    rivals = list(rivals_of(INPUTS))
+    assert {each.cause for each in rivals} <= set(CAUSES)
+    for rival in rivals:
+        changed = rival.change(INPUTS)
+        same = (
+            np.array_equal(changed.tracks.position, INPUTS.tracks.position)
+            and np.array_equal(changed.tracks.radius, INPUTS.tracks.radius)
+            and np.array_equal(changed.walls.endpoints, INPUTS.walls.endpoints)
+            and changed.material == INPUTS.material
+        )
+        assert not same or rival.cause == "walls_shifted"  # these walls rest
+
+
+def test_given_friction_that_is_measured_has_no_rival():
+    measured = replace(INPUTS, material=RodMaterial(friction_measured=True))
+    assert "friction" not in {each.cause for each in rivals_of(measured)}

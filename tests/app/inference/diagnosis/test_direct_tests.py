@@ -1,0 +1,95 @@
+"""Errors of the input that show without forces: rotations, the order of the photographs, walls at rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rodsight.inference.diagnosis.direct_tests import examine_order, examine_rotations, examine_walls
+from rodsight.tracks import Tracks, TrackStatus, WallTracks
+
+FRAMES, SIDE, PITCH, NOISE = 8, 8, 0.016, 1e-5
+N, RADIUS = SIDE * SIDE, 0.008
+STEP = 6e-3  # of shear between two photographs
+
+
+def rolling_tracks():
+    """Layers of rods that slide past one another in alternating directions, each rolling on its neighbours."""
+    x, y = (each.ravel() * PITCH + RADIUS for each in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
+    rng = np.random.default_rng(2)
+    layer = np.cumsum(rng.normal(0.0, 1.0, SIDE))[(y // PITCH).astype(int)]
+    time = np.arange(FRAMES)[:, None]
+    position = np.stack([x + STEP * PITCH * layer * time, np.broadcast_to(y, (FRAMES, N))], axis=-1)
+    position = position + NOISE * rng.standard_normal(position.shape)
+    flat = np.full((FRAMES, N), NOISE)
+    return Tracks(
+        np.arange(N), np.full(N, RADIUS), 30.0 * np.arange(FRAMES), position, np.zeros((FRAMES, N)), flat,
+        np.full((FRAMES, N), np.nan), np.full((FRAMES, N), TrackStatus.GIVEN, np.uint8),
+    )  # fmt: skip
+
+
+def box(frames=FRAMES):
+    """Bottom and top of a box around the rods."""
+    width = height = SIDE * PITCH
+    ends = np.array([[[0.0, 0.0], [width, 0.0]], [[width, height], [0.0, height]]])
+    return WallTracks(("bottom", "top"), np.repeat(ends[None], frames, axis=0), np.array([np.nan, 5e4]))
+
+
+def with_rolling(factor):
+    """The same with the rotations that rolling leads to expect, times a factor."""
+    from rodsight.solver.inferred.unknown_rotations import fill_unknown_rotations
+
+    tracks, walls = rolling_tracks(), box()
+    unknown = np.full_like(tracks.rotation, np.nan)
+    expected = fill_unknown_rotations(
+        tracks.radius, tracks.position, unknown, tracks.present, walls.endpoints, side=walls.side, cell=None
+    )
+    return replace(tracks, rotation=factor * expected)
+
+
+@pytest.mark.parametrize(
+    ("factor", "cause"), [(1.0, None), (-1.0, "rotation_sign"), (57.3, "rotation_in_degrees"), (0.0, "rotation_zero")]
+)
+def test_wrong_rotations_are_recognised(factor, cause):
+    found = examine_rotations(with_rolling(factor), box())
+    assert [each.cause for each in found] == ([] if cause is None else [cause])
+
+
+def test_unknown_and_unrelated_rotations_give_no_finding():
+    tracks = rolling_tracks()
+    assert examine_rotations(replace(tracks, rotation=np.full((FRAMES, N), np.nan)), box()) == []
+    random = np.random.default_rng(5).normal(size=(FRAMES, N))
+    assert examine_rotations(replace(tracks, rotation=random), box()) == []
+
+
+def test_photographs_in_order_give_no_finding():
+    assert examine_order(rolling_tracks()) == []
+
+
+def test_swapped_and_repeated_photographs_are_named():
+    tracks = rolling_tracks()
+    order = np.arange(FRAMES)
+    order[[3, 4]] = order[[4, 3]]
+    (swapped,) = examine_order(replace(tracks, position=tracks.position[order]))
+    assert swapped.cause == "photographs_swapped"
+    assert "3 and 4" in swapped.evidence
+    (repeated,) = examine_order(replace(tracks, position=tracks.position[[0, 1, 2, 3, 3, 4, 5, 6]]))
+    assert repeated.cause == "photograph_repeated"
+    assert "photograph 4" in repeated.evidence
+
+
+def test_a_return_of_the_loading_is_no_swap():
+    tracks = rolling_tracks()
+    assert examine_order(replace(tracks, position=tracks.position[[0, 1, 2, 3, 2, 1, 0, 1]])) == []
+
+
+def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
+    tracks, walls = rolling_tracks(), box()
+    assert examine_walls(tracks, walls) == []
+    rise = np.linspace(0.0, 1e-3, FRAMES)[:, None] * np.linspace(0.0, 1.0, N)
+    moved = replace(tracks, position=tracks.position + np.stack([0.0 * rise, rise], axis=-1))
+    (found,) = examine_walls(moved, walls)
+    assert found.cause == "wall_at_rest"
+    assert "penetrate wall 'top'" in found.evidence
+    endpoints = walls.endpoints.copy()
+    endpoints[:, 1, :, 1] += np.linspace(0.0, 1e-3, FRAMES)[:, None]
+    assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
