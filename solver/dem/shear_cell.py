@@ -86,11 +86,6 @@ class ShearCell(Simulation):
         return float(self._boundary.state[WIDTH])
 
     @property
-    def side_length(self) -> float:
-        """Length of the bars at both sides [m]."""
-        return self._side_length
-
-    @property
     def area(self) -> float:
         """Area between the walls [m²]."""
         return self.width * self.height

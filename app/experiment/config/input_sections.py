@@ -180,8 +180,8 @@ class Plate(Section):
     """Load and end points of one wall."""
 
     pressure: Annotated[float, between(1e-3, 1e11)] | None = key(
-        "Pressure that loads this wall; absent: its measured velocity is imposed. One loaded wall sets the scale of "
-        "all forces.",
+        "Pressure that loads this wall between its neighbours, where rods can touch it; absent: its measured velocity "
+        "is imposed. One loaded wall sets the scale of all forces.",
         unit="Pa",
         default=None,
     )

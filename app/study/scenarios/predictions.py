@@ -19,14 +19,29 @@ from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_folder import make_scenario
+from ...synthetic.scenarios.scenario_table import SCENARIOS
 from .scenario_score import ScenarioScore, StudyPlan, read_scenario
 from .score_table import describe_seeds, score_scenarios
 
+# The causes that a diagnosis may name; of every other scenario none, or "not_explained" where the model lacks physics.
+TRUE_CAUSE: dict[ScenarioName, str] = {
+    "time_reversed": "photographs_reversed", "swapped_frames": "photographs_swapped",
+    "duplicate_frame": "photograph_repeated", "theta_sign": "rotation_sign", "theta_zero": "rotation_zero",
+    "theta_degrees": "rotation_in_degrees", "mu_01": "friction", "mu_05": "friction", "mu_low": "friction",
+    "mu_high": "friction", "walls_late": "walls_shifted", "top_fixed": "wall_at_rest",
+    "aspect_03": "stretched_picture", "aspect_1": "stretched_picture", "class_2": "class_radii",
+    "smooth_walls": "wall_friction", "wrong_class": "not_explained",
+}  # fmt: skip
 COMPARED_SCENARIOS: tuple[ScenarioName, ...] = (
     "shear", "sheared", "biaxial", "isotropic", "unseen", "centres", "radii_03", "radii_1", "step_05", "step_1",
-    "ten_frames", "outer", "soft", "mu_low", "mu_high", "loose", "noise_40", "stiff", "base_friction", "smooth_walls",
-    "cohesion", "inertia", "time_reversed", "theta_degrees", "mu_01", "top_fixed", "aspect_1", "class_2", "wrong_class",
+    "ten_frames", "outer", "soft", "loose", "cyclic", "noise_40", "circle", "stiff", "base_friction", "cohesion",
+    "friction_spread", "inertia", "rolling", "sizes_10", *TRUE_CAUSE, "overhang", "outliers",
+    "missing_poses",
 )  # fmt: skip
+HEADINGS = (
+    "scenario", "seed", "noise/motion", "step °", "gaps %", "expected", "from", "to", "r from 3", "", "diagnosis",
+)  # fmt: skip
+NOT_EXPLAINED = "not_explained"
 HIGH, POOR_RESULT = 0.95, 0.9  # predicted r above which no test may reach less than the second
 
 
@@ -50,6 +65,18 @@ class PredictionOutcome:
             return None
         return low <= self.score.r_late <= high
 
+    @property
+    def named(self) -> str:
+        """Causes that the diagnosis named; empty: none."""
+        return "" if self.prediction is None else ", ".join(each.cause for each in self.prediction.diagnosis)
+
+    @property
+    def rightly(self) -> bool | None:
+        """Whether the true cause was named; None: none was named, or only that something is not explained."""
+        if self.named in ("", NOT_EXPLAINED):
+            return None
+        return self.named == TRUE_CAUSE.get(self.score.scenario)
+
 
 def study_predictions(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
@@ -62,8 +89,20 @@ def study_predictions(
 def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -> None:
     """Print a row for every scenario and seed, then the number of correct intervals."""
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 1, 0, 0))
-    for heading in ("scenario", "seed", "noise/motion", "step °", "gaps %", "expected", "from", "to", "r from 3", ""):
-        table.add_column(heading, justify="left" if heading in ("scenario", "") else "right", no_wrap=True)
+    for heading in (
+        "scenario",
+        "seed",
+        "noise/motion",
+        "step °",
+        "gaps %",
+        "expected",
+        "from",
+        "to",
+        "r from 3",
+        "",
+        "diagnosis",
+    ):
+        table.add_column(heading, justify="left" if heading in ("scenario", "", "diagnosis") else "right", no_wrap=True)
     for each in outcomes:
         table.add_row(each.score.scenario, str(each.score.seed), *_cells(each))
     console.print(table)
@@ -71,6 +110,13 @@ def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -
     reached, expected = [each.score.r_late for each in known], [each.expected[0] for each in known]
     excessive = sum(r < POOR_RESULT and e > HIGH for r, e in zip(reached, expected, strict=True) if r is not None)
     rank = float(spearmanr(reached, expected).statistic) if len(set(expected)) > 2 else math.nan
+    wrong_input = [each for each in outcomes if SCENARIOS[each.score.scenario].group == "wrong input"]
+    console.print(
+        f"The diagnosis named the right cause in {sum(each.rightly is True for each in wrong_input)} of "
+        f"{len(wrong_input)} wrong inputs, and a wrong one in {sum(each.rightly is False for each in outcomes)} of all "
+        f"{len(outcomes)}.",
+        highlight=False, soft_wrap=True,
+    )  # fmt: skip
     console.print(
         f"{sum(bool(each.inside) for each in known)} of {len(known)} are in their interval, which should hold two of "
         f"three; rank correlation of prediction and result {rank:.2f}; {excessive} predictions above {HIGH} of those "
@@ -101,4 +147,4 @@ def _cells(each: PredictionOutcome) -> list[str]:
         data = [f"{quality.noise_ratio:.3f}", f"{step:.2f}", f"{gaps:.2f}"]
     expected = ["–" if math.isnan(value) else f"{value:.3f}" for value in each.expected]
     remark = {True: "", False: "outside", None: "refused" if each.prediction is None else "no prediction"}[each.inside]
-    return [*data, *expected, "–" if r is None else f"{r:.3f}", remark]
+    return [*data, *expected, "–" if r is None else f"{r:.3f}", remark, each.named]

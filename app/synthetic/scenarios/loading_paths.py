@@ -112,9 +112,9 @@ def _simulate_periodic(loading: LoadingPath, grains: int, rng: np.random.Generat
 def compress_biaxially(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFrame]:
     """Lower the plate at a given rate, the right side under constant pressure; step: axial strain."""
     pressure = loading.settings.pressure * loading.settings.length
-    cell.load(top=np.nan, side=pressure * cell.side_length)
     first = cell.height
     for k in range(loading.frames):
+        cell.load(top=np.nan, side=pressure * cell.height)  # over the part of the bar that rods touch
         if k:
             cell.move_to(height=first * (1.0 - k * loading.step))
         yield cell.photograph(cell.rest())

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import pytest
 from rich.console import Console
+from rodsight.inference.diagnosis.causes import CAUSES, finding
 from rodsight.inference.trial import Trial
 from rodsight.prediction import Prediction
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.expected_correlation import bound_correlation, expected_interval
-from rodsight.study.scenarios.predictions import PredictionOutcome, print_predictions
+from rodsight.study.scenarios.predictions import TRUE_CAUSE, PredictionOutcome, print_predictions
 from rodsight.study.scenarios.scenario_score import ScenarioScore
+from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
 
 from ..inference.test_data_quality import GOOD
 
@@ -66,3 +68,20 @@ def test_results_outside_the_predicted_interval_are_marked():
     assert "1 of 3 are in their interval" in text
     assert "no prediction" in text
     assert "refused" in text
+
+
+@pytest.mark.parametrize(
+    ("scenario", "named", "rightly"),
+    [("mu_01", "friction", True), ("mu_01", "walls_shifted", False), ("sheared", "friction", False),
+     ("sheared", None, None), ("cohesion", "not_explained", None)],
+)  # fmt: skip
+def test_a_diagnosis_is_right_only_with_the_true_cause(scenario, named, rightly):
+    diagnosis = () if named is None else (finding(named, "evidence"),)
+    each = PredictionOutcome(ScenarioScore(scenario, 2, ""), replace(predicted(SOUND), diagnosis=diagnosis))
+    assert each.rightly is rightly
+
+
+def test_every_scenario_of_wrong_input_has_a_true_cause_or_needs_none():
+    wrong = {name for name, each in SCENARIOS.items() if each.group == "wrong input"}
+    assert wrong - set(TRUE_CAUSE) == {"theta_absent", "overhang", "outliers", "missing_poses"}
+    assert set(TRUE_CAUSE.values()) <= set(CAUSES)

@@ -1,6 +1,7 @@
 """A cause is named only where its rival clearly wins."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from rodsight.solver.bodies.rods import RodMaterial
 from ...study.test_predictions import SOUND, WRONG
 from .test_direct_tests import box, rolling_tracks
 
+ROOT = Path(__file__).parents[4]
 INPUTS = Inputs(rolling_tracks(), box(), RodMaterial())
 INPUTS = replace(INPUTS, tracks=replace(INPUTS.tracks, rotation=np.full_like(INPUTS.tracks.rotation, np.nan)))
 
@@ -73,3 +75,9 @@ def test_every_rival_has_a_documented_cause_and_changes_the_input():
 def test_given_friction_that_is_measured_has_no_rival():
     measured = replace(INPUTS, material=RodMaterial(friction_measured=True))
     assert "friction" not in {each.cause for each in rivals_of(measured)}
+
+
+def test_the_documentation_lists_every_cause():
+    page = (ROOT / "app/docs/trust.md").read_text(encoding="utf-8")
+    for name, cause in CAUSES.items():
+        assert f"| `{name}` | {cause.effect} | {cause.cure} |" in page
