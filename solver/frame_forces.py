@@ -150,6 +150,13 @@ class FrameForces:
             since=2,
         ),
     ] = NAN
+    scale_sd: Annotated[
+        float,
+        Quantity(
+            "relative standard deviation of the scale of all forces, NaN where they are known up to a factor only",
+            since=2,
+        ),
+    ] = NAN
     trust_penalties: Annotated[
         str,
         Quantity("reasons that lower the trust with their cures, the worst first", since=2, formerly="frames/doubt"),

@@ -11,6 +11,7 @@ from ..assessment.evidence import Evidence
 from ..assessment.force_intervals import calibrate_sd
 from ..assessment.formula_sd import normal_sd, tangential_sd
 from ..assessment.penalties import assess, describe_penalties
+from ..assessment.scale_sd import scale_sd
 from ..assessment.status import StatusDecision
 from ..assessment.trust import hidden_fraction, unseen_penalty
 from ..bodies.grains import Array
@@ -62,6 +63,7 @@ def report_frame(
     reported = replace(
         frame, trust=assessed.trust, expected_correlation=assessed.expected_correlation,
         trust_penalties=describe_penalties(evidence), grain_unbalance=unbalance,
+        scale_sd=scale_sd(evidence) if problem.packing.scale_is_known else np.nan,
     )  # fmt: skip
     first = problem.k == 0 and estimate.mixture is not None
     # Only these fields were calibrated on packings with known forces.
