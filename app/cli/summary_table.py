@@ -71,6 +71,9 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
     ]
     lines += _sd_line(summary) + budget_lines(summary) + _penalty_line(summary)
     lines += [_load_line(each) for each in summary.get("loads", [])]
+    scale = [each for each in summary.get("scale_sd", []) if each is not None]
+    if scale:
+        lines.append(f"Scale of all forces: standard deviation {100 * np.median(scale):.0f} % (median over frames).")
     if summary.get("weight") and not summary["loaded_walls"]:
         lines.append(f"No wall has a given load: the weight of the rods, {summary['weight']:.3g} N, sets the scale.")
     elif not summary["loaded_walls"]:

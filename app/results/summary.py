@@ -33,6 +33,8 @@ class _Frame(NamedTuple):
     failed_reason: str
     contact_count: int
     trust: float
+    expected_correlation: float
+    scale_sd: float
     trust_penalties: str
     unbalance: float
     natural_map: float
@@ -45,8 +47,9 @@ class _Frame(NamedTuple):
     def of(cls, forces: FrameForces) -> _Frame:
         return cls(
             forces.frame, forces.status, forces.reason, forces.failed_reason, forces.contacts.count, forces.trust,
-            forces.trust_penalties, forces.unbalance, forces.natural_map, forces.correction, _median_deviation(forces),
-            forces.relative_error, None if forces.error_budget is None else forces.error_budget.tolist(),
+            forces.expected_correlation, forces.scale_sd, forces.trust_penalties, forces.unbalance,
+            forces.natural_map, forces.correction, _median_deviation(forces), forces.relative_error,
+            None if forces.error_budget is None else forces.error_budget.tolist(),
         )  # fmt: skip
 
 
@@ -112,6 +115,8 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "natural_map": _plain([frame.natural_map for frame in frames]),
         "correction": _plain([frame.correction for frame in frames]),
         "trust": _plain(trust.tolist()),
+        "expected_correlation": _plain([frame.expected_correlation for frame in frames]),
+        "scale_sd": _plain([frame.scale_sd for frame in frames]),
         "trust_penalties": [frame.trust_penalties for frame in frames],
         "friction_angle_degrees": _plain([float(np.rad2deg(each.friction_angle)) for each in statistics]),
         "coordination_number": _plain([each.coordination_number for each in statistics]),
