@@ -27,7 +27,9 @@ from .rivals import rivals_of
 CLEAR, AHEAD = 0.2, 0.1
 DOUBTFUL = 0.93  # expected r of some photographs of a solved test below which rivals are compared
 UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause wins
-LEAST_GRAINS = 40  # of a packing that is diagnosed: fewer show too little
+LEAST_GRAINS = (
+    100  # of a packing whose rivals are compared: the evidence of fewer varies by chance as much as by causes
+)
 
 
 def diagnose(

@@ -7,7 +7,7 @@ import pytest
 from rodsight.inference.diagnosis.direct_tests import examine_order, examine_rotations, examine_walls
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
-FRAMES, SIDE, PITCH, NOISE = 8, 8, 0.016, 1e-5
+FRAMES, SIDE, PITCH, NOISE = 8, 10, 0.016, 1e-5
 N, RADIUS = SIDE * SIDE, 0.008
 STEP = 6e-3  # of shear between two photographs
 
