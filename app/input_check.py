@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from . import pipeline
-from .inference.trial import TRIAL_PHOTOGRAPHS
+from .inference.diagnosis.trial import TRIAL_PHOTOGRAPHS
 from .prediction import Prediction, describe_photographs, predict_accuracy
 from .results.finding import Finding
 from .run_folder import Run

@@ -27,9 +27,10 @@ from .experiment.walls import read_walls
 from .inference.corrected_sequence import CorrectedSequence
 from .inference.diagnosis.diagnose import diagnose_solved
 from .inference.frame_store import CheckpointStore, FrameStore, SolvedFrame
-from .inference.infer_sequence import FIRST_FRAME, InferenceObserver, infer_sequence
+from .inference.infer_sequence import FIRST_FRAME, infer_sequence
 from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
+from .inference.solve_frames import InferenceObserver
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError, RunError, UndeterminedError
@@ -247,7 +248,8 @@ def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inp
 
 def _inputs_of_solved(run: Run, log: VerdictLog, results: Results, tracks: Tracks, walls: WallTracks) -> Inputs:
     """The same with the friction that was measured, for sequences that are solved again."""
-    return _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
+    inputs = _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
+    return inputs.with_base_friction(results.base_friction) if inputs.material.base_friction_measured else inputs
 
 
 def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:

@@ -11,12 +11,12 @@ import numpy as np
 
 from .experiment.config.experiment_file import ExperimentFile
 from .experiment.experiment import Experiment, GrainGuess, read_grain_guess
-from .inference.data_quality import DataQuality, measure_data_quality
+from .inference.diagnosis.data_quality import DataQuality, measure_data_quality
 from .inference.diagnosis.diagnose import diagnose
-from .inference.infer_sequence import InferenceObserver
+from .inference.diagnosis.trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial
 from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
-from .inference.trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial
+from .inference.solve_frames import InferenceObserver
 from .process.errors import UndeterminedError
 from .process.progress import Progress, no_progress
 from .results.finding import Finding

@@ -87,6 +87,8 @@ def trust_lines(summary: dict[str, Any]) -> list[str]:
         lines.append(
             f"Friction from the motion: {measured} ({low} to {high}), which {verdict} the given {friction['given']:g}."
         )
+    if summary.get("base_friction"):
+        lines.append(f"Friction of the base that was used: {summary['base_friction']:.3g}.")
     if friction is not None and friction["walls"][0] is not None:
         measured, low, high = (_cell(value, ".2f") for value in friction["walls"])
         lines.append(f"Friction of the walls from the motion: {measured} ({low} to {high}), which was used.")

@@ -18,9 +18,10 @@ from ..experiment.config.experiment_file import as_toml
 from ..experiment.experiment import Experiment, load_experiment
 from ..inference.corrected_sequence import CorrectedSequence
 from ..inference.frame_store import CheckpointStore, SolvedFrame
-from ..inference.infer_sequence import InferenceObserver, infer_sequence
+from ..inference.infer_sequence import infer_sequence
 from ..inference.inference_settings import material_of, settings_of
 from ..inference.inputs import Inputs
+from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError
 from ..process.frame_range import ALL_FRAMES
 from ..process.sources import hash_of_code

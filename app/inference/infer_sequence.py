@@ -8,49 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
-import numpy as np
-
-from ..process.progress import Progress, no_progress
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..solver.assessment.penalties import penalise_friction
-from ..solver.assessment.statistic_intervals import widen_for_friction, with_sd
-from ..solver.contacts.contacts import ContactSource
+from ..solver.assessment.statistic_intervals import widen_for_friction
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
-from ..solver.parallel import prefetch
-from ..solver.sequence.failure import describe_error, failed_frame
-from ..solver.sequence.frames import solve_first_frame, solve_sequence
-from ..solver.statistics.frame_statistics import ContactProbabilities, FrameStatistics, frame_statistics, no_statistics
+from ..solver.sequence.frames import solve_first_frame
+from ..solver.statistics.frame_statistics import FrameStatistics
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
 from .correction.friction import check_sequence_friction
+from .diagnosis.base_friction import measure_base_friction
+from .diagnosis.trial import trial_score
 from .first_frame import estimate_first_frame
-from .frame_store import FrameStore, MemoryStore, SolvedFrame
+from .frame_store import FrameStore, MemoryStore
 from .inputs import Inputs
+from .solve_frames import InferenceObserver, solve_frames, summarise_frame, with_remarks
 
 FIRST_FRAME = "first photograph"  # stage in which the first frame is estimated from all others
-
-
-class InferenceObserver:
-    """Receives the events of an inference; the default ignores all of them."""
-
-    def __init__(self, progress: Progress = no_progress) -> None:
-        self.progress = progress  # called after every frame of stage "solving"
-
-    def corrected(self, sequence: CorrectedSequence) -> None:
-        """The sequence is corrected and will be solved."""
-
-    def solved(self, frame: SolvedFrame) -> None:
-        """A frame is solved and stored."""
-
-    def restored(self, store: FrameStore, count: int) -> None:
-        """The first `count` frames are in the store and are not solved again."""
-
-    def failed(self, stage: str, frame: int, error: Exception) -> None:
-        """A frame failed in a stage; the others continue."""
 
 
 def infer_sequence(
@@ -86,11 +63,13 @@ def infer_sequence(
     """
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
+    if inputs.material.base_friction_measured:
+        inputs = measure_base_friction(inputs, trial_score)
     sequence = correct_sequence(inputs)
     observer.corrected(sequence)
-    _solve_missing_frames(sequence, store, observer)
+    solve_frames(sequence, store, observer)
     frames, statistics = store.sequences(len(sequence.snapshots))
-    unsolved = sequence.unsolved_results()
+    unsolved = replace(sequence.unsolved_results(), base_friction=inputs.material.base_friction)
     if not complete or all(each.status is FrameStatus.FAILED for each in frames):
         return replace(unsolved, frames=frames, statistics=statistics)
     frames, statistics = _with_first_frame(sequence, frames, statistics, observer)
@@ -99,37 +78,6 @@ def infer_sequence(
     assessed = LazySequence(count, lambda k: penalise_friction(frames[k], check, measured=measured))
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
     return replace(unsolved, frames=assessed, statistics=widened, friction_check=check)
-
-
-def _solve_missing_frames(sequence: CorrectedSequence, store: FrameStore, observer: InferenceObserver) -> None:
-    """Solve the frames that the store lacks, each from the state of the one before it."""
-    total = len(sequence.snapshots)
-    done = min(store.finished(), total)
-    last = store.load(done - 1) if done else None
-    observer.restored(store, done)
-    observer.progress("solving", done, total)
-    if done == total:
-        return
-    solved = solve_sequence(
-        sequence.packing, sequence.snapshots, sequence.settings,
-        state=None if last is None else last.state, first=done, verdicts=sequence.verdicts, failed=sequence.failed,
-        observer=partial(observer.failed, "solving"), ahead=True,
-    )  # fmt: skip
-    for forces, state in prefetch(solved, sequence.settings.workers):
-        try:
-            statistics = _summarise(sequence, forces)
-        except MemoryError:  # no fault of the frame
-            raise
-        except Exception as error:
-            observer.failed("statistics", forces.frame, error)
-            n, w = sequence.packing.grains.count, len(sequence.packing.pressure)
-            reason = f"its statistics could not be computed ({describe_error(error)})"
-            members = sequence.settings.keep_members
-            forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
-        frame = SolvedFrame(_with_remarks(sequence, forces), statistics, state)
-        store.save(frame)
-        observer.solved(frame)
-        observer.progress("solving", forces.frame + 1, total)
 
 
 def _with_first_frame(
@@ -148,8 +96,8 @@ def _with_first_frame(
             sequence.packing, sequence.snapshots, sequence.settings, posterior, reason,
             verdicts=sequence.verdicts, failed=sequence.failed,
         )  # fmt: skip
-        forces = _limit_by_second(_with_remarks(sequence, forces), frames)
-        summary = _summarise(sequence, forces)
+        forces = _limit_by_second(with_remarks(sequence, forces), frames)
+        summary = summarise_frame(sequence, forces)
     except MemoryError:  # no fault of the frame
         raise
     except Exception as error:
@@ -173,37 +121,10 @@ def _limit_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> Fram
     )  # fmt: skip
 
 
-def _with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
-    """Report the measured noise of all frames with the first, and which contacts belong to interpolated rods."""
-    if forces.frame == 0 and sequence.noise_remark:
-        forces = replace(forces, reason=f"{sequence.noise_remark}; {forces.reason}")
-    interpolated = sequence.tracks.interpolated[forces.frame]
-    if not interpolated.any():
-        return forces
-    contacts, padded = forces.contacts, np.append(interpolated, False)
-    theirs = padded[contacts.i] | padded[np.minimum(contacts.j, len(interpolated))]
-    theirs &= forces.source == ContactSource.DETECTED
-    source = np.where(theirs, np.uint8(ContactSource.INTERPOLATED), forces.source)
-    return replace(forces, source=source, reason=f"{interpolated.sum()} lost rods are interpolated; {forces.reason}")
-
-
-def _summarise(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatistics:
-    packing, snapshot = sequence.packing, sequence.snapshots[forces.frame]
-    if forces.status is FrameStatus.FAILED:
-        return no_statistics(len(packing.pressure))
-    assert forces.bearing_probability is not None
-    assert forces.sliding_probability is not None
-    statistics = frame_statistics(
-        forces.contacts, forces.fn, forces.ft,
-        ContactProbabilities(forces.bearing_probability, forces.sliding_probability), snapshot, packing,
-    )  # fmt: skip
-    return with_sd(statistics, forces, scale_is_known=packing.scale_is_known, moved=forces.frame > 0)
-
-
 def _widen_statistics(
     sequence: CorrectedSequence, statistics: FrameStatistics, assessed: FrameForces, check: FrictionCheck | None
 ) -> FrameStatistics:
     """Statistics after the friction check: with another coefficient other contacts slide."""
     if check is None or check.agrees or assessed.status is FrameStatus.FAILED:
         return statistics
-    return widen_for_friction(_summarise(sequence, assessed), check.given, check.measured)
+    return widen_for_friction(summarise_frame(sequence, assessed), check.given, check.measured)

@@ -49,7 +49,9 @@ def material_of(config: InferenceSections) -> RodMaterial:
     given = config.material.model_dump()
     if measured := given["friction"] == "measured":
         given["friction"] = FIRST_GUESS
-    return RodMaterial(**given, friction_measured=measured)
+    if base_measured := given["base_friction"] == "measured":
+        given["base_friction"] = 0.0
+    return RodMaterial(**given, friction_measured=measured, base_friction_measured=base_measured)
 
 
 def settings_of(config: InferenceSections) -> InferenceSettings:

@@ -24,6 +24,11 @@ class Inputs:
     settings: InferenceSettings = field(default_factory=InferenceSettings)
     verdicts: Mapping[int, Verdicts] = field(default_factory=dict)  # of reviewers, by row of the frame
 
+    def with_base_friction(self, coefficient: float) -> Inputs:
+        """Fix the friction coefficient of the base, which is then not measured again."""
+        material = replace(self.material, base_friction=coefficient, base_friction_measured=False)
+        return replace(self, material=material)
+
     def with_friction(self, friction: float, check: FrictionCheck | None = None) -> Inputs:
         """Fix a friction coefficient that was to be measured, so that a sequence solved again does not measure it.
 

@@ -31,7 +31,7 @@ WARNINGS = {
     "solver/boundary/boundary_correction.py": ("describe",),
     "app/experiment/plausibility.py": ("implausible_loads", "open_sides", "rods_beyond_ends"),
     "app/experiment/boundary.py": ("free_surfaces",),
-    "app/inference/data_quality.py": ("describe", "obstacle"),
+    "app/inference/diagnosis/data_quality.py": ("describe", "obstacle"),
     "app/prediction.py": ("verdict",),
 }  # fmt: skip
 RAISES = re.compile(r"Error\(|\.error\(|_error\(|notes\.append\(")  # code without a match is not parsed

@@ -25,9 +25,10 @@ from ..experiment.experiment import (
 )
 from ..experiment.reading.tables import Table
 from ..experiment.walls import ARC_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS, arrange_arcs, arrange_loads, arrange_walls
-from ..inference.infer_sequence import InferenceObserver, infer_sequence
+from ..inference.infer_sequence import infer_sequence
 from ..inference.inference_settings import material_of, settings_of
 from ..inference.inputs import Inputs
+from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError, UndeterminedError
 from ..process.progress import Progress
 from ..solver.bodies.cell import unwrap

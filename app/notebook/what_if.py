@@ -9,8 +9,9 @@ import numpy as np
 
 from .. import pipeline
 from ..exchange.grain_quantities import rod_length
-from ..inference.infer_sequence import InferenceObserver, infer_sequence
+from ..inference.infer_sequence import infer_sequence
 from ..inference.inputs import Inputs
+from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError
 from ..results.results import Results
 from ..solver.contacts.pairs import find_rows

@@ -63,6 +63,7 @@ class Results:
     friction_check: FrictionCheck | None = None
     radius_tuning: RadiusTuning | None = None  # None: not requested
     boundary: Boundary | None = None  # None: used as given
+    base_friction: float = 0.0  # coefficient of the base that was used; 0: none
     diagnosis: tuple[Finding, ...] = ()  # causes of wrong forces that the evidence supports
     ensemble_size: int = 0  # resampled sequences behind the standard deviations of the forces; 0: free formula
 

@@ -192,6 +192,7 @@ ATTRIBUTES = (
     Attribute("frames", "two integers", "frames of the experiment in the file: first, and end or −1"),
     Attribute("configuration", "text", "the resolved configuration, TOML"),
     Attribute("friction", "number", "coefficient of friction used"),
+    Attribute("base_friction", "number", "coefficient of friction of the base that was used, 0: none", since=2),
     Attribute("diagnosis", "text", "causes of wrong forces that the evidence supports, JSON", since=2),
     Attribute("source", "text", "method of the standard deviation", DEVIATIONS),
     Attribute("ensemble_size", "integer", "number of resampled sequences behind it, 0: none", DEVIATIONS),

@@ -130,6 +130,7 @@ def summarize(results: Results, agreement: Sequence[Agreement] | None, seconds: 
         "weight": _weight(results),
         "diagnosis": [each.as_plain() for each in results.diagnosis],
         "friction": _friction(results),
+        "base_friction": results.base_friction,
         "wall_force_error": _wall_force_error(results, settled),
         "calibration": results.calibration.verdict if results.calibration is not None else None,
         "boundary": results.boundary.describe(results.walls.name) if results.boundary is not None else [],

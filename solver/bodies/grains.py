@@ -25,6 +25,7 @@ class Grains:
         Bool[np.ndarray, " n"] | None,
         Quantity("whether the grain is the packing's boundary: its motion is imposed", dims="grain", since=2),
     ] = None  # None: no grain
+    drag: Float[Array, "n 2"] | None = None  # [N] of a base in the frame at hand; None: no base
 
     def __post_init__(self) -> None:
         if self.boundary is not None and self.boundary.shape != self.radius.shape:
@@ -69,8 +70,9 @@ class Grains:
         return 0.5 * self.mass * self.radius**2
 
     def weight(self, gravity: tuple[float, float]) -> Array:
-        """Weight of every grain (n, 2) [N]; gravity [m/s²]."""
-        return self.mass[:, None] * np.asarray(gravity)
+        """Weight of every grain, and its drag on a base (n, 2) [N]; gravity [m/s²]."""
+        weight = self.mass[:, None] * np.asarray(gravity)
+        return weight if self.drag is None else weight + self.drag
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -22,6 +23,7 @@ class Material:
     wall_friction: float
     formal_weight: float = 0.0  # η in [0, ½]
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
+    base_drag: float = 0.0  # [m/s²] friction coefficient of the base on which the grains slide × gravity onto it
 
     def __post_init__(self) -> None:
         if self.friction < 0 or self.wall_friction < 0:
@@ -44,6 +46,23 @@ class Packing:
     # [Pa] on plates, NaN where the motion is imposed; of a measured load its mean over the frames
     pressure: Float[Array, " w"]
     inferred: int = 0  # number of grains that no photograph shows
+
+    def at_frame(self, snapshots: Sequence[Snapshot], k: int) -> Packing:
+        """Return the packing with the friction of the base on every grain in frame k; itself without a base.
+
+        Notes
+        -----
+        F = −μ m g u / √(|u|² + 4 σ²), u the displacement since the frame before (of the first frame, until the next
+        one) and σ the standard deviation of a position: what hardly moves has no direction of sliding.
+        """
+        if self.material.base_drag == 0.0 or len(snapshots) < 2:
+            return self
+        before, after = (snapshots[k - 1], snapshots[k]) if k else (snapshots[0], snapshots[1])
+        moved = np.nan_to_num(after.position - before.position)
+        size = np.sqrt((moved**2).sum(axis=1) + 4.0 * snapshots[k].sigma ** 2)
+        limit = self.material.base_drag * self.grains.mass
+        drag = -limit[:, None] * moved / np.where(size > 0.0, size, 1.0)[:, None]
+        return replace(self, grains=replace(self.grains, drag=drag))
 
     @property
     def weight(self) -> Array:

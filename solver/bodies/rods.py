@@ -22,6 +22,9 @@ class RodMaterial:
     wall_friction: float | None = None  # None: as friction
     formal_weight: float = 0.0  # η in [0, ½]
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
+    base_friction: float = 0.0  # coefficient between the rods and the base on which they slide
+    base_gravity: float = 9.81  # [m/s²] normal to the picture
+    base_friction_measured: bool = False  # True: estimated from trial solutions
     friction_measured: bool = False  # True: `friction` is an initial guess, estimated from the motion
     stiffness: float | Literal["rigid", "estimate"] | None = (
         None  # [Pa] contact stiffness per length; None: estimated from the gaps where they show it
@@ -33,7 +36,9 @@ class RodMaterial:
 
     def friction_law(self) -> Material:
         """Return friction, formal weight and gravity as `Material`."""
-        return Material(self.friction, self.at_walls(), self.formal_weight, self.gravity)
+        return Material(
+            self.friction, self.at_walls(), self.formal_weight, self.gravity, self.base_friction * self.base_gravity
+        )
 
     def pack(
         self, radius: Array, pressure: Array, inferred: int = 0, boundary: NDArray[np.bool_] | None = None

@@ -69,12 +69,12 @@ def equilibrium_matrix(contacts: Contacts, radius: Array, walls: Walls) -> csr_m
     return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
 
 
-def external_load(mass: Array, walls: Walls, gravity: tuple[float, float] = (0.0, 0.0)) -> Array:
+def external_load(weight: Array, walls: Walls) -> Array:
     """Return b (3n + p,) of the equilibrium H f = b: minus the weights, zero torques, the loads of the plates.
 
-    mass (n,) [kg]; gravity [m/s²].
+    weight (n, 2) [N].
     """
-    return np.concatenate([-mass * gravity[0], -mass * gravity[1], np.zeros(len(mass)), walls.load[walls.loaded]])
+    return np.concatenate([-weight[:, 0], -weight[:, 1], np.zeros(len(weight)), walls.load[walls.loaded]])
 
 
 def relative_motion(

@@ -154,6 +154,7 @@ def _sliding_frames(
 def _sliding_frame(
     packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float, settings: ContactProbabilitySettings
 ) -> SlidingFrame:
+    packing = packing.at_frame(snapshots, k)
     snapshot, window = snapshots[k], window_of(k, len(snapshots))
     contacts, probability = probable_contacts(
         packing.grains, [snapshots[f] for f in window], k - window.start, settings

@@ -68,7 +68,7 @@ class SequenceEvidence:
         verdicts : Verdicts
             Reviewed pairs: forbidden ones are left out, forced ones have the prior probability REVIEWED_PRIOR.
         """
-        packing, snapshot = self.packing, self.snapshots[k]
+        packing, snapshot = self.packing.at_frame(self.snapshots, k), self.snapshots[k]
         walls = packing.walls_of(snapshot)
         with np.errstate(invalid="ignore"):
             near = self.gap[k] < self.reach

@@ -38,6 +38,7 @@ def pose_frame(
     """
     snapshots = sequence.snapshots
     window = window_of(k, len(snapshots))
+    sequence = replace(sequence, packing=sequence.packing.at_frame(snapshots, k))
     snapshot, bridged = interpolate_lost_grains([snapshots[f] for f in window], k - window.start)
     if np.isfinite(state.time):
         motion = motion_to(snapshot, state.seen, state.time, state.endpoints, state.cell)

@@ -137,4 +137,4 @@ def test_relative_motion_is_the_transpose_of_equilibrium(seed):
     bodies = np.concatenate([velocity[:, 0], velocity[:, 1], spin, [plate]])
     work = float(bodies @ (h @ np.concatenate([fn, ft])))
     assert work == pytest.approx(float(fn @ un + ft @ ut), rel=ROUNDING, abs=ROUNDING)
-    assert len(external_load(GRAINS.mass, WALLS, (0.0, -9.81))) == 3 * n + 1
+    assert len(external_load(GRAINS.weight((0.0, -9.81)), WALLS)) == 3 * n + 1

@@ -70,7 +70,7 @@ def test_every_method_has_the_same_equilibrium():
     row = matrix[[3 * grains.count]].toarray()[0]
     on = np.isin(contacts.j - grains.count, (2, 4))
     assert row == pytest.approx(np.concatenate([contacts.normal[:, 1] * on, contacts.tangent[:, 1] * on]))
-    assert external_load(grains.mass, walls)[-1] == LOAD
+    assert external_load(grains.weight((0.0, 0.0)), walls)[-1] == LOAD
     balance = assemble_balance(
         contacts, grains, walls, present=np.ones(3, bool), friction=np.full(contacts.count, 0.3), force_unit=LOAD
     )

@@ -34,6 +34,16 @@ class MaterialSection(Section):
     wall_friction: Annotated[float, between(0, 2)] | None = key(
         "Coefficient of friction at walls; absent: as friction.", default=RODS.wall_friction
     )
+    base_friction: Annotated[float, between(0, 1e4)] | Literal["measured"] = key(
+        "Coefficient of friction between the rods and the base on which they slide, opposed to the motion of each; "
+        "measured: the one whose forces leave least unexplained.",
+        default=RODS.base_friction,
+    )
+    base_gravity: Annotated[float, above(0, 1e6)] = key(
+        "Acceleration that presses the rods on the base, normal to the picture.",
+        unit="m/s²",
+        default=RODS.base_gravity,
+    )
     stiffness: Annotated[float, above(0, 1e13)] | Literal["estimate", "rigid"] | None = key(
         "Normal stiffness of a contact per length; estimate: grains are soft, and it is found from their overlaps; "
         "rigid: overlaps are not used; absent: decided by the gaps. The overlap is taken as proportional to the force.",

@@ -37,6 +37,10 @@ CAUSES: dict[str, Cause] = {
     "wall_friction": Cause(
         "tangential forces at the walls are limited wrongly", "set material.wall_friction to the value found"
     ),
+    "base_friction": Cause(
+        "the base carries part of the load, and the forces are too small",
+        'set material.base_friction to "measured", or to the coefficient found',
+    ),
     "walls_shifted": Cause(
         "rods seem to penetrate walls or to leave them", "give the walls at the times of the photographs"
     ),

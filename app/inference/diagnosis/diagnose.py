@@ -11,16 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...process.errors import UndeterminedError
 from ...process.progress import Progress, no_progress
 from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.bodies.grains import Array
 from ..inputs import Inputs
-from ..trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial
 from .causes import finding
 from .direct_tests import examine_order, examine_rotations, examine_walls
 from .rivals import rivals_of
+from .trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial, trial_score
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
@@ -65,7 +64,7 @@ def diagnose(
     rise: dict[str, tuple[float, str]] = {}
     for done, rival in enumerate(rivals):
         progress("diagnosing", done, len(rivals))
-        score = _score(rival.change(inputs), first)
+        score = trial_score(rival.change(inputs), first)
         rise[rival.cause] = max(rise.get(rival.cause, (float("-inf"), "")), (score - trial.score, rival.words))
     progress("diagnosing", len(rivals), len(rivals))
     best = _winner(rise)
@@ -111,14 +110,6 @@ def _winner(rise: dict[str, tuple[float, str]]) -> str:
         return ""
     clear = len(order) == 1 or rise[order[0]][0] - rise[order[1]][0] > AHEAD
     return order[0] if clear else ""
-
-
-def _score(inputs: Inputs, first: int) -> float:
-    try:
-        trial = solve_trial(inputs, TRIAL_PHOTOGRAPHS, first=first)
-    except (UndeterminedError, ValueError, FloatingPointError):  # a rival that cannot be true
-        return float("-inf")
-    return float("-inf") if trial is None else trial.score
 
 
 def _remainder(gain: float) -> str:

@@ -10,9 +10,11 @@ import numpy as np
 from ...solver.bodies.grains import Array
 from ...tracks import Tracks, WallTracks
 from ..inputs import Inputs
+from .base_friction import coefficient_of
 
 FRICTIONS = (0.12, 0.2, 0.35, 0.5, 0.8)  # coefficients between rods that are compared …
 DISTINCT = 0.04  # … if they differ by so much from the given one
+DRAGS = (0.05, 0.12)  # of a base, over the mean contact force, that are compared
 SMOOTH, ROUGH = 0.02, 0.5  # coefficients at walls that are compared
 STRETCHES = (-0.01, -0.003, 0.003, 0.01)  # of x relative to y
 CLASS_ERRORS = (-0.02, 0.02)  # of the radii of a class
@@ -35,6 +37,11 @@ def rivals_of(inputs: Inputs) -> Iterator[Rival]:
         for friction in FRICTIONS:
             if abs(friction - inputs.material.friction) > DISTINCT:
                 yield Rival("friction", f"rods have a friction of about {friction:g}", _with_friction(friction))
+    if np.isfinite(inputs.walls.usual_pressure(inputs.material.length)).any() and not inputs.material.base_friction:
+        for fraction in DRAGS:
+            coefficient = coefficient_of(inputs, fraction)
+            words = f"the base slows each rod by {100.0 * fraction:.0f} % of the mean force"
+            yield Rival("base_friction", words, _with_base(coefficient))
     if inputs.walls.count:
         given = inputs.material.wall_friction
         given = inputs.material.friction if given is None else given
@@ -66,6 +73,10 @@ def _reversed(inputs: Inputs) -> Inputs:
 
 def _with_friction(friction: float) -> Callable[[Inputs], Inputs]:
     return lambda inputs: replace(inputs, material=replace(inputs.material, friction=friction))
+
+
+def _with_base(coefficient: float) -> Callable[[Inputs], Inputs]:
+    return lambda inputs: inputs.with_base_friction(coefficient)
 
 
 def _with_wall_friction(friction: float) -> Callable[[Inputs], Inputs]:

@@ -73,6 +73,7 @@ def save_results(file: Path, results: Results, origin: Provenance) -> None:
         _write_origin(store, results.name, origin)
         store.attrs["configuration"] = results.configuration
         store.attrs["friction"] = results.friction
+        store.attrs["base_friction"] = results.base_friction
         store.attrs["diagnosis"] = json.dumps([each.as_plain() for each in results.diagnosis])
         write_results(store, results)
         for path in DEVIATIONS:
@@ -102,6 +103,7 @@ def load_results(file: Path) -> Results:
             boundary=stored.part("boundary"),
             friction_check=stored.part("friction_check"),
             radius_tuning=stored.part("radius_tuning"),
+            base_friction=float(store.attrs.get("base_friction", 0.0)),
             diagnosis=tuple(Finding(**each) for each in json.loads(str(store.attrs.get("diagnosis", "[]")))),
             ensemble_size=_ensemble_size(store),
         )

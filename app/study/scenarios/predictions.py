@@ -13,7 +13,7 @@ from rich.table import Table
 from scipy.stats import spearmanr
 
 from ...experiment.experiment import load_experiment
-from ...inference.data_quality import REFERENCE_STEP
+from ...inference.diagnosis.data_quality import REFERENCE_STEP
 from ...prediction import Prediction, predict_accuracy
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
@@ -28,13 +28,13 @@ TRUE_CAUSE: dict[ScenarioName, str] = {
     "time_reversed": "photographs_reversed", "swapped_frames": "photographs_swapped",
     "duplicate_frame": "photograph_repeated", "theta_sign": "rotation_sign", "theta_zero": "rotation_zero",
     "theta_degrees": "rotation_in_degrees", "mu_01": "friction", "mu_05": "friction", "mu_low": "friction",
-    "mu_high": "friction", "walls_late": "walls_shifted", "top_fixed": "wall_at_rest",
+    "mu_high": "friction", "base_friction": "base_friction", "walls_late": "walls_shifted", "top_fixed": "wall_at_rest",
     "aspect_03": "stretched_picture", "aspect_1": "stretched_picture", "class_2": "class_radii",
     "smooth_walls": "wall_friction", "wrong_class": "not_explained",
 }  # fmt: skip
 COMPARED_SCENARIOS: tuple[ScenarioName, ...] = (
     "shear", "sheared", "biaxial", "isotropic", "unseen", "centres", "radii_03", "radii_1", "step_05", "step_1",
-    "ten_frames", "outer", "soft", "loose", "cyclic", "noise_40", "circle", "stiff", "base_friction", "cohesion",
+    "ten_frames", "outer", "soft", "loose", "cyclic", "noise_40", "circle", "stiff", "cohesion",
     "friction_spread", "inertia", "rolling", "sizes_10", *TRUE_CAUSE, "overhang", "outliers",
     "missing_poses",
 )  # fmt: skip

@@ -18,9 +18,10 @@ from ...experiment.walls import read_walls
 from ...inference.corrected_sequence import CorrectedSequence
 from ...inference.correction.correct_sequence import correct_sequence
 from ...inference.frame_store import MemoryStore
-from ...inference.infer_sequence import InferenceObserver, infer_sequence
+from ...inference.infer_sequence import infer_sequence
 from ...inference.inference_settings import material_of, settings_of
 from ...inference.inputs import Inputs
+from ...inference.solve_frames import InferenceObserver
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...results.results import Results

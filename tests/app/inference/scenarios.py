@@ -9,9 +9,10 @@ import numpy as np
 from rodsight.experiment.experiment import Experiment, load_experiment
 from rodsight.inference.corrected_sequence import CorrectedSequence
 from rodsight.inference.frame_store import MemoryStore
-from rodsight.inference.infer_sequence import InferenceObserver, infer_sequence
+from rodsight.inference.infer_sequence import infer_sequence
 from rodsight.inference.inference_settings import material_of, settings_of
 from rodsight.inference.inputs import Inputs
+from rodsight.inference.solve_frames import InferenceObserver
 from rodsight.results.results import Results
 from rodsight.solver.contacts.pairs import Keys
 from rodsight.solver.frame_forces import FrameForces

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import infer_sequence as inference
+from rodsight.inference import solve_frames as solving
 from rodsight.inference.frame_store import MemoryStore
-from rodsight.inference.infer_sequence import InferenceObserver, infer_sequence
+from rodsight.inference.infer_sequence import infer_sequence
 from rodsight.inference.inputs import Inputs
+from rodsight.inference.solve_frames import InferenceObserver
 from rodsight.results.results import Results
 from rodsight.robustness.design import Case
 from rodsight.robustness.factors import FIRST_COMPARED
@@ -130,7 +132,7 @@ def test_a_sequence_without_a_solved_frame_is_neither_estimated_nor_checked(cont
 
         return failed_frame(k, "test", inputs.tracks.grain_count, inputs.walls.count)
 
-    monkeypatch.setattr(inference, "solve_sequence", unsolvable)
+    monkeypatch.setattr(solving, "solve_sequence", unsolvable)
     results = infer_sequence(inputs)
     assert {frame.status for frame in results.frames} == {FrameStatus.FAILED}
     assert results.friction_check is None

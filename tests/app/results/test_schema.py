@@ -27,8 +27,13 @@ ORIGIN = Provenance("fingerprint", "experiment.toml", (2, 5), {"photos/0000.jpg"
 OWN = {"unit", "units", "long_name", "flag_values", "flag_meanings", "DIMENSION_LIST", "DIMENSION_LABELS"}
 OF_SCALES = {"CLASS", "NAME", "REFERENCE_LIST", "long_name"}
 MADE_WITH = 2  # schema of the stored file: datasets of this version may be newer than the file
-NEWER = {"inputs", "code", "libraries", "diagnosis"}  # attributes that the stored file is older than
-UNDECLARED = {"FrameForces.frame", "Contacts.grain_count", "Contacts.wall_count"}  # derived from the rest of a file
+NEWER = {"inputs", "code", "libraries", "diagnosis", "base_friction"}  # attributes that the stored file is older than
+UNDECLARED = {
+    "Grains.drag",
+    "FrameForces.frame",
+    "Contacts.grain_count",
+    "Contacts.wall_count",
+}  # derived from the rest of a file
 
 
 @pytest.fixture(scope="module", params=["stored", "written now"])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 from rodsight.inference.diagnosis.causes import CAUSES, finding
-from rodsight.inference.trial import Trial
+from rodsight.inference.diagnosis.trial import Trial
 from rodsight.prediction import Prediction
 from rodsight.solver.assessment.evidence import Evidence
 from rodsight.solver.assessment.expected_correlation import bound_correlation, expected_interval

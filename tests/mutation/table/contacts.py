@@ -38,7 +38,7 @@ MUTANTS = [
             "add(axis * n + j[pair], offset + column[pair], direction[pair, axis])",
             "add(axis * n + j[pair], offset + column[pair], -direction[pair, axis])",
         ),
-        ("-mass * gravity[1]", "mass * gravity[1]"),
+        ("-weight[:, 1]", "mass * gravity[1]"),
         ('un = np.einsum("ij,ij->i", motion, contacts.normal)', 'un = -np.einsum("ij,ij->i", motion, contacts.normal)'),
     ),
     *mutants_of(

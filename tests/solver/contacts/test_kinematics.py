@@ -103,7 +103,7 @@ def test_stack_of_three_grains_carries_load_and_weight():
     # 0-1, 0-floor, 1-2, 2-plate: every contact carries the weight and load above it.
     above = {1: 20 + weight[1:].sum(), 3: 20 + weight.sum(), 2: 20 + weight[2], 5: 20.0}
     fn = np.array([above[int(j)] for j in contacts.j])
-    load = external_load(grains.mass, walls, (0.0, -9.81))
+    load = external_load(grains.weight((0.0, -9.81)), walls)
     np.testing.assert_allclose(matrix @ np.concatenate([fn, np.zeros(4)]), load, atol=EXACT * 20)
 
 

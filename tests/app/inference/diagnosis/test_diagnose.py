@@ -9,8 +9,8 @@ from rodsight.inference.diagnosis import diagnose as module
 from rodsight.inference.diagnosis.causes import CAUSES
 from rodsight.inference.diagnosis.diagnose import diagnose
 from rodsight.inference.diagnosis.rivals import rivals_of
+from rodsight.inference.diagnosis.trial import Trial
 from rodsight.inference.inputs import Inputs
-from rodsight.inference.trial import Trial
 from rodsight.solver.bodies.rods import RodMaterial
 
 from ...study.test_predictions import SOUND, WRONG
@@ -35,7 +35,7 @@ def scores(monkeypatch):
             yield replace(each, change=lambda _, changed=changed: changed)
 
     monkeypatch.setattr(module, "rivals_of", rivals)
-    monkeypatch.setattr(module, "_score", lambda inputs, _: given + rises.get(by_input[id(inputs)][1], 0.0))
+    monkeypatch.setattr(module, "trial_score", lambda inputs, _: given + rises.get(by_input[id(inputs)][1], 0.0))
     return rises
 
 

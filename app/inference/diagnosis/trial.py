@@ -10,13 +10,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..solver.assessment.evidence import Evidence
-from ..solver.assessment.expected_correlation import correlation_score, expected_interval
-from ..solver.assessment.penalties import assess, find_penalties
-from .correction.close_photographs import sufficient_stride
-from .frame_store import MemoryStore
-from .infer_sequence import InferenceObserver, infer_sequence
-from .inputs import Inputs
+from ...process.errors import UndeterminedError
+from ...solver.assessment.evidence import Evidence
+from ...solver.assessment.expected_correlation import correlation_score, expected_interval
+from ...solver.assessment.penalties import assess, find_penalties
+from ..correction.close_photographs import sufficient_stride
+from ..correction.correct_sequence import correct_sequence
+from ..frame_store import MemoryStore
+from ..inputs import Inputs
+from ..solve_frames import InferenceObserver, solve_frames
 
 TRIAL_PHOTOGRAPHS = 6
 SETTLED = 2  # frames from which on a trial is judged: earlier ones lack a history
@@ -84,10 +86,19 @@ def solve_trial(
     store = MemoryStore()
     settings = inputs.settings.without_sweeps()
     given = replace(inputs, tracks=tracks, walls=walls, settings=settings)
-    infer_sequence(given, observer, store, complete=False)
+    solve_frames(correct_sequence(given), store, InferenceObserver() if observer is None else observer)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
     evidence = tuple(each.state.evidence for each in judged if each.state.evidence.assessed)
     return Trial(evidence, stride) if evidence else None
+
+
+def trial_score(inputs: Inputs, first: int = 0) -> float:
+    """Score of a trial solution; −∞ where the input allows none."""
+    try:
+        trial = solve_trial(inputs, first=first)
+    except (UndeterminedError, ValueError, FloatingPointError):  # a rival that cannot be true
+        return -math.inf
+    return -math.inf if trial is None else trial.score
 
 
 def _kept(evidence: Evidence) -> float:

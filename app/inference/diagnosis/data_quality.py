@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..solver.bodies.grains import Grains
-from ..solver.bodies.motion import Snapshot
-from ..solver.bodies.rods import RodMaterial
-from ..solver.bodies.strain import displacement_gradient, shear_strain
-from ..solver.bodies.walls import Walls
-from ..solver.contacts.contacts import Contacts, measure_pairs
-from ..solver.contacts.kinematics import relative_motion
-from ..solver.contacts.surface import typical_overlap
-from ..solver.detection.displacement import displacement_scale
-from ..solver.detection.precision import contradiction, measure_precision
-from ..solver.detection.refinement import refine
-from ..solver.detection.touch_probability import ContactProbabilitySettings
-from ..solver.posterior.sequence_evidence import gather_position_evidence
-from ..tracks import Tracks, WallTracks
-from .snapshots import make_snapshots
+from ...solver.bodies.grains import Grains
+from ...solver.bodies.motion import Snapshot
+from ...solver.bodies.rods import RodMaterial
+from ...solver.bodies.strain import displacement_gradient, shear_strain
+from ...solver.bodies.walls import Walls
+from ...solver.contacts.contacts import Contacts, measure_pairs
+from ...solver.contacts.kinematics import relative_motion
+from ...solver.contacts.surface import typical_overlap
+from ...solver.detection.displacement import displacement_scale
+from ...solver.detection.precision import contradiction, measure_precision
+from ...solver.detection.refinement import refine
+from ...solver.detection.touch_probability import ContactProbabilitySettings
+from ...solver.posterior.sequence_evidence import gather_position_evidence
+from ...tracks import Tracks, WallTracks
+from ..snapshots import make_snapshots
 
 EXAMINED_PHOTOGRAPHS = 3
 UNCLEAR_GAPS = 0.009  # standard deviation of the gaps of touching grains over a diameter that hides the contacts

@@ -1,0 +1,97 @@
+"""Solution of the frames of a corrected sequence, one after the other, into a store."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ..process.progress import Progress, no_progress
+from ..solver.assessment.statistic_intervals import with_sd
+from ..solver.contacts.contacts import ContactSource
+from ..solver.frame_forces import FrameForces, FrameStatus
+from ..solver.parallel import prefetch
+from ..solver.sequence.failure import describe_error, failed_frame
+from ..solver.sequence.frames import solve_sequence
+from ..solver.statistics.frame_statistics import ContactProbabilities, FrameStatistics, frame_statistics, no_statistics
+from .corrected_sequence import CorrectedSequence
+from .frame_store import FrameStore, SolvedFrame
+
+
+class InferenceObserver:
+    """Receives the events of an inference; the default ignores all of them."""
+
+    def __init__(self, progress: Progress = no_progress) -> None:
+        self.progress = progress  # called after every frame of stage "solving"
+
+    def corrected(self, sequence: CorrectedSequence) -> None:
+        """The sequence is corrected and will be solved."""
+
+    def solved(self, frame: SolvedFrame) -> None:
+        """A frame is solved and stored."""
+
+    def restored(self, store: FrameStore, count: int) -> None:
+        """The first `count` frames are in the store and are not solved again."""
+
+    def failed(self, stage: str, frame: int, error: Exception) -> None:
+        """A frame failed in a stage; the others continue."""
+
+
+def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: InferenceObserver) -> None:
+    """Solve the frames that the store lacks, each from the state of the one before it."""
+    total = len(sequence.snapshots)
+    done = min(store.finished(), total)
+    last = store.load(done - 1) if done else None
+    observer.restored(store, done)
+    observer.progress("solving", done, total)
+    if done == total:
+        return
+    solved = solve_sequence(
+        sequence.packing, sequence.snapshots, sequence.settings,
+        state=None if last is None else last.state, first=done, verdicts=sequence.verdicts, failed=sequence.failed,
+        observer=partial(observer.failed, "solving"), ahead=True,
+    )  # fmt: skip
+    for forces, state in prefetch(solved, sequence.settings.workers):
+        try:
+            statistics = summarise_frame(sequence, forces)
+        except MemoryError:  # no fault of the frame
+            raise
+        except Exception as error:
+            observer.failed("statistics", forces.frame, error)
+            n, w = sequence.packing.grains.count, len(sequence.packing.pressure)
+            reason = f"its statistics could not be computed ({describe_error(error)})"
+            members = sequence.settings.keep_members
+            forces, statistics = failed_frame(forces.frame, reason, n, w, with_members=members), no_statistics(w)
+        frame = SolvedFrame(with_remarks(sequence, forces), statistics, state)
+        store.save(frame)
+        observer.solved(frame)
+        observer.progress("solving", forces.frame + 1, total)
+
+
+def with_remarks(sequence: CorrectedSequence, forces: FrameForces) -> FrameForces:
+    """Report the measured noise of all frames with the first, and which contacts belong to interpolated rods."""
+    if forces.frame == 0 and sequence.noise_remark:
+        forces = replace(forces, reason=f"{sequence.noise_remark}; {forces.reason}")
+    interpolated = sequence.tracks.interpolated[forces.frame]
+    if not interpolated.any():
+        return forces
+    contacts, padded = forces.contacts, np.append(interpolated, False)
+    theirs = padded[contacts.i] | padded[np.minimum(contacts.j, len(interpolated))]
+    theirs &= forces.source == ContactSource.DETECTED
+    source = np.where(theirs, np.uint8(ContactSource.INTERPOLATED), forces.source)
+    return replace(forces, source=source, reason=f"{interpolated.sum()} lost rods are interpolated; {forces.reason}")
+
+
+def summarise_frame(sequence: CorrectedSequence, forces: FrameForces) -> FrameStatistics:
+    """Compute the statistics of a solved frame, with their standard deviations."""
+    packing, snapshot = sequence.packing, sequence.snapshots[forces.frame]
+    if forces.status is FrameStatus.FAILED:
+        return no_statistics(len(packing.pressure))
+    assert forces.bearing_probability is not None
+    assert forces.sliding_probability is not None
+    statistics = frame_statistics(
+        forces.contacts, forces.fn, forces.ft,
+        ContactProbabilities(forces.bearing_probability, forces.sliding_probability), snapshot, packing,
+    )  # fmt: skip
+    return with_sd(statistics, forces, scale_is_known=packing.scale_is_known, moved=forces.frame > 0)
