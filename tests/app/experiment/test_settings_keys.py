@@ -91,7 +91,11 @@ def test_keys_are_found_for_a_wall_and_an_index_of_a_list():
         ("solver.kapa=1", "key solver.kapa: is not known (value 1): did you mean solver.kappa?"),
         ("solver.kappa=-1", "(Kinematic number: weight of the measured motion relative to the contact forces)"),
         ("material.gravity=[0.0]", "Gravity in the plane"),
-        ('walls.top.pressure="much"', "(Pressure that loads this wall; absent: its measured velocity is imposed [Pa])"),
+        (
+            'walls.top.pressure="much"',
+            "(Pressure that loads this wall between its neighbours, where rods can touch it; absent: its measured "
+            "velocity is imposed [Pa])",
+        ),
     ],
 )
 def test_an_error_quotes_the_description_of_the_key(setting, expected, tracked, capsys):

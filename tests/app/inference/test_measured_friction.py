@@ -81,7 +81,7 @@ def test_statistics_are_recomputed_and_less_certain_where_the_motion_contradicts
     results = make_results(1, 8, 7, sweeps=2)
     frame = replace(results.frames[0], status=FrameStatus.SETTLED)
     before, anew = results.statistics[0], replace(results.statistics[0], friction_angle_sd=0.01)
-    monkeypatch.setattr(infer_sequence, "_summarise", lambda sequence, assessed: anew)
+    monkeypatch.setattr(infer_sequence, "summarise_frame", lambda sequence, assessed: anew)
 
     def after(check: FrictionCheck | None, status: FrameStatus = FrameStatus.SETTLED) -> FrameStatistics:
         sequence = cast(CorrectedSequence, None)

@@ -66,7 +66,8 @@ def test_soft_grains_are_a_separate_source_whose_intervals_widen_with_the_penalt
     assert source_of_frame(soft) == EvidenceSource.SOFT
     assert source_of_frame(replace(soft, frame=0)) == EvidenceSource.SOFT_FIRST
     sure, penalised = (interval_factors(replace(soft, trust=trust)) for trust in (0.98, 0.93))
-    assert (penalised > 1.2 * sure).all()
+    assert (penalised[:, 0] > 1.2 * sure[:, 0]).all()  # of f_t the fit found no effect
+    assert (penalised >= sure).all()
 
 
 def test_the_formula_sd_is_recovered_from_the_calibrated_one(frame):
@@ -86,13 +87,13 @@ def test_a_penalty_widens_the_intervals_of_motion(frame):
     assert penalised > 1.1 * sure
 
 
-def test_new_forces_widen_the_intervals_of_mixtures_but_not_of_motion(frame):
-    for weight, widens in ((0.5, True), (0.0, False)):
+def test_new_forces_widen_no_interval_beyond_what_the_trust_does(frame):
+    for weight in (0.5, 0.0):
         same, new = (
             calibrate_sd(replace(frame, position_weight=weight, force_change=change)).fn_sd[-1]
             for change in (0.02, 0.3)
         )
-        assert (new > 1.1 * same) == widens
+        assert new == same
     unknown, usual = (interval_factors(replace(frame, position_weight=0.5, force_change=change))
                       for change in (np.nan, USUAL_CHANGE))  # fmt: skip
     assert unknown == pytest.approx(usual)
@@ -103,7 +104,7 @@ def test_intervals_of_motion_widen_with_the_number_of_contacts(frame):
     fewer = replace(frame, fn=np.where(half, 0.0, frame.fn))
     difference = terms_of(frame)[Term.SIZE] - terms_of(fewer)[Term.SIZE]
     assert difference == pytest.approx(np.log((frame.fn > 0).sum() / (fewer.fn > 0).sum()))
-    assert SLOPE[EvidenceSource.MOTION, Term.SIZE, 0] > 0.05
+    assert SLOPE[EvidenceSource.MOTION, Term.SIZE, 0] > 0.0
     assert np.isfinite(terms_of(replace(frame, fn=0.0 * frame.fn))[Term.SIZE])
 
 
@@ -157,18 +158,18 @@ def test_a_wrong_friction_widens_by_fractions_of_the_force_and_of_the_mean(frame
 
 
 def test_standard_deviations_are_what_was_fitted(frame):
-    """Of the motion, T = 0.9: factor of the group · exp(6.79 · 0.1 + 0.10 ln(c/500)) · 0.2 (s/0.2)^0.89, and of f_t."""
+    """Of the motion, T = 0.9: factor of the group · exp(6.16 · 0.1 + 0.05 ln(c/500)) · 0.2 (s/0.2)^0.95, and of f_t."""
     mean = frame.fn[frame.fn > 0].mean()
     size = np.log((frame.fn > 0).sum() / 500.0)
     plain = ~frame.contacts.with_wall & (frame.bearing_probability == 1.0)
     calibrated = calibrate_sd(frame)
-    for group, fn_factor, ft_factor in ((Group.MEAN, 0.57, 0.66), (Group.STRONG, 0.52, 0.69)):
+    for group, fn_factor, ft_factor in ((Group.MEAN, 0.56, 0.57), (Group.STRONG, 0.53, 0.59)):
         row = np.flatnonzero(plain & (groups_of(frame) == group))[-1]
         s = np.hypot(0.1 * frame.fn[row] / mean, 0.02)
-        expected = mean * fn_factor * np.exp(6.79 * 0.1 + 0.10 * size) * 0.2 * (s / 0.2) ** 0.89
+        expected = mean * fn_factor * np.exp(6.16 * 0.1 + 0.05 * size) * 0.2 * (s / 0.2) ** 0.95
         assert calibrated.fn_sd[row] == pytest.approx(expected)
         s = np.hypot(0.03 * frame.fn[row] / mean, 0.006)
-        expected = mean * ft_factor * np.exp(5.82 * 0.1 + 0.07 * size) * 0.06 * (s / 0.06) ** 0.75
+        expected = mean * ft_factor * np.exp(6.97 * 0.1 + 0.05 * size) * 0.06 * (s / 0.06) ** 0.79
         assert calibrated.ft_sd[row] == pytest.approx(expected)
 
 
