@@ -1,10 +1,10 @@
 """Access control of the local pages: only this browser, this page and this machine are admitted.
 
-The first address contains a random token. The server exchanges it for a cookie that requests of other sites do not
-carry (same-site, strict) and that scripts cannot read. `Host` must name this machine, so that a foreign name that
-resolves to it is refused. `Origin`, where a browser sends it, must be that of this page, and a request that changes
-something must have one. No answer carries a CORS header. The content policy restricts the page, and the viewer in it,
-to requests to this server.
+The first address contains a random token, which opens once. The server exchanges it for a cookie that requests of other
+sites do not carry (same-site, strict) and that scripts cannot read. Both are drawn anew by every process. `Host` must
+name this machine, so that a foreign name that resolves to it is refused. `Origin`, where a browser sends it, must be
+that of this page, and a request that changes something must have one. No answer carries a CORS header. The content
+policy restricts the page, and the viewer in it, to requests to this server.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ class Gate:
     command: str = "review"  # the command that printed the address
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # in the first address
     secret: str = field(default_factory=lambda: secrets.token_urlsafe(32))  # in the cookie
+    _unused: list[bool] = field(default_factory=lambda: [True])  # emptied by the first visit
 
     @property
     def address(self) -> str:
@@ -80,9 +81,24 @@ class Gate:
         objection = self.objection(known, changes=changes, entering=entering)
         return None if objection is None else (HTTPStatus.FORBIDDEN, objection)
 
-    def opens(self, token: str) -> bool:
-        """Return whether a token is that of the first address."""
-        return secrets.compare_digest(token.encode(), self.token.encode())
+    def refuse_entry(self, token: str, headers: Mapping[str, str]) -> str | None:
+        """Return why a first visit with this token is refused, None if it is admitted.
+
+        The token is used up by the first visit; the browser that has the cookie may come again.
+        """
+        if not secrets.compare_digest(token.encode(), self.token.encode()):
+            return f"this token is not the one that `rodsight {self.command}` printed"
+        if self._has_cookie(headers.get("Cookie") or ""):
+            return None
+        try:
+            self._unused.pop()  # one of two visits at the same moment
+        except IndexError:
+            address = f"http://127.0.0.1:{self.port}/"
+            return (
+                f"this address has been opened before, and opens once: use {address} in the browser that opened it, or "
+                f"run `rodsight {self.command}` again"
+            )
+        return None
 
     def admits_at_once(self, headers: Mapping[str, str]) -> bool:
         """Return whether a browser sends the new cookie with the redirection of the first visit.

@@ -43,15 +43,14 @@ class GatedHandler(BaseHTTPRequestHandler):
             return
         if not entering:
             self.answer_get(parts.path, query)
-        elif self.gate.opens(query["token"]):
+        elif (refusal := self.gate.refuse_entry(query["token"], dict(self.headers.items()))) is None:
             place, cookie = self.first_page(query), self.gate.set_cookie
             if self.gate.admits_at_once(dict(self.headers.items())):
                 self.send(b"", "text/plain", HTTPStatus.SEE_OTHER, Location=place, Set_Cookie=cookie)
             else:
                 self.send(redirect_page(place).encode(), "text/html; charset=utf-8", Set_Cookie=cookie)
         else:
-            sentence = f"this token is not the one that `rodsight {self.gate.command}` printed"
-            self.send_text(HTTPStatus.FORBIDDEN, sentence)
+            self.send_text(HTTPStatus.FORBIDDEN, refusal)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing: the terminal shows messages for the user only."""

@@ -63,8 +63,9 @@ class Guard:
             return PlainTextResponse(objection, 403)
         if not entering:
             return None
-        if not self.gate.opens(request.query_params["token"]):
-            return PlainTextResponse(f"this token is not the one that `rodsight {self.gate.command}` printed", 403)
+        refusal = self.gate.refuse_entry(request.query_params["token"], headers)
+        if refusal is not None:
+            return PlainTextResponse(refusal, 403)
         cookie = {"Set-Cookie": self.gate.set_cookie}
         if self.gate.admits_at_once(headers):
             return RedirectResponse(self.entry, 303, cookie)
