@@ -10,14 +10,18 @@ policy restricts the page, and the viewer in it, to requests to this server.
 from __future__ import annotations
 
 import secrets
+import socket
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from email.message import Message
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import ThreadingHTTPServer
 from typing import Any
+
+from .connections import BACKLOG, Connections
 
 CONTENT_POLICY = "; ".join(
     (
@@ -42,10 +46,34 @@ class QuietServer(ThreadingHTTPServer):
     """A server that prints nothing about clients that disconnect: the terminal shows messages for the user only."""
 
     daemon_threads = True
+    request_queue_size = BACKLOG
+
+    def __init__(self, *arguments: Any, **more: Any) -> None:
+        self.known = Connections()
+        super().__init__(*arguments, **more)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        self.known.opened(client_address, lambda: _end(request))
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.known.forget(client_address)
+
+    def service_actions(self) -> None:
+        self.known.close_expired()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)
+
+
+def _end(connection: socket.socket) -> None:
+    """End a connection that another thread reads from."""
+    with suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)
 
 
 @dataclass(frozen=True, slots=True)
