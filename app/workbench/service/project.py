@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Channel, Image, ImageSelection, read_photograph
+from ...experiment.reading.input_files import InputFiles
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...out_of_date import out_of_date
@@ -142,8 +143,7 @@ class Project:
         if not 0 <= frame < len(found.files):
             raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
         file, section = found.files[frame], found.data.get("photographs", {})
-        if not file.resolve().is_relative_to(self.root.resolve()):
-            raise InputError(file, "", f"lies outside of {self.root}: open the folder that holds both")
+        InputFiles(self.root).refuse_outside(file)  # also where it was exchanged for a link since
         return file, hash(stamp_of(file)), section.get("channel", "grey")
 
     def picture(self, frame: int, widest: int) -> bytes:
@@ -320,7 +320,7 @@ class Project:
         with self.lock:
             stamp = self.stamp()
             if self._outdated is None or self._outdated[0] != stamp:
-                self._outdated = stamp, out_of_date(self.results)
+                self._outdated = stamp, out_of_date(self.results, self.root)
             return self._outdated[1]
 
     def _run_overview(self) -> dict[str, Any] | None:
@@ -376,7 +376,7 @@ class Project:
         folder = (self.folder / pattern).parent
         try:
             return folder.stat().st_mtime_ns
-        except OSError:
+        except (OSError, ValueError):
             return None
 
 

@@ -45,9 +45,11 @@ from .endpoints import (
 from .guard import Guard
 from .project import Project
 from .recordings import PATH, Viewer, answer_recording, answer_shared, answer_viewer
+from .setup_endpoints import LARGEST_WRITTEN, WITH_TABLE
 from .workbench import Workbench
 
-LARGEST_BODY = 256 * 1024  # bytes of a request
+LARGEST_BODY = 256 * 1024  # bytes of a request without a table
+LARGEST_TABLE = 4 * LARGEST_WRITTEN  # bytes of a request with one: a character has up to four, an escaped line end two
 THUMBNAIL = 480  # [px] of a picture on the first page
 POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
@@ -94,8 +96,9 @@ def make_application(workbench: Workbench, gate: Gate, entry: str = "/", known: 
 
     async def call(request: Request) -> Response:
         length = request.headers.get("Content-Length") or ""
-        if not length.isdecimal() or len(length) > 9 or int(length) > LARGEST_BODY:
-            return PlainTextResponse(f"a request has at most {LARGEST_BODY} bytes", 413)
+        largest = LARGEST_TABLE if request.path_params["name"] in WITH_TABLE else LARGEST_BODY
+        if not length.isdecimal() or len(length) > 9 or int(length) > largest:
+            return PlainTextResponse(f"a request has at most {largest} bytes", 413)
         body = await request.body()
         return await run_in_threadpool(_guarded, lambda: _call(workbench, request.path_params["name"], body))
 
@@ -202,6 +205,8 @@ def _guarded(work: Callable[[], Response]) -> Response:
         return PlainTextResponse(_plain(str(error)), 400)
     except (InputError, RunError) as error:
         return PlainTextResponse(_plain(str(error)), 422)
+    except RecursionError:
+        return PlainTextResponse("the experiment file is nested too deeply", 422)
     except OSError as error:
         return PlainTextResponse(_plain(f"{error.filename or ''} {error.strerror or error}".strip()), 422)
 

@@ -190,6 +190,6 @@ def stamp_of(file: Path) -> Stamp:
     """
     try:
         stat = file.stat()
-    except OSError:
+    except (OSError, ValueError):  # ValueError: a name that no file can have
         return file.name, -1, -1, -1, -1
     return file.name, stat.st_mtime_ns, stat.st_size, stat.st_ino, stat.st_ctime_ns

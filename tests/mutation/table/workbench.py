@@ -29,7 +29,7 @@ MUTANTS = [
     *mutants_of(
         "app/workbench/service/server.py",
         "tests/app/workbench/test_gate.py",
-        ("> LARGEST_BODY:", "> 1 << 40:"),
+        ("> largest:", "> 1 << 40:"),
     ),
     *mutants_of(
         "app/workbench/service/workbench.py",
