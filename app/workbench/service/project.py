@@ -232,8 +232,9 @@ class Project:
     def job(self) -> Job:
         """The runs of the experiment, one at a time."""
         with self.lock:
-            if self._job is None or (self._job.results != self.results and self._job.process is None):
-                self._job = Job(self.root, self.folder, self.results)
+            if self._job is None or (self._job.results != self.results and not self._job.is_running):
+                self._job = Job(self.root, self.folder, self.results, self.folder / PLACE)
+                self._job.find()
             return self._job
 
     def run_data(self) -> RunData | None:
@@ -347,6 +348,7 @@ class Project:
     def describe(self) -> dict[str, Any]:
         """Describe the set-up for the page; places in pixels, everything else in SI units."""
         found = self.validation()
+        self.draft.note_shown()
         section = found.data.get("photographs", {})
         height, width = found.shape or (0, 0)
         bounds: tuple[float, ...] | None = None

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import RAW_SUFFIXES, in_order, natural_key
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from ...run_folder import SUMMARY, TRACKS, UNFINISHED
+from .toml_edit import set_values
 
 PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
 DEEPEST = 3  # folders below the one that was opened
@@ -124,8 +123,7 @@ def duplicate(folder: Path, root: Path) -> Path:
         folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs")
     )
     file = part / CONFIG_NAME
-    data = tomllib.loads(file.read_text(encoding="utf-8"))
-    write_atomically(file, tomli_w.dumps(data | {"name": valid_name(target.name)}).encode())
+    write_atomically(file, set_values(file.read_bytes().decode("utf-8"), {"name": valid_name(target.name)}).encode())
     part.rename(target)
     return target
 
