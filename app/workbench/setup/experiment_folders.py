@@ -15,7 +15,7 @@ from typing import Any
 
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import RAW_SUFFIXES, in_order, natural_key
-from ...process.atomic import write_atomically
+from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
 from ...run_folder import SUMMARY, TRACKS, UNFINISHED
 from .toml_edit import set_values
@@ -102,7 +102,8 @@ def copy_sample(root: Path) -> Path:
     if source is None:
         raise InputError("the sample", "", "is not installed with the package; it comes with the source")
     if not (target / CONFIG_NAME).is_file():
-        shutil.copytree(source, target, dirs_exist_ok=True)
+        with replacing_folder(target) as part:
+            shutil.copytree(source, part, dirs_exist_ok=True)
     return target
 
 
@@ -118,13 +119,14 @@ def duplicate(folder: Path, root: Path) -> Path:
         raise InputError(folder, "", "is the folder that was opened: open the one above it to duplicate the experiment")
     names = (f"{folder.name} copy", *(f"{folder.name} copy {k}" for k in range(2, 1000)))
     target = next(folder.with_name(name) for name in names if not folder.with_name(name).exists())
-    part = target.with_name(f".{target.name}.part")
-    shutil.copytree(
-        folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs")
-    )
-    file = part / CONFIG_NAME
-    write_atomically(file, set_values(file.read_bytes().decode("utf-8"), {"name": valid_name(target.name)}).encode())
-    part.rename(target)
+    with replacing_folder(target) as part:
+        shutil.copytree(
+            folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs"),
+            dirs_exist_ok=True,
+        )  # fmt: skip
+        file = part / CONFIG_NAME
+        described = set_values(file.read_bytes().decode("utf-8"), {"name": valid_name(target.name)})
+        write_atomically(file, described.encode())
     return target
 
 
