@@ -17,7 +17,7 @@ from .verdicts.log import VERDICTS, VerdictLog
 LISTED = 3  # files that a reason names
 
 
-def out_of_date(folder: Path) -> list[str]:
+def out_of_date(folder: Path, root: Path | None = None) -> list[str]:
     """Return the reasons for which the results of a run's folder are out of date.
 
     Files of unchanged size, number and times are not read.
@@ -26,6 +26,8 @@ def out_of_date(folder: Path) -> list[str]:
     ----------
     folder : Path
         The run's folder.
+    root : Path, optional
+        Folder outside of which no file of the experiment is read.
 
     Returns
     -------
@@ -42,7 +44,7 @@ def out_of_date(folder: Path) -> list[str]:
     if settings_in_file(owner) != piece.get("file_settings"):
         reasons.append(f"{owner.name} has changed")
     try:
-        reasons += _changed_inputs(load_experiment(owner), files, piece.get("stamps"))
+        reasons += _changed_inputs(load_experiment(owner, root=root), files, piece.get("stamps"))
     except (InputError, RunError, OSError) as error:
         reasons.append(f"its input cannot be read: {error}")
     if fingerprint(VerdictLog(folder / VERDICTS).snapshot()) != piece.get("verdicts"):

@@ -56,6 +56,7 @@ class Experiment:
         """Return the photographs; channel: used instead of the experiment's own."""
         section = self.config.photographs
         assert section is not None
+        self.inputs.refuse_outside(Path(os.path.normpath(self.folder / section.files)))  # before folders are listed
         files = self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
         selection = ImageSelection(channel or section.channel, section.region, section.mask)
         return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, selection=selection)
@@ -81,12 +82,15 @@ class Experiment:
         return files + (list(self.photographs().files) if config.photographs else [])
 
 
-def load_experiment(path: Path, settings: Sequence[str] = ()) -> Experiment:
-    """Load an experiment from its folder or its experiment.toml, overridden by KEY=VALUE settings."""
+def load_experiment(path: Path, settings: Sequence[str] = (), *, root: Path | None = None) -> Experiment:
+    """Load an experiment from its folder or its experiment.toml, overridden by KEY=VALUE settings.
+
+    root: folder outside of which no file of the experiment is read.
+    """
     file = path / CONFIG_NAME if path.is_dir() else path
     if not file.exists():
         raise InputError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
-    inputs = InputFiles()
+    inputs = InputFiles(root)
     return Experiment(file, load_config(file, tuple(settings), inputs), inputs)
 
 

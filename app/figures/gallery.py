@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
 from matplotlib.figure import Figure
 
+from ..process.atomic import write_atomically
 from ..results.results import Results, TruthContacts
 from ..solver.frame_forces import FrameStatus
 from .directions import draw_rose, draw_stress
@@ -121,6 +123,8 @@ def write_figures(
         figure = draw_figure(results, name, frame, width=width, truth=truth)
         for kind in kinds:
             files.append(folder / f"{name}.{kind}")
-            with paper_style():  # the fonts of PDF and SVG are chosen when the file is written
-                figure.savefig(files[-1])
+            stream = io.BytesIO()  # a file that cannot be written to confuses matplotlib
+            with paper_style():  # holds the fonts of PDF and SVG
+                figure.savefig(stream, format=kind)
+            write_atomically(files[-1], stream.getvalue())
     return files

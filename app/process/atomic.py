@@ -1,8 +1,9 @@
-"""Atomic writes: a file appears whole or not at all."""
+"""Atomic writes: a file, or a folder, appears whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,36 @@ def replacing(file: Path) -> Iterator[Path]:
         os.replace(part, file)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_folder(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder to fill, which becomes `folder` once the block ends without an error.
+
+    Where the folder exists already, its files are replaced one by one at the end.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = folder.with_name(f".{folder.name}{PART}")
+    shutil.rmtree(part, ignore_errors=True)  # of a process that was killed
+    try:
+        part.mkdir()
+        yield part
+        if folder.is_dir():
+            _move_into(part, folder)
+        else:
+            os.replace(part, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _move_into(source: Path, target: Path) -> None:
+    """Move every file of a folder into another one."""
+    target.mkdir(exist_ok=True)
+    for each in source.iterdir():
+        if each.is_dir():
+            _move_into(each, target / each.name)
+        else:
+            os.replace(each, target / each.name)
 
 
 def write_atomically(file: Path, content: bytes) -> None:

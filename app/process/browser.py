@@ -25,21 +25,13 @@ def redirect_page(address: str) -> str:
     return REDIRECT.format(address=html.escape(address))
 
 
-def open_page(address: str, *, outlived: bool = False) -> None:
-    """Open an address by a file that only this user can read, and that leads to it.
+def open_page(address: str) -> None:
+    """Open an address by a file that only this user can read, and that leads to it; it is removed with the process.
 
     A browser that runs in the foreground does not stop this process.
-
-    Parameters
-    ----------
-    address : str
-        The address, with its token.
-    outlived : bool
-        The server outlives this process, whose end must not remove the file.
     """
     folder = Path(tempfile.mkdtemp(prefix="rodsight-page-"))  # closed to others
-    if not outlived:
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / "open.html"
     with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as stream:
         stream.write(redirect_page(address))

@@ -42,7 +42,12 @@ class Holder:
     @classmethod
     def this(cls) -> Holder:
         """Return the current process."""
-        return cls(os.getpid(), _start_time(os.getpid()), socket.gethostname(), _boot(), _container())
+        return cls.of(os.getpid())
+
+    @classmethod
+    def of(cls, process: int) -> Holder:
+        """Return a process of this machine by its number."""
+        return cls(process, _start_time(process), socket.gethostname(), _boot(), _container())
 
     @property
     def is_alive(self) -> bool:
@@ -219,7 +224,8 @@ def _start_time(process: int) -> str:
     """Return when a process started, in clock ticks since boot; empty where there is no such process."""
     try:
         status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
-        return status.rpartition(")")[2].split()[19]
+        fields = status.rpartition(")")[2].split()
+        return "" if fields[0] == "Z" else fields[19]  # Z: it has ended, and nobody has asked for its status
     except (OSError, IndexError):
         return "" if not _exists_without_proc(process) else "unknown"
 

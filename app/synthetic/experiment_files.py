@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..process.atomic import replacing, write_atomically
 from ..solver.bodies.grains import Array
 from ..solver.bodies.wall_shapes import IN, circle_parameters, wall_distance
 from ..solver.dem.dem_truth import DemSettings, DemTruth
@@ -168,7 +169,8 @@ def write_experiment(
     plates = "".join(f"[walls.{wall}]\npressure = {value}\n" for wall, value in known.pressure.items())
     walls = f"[walls]\n{walls}{sensors}{plates}"
     gravity = f"gravity = [{known.gravity[0]}, {known.gravity[1]}]\n" if any(known.gravity) else ""
-    path.write_text(
+    write_atomically(
+        path,
         f"""{remarks}name = "{name}"
 truth = "truth_contacts.csv"
 truth_tracks = "truth_tracks.csv"
@@ -180,8 +182,7 @@ density = {known.density}
 length = {known.length}
 friction = {known.friction}
 wall_friction = {known.wall_friction}
-{gravity}""",
-        encoding="utf-8",
+{gravity}""".encode(),
     )
 
 
@@ -190,7 +191,7 @@ def _metres(value: float) -> str:
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..process.atomic import replacing_folder
 from ..process.errors import InputError
 from ..process.progress import Progress, no_progress
 from ..solver.bodies.grains import Array
@@ -74,18 +75,18 @@ def make_photoelastic(
     pixel = 2.0 * float(truth.radius.mean()) / DIAMETER
     floor = float(truth.position[..., 1].max()) / pixel + DIAMETER
     centre_error = CENTRE_ERROR * rng.standard_normal((grains, 2))
-    out.mkdir(parents=True, exist_ok=True)
-    for frame in range(truth.frame_count):
-        place = truth.position[frame] / pixel
-        place = np.column_stack([place[:, 0], floor - place[:, 1]]) + centre_error
-        place += NOISE * rng.standard_normal(place.shape)
-        radius = np.rint(truth.radius / pixel - RADIUS_DEFICIT + RADIUS_NOISE * rng.standard_normal(grains))
-        normal, tangential = _read_forces(truth, frame, rng)
-        stem = out / f"DSC{FIRST + 2 * frame:05d}_solved_Tracke"
-        discs = np.column_stack([np.arange(1, grains + 1), place, radius, normal.sum(axis=1)])
-        np.savetxt(f"{stem}_ParticleData.dlm", discs, fmt=("%d", "%.2f", "%.2f", "%d", "%.5g"), delimiter=",")
-        np.savetxt(f"{stem}_NormWeightedAdjacencyMatrix.dlm", normal, fmt="%.5g", delimiter=",")
-        np.savetxt(f"{stem}_TanWeightedAdjacencyMatrix.dlm", tangential, fmt="%.5g", delimiter=",")
+    with replacing_folder(out) as part:
+        for frame in range(truth.frame_count):
+            place = truth.position[frame] / pixel
+            place = np.column_stack([place[:, 0], floor - place[:, 1]]) + centre_error
+            place += NOISE * rng.standard_normal(place.shape)
+            radius = np.rint(truth.radius / pixel - RADIUS_DEFICIT + RADIUS_NOISE * rng.standard_normal(grains))
+            normal, tangential = _read_forces(truth, frame, rng)
+            stem = part / f"DSC{FIRST + 2 * frame:05d}_solved_Tracke"
+            discs = np.column_stack([np.arange(1, grains + 1), place, radius, normal.sum(axis=1)])
+            np.savetxt(f"{stem}_ParticleData.dlm", discs, fmt=("%d", "%.2f", "%.2f", "%d", "%.5g"), delimiter=",")
+            np.savetxt(f"{stem}_NormWeightedAdjacencyMatrix.dlm", normal, fmt="%.5g", delimiter=",")
+            np.savetxt(f"{stem}_TanWeightedAdjacencyMatrix.dlm", tangential, fmt="%.5g", delimiter=",")
     return MadePhotoelastic(out, truth, pixel)
 
 

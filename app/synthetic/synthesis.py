@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from ..experiment.units import Scale
+from ..process.atomic import write_atomically
 from ..process.errors import InputError
 from ..process.progress import Progress, no_progress
 from ..solver.bodies.grains import Array
@@ -205,8 +206,7 @@ def _write_photographs(
             noise_seed=int(np.random.SeedSequence([seed, k]).generate_state(1)[0]),
         )
         name = out / "photos" / f"{k:04d}.{suffix}"
-        if not cv2.imwrite(str(name), image, options):
-            raise OSError(f"{name}: the photograph could not be written")
+        write_atomically(name, cv2.imencode(name.suffix, image, options)[1].tobytes())
         progress("photograph", k + 1, truth.frame_count)
     scale = Scale(pixel, height)
     experiment_files.write_grains_in_pixels(

@@ -15,7 +15,7 @@ from tests.program import ROOT
 # Modules without guaranteed stability, and the distribution that they belong to.
 INTERNALS = {
     "numba.core": "numba", "numba.np": "numba", "llvmlite": "llvmlite", "pydantic_core": "pydantic",
-    "rerun_cli": "rerun-sdk", "rerun_bindings": "rerun-sdk",
+    "uvicorn.protocols": "uvicorn", "rerun_cli": "rerun-sdk", "rerun_bindings": "rerun-sdk",
 }  # fmt: skip
 REQUIREMENTS = {
     each.name: each
@@ -55,3 +55,14 @@ def test_the_installed_version_is_inside_the_bounds(name: str) -> None:
     assert bounds.contains(installed), (
         f"{name} {installed} is outside {bounds}: run all tests with it, then move the bound in pyproject.toml"
     )
+
+
+def test_every_dependency_has_a_locked_version_within_its_bounds():
+    lines = (ROOT / ".ci" / "locked.txt").read_text().splitlines()
+    locked = dict(line.split("==") for line in lines if not line.startswith("#"))
+    assert {name for name, each in REQUIREMENTS.items() if Version(locked[name]) not in each.specifier} == set()
+
+
+def test_every_dependency_is_listed_with_its_licence():
+    listed = (ROOT / "app" / "docs" / "install.md").read_text(encoding="utf-8").partition("## Licences")[2]
+    assert [name for name in REQUIREMENTS if f"| {name} |" not in listed] == []

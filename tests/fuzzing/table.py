@@ -23,14 +23,16 @@ _ROWS = {
                "test_long_runs"),
     "scrubbed": ("photographs of one recording", "pictures that took more than 20 s", "test_scrubbing"),
     "requests": ("hostile requests", "admitted, or answered with a traceback", "test_hostile_requests"),
+    "values": ("hostile values in requests of the page itself", "answered with a traceback", "test_hostile_values"),
 }  # fmt: skip
 
 _HEAD = """# Robustness, counted
 
 Counts of the last runs of `pytest -m slow tests/fuzzing`, for corrupted inputs of `python -m tests.fuzzing --pieces`;
 `python -m tests.fuzzing` prints the table and writes this page. A full run has at least 10 000 corrupted inputs, 100
-kills, 40 faults, 800 requests, 1000 photographs and a recording of 10 000. Failures are corrected after they were
-counted, and counted again by the next run. [Threats](threats.md) lists the attacks.
+kills, 40 faults, 800 requests of each server and 9600 of the page itself, 1000 photographs and a recording of 10 000.
+Failures are corrected after they were counted, and counted again by the next run. [Threats](threats.md) lists the
+attacks.
 
 """
 

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ...process.errors import RunError
 from ..arguments import AsJson, Quiet, Scheduler, Workers, worker_count
 from ..terminal import print_line, progress_of, table_console
 
 if TYPE_CHECKING:
+    from ...campaigns.campaign import CampaignResults
     from ...campaigns.collect import Row
 
 
@@ -61,13 +63,13 @@ def campaign(
         done = run_campaign(cases, folder, workers=processes, scheduler=scheduler, progress=progress)
     if as_json:
         print(json.dumps({"folder": str(folder), "report": str(done.report), "runs": done.rows}, indent=1))
-        return 1 if done.failed else 0
+        return _status(done, len(cases))
     _print(console, done.rows)
     for each in done.failed:
         print_line(console, f"{each.name} failed: {each.error}")
     counts = f"{len(cases)} runs, {done.reused} of them reused, {len(done.failed)} failed"
     print_line(console, f"{counts}. Report: {done.report}")
-    return 1 if done.failed else 0
+    return _status(done, len(cases))
 
 
 def _print(console: object, rows: list[Row]) -> None:
@@ -84,3 +86,11 @@ def _print(console: object, rows: list[Row]) -> None:
     for row in rows:
         table.add_row(*("–" if row.get(name) is None else str(row[name]) for name in present))
     console.print(table)
+
+
+def _status(done: CampaignResults, count: int) -> int:
+    """Return the exit status; raise RunError, a line that is also printed with --quiet, where runs failed."""
+    if not done.failed:
+        return 0
+    first = done.failed[0]
+    raise RunError(f"{len(done.failed)} of {count} runs failed, first {first.name}: {first.error}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import tyro
 
+from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ..arguments import AsJson, Quiet, Settings
@@ -182,7 +183,7 @@ def _study_real(folder: Path | None, page: Path | None, frame: int | None, *, as
     )
     found = real_forces.study_real(results, truth, sides, frame)
     if page is not None:
-        page.write_text(real_page.real_page(found), encoding="utf-8")
+        write_atomically(page, real_page.real_page(found).encode())
     if as_json:
         print(json.dumps(real_forces.as_json(found), indent=1))
         return 0
@@ -332,8 +333,7 @@ def _study_report(request: _StudyRequest, page: Path | None, *, as_json: bool) -
         found = study_calibration(request.plan, request.scenarios or SCENARIOS, request.seeds, progress)
     facts = found.facts()
     file = request.out / "report.html" if page is None else page
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(report_page(found), encoding="utf-8")
+    write_atomically(file, report_page(found).encode())
     if as_json:
         print(json.dumps(facts, indent=1))
     else:

@@ -12,6 +12,7 @@ import numpy as np
 from ...experiment.experiment import CELL_COLUMNS, CONFIG_NAME
 from ...experiment.reading.corners import FrameCorners, bars_of_corners
 from ...experiment.reading.tables import write_table
+from ...process.atomic import replacing_folder
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from .imported_corners import CornerDiscs
@@ -49,7 +50,14 @@ def write_folder(folder: Path, imported: ImportedTracks, contents: FolderContent
         if wall not in names:
             existing = f"the walls are {', '.join(names)}" if names else "there are no walls: give --walls"
             raise InputError("--pressure", wall, f"is not a wall ({existing})")
-    folder.mkdir(parents=True, exist_ok=True)
+    with replacing_folder(folder) as part:
+        _write_files(part, imported, contents)
+        description = _describe(folder, imported, contents, source)
+        (part / CONFIG_NAME).write_text(description, encoding="utf-8")
+
+
+def _write_files(folder: Path, imported: ImportedTracks, contents: FolderContents) -> None:
+    """Write the tables."""
     tracks = imported.tracks
     frame, grain = np.nonzero(tracks.present)
     poses: dict[str, Iterable[object]] = {
@@ -79,7 +87,6 @@ def write_folder(folder: Path, imported: ImportedTracks, contents: FolderContent
         write_table(folder / "cell.csv", dict(zip(CELL_COLUMNS, (range(len(contents.cell)), *vectors), strict=True)))
     if contents.truth is not None:
         write_table(folder / "truth_contacts.csv", contents.truth)
-    (folder / CONFIG_NAME).write_text(_describe(folder, imported, contents, source), encoding="utf-8")
 
 
 def _write_walls(file: Path, walls: Walls) -> None:

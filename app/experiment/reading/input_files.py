@@ -22,15 +22,36 @@ class InputFiles:
     """Reader of input files that keeps the hash of the bytes it returned.
 
     A file that is read again must be unchanged, so that no result is stored under the hash of another content.
+
+    Parameters
+    ----------
+    root : Path, optional
+        Folder outside of which nothing is read, wherever `..`, links and absolute names lead.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, root: Path | None = None) -> None:
+        self._root = None if root is None else root.resolve()
         self._sums: dict[Path, str] = {}  # SHA-256 by file
         self.unused_columns: dict[Path, tuple[str, ...]] = {}  # of tables: names that nothing has read
         self._listed: dict[str, tuple[Path, ...]] = {}
 
+    def refuse_outside(self, file: Path) -> None:
+        """Raise InputError for a file outside of the root."""
+        if self._root is None:
+            return
+        try:
+            inside = file.resolve().is_relative_to(self._root)
+        except (OSError, ValueError, RuntimeError):  # a name that no file can have, or links in a circle
+            raise InputError(file, "", "is no name of a file") from None
+        if not inside:
+            raise InputError(file, "", f"lies outside of {self._root}: open the folder that holds both")
+
     def read(self, file: Path) -> bytes:
-        """Return the bytes of a file. Raises OSError, and RunError where it has changed since it was first read."""
+        """Return the bytes of a file.
+
+        Raises OSError, InputError outside of the root, and RunError where it has changed since it was first read.
+        """
+        self.refuse_outside(file)
         content = regular(file).read_bytes()
         digest = hashlib.sha256(content).hexdigest()
         if self._sums.setdefault(file, digest) != digest:
@@ -51,7 +72,9 @@ class InputFiles:
         return self._sums[file]
 
     def listed(self, pattern: str, find: Callable[[], tuple[Path, ...]]) -> tuple[Path, ...]:
-        """Return the files that match a pattern, as they were first found."""
+        """Return the files that match a pattern, as they were first found. Raises InputError outside of the root."""
         if pattern not in self._listed:
             self._listed[pattern] = find()
+            for file in self._listed[pattern]:
+                self.refuse_outside(file)
         return self._listed[pattern]

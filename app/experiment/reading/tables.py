@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...process.atomic import replacing
 from ...process.errors import InputError
 from .column_names import refuse_likely_names
 from .input_files import InputFiles
@@ -170,7 +171,7 @@ def _header(content: bytes) -> list[str]:
 
 def write_table(file: Path, columns: Mapping[str, Iterable[object]]) -> None:
     """Write columns of equal length, floats with all their digits."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
+    with replacing(file) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))

@@ -1,23 +1,27 @@
 """Access control of the local pages: only this browser, this page and this machine are admitted.
 
-The first address contains a random token. The server exchanges it for a cookie that requests of other sites do not
-carry (same-site, strict) and that scripts cannot read. `Host` must name this machine, so that a foreign name that
-resolves to it is refused. `Origin`, where a browser sends it, must be that of this page, and a request that changes
-something must have one. No answer carries a CORS header. The content policy restricts the page, and the viewer in it,
-to requests to this server.
+The first address contains a random token, which opens once. The server exchanges it for a cookie that requests of other
+sites do not carry (same-site, strict) and that scripts cannot read. Both are drawn anew by every process. `Host` must
+name this machine, so that a foreign name that resolves to it is refused. `Origin`, where a browser sends it, must be
+that of this page, and a request that changes something must have one. No answer carries a CORS header. The content
+policy restricts the page, and the viewer in it, to requests to this server.
 """
 
 from __future__ import annotations
 
 import secrets
+import socket
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from email.message import Message
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from http.server import ThreadingHTTPServer
 from typing import Any
+
+from .connections import BACKLOG, Connections
 
 CONTENT_POLICY = "; ".join(
     (
@@ -42,10 +46,34 @@ class QuietServer(ThreadingHTTPServer):
     """A server that prints nothing about clients that disconnect: the terminal shows messages for the user only."""
 
     daemon_threads = True
+    request_queue_size = BACKLOG
+
+    def __init__(self, *arguments: Any, **more: Any) -> None:
+        self.known = Connections()
+        super().__init__(*arguments, **more)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        self.known.opened(client_address, lambda: _end(request))
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.known.forget(client_address)
+
+    def service_actions(self) -> None:
+        self.known.close_expired()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)
+
+
+def _end(connection: socket.socket) -> None:
+    """End a connection that another thread reads from."""
+    with suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +84,7 @@ class Gate:
     command: str = "review"  # the command that printed the address
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # in the first address
     secret: str = field(default_factory=lambda: secrets.token_urlsafe(32))  # in the cookie
+    _unused: list[bool] = field(default_factory=lambda: [True])  # emptied by the first visit
 
     @property
     def address(self) -> str:
@@ -80,9 +109,24 @@ class Gate:
         objection = self.objection(known, changes=changes, entering=entering)
         return None if objection is None else (HTTPStatus.FORBIDDEN, objection)
 
-    def opens(self, token: str) -> bool:
-        """Return whether a token is that of the first address."""
-        return secrets.compare_digest(token.encode(), self.token.encode())
+    def refuse_entry(self, token: str, headers: Mapping[str, str]) -> str | None:
+        """Return why a first visit with this token is refused, None if it is admitted.
+
+        The token is used up by the first visit; the browser that has the cookie may come again.
+        """
+        if not secrets.compare_digest(token.encode(), self.token.encode()):
+            return f"this token is not the one that `rodsight {self.command}` printed"
+        if self._has_cookie(headers.get("Cookie") or ""):
+            return None
+        try:
+            self._unused.pop()  # one of two visits at the same moment
+        except IndexError:
+            address = f"http://127.0.0.1:{self.port}/"
+            return (
+                f"this address has been opened before, and opens once: use {address} in the browser that opened it, or "
+                f"run `rodsight {self.command}` again"
+            )
+        return None
 
     def admits_at_once(self, headers: Mapping[str, str]) -> bool:
         """Return whether a browser sends the new cookie with the redirection of the first visit.

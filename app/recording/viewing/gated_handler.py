@@ -8,7 +8,8 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from ...process.browser import redirect_page
-from .gate import SAFE_HEADERS, Gate
+from .connections import is_other_user
+from .gate import SAFE_HEADERS, Gate, QuietServer
 
 TIMEOUT = 60.0  # [s] without data from the client
 
@@ -43,15 +44,15 @@ class GatedHandler(BaseHTTPRequestHandler):
             return
         if not entering:
             self.answer_get(parts.path, query)
-        elif self.gate.opens(query["token"]):
+        elif (refusal := self.gate.refuse_entry(query["token"], dict(self.headers.items()))) is None:
             place, cookie = self.first_page(query), self.gate.set_cookie
             if self.gate.admits_at_once(dict(self.headers.items())):
                 self.send(b"", "text/plain", HTTPStatus.SEE_OTHER, Location=place, Set_Cookie=cookie)
             else:
                 self.send(redirect_page(place).encode(), "text/html; charset=utf-8", Set_Cookie=cookie)
         else:
-            sentence = f"this token is not the one that `rodsight {self.gate.command}` printed"
-            self.send_text(HTTPStatus.FORBIDDEN, sentence)
+            self.close_connection = True
+            self.send_text(HTTPStatus.FORBIDDEN, refusal)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing: the terminal shows messages for the user only."""
@@ -59,9 +60,15 @@ class GatedHandler(BaseHTTPRequestHandler):
     def refused(self, *, changes: bool, entering: bool = False) -> bool:
         """Return whether the gate refuses the request; a refusal is sent and the connection ends."""
         refusal = self.gate.refusal(self.headers, changes=changes, entering=entering)
+        known = self.server.known if isinstance(self.server, QuietServer) else None
+        client = (str(self.client_address[0]), int(self.client_address[1]))
+        if refusal is None and known is not None and known.is_new(client) and is_other_user(client, self.gate.port):
+            refusal = HTTPStatus.FORBIDDEN, "this page belongs to another user of this machine"
         if refusal is not None:
             self.close_connection = True  # the body, if any, was not read
             self.send_text(*refusal)
+        elif known is not None and not entering:  # the token of a first visit is still to be compared
+            known.forget(client)
         return refusal is not None
 
     def send_text(self, status: HTTPStatus, sentence: str) -> None:

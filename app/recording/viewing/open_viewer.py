@@ -6,7 +6,6 @@ import shlex
 import subprocess
 from pathlib import Path
 
-from ...process.browser import open_page
 from .recording_server import IDLE_LIMIT, start_server_process
 from .viewer import ViewerKind, has_display, view_command, viewer_environment
 
@@ -42,9 +41,7 @@ def open_viewer(path: Path | str, kind: ViewerKind | str = ViewerKind.NATIVE, *a
     if kind is ViewerKind.NATIVE and not has_display():
         return f"No display here. In a browser: rodsight view --web {shown}; elsewhere: rerun {shown}"
     if kind is ViewerKind.WEB:
-        address = start_server_process([Path(each) for each in (path, *also)])
-        if has_display():
-            open_page(address, outlived=True)
+        address = start_server_process([Path(each) for each in (path, *also)], browser=has_display())
         return f"Served at {address} until {IDLE_LIMIT / 3600.0:g} h pass without a request."
     subprocess.Popen(
         view_command(path, *also),

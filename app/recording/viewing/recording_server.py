@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import signal
 import subprocess
 import sys
 import threading
@@ -19,6 +20,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import IO
 
+from ...process.browser import open_page
 from .gate import Gate, QuietServer
 from .gated_handler import GatedHandler
 from .web_viewer import WebViewer, read_web_viewer
@@ -28,6 +30,7 @@ POLL_INTERVAL = 0.1  # [s] between two reads of a growing recording
 CLOSE_TIMEOUT = 5.0  # [s] in which clients can receive the end of a recording
 PIECE_SIZE = 1 << 20  # [bytes]
 RENDERERS = ("webgl", "webgpu")
+BROWSER = "browser"  # argument of the server process: open the page
 COMMAND = f"from {__name__} import run_server_process; run_server_process()"
 
 _PAGE = {
@@ -126,8 +129,8 @@ def read_growing_file(stream: IO[bytes], complete: threading.Event) -> Iterator[
         complete.wait(POLL_INTERVAL)
 
 
-def start_server_process(recordings: Sequence[Path]) -> str:
-    """Serve recordings from a process that outlives this one.
+def start_server_process(recordings: Sequence[Path], *, browser: bool = False) -> str:
+    """Serve recordings from a process that outlives this one, and opens the page where a browser is wanted.
 
     Returns
     -------
@@ -140,7 +143,7 @@ def start_server_process(recordings: Sequence[Path]) -> str:
         If the server does not start.
     """
     process = subprocess.Popen(
-        [sys.executable, "-c", COMMAND, *map(str, recordings)],
+        [sys.executable, "-c", COMMAND, BROWSER if browser else "", *map(str, recordings)],
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, map(os.path.abspath, sys.path)))},
         start_new_session=True,
@@ -155,9 +158,13 @@ def start_server_process(recordings: Sequence[Path]) -> str:
 
 def run_server_process() -> None:
     """Print the address and serve the recordings of the command line until IDLE_LIMIT passes without a request."""
-    server = RecordingServer([Path(each) for each in sys.argv[1:]])
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # what is registered to be removed at the end is
+    wanted, *files = sys.argv[1:]
+    server = RecordingServer([Path(each) for each in files])
     print(server.address, flush=True)
     sys.stdout.close()
+    if wanted == BROWSER:
+        open_page(server.address)  # here: the file that leads to the page is removed when its token ends
     while (rest := IDLE_LIMIT - (time.monotonic() - server.last_request)) > 0:
         time.sleep(rest)
     server.close()

@@ -1,12 +1,13 @@
 """One run as a child process: its stage, the time left, its messages. A pause ends the process.
 
 A run that is ended by a signal stores its finished frames, and the same command resumes there: a pause costs at most
-one frame and no memory.
+one frame and no memory. It writes to a file, not to a pipe: it outlives this process, and is found again by the next.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -14,14 +15,28 @@ import sys
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from ...process.atomic import write_atomically
+from ...process.lock import Holder
 from ...run_folder import UNFINISHED
 
-PROGRAM = (sys.executable, "-c", "from rodsight.cli.main import main; main()")
+COMMAND = """
+import json
+from rodsight.cli.main import main
+try:
+    main()
+except SystemExit as end:
+    print(json.dumps({"exit": end.code or 0}), flush=True)
+    raise
+"""
+PROGRAM = (sys.executable, "-c", COMMAND)
+OUTPUT, PROCESS = "run.log", "run.json"  # in the folder of the journal: what the run writes; its process
+POLLING = 0.1  # [s] between two reads of what the run writes
 KEPT_LINES = 200  # of its messages
 INTERRUPTED = (130, 143)  # exit statuses of a run that a signal ended
 # Stages in order, as the page names them.
@@ -63,22 +78,24 @@ class Job:
     root: Path  # working directory of the command
     experiment: Path
     results: Path
+    place: Path  # folder of its output and of the number of its process
     state: JobState = JobState.IDLE
     stages: dict[str, Stage] = field(default_factory=dict)
     messages: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT_LINES))
     alarms: list[dict[str, Any]] = field(default_factory=list)
     version: int = 0  # increases with every report
-    process: subprocess.Popen[str] | None = None
+    process: subprocess.Popen[bytes] | None = None
+    found: Holder | None = None  # the process of a run that another server started
+    _status: int | None = None  # exit status that the run has written
     _discard: bool = False
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
     def start(self, *options: str) -> None:
         """Start the run, or resume it. While it runs this does nothing."""
         with self._lock:
-            if self.process is not None:
+            if self.is_running:
                 return
-            self.stages, self.alarms, self._discard = {}, [], False
-            self.messages.clear()
+            self._forget_last()
             command = [
                 *PROGRAM,
                 "run",
@@ -89,12 +106,39 @@ class Job:
                 "lines",
                 *options,
             ]
-            self.process = subprocess.Popen(
-                command, cwd=self.root, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                text=True, errors="replace", start_new_session=True,
-            )  # fmt: skip
+            self.place.mkdir(exist_ok=True)
+            with (self.place / OUTPUT).open("wb") as output:
+                self.process = subprocess.Popen(
+                    command, cwd=self.root, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                )  # fmt: skip
+            values = asdict(Holder.of(self.process.pid)) | {"results": str(self.results)}
+            write_atomically(self.place / PROCESS, json.dumps(values).encode())
             self._set_state(JobState.RUNNING)
             threading.Thread(target=self._read_output, args=(self.process,), daemon=True).start()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the process of a run is there."""
+        return self.process is not None or self.found is not None
+
+    def find(self) -> None:
+        """Find the run that a server started which is gone; where it has ended meanwhile this does nothing."""
+        with self._lock:
+            if self.is_running:
+                return
+            try:
+                stored = json.loads((self.place / PROCESS).read_bytes())
+                results = stored.pop("results")
+                holder = Holder(**stored)
+            except (OSError, ValueError, TypeError, AttributeError, KeyError):
+                return
+            if results != str(self.results) or not holder.is_near or not holder.is_alive:
+                return
+            self._forget_last()
+            self.found = holder
+            self._set_state(JobState.RUNNING)
+            threading.Thread(target=self._read_output, args=(None,), daemon=True).start()
 
     def pause(self, *, discard: bool = False) -> None:
         """End the process; discard: remove the unfinished stage.
@@ -103,18 +147,25 @@ class Job:
         """
         with self._lock:
             self._discard = discard
-            if self.process is None:
+            if not self.is_running:
                 self._clear()
                 return
             self._set_state(JobState.PAUSING)
-            self.process.send_signal(signal.SIGTERM)
+            if self.process is not None:
+                self.process.send_signal(signal.SIGTERM)
+            elif self.found is not None and self.found.is_alive:
+                os.kill(self.found.process, signal.SIGTERM)
 
     def close(self) -> None:
         """Pause the run, and wait until it has ended."""
-        process = self.process
+        process, found = self.process, self.found
+        if process is None and found is None:
+            return
+        self.pause()
         if process is not None:
-            self.pause()
             process.wait()
+        while found is not None and found.is_alive:
+            time.sleep(POLLING)
 
     def as_values(self) -> dict[str, Any]:
         """Describe the run as plain values."""
@@ -148,15 +199,28 @@ class Job:
                     known.done, known.total = done, total
             elif "alarm" in report:
                 self.alarms.append(report)
+            elif isinstance(report.get("exit"), int):
+                self._status = report["exit"]
 
-    def _read_output(self, process: subprocess.Popen[str]) -> None:
-        assert process.stdout is not None
-        with process.stdout as lines:
-            for line in lines:
-                self.read_line(line)
-        status = process.wait()
+    def _read_output(self, process: subprocess.Popen[bytes] | None) -> None:
+        """Read what the run writes until it has ended; process: None for a run that another server started."""
+        with suppress(OSError), (self.place / OUTPUT).open(encoding="utf-8", errors="replace") as lines:
+            part = ""
+            while True:
+                ended = not self._is_alive(process)  # before the last lines are read
+                while piece := lines.readline():
+                    part += piece
+                    if part.endswith("\n"):
+                        self.read_line(part)
+                        part = ""
+                if ended:
+                    break
+                time.sleep(POLLING)
+            self.read_line(part)
+        status = self._status if process is None else process.wait()
         with self._lock:
-            self.process = None
+            self.process = self.found = None
+            (self.place / PROCESS).unlink(missing_ok=True)
             if self._discard:
                 self._clear()
             elif status == 0:
@@ -164,6 +228,15 @@ class Job:
             else:
                 paused = status in INTERRUPTED or self.state is JobState.PAUSING
                 self._set_state(JobState.PAUSED if paused else JobState.FAILED)
+
+    def _is_alive(self, process: subprocess.Popen[bytes] | None) -> bool:
+        if process is not None:
+            return process.poll() is None
+        return self.found is not None and self.found.is_alive
+
+    def _forget_last(self) -> None:
+        self.stages, self.alarms, self._discard, self._status = {}, [], False, None
+        self.messages.clear()
 
     def _clear(self) -> None:
         if self._discard:

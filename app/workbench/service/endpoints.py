@@ -15,13 +15,14 @@ from .workbench import Workbench
 Endpoint = Callable[..., Any]
 
 
-def _without_nul(text: str) -> str:
+def without_nul(text: str) -> str:
+    """Refuse a text that no file can be named by."""
     if "\0" in text:
         raise ValueError("a text has no NUL character")
     return text
 
 
-Text = Annotated[str, StringConstraints(max_length=300), AfterValidator(_without_nul)]
+Text = Annotated[str, StringConstraints(max_length=300), AfterValidator(without_nul)]
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e12, le=1e12)]
 Whole = Annotated[int, Field(ge=0, lt=2**53)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=2)]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Channel, Image, ImageSelection, read_photograph
+from ...experiment.reading.input_files import InputFiles
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...out_of_date import out_of_date
@@ -142,8 +143,7 @@ class Project:
         if not 0 <= frame < len(found.files):
             raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
         file, section = found.files[frame], found.data.get("photographs", {})
-        if not file.resolve().is_relative_to(self.root.resolve()):
-            raise InputError(file, "", f"lies outside of {self.root}: open the folder that holds both")
+        InputFiles(self.root).refuse_outside(file)  # also where it was exchanged for a link since
         return file, hash(stamp_of(file)), section.get("channel", "grey")
 
     def picture(self, frame: int, widest: int) -> bytes:
@@ -232,8 +232,9 @@ class Project:
     def job(self) -> Job:
         """The runs of the experiment, one at a time."""
         with self.lock:
-            if self._job is None or (self._job.results != self.results and self._job.process is None):
-                self._job = Job(self.root, self.folder, self.results)
+            if self._job is None or (self._job.results != self.results and not self._job.is_running):
+                self._job = Job(self.root, self.folder, self.results, self.folder / PLACE)
+                self._job.find()
             return self._job
 
     def run_data(self) -> RunData | None:
@@ -320,7 +321,7 @@ class Project:
         with self.lock:
             stamp = self.stamp()
             if self._outdated is None or self._outdated[0] != stamp:
-                self._outdated = stamp, out_of_date(self.results)
+                self._outdated = stamp, out_of_date(self.results, self.root)
             return self._outdated[1]
 
     def _run_overview(self) -> dict[str, Any] | None:
@@ -347,6 +348,7 @@ class Project:
     def describe(self) -> dict[str, Any]:
         """Describe the set-up for the page; places in pixels, everything else in SI units."""
         found = self.validation()
+        self.draft.note_shown()
         section = found.data.get("photographs", {})
         height, width = found.shape or (0, 0)
         bounds: tuple[float, ...] | None = None
@@ -376,7 +378,7 @@ class Project:
         folder = (self.folder / pattern).parent
         try:
             return folder.stat().st_mtime_ns
-        except OSError:
+        except (OSError, ValueError):
             return None
 
 

@@ -23,7 +23,7 @@ from ...recording.parts import parts_of
 from ...recording.viewing.single_page import write_single_page
 from ...recording.viewing.web_viewer import WebViewer, read_web_viewer
 from ...run_folder import LATER, RECORDING, SIDE
-from .endpoints import Number, Text, Whole, endpoint
+from .endpoints import ExperimentQuery, Number, Text, Whole, endpoint
 from .project import Project
 from .workbench import Workbench
 
@@ -80,7 +80,7 @@ def shared(workbench: Workbench, at: Text) -> dict[str, Any]:
 
 def answer_shared(workbench: Workbench, request: Request) -> Response:
     """Send the HTML file as a download: it must not run as a page of this server."""
-    page = _page_of(workbench.project(request.query_params.get("at", "")))
+    page = _page_of(workbench.project(ExperimentQuery.of(request).at))
     if not page.is_file():
         return PlainTextResponse("no file has been written to be shared yet", 404)
     return FileResponse(page, media_type="application/octet-stream", filename=page.name)

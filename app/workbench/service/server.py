@@ -10,6 +10,7 @@ import asyncio
 import json
 import socket
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -22,6 +23,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from ...process.errors import InputError, RunError
+from ...recording.viewing.connections import BACKLOG, Connections
 from ...recording.viewing.gate import Gate
 from ...reviewing.session import UnknownPair
 from ..inspecting.run_data import run_stamp
@@ -43,9 +45,11 @@ from .endpoints import (
 from .guard import Guard
 from .project import Project
 from .recordings import PATH, Viewer, answer_recording, answer_shared, answer_viewer
+from .setup_endpoints import LARGEST_WRITTEN, WITH_TABLE
 from .workbench import Workbench
 
-LARGEST_BODY = 256 * 1024  # bytes of a request
+LARGEST_BODY = 256 * 1024  # bytes of a request without a table
+LARGEST_TABLE = 4 * LARGEST_WRITTEN  # bytes of a request with one: a character has up to four, an escaped line end two
 THUMBNAIL = 480  # [px] of a picture on the first page
 POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
@@ -54,7 +58,7 @@ KINDS = {
 }  # fmt: skip
 
 
-def make_application(workbench: Workbench, gate: Gate, entry: str = "/") -> ASGIApp:
+def make_application(workbench: Workbench, gate: Gate, entry: str = "/", known: Connections | None = None) -> ASGIApp:
     """Make the server's application, without a network.
 
     Parameters
@@ -65,6 +69,8 @@ def make_application(workbench: Workbench, gate: Gate, entry: str = "/") -> ASGI
         The access rules.
     entry : str
         Address to which the first visit is redirected.
+    known : Connections, optional
+        The connections of the server; those whose requests are admitted are taken from its list.
     """
     assets = dict(_page_files(files(__name__.rsplit(".", 2)[0]) / "page"))
     viewer = Viewer()
@@ -90,8 +96,9 @@ def make_application(workbench: Workbench, gate: Gate, entry: str = "/") -> ASGI
 
     async def call(request: Request) -> Response:
         length = request.headers.get("Content-Length") or ""
-        if not length.isdecimal() or len(length) > 9 or int(length) > LARGEST_BODY:
-            return PlainTextResponse(f"a request has at most {LARGEST_BODY} bytes", 413)
+        largest = LARGEST_TABLE if request.path_params["name"] in WITH_TABLE else LARGEST_BODY
+        if not length.isdecimal() or len(length) > 9 or int(length) > largest:
+            return PlainTextResponse(f"a request has at most {largest} bytes", 413)
         body = await request.body()
         return await run_in_threadpool(_guarded, lambda: _call(workbench, request.path_params["name"], body))
 
@@ -117,7 +124,7 @@ def make_application(workbench: Workbench, gate: Gate, entry: str = "/") -> ASGI
         ),
         Route("/api/{name}", call, methods=["POST"]),
     ]
-    return Guard(Starlette(routes=routes), gate, f"{PATH}{workbench.key}/", entry)
+    return Guard(Starlette(routes=routes), gate, f"{PATH}{workbench.key}/", entry, known or Connections())
 
 
 class WorkbenchServer:
@@ -127,19 +134,23 @@ class WorkbenchServer:
         """Bind the port; command: that prints the address; entry: address to which the first visit is redirected."""
         import uvicorn
 
+        from .http_connection import HttpConnection
+
         self.workbench = workbench
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._socket.bind(("127.0.0.1", port))
-            self._socket.listen(128)  # a browser that is faster than the server waits
+            self._socket.listen(BACKLOG)  # a browser that is faster than the server waits
         except BaseException:
             self._socket.close()
             raise
         self.gate = Gate(self._socket.getsockname()[1], command)
+        known = Connections()
         config = uvicorn.Config(
-            make_application(workbench, self.gate, entry), log_config=None, access_log=False, server_header=False,
-            lifespan="off", timeout_graceful_shutdown=1,
+            make_application(workbench, self.gate, entry, known), log_config=None, access_log=False,
+            server_header=False, lifespan="off", timeout_graceful_shutdown=1, backlog=BACKLOG,
+            http=partial(HttpConnection, known),
         )  # fmt: skip
         self._server = uvicorn.Server(config)
 
@@ -194,6 +205,8 @@ def _guarded(work: Callable[[], Response]) -> Response:
         return PlainTextResponse(_plain(str(error)), 400)
     except (InputError, RunError) as error:
         return PlainTextResponse(_plain(str(error)), 422)
+    except RecursionError:
+        return PlainTextResponse("the experiment file is nested too deeply", 422)
     except OSError as error:
         return PlainTextResponse(_plain(f"{error.filename or ''} {error.strerror or error}".strip()), 422)
 

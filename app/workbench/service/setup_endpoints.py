@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, StringConstraints
+from pydantic import AfterValidator, Field, StringConstraints
 
 from ...experiment.experiment import GrainGuess
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ..setup import circles, edits
 from ..setup.validation import ValidationResult, outside_walls
-from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint
+from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint, without_nul
 from .project import Project
 from .workbench import Workbench
 
@@ -20,7 +20,9 @@ Pressure = Annotated[float, Field(ge=1e-3, le=1e11)]
 Three = Annotated[list[Point], Field(min_length=3, max_length=3)]
 Round = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Lens = Annotated[dict[Annotated[str, StringConstraints(max_length=2)], Number], Field(max_length=20)]
-Written = Annotated[str, StringConstraints(max_length=5_000_000)]  # a table of a hundred thousand rows
+LARGEST_WRITTEN = 5_000_000  # characters of a table: a hundred thousand rows
+Written = Annotated[str, StringConstraints(max_length=LARGEST_WRITTEN), AfterValidator(without_nul)]
+WITH_TABLE = frozenset(("set_table",))  # endpoints whose requests hold a table
 LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
 Polygon = Annotated[list[Point], Field(min_length=3, max_length=500)]
 Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]

@@ -8,18 +8,16 @@ import threading
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-import tomli_w
 
 from ...experiment.config.experiment_file import find_wrong_values
 from ...experiment.experiment import CONFIG_NAME
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from .journal import Action, Contents, Journal, checksum_of
+from .toml_edit import MISSING, leaves, set_values, with_values
 
 Stamp = tuple[str, int, int, int, int]
 
@@ -32,6 +30,7 @@ class Draft:
     journal: Journal = field(default_factory=Journal)  # default: in memory
     lock: threading.RLock = field(default_factory=threading.RLock)
     root: Path | None = None  # nothing outside of it is read or written; None: the folder
+    _shown: dict[str, Any] | None = None  # the experiment file as the user saw it last
     _step: Contents | None = None  # files before the first change of a step that is not finished
 
     @property
@@ -61,18 +60,13 @@ class Draft:
             self._put(files)
 
     def with_keys(self, keys: Mapping[str, Any]) -> bytes:
-        """Return the experiment file with dotted keys set, None: removed; its first comment is kept."""
-        data = deepcopy(self.data())
-        for key, value in keys.items():
-            *path, last = key.split(".")
-            place = data
-            for part in path:
-                place = place.setdefault(part, {})
-            if value is None:
-                place.pop(last, None)
-            else:
-                place[last] = value
-        return (self._first_comment() + tomli_w.dumps(data)).encode()
+        """Return the experiment file with dotted keys set, None: removed; comments and order are kept."""
+        self.data()  # raises where it is no TOML
+        return set_values((self._read(CONFIG_NAME) or b"").decode("utf-8"), keys).encode()
+
+    def note_shown(self) -> None:
+        """Note that the user sees the experiment file as it is now: what others change later, an edit must not undo."""
+        self._shown = self.data()
 
     def set_keys(self, name: str, keys: Mapping[str, Any], tables: Mapping[str, bytes | None] | None = None) -> None:
         """Set dotted keys of the experiment file, and write tables with it, as one step of undo.
@@ -80,8 +74,9 @@ class Draft:
         Raises
         ------
         InputError
-            A value is wrong: nothing is written.
+            A value is wrong, or another program has changed it since the user saw it: nothing is written.
         """
+        self._refuse_overwriting(keys)
         content = self.with_keys(keys)
         wrong = find_wrong_values(
             self.file, tomllib.loads(content.decode()), [key for key in keys if keys[key] is not None]
@@ -138,6 +133,21 @@ class Draft:
         """Return values that change with the files, whoever changed them."""
         return tuple(stamp_of(self.folder / name) for name in (CONFIG_NAME, *names))
 
+    def _refuse_overwriting(self, keys: Mapping[str, Any]) -> None:
+        """Raise InputError where an edit replaces what another program has written since the user saw the file."""
+        if self._shown is None:
+            return
+        now, seen = leaves(self.data()), leaves(self._shown)
+        edited = leaves(with_values(self.data(), keys))
+        for key in now.keys() | seen.keys() | edited.keys():
+            former, present, new = (values.get(key, MISSING) for values in (seen, now, edited))
+            if former != present and present != new and former != new:
+                self.note_shown()
+                raise InputError(
+                    self.file, f"key {key}", f"was changed by another program, from {_word(former)} to "
+                    f"{_word(present)}, since the page showed it; nothing was written. Repeat the edit to replace it",
+                )  # fmt: skip
+
     def _put(self, files: Mapping[str, bytes | None]) -> None:
         for name, content in files.items():
             place = self._inside(name, follow=False)
@@ -145,6 +155,8 @@ class Draft:
                 place.unlink(missing_ok=True)
             else:
                 write_atomically(place, content)
+        if self._shown is not None and CONFIG_NAME in files:
+            self.note_shown()
 
     def _read(self, name: str) -> bytes | None:
         try:
@@ -168,10 +180,9 @@ class Draft:
             raise InputError(self.file, f"file {name!r}", f"lies outside of {root}: the workbench does not touch it")
         return file
 
-    def _first_comment(self) -> str:
-        lines = (self._read(CONFIG_NAME) or b"").decode("utf-8").splitlines(keepends=True)
-        count = next((k for k, line in enumerate(lines) if not line.startswith("#")), len(lines))
-        return "".join(lines[:count])
+
+def _word(value: Any) -> str:
+    return "nothing" if value is MISSING else str(value)
 
 
 def as_table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -190,6 +201,6 @@ def stamp_of(file: Path) -> Stamp:
     """
     try:
         stat = file.stat()
-    except OSError:
+    except (OSError, ValueError):  # ValueError: a name that no file can have
         return file.name, -1, -1, -1, -1
     return file.name, stat.st_mtime_ns, stat.st_size, stat.st_ino, stat.st_ctime_ns

@@ -345,7 +345,7 @@ def snapped_to(radii: Sequence[float], rods: GrainGuess, scale: Scale) -> GrainG
 def find_classes(radius: Array, most: int = 8) -> Array:
     """Find radius classes (k,), in the unit of the radii: gaps in the sorted radii separate them."""
     ordered = np.sort(radius)
-    if len(ordered) == 0:
+    if len(ordered) < 2:
         return ordered
     gap = np.diff(ordered)
     parts = np.split(ordered, np.flatnonzero(gap > np.maximum(0.035 * ordered[1:], 3.0 * np.median(gap))) + 1)

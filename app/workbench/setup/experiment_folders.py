@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import RAW_SUFFIXES, in_order, natural_key
-from ...process.atomic import write_atomically
+from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
 from ...run_folder import SUMMARY, TRACKS, UNFINISHED
+from .toml_edit import set_values
 
 PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
 DEEPEST = 3  # folders below the one that was opened
@@ -38,7 +37,7 @@ class ImageSeries:
 
 def find_experiments(root: Path) -> list[Path]:
     """Find the folders with an experiment file, in natural order."""
-    return [folder for folder in _folders(root) if (folder / CONFIG_NAME).is_file()]
+    return [folder for folder in _folders(root) if _is_file(folder / CONFIG_NAME)]
 
 
 def find_image_series(root: Path) -> list[ImageSeries]:
@@ -46,11 +45,11 @@ def find_image_series(root: Path) -> list[ImageSeries]:
     found = []
     for folder in _folders(root):
         above = folder.parent
-        if (folder / CONFIG_NAME).is_file() or (above.is_relative_to(root) and folder in _named_folders(above)):
+        if _is_file(folder / CONFIG_NAME) or (above.is_relative_to(root) and folder in _named_folders(above)):
             continue
         kinds: dict[str, list[Path]] = {}
         for file in _listed(folder):
-            if file.suffix.lower() in PICTURES and file.is_file():
+            if file.suffix.lower() in PICTURES and _is_file(file):
                 kinds.setdefault(file.suffix, []).append(file)
         found += [ImageSeries(folder, suffix, in_order(each)) for suffix, each in sorted(kinds.items())]
     return found
@@ -76,12 +75,12 @@ def find_series(root: Path, folder: str, suffix: str) -> ImageSeries:
 def _named_folders(folder: Path) -> tuple[Path, ...]:
     """The folders of the photographs that the experiment of a folder names; all where it cannot be read."""
     file = folder / CONFIG_NAME
-    if not file.is_file():
+    if not _is_file(file):
         return ()
     try:
         section = tomllib.loads(file.read_text(encoding="utf-8")).get("photographs")
     except (OSError, ValueError, RecursionError):
-        return tuple(folder.iterdir())
+        return tuple(_listed(folder))
     pattern = section.get("files") if isinstance(section, dict) else None
     return ((folder / pattern).parent,) if isinstance(pattern, str) else ()
 
@@ -103,7 +102,8 @@ def copy_sample(root: Path) -> Path:
     if source is None:
         raise InputError("the sample", "", "is not installed with the package; it comes with the source")
     if not (target / CONFIG_NAME).is_file():
-        shutil.copytree(source, target, dirs_exist_ok=True)
+        with replacing_folder(target) as part:
+            shutil.copytree(source, part, dirs_exist_ok=True)
     return target
 
 
@@ -119,14 +119,14 @@ def duplicate(folder: Path, root: Path) -> Path:
         raise InputError(folder, "", "is the folder that was opened: open the one above it to duplicate the experiment")
     names = (f"{folder.name} copy", *(f"{folder.name} copy {k}" for k in range(2, 1000)))
     target = next(folder.with_name(name) for name in names if not folder.with_name(name).exists())
-    part = target.with_name(f".{target.name}.part")
-    shutil.copytree(
-        folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs")
-    )
-    file = part / CONFIG_NAME
-    data = tomllib.loads(file.read_text(encoding="utf-8"))
-    write_atomically(file, tomli_w.dumps(data | {"name": valid_name(target.name)}).encode())
-    part.rename(target)
+    with replacing_folder(target) as part:
+        shutil.copytree(
+            folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs"),
+            dirs_exist_ok=True,
+        )  # fmt: skip
+        file = part / CONFIG_NAME
+        described = set_values(file.read_bytes().decode("utf-8"), {"name": valid_name(target.name)})
+        write_atomically(file, described.encode())
     return target
 
 
@@ -171,10 +171,26 @@ def _listed(folder: Path) -> list[Path]:
         return []
 
 
+def _is_file(file: Path) -> bool:
+    """Whether there is a file; not where its folder may not be entered."""
+    try:
+        return file.is_file()
+    except OSError:
+        return False
+
+
+def _is_folder(place: Path) -> bool:
+    """Whether this is a folder of the root, not a link that leads elsewhere."""
+    try:
+        return place.is_dir() and not place.is_symlink()
+    except OSError:
+        return False
+
+
 def _folders(root: Path, depth: int = 0) -> Iterator[Path]:
     yield root
     if depth == DEEPEST:
         return
     for each in sorted(_listed(root), key=natural_key):
-        if each.is_dir() and not each.name.startswith(".") and each.name not in SKIPPED and not each.is_symlink():
+        if not each.name.startswith(".") and each.name not in SKIPPED and _is_folder(each):
             yield from _folders(each, depth + 1)

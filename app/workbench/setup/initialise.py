@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -106,7 +105,7 @@ def _find_rods_and_walls(draft: Draft, flags: SetupFlags, first: Image) -> tuple
         if not source.is_file():
             raise InputError("--walls", flags.walls, "is neither auto, none nor a table frame,wall,x1,y1,x2,y2")
         if source.resolve() != (draft.folder / edits.WALLS).resolve():
-            shutil.copyfile(source, draft.folder / edits.WALLS)
+            write_atomically(draft.folder / edits.WALLS, Path(source).read_bytes())
         draft.set_keys("walls", {"walls.file": edits.WALLS})
     for wall, pressure in flags.pressure.items():
         found = validate(draft)

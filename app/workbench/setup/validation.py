@@ -27,6 +27,7 @@ from ...experiment.plausibility import (
     rods_beyond_ends,
     rods_cut_by_walls,
 )
+from ...experiment.reading.input_files import InputFiles
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...experiment.walls import read_walls
@@ -159,7 +160,7 @@ def _read_inputs(found: ValidationResult, draft: Draft, filled: dict[str, Any]) 
             usable.pop(name, None)
     if find_config_errors(draft.file, usable):
         return
-    experiment = Experiment(draft.file, ExperimentFile.model_validate(usable))
+    experiment = Experiment(draft.file, ExperimentFile.model_validate(usable), InputFiles(draft.root or draft.folder))
     found.experiment = experiment
     if found.tracked:
         _validate_tracks(found, experiment)

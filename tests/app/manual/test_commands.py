@@ -197,7 +197,7 @@ def at_work(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         threading.Thread(target=look, daemon=True).start()
         return True
 
-    def serve_here(files: list[Path]) -> str:  # a server process would outlive the command
+    def serve_here(files: list[Path], *, browser: bool) -> str:  # a server process would outlive the command
         servers.append(recording_server.RecordingServer(files))
         return servers[-1].address
 

@@ -102,3 +102,13 @@ def test_a_process_holds_a_folder_once(tmp_path):
         hold_folder(tmp_path, print),
     ):
         pass
+
+
+def test_a_process_that_has_ended_does_not_live_although_its_status_was_not_asked_for():
+    process = subprocess.Popen([sys.executable, "-c", ""], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    holder = Holder.of(process.pid)
+    assert holder.is_alive
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # ended, and still listed
+    assert not holder.is_alive
+    process.communicate()

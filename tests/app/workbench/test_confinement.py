@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
+import tomli_w
 from rodsight.process.errors import InputError
 from rodsight.workbench.service.project import Project
 from rodsight.workbench.service.workbench import Workbench
@@ -47,9 +49,10 @@ def test_a_file_of_another_folder_inside_the_root_is_found(root):
     assert (root / "shared.csv").read_text() == "y\n"
 
 
-@pytest.mark.parametrize("name", ["../../outside", "/tmp/outside", "..", "a/b"])
+@pytest.mark.parametrize("name", ["../../outside", "absolute", "..", "a/b"])
 def test_the_name_of_an_experiment_leads_nowhere_else(root, name):
-    edit(root / "tracked" / "experiment.toml", 'name = "tracked"', f'name = "{name}"')
+    given = str(root.parent / "outside") if name == "absolute" else name
+    edit(root / "tracked" / "experiment.toml", 'name = "tracked"', f'name = "{given}"')
     assert Project(root, root / "tracked").results == root / "runs" / "tracked"
 
 
@@ -64,8 +67,48 @@ def test_photographs_outside_are_not_served(made_photographs, tmp_path):
     folder = Path(shutil.copytree(made_photographs, tmp_path / "root" / "mine"))
     shutil.move(folder / "photos", tmp_path / "elsewhere")
     (folder / "photos").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match="lies outside"):
-        Project(tmp_path / "root", folder).picture(0, 100)
+    project = Project(tmp_path / "root", folder)
+    assert "lies outside" in " ".join(project.validation().steps["photographs"].messages)
+    with pytest.raises(InputError):
+        project.picture(0, 100)
+
+
+def test_a_photograph_that_becomes_a_link_is_not_served(made_photographs, tmp_path):
+    folder = Path(shutil.copytree(made_photographs, tmp_path / "root" / "mine"))
+    project = Project(tmp_path / "root", folder)
+    first = project.validation().files[0]
+    shutil.move(first, tmp_path / "elsewhere.jpg")
+    first.symlink_to(tmp_path / "elsewhere.jpg")
+    with pytest.raises(InputError):
+        project.picture(0, 100)
+
+
+@pytest.mark.parametrize("way", ["above", "link", "absolute"])
+@pytest.mark.parametrize("table", ["positions", "grains", "times", "file"])
+def test_no_table_outside_is_read(root, table, way):
+    folder = root / "tracked"
+    config = tomllib.loads((folder / "experiment.toml").read_text())
+    section = "walls" if table == "file" else "tracks"
+    outside = root.parent / "outside.csv"
+    shutil.move(folder / config[section][table], outside)
+    named = {"above": "../../outside.csv", "link": "link.csv", "absolute": str(outside)}[way]
+    (folder / "link.csv").symlink_to(outside)
+    (folder / "experiment.toml").write_text(tomli_w.dumps(config | {section: config[section] | {table: named}}))
+    visitor = Visitor(Workbench(root)).enter()
+    described = visitor.request("project", at="tracked")
+    said = [text for step in described["steps"] for text in step["messages"]] + described["other_messages"]
+    assert "lies outside" in " ".join(said)
+    assert not described["ready"]
+    assert "lies outside" in visitor.refused("run_start", at="tracked")
+
+
+def test_no_folder_outside_is_searched_for_photographs(made_photographs, tmp_path):
+    folder = Path(shutil.copytree(made_photographs, tmp_path / "root" / "mine"))
+    shutil.copytree(folder / "photos", tmp_path / "elsewhere")
+    edit(folder / "experiment.toml", "photos/*", "../../**/*")
+    described = Visitor(Workbench(tmp_path / "root")).enter().request("project", at="mine")
+    assert described["files"] == []
+    assert "lies outside" in " ".join(described["steps"][0]["messages"])
 
 
 BAD = {
@@ -90,6 +133,39 @@ def test_a_bad_folder_is_shown_as_such_beside_the_others(root, kind):
     assert "error" not in good
     if kind != "folder":
         assert next(each for each in experiments if each is not good)["error"]
+
+
+def test_a_folder_that_may_not_be_entered_takes_no_other_with_it(root, monkeypatch):
+    (root / "closed").mkdir()
+    (root / "closed" / "inner").mkdir()
+    status = Path.stat
+
+    def refuse(place: Path, **more: bool) -> os.stat_result:
+        if place.parent.name == "closed":
+            raise PermissionError(13, "Permission denied", str(place))
+        return status(place, **more)
+
+    monkeypatch.setattr(Path, "stat", refuse)
+    experiments = Visitor(Workbench(root)).enter().request("home")["experiments"]
+    assert [each["name"] for each in experiments] == ["tracked"]
+
+
+def test_a_table_of_five_megabytes_is_taken_and_a_greater_one_refused(begun):
+    visitor, at = begun
+    lines = "".join(f"{k},{30 * k}\n" for k in range(40_000))
+    table = "frame,time\n" + lines
+    assert len(table) > 388_000
+    answer = visitor.post("set_table", {"at": at, "name": "times", "table": table})
+    assert answer.status_code == 422  # it is read, and has a row for every photograph but is too long
+    assert "frame" in answer.text
+    assert visitor.post("set_table", {"at": at, "name": "times", "table": "x" * 5_000_001}).status_code == 400
+    assert visitor.post("set_table", {"at": at, "name": "times", "table": "x" * 21_000_000}).status_code == 413
+
+
+@pytest.fixture
+def begun(visitor):
+    at = visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")["at"]
+    return visitor, at
 
 
 @pytest.mark.parametrize("at", ["\0", "a\0b", "\ud800", "../..", "x" * 301, "\uffff"])

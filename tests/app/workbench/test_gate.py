@@ -177,3 +177,21 @@ def test_a_long_request_is_refused(visitor):
         "/api/home", content=body, headers={"Origin": HOST, "Content-Type": "application/json"}
     )
     assert answer.status_code == 413
+
+
+def test_the_token_opens_one_browser_which_may_come_again(outsider, outside_client):
+    address = {"token": outsider.gate.token}
+    outsider.enter()
+    answer = outside_client(outsider).get("/", params=address, follow_redirects=False)
+    assert answer.status_code == 403
+    assert "Set-Cookie" not in answer.headers
+    assert "opens once" in answer.text
+    assert outsider.client.get("/", params=address).status_code == 303  # it has the cookie
+    assert outsider.client.get("/").status_code == 200
+
+
+def test_the_cookie_of_one_server_opens_no_other(outsider, tmp_path):
+    outsider.enter()
+    other = Visitor(Workbench(tmp_path))
+    other.client.cookies = outsider.client.cookies
+    assert other.client.get("/").status_code == 403

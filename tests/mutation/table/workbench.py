@@ -22,14 +22,14 @@ MUTANTS = [
         "tests/app/workbench/test_gate.py",
         ("if len(request.headers.getlist(name)) > 1:", "if False:"),
         ("is_open = secrets.compare_digest(beginning, self.open_path.encode())", "is_open = beginning[:5] == b'/reco'"),
-        ('if not self.gate.opens(request.query_params["token"]):', "if False:"),
+        ("if refusal is not None:", "if False:"),
         ('changes=request.method != "GET"', "changes=False"),
         ('{"Cache-Control": "no-store"} | SAFE_HEADERS', '{"Cache-Control": "no-store"}'),
     ),
     *mutants_of(
         "app/workbench/service/server.py",
         "tests/app/workbench/test_gate.py",
-        ("> LARGEST_BODY:", "> 1 << 40:"),
+        ("> largest:", "> 1 << 40:"),
     ),
     *mutants_of(
         "app/workbench/service/workbench.py",
