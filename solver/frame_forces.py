@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Annotated
 
@@ -168,3 +168,9 @@ class FrameForces:
     ] = None  # not requested
     relative_error: Annotated[float, Quantity("error of the forces that the budget divides, ‖σ‖ / ‖f‖", since=2)] = NAN
     failed_reason: Annotated[str, Quantity("why it could not be solved; empty where it was", since=2)] = ""
+
+    def scaled(self, factor: float) -> FrameForces:
+        """The same with all reported forces and their standard deviations multiplied."""
+        return replace(
+            self, fn=factor * self.fn, ft=factor * self.ft, fn_sd=factor * self.fn_sd, ft_sd=factor * self.ft_sd
+        )

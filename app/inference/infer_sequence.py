@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..solver.assessment.penalties import penalise_friction
@@ -96,6 +98,8 @@ def _with_first_frame(
             sequence.packing, sequence.snapshots, sequence.settings, posterior, reason,
             verdicts=sequence.verdicts, failed=sequence.failed,
         )  # fmt: skip
+        if sequence.settings.soft and not sequence.packing.scale_is_known:
+            forces = _on_scale_of(frames[0], forces)
         forces = _limit_by_second(with_remarks(sequence, forces), frames)
         summary = summarise_frame(sequence, forces)
     except MemoryError:  # no fault of the frame
@@ -107,6 +111,12 @@ def _with_first_frame(
         LazySequence(len(frames), lambda k: forces if k == 0 else frames[k]),
         LazySequence(len(frames), lambda k: summary if k == 0 else statistics[k]),
     )
+
+
+def _on_scale_of(former: FrameForces, forces: FrameForces) -> FrameForces:
+    """The estimate of a frame on the scale of its former estimate, to which the forces of later frames refer."""
+    ratio = forces.overlap / former.overlap if former.overlap > 0.0 else np.nan
+    return forces.scaled(ratio) if ratio > 0.0 else forces
 
 
 def _limit_by_second(forces: FrameForces, frames: Sequence[FrameForces]) -> FrameForces:

@@ -6,22 +6,16 @@ towards the rim of the picture, or that depend on the direction of the pair, sho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ..bodies.grains import Array
+from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs
 
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
-WIDEST = 0.15  # mean diameters: gap of a pair that may touch although it is distorted
 FEWEST_PAIRS = 100  # in a frame
-FIRST_QUANTILE = 0.2  # of all gaps: where touching ones are looked for first
-FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.06, 0.75, 2.0  # mean diameters; factor of a round; robust standard deviations
-ROUNDS = 15
-OVERLAPS = 3.0  # widths: larger overlaps are errors, too
-MAD_TO_SD = 1.4826  # median of the absolute value to the standard deviation of a normal distribution
 SIGNIFICANT = 5.0  # standard errors
 EXPLAINED = 0.9  # greatest ratio of the robust scatter of touching gaps after a correction to that before
 ANISOTROPY, RADIAL = slice(0, 2), slice(2, 3)  # unknowns of the model
@@ -86,16 +80,6 @@ class _Pairs:
     frames: int
 
 
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    value: Array  # (3 + q,)
-    sd: Array
-    scatter: float  # [m] of the pairs that count as touching
-    misfit: float  # [m] of all pairs, on whose number models compare
-    residual: Array  # (m,) [m]
-    weight: Array  # (m,)
-
-
 def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[np.integer]) -> CameraDistortion | None:
     """Find the distortion of the camera.
 
@@ -128,7 +112,7 @@ def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[n
         return None
     middle = 0.5 * (present.min(axis=0) + present.max(axis=0))
     half_width = 0.5 * float(np.ptp(present, axis=0).max())
-    pairs = _near_pairs(position[rows], radius, size_class, middle, half_width)
+    pairs = _pairs_with_design(position[rows], radius, size_class, middle, half_width)
     if len(pairs.gap) < FEWEST_PAIRS * pairs.frames:
         return None
     diameter = 2.0 * float(radius.mean())
@@ -152,55 +136,34 @@ def _displacements(position: Array, middle: Array, half_width: float) -> Array:
     return half_width * np.stack([x * np.array([1.0, -1.0]), x[..., ::-1], square * x])
 
 
-def _near_pairs(
+def _pairs_with_design(
     position: Array, radius: Array, size_class: NDArray[np.integer], middle: Array, half_width: float
 ) -> _Pairs:
-    reach, classes = WIDEST * 2.0 * float(radius.mean()), int(size_class.max()) + 1
-    parts = []
+    classes, parts = int(size_class.max()) + 1, []
     for place in position:
-        here = np.flatnonzero(np.isfinite(place[:, 0]))
-        i, j = here[KDTree(place[here]).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")].T
-        branch = place[j] - place[i]
-        length = np.linalg.norm(branch, axis=1)
-        gap = length - radius[i] - radius[j]
-        near = (gap < reach) & (length > 0.0)
-        i, j, branch, length, gap = i[near], j[near], branch[near], length[near], gap[near]
+        near = find_near_pairs(place, radius)
         moved = _displacements(place, middle, half_width)
-        along = np.einsum("pck,ck->cp", moved[:, j] - moved[:, i], branch / length[:, None])
-        own = np.zeros((len(i), classes))
-        for side in (i, j):
-            np.add.at(own, (np.arange(len(i)), size_class[side]), -1.0)
-        parts.append((gap, np.column_stack([along, own]), (0.5 * (place[i] + place[j]) - middle) / half_width))
+        along = np.einsum("pck,ck->cp", moved[:, near.j] - moved[:, near.i], near.normal)
+        own = count_classes(near, size_class, classes)
+        centre = (0.5 * (place[near.i] + place[near.j]) - middle) / half_width
+        parts.append((near.gap, np.column_stack([along, -own]), centre))
     gap, design, centre = (np.concatenate(each) for each in zip(*parts, strict=True))
     return _Pairs(gap, design, centre, len(position))
 
 
-def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float) -> _Fit:
+def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float) -> TouchingFit:
     """Fit some unknowns of the camera, and the errors of radii."""
     count = pairs.design.shape[1]
     used = [*unknowns, *range(3, count)]
-    design, gap = pairs.design[:, used], pairs.gap
-    value = np.zeros(len(used))
-    value[len(unknowns) :] = 0.5 * np.quantile(gap, FIRST_QUANTILE)
-    width, scatter = FIRST_WIDTH * diameter, 0.0
-    normal, residual, weight = np.eye(len(used)), gap, np.ones(len(gap))
-    for _ in range(ROUNDS):
-        residual = gap + design @ value
-        apart = (1.0 + (residual / width) ** 2) ** -2
-        overlap = 1.0 / (1.0 + (residual / (OVERLAPS * width)) ** 2)
-        weight = np.where(residual > 0.0, apart, overlap)
-        normal = design.T @ (weight[:, None] * design)
-        value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
-        residual = gap + design @ value
-        scatter = MAD_TO_SD * float(np.median(np.abs(residual[weight > 0.5])))
-        width = max(SHRINK * width, LAST_WIDTH * scatter)
-    sd = scatter * np.sqrt(pairs.frames * np.diag(np.linalg.pinv(normal)))
-    full, full_sd = np.zeros(count), np.zeros(count)
-    full[used], full_sd[used] = value, sd
-    return _Fit(full, full_sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight)
+    found = fit_touching_pairs(
+        pairs.gap, pairs.design[:, used], np.arange(len(used)) >= len(unknowns), diameter, pairs.frames
+    )
+    value, sd = np.zeros(count), np.zeros(count)
+    value[used], sd[used] = found.value, found.sd
+    return replace(found, value=value, sd=sd)
 
 
-def _place_dependence(pairs: _Pairs, fit: _Fit) -> float:
+def _place_dependence(pairs: _Pairs, fit: TouchingFit) -> float:
     """Compute the range of the mean touching gap over the picture [m]; 0 where it is within scatter and error."""
     touching = fit.weight > 0.5
     x, y = pairs.middle[touching].T

@@ -133,6 +133,30 @@ def motion_weight(overlap: float, moved: float) -> float:
     return 1.0 / (1.0 + (overlap / (HALF_WEIGHT_OVERLAP * moved)) ** 2) if moved > 0.0 else 0.0
 
 
+def overlap_scale(positions: FramePosterior, total: float, unit: float) -> float:
+    """Compute the factor of forces of soft grains whose scale no load determines, so that it follows their overlaps.
+
+    Parameters
+    ----------
+    positions : FramePosterior
+        Position-only estimate, whose mean force is one unit in every frame.
+    total : float
+        Sum of f_n of the field to be multiplied [N].
+    unit : float
+        Overlap [m] of a contact with the unit of force, the same in all frames; NaN: that of this frame.
+
+    Returns
+    -------
+    float
+        (S_p/total) (overlap/unit), S_p the sum of f_n of the positions: stiffness is constant, so that the force of a
+        contact is proportional to its overlap. 1 where there is no overlap or no force.
+    """
+    unit = positions.overlap if np.isnan(unit) else unit
+    if not (positions.overlap > 0.0 and unit > 0.0 and total > 0.0):
+        return 1.0
+    return float(positions.fn.sum()) / total * positions.overlap / unit
+
+
 def offered_pairs(positions: FramePosterior) -> Contacts:
     """Select the pairs that bear force by positions and balance, to be added to the network of the motion estimate."""
     return positions.contacts.select(positions.bearing_probability > MIN_OFFERED_PROBABILITY)

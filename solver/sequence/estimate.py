@@ -21,7 +21,7 @@ from ..contacts.pairs import Keys, align, are_among
 from ..convex.ensemble_members import NormalisedSlip
 from ..detection.contact_networks import ThresholdNetwork
 from ..mixture.equilibrium_projection import project_mixed_field
-from ..mixture.frame_mixture import ForceEstimate, Mixture, mix_on_contacts, motion_weight
+from ..mixture.frame_mixture import ForceEstimate, Mixture, mix_on_contacts, motion_weight, overlap_scale
 from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
 from ..posterior.frame_posterior import FramePosterior
@@ -75,6 +75,14 @@ class Estimate:
     def force(self) -> Array:
         return np.column_stack([self.fn, self.ft])
 
+    def scaled(self, factor: float) -> Estimate:
+        """The same with all reported forces multiplied; those of the chain and of the members stay."""
+        assert self.fn_sd is not None
+        assert self.ft_sd is not None
+        return replace(
+            self, fn=factor * self.fn, ft=factor * self.ft, fn_sd=factor * self.fn_sd, ft_sd=factor * self.ft_sd
+        )
+
 
 def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimate, Evidence]:
     """Solve a frame from the state of the previous frame."""
@@ -93,6 +101,9 @@ def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimat
             evidence = gather_evidence(problem, offered, state)
             evidence = _with_agreements(problem, evidence, offered, posterior)
             mixed = _mix(problem, offered, posterior, motion_reliability(evidence))
+            if problem.follows_overlap:
+                factor = overlap_scale(posterior, float(mixed.fn.sum()), state.overlap_unit)
+                mixed = mixed.scaled(factor)
             return mixed, _evidence_of_mixture(problem, mixed, evidence, state)
     return _motion_estimate(problem, state)
 

@@ -81,7 +81,13 @@ def solve_frame(problem: FrameProblem, state: SequenceState) -> tuple[FrameForce
         frames_since_reset=since_reset,
         frames_since_event=0 if eventful else state.frames_since_event + 1,
         reported=ForceMemory(frame.contacts.key, np.column_stack([frame.fn, frame.ft])),
+        overlap_unit=state.overlap_unit if np.isfinite(state.overlap_unit) else _overlap_unit(problem, estimate),
     )
+
+
+def _overlap_unit(problem: FrameProblem, estimate: Estimate) -> float:
+    """Overlap [m] per unit of force of the first frame that shows one, to which later frames are scaled; NaN: none."""
+    return estimate.overlap if problem.follows_overlap and estimate.overlap > 0.0 else np.nan
 
 
 def _compare_with_former(problem: FrameProblem, frame: FrameForces, state: SequenceState) -> FrameForces:

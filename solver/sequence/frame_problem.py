@@ -50,6 +50,11 @@ class FrameProblem:
         return self.sequence.settings
 
     @property
+    def follows_overlap(self) -> bool:
+        """Whether only the overlaps of soft grains show how the scale of the forces changes from frame to frame."""
+        return self.settings.soft and not self.packing.scale_is_known
+
+    @property
     def walls(self) -> Walls:
         """The walls at the frame, at rest and under their loads."""
         return self.packing.walls_of(self.snapshot)

@@ -35,6 +35,7 @@ class SequenceState:
     frames_since_event: int
     reported: ForceMemory  # forces reported of the last frame
     cell: Array | None = None  # (2, 2) [m] of the last frame
+    overlap_unit: float = np.nan  # [m] overlap of soft grains per unit of force, where no load fixes it; NaN: none yet
 
     @classmethod
     def first(cls, packing: Packing) -> SequenceState:

@@ -20,12 +20,11 @@ from ...experiment.photographs import natural_key
 from ...experiment.reading.tables import Table
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
+from ...solver.boundary.size_classes import group_readings
 from .foreign_table import read_text
 from .observations import ImportedTracks, Observations
 
 DISCS, BONDS = "_ParticleData.dlm", "_bonds.txt"
-MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes of discs, and within one
-MAX_SIZES, MIN_DISCS = 4, 10
 COPY_DIGITS = 1e-6  # relative difference of copies: that of their rounding
 LEAST_COPIES = 4  # rows
 NORMAL, TANGENTIAL = "_NormWeightedAdjacencyMatrix.dlm", "_TanWeightedAdjacencyMatrix.dlm"
@@ -186,18 +185,13 @@ def _group_radii(ids: Array, radius: Array) -> tuple[Array, list[float]]:
 
     Detected radii are whole or half pixels and depend on the light; the mean of a class is more precise.
     """
-    which, row = np.unique(ids, return_inverse=True)
+    row = np.unique(ids, return_inverse=True)[1]
     mean = np.bincount(row, radius) / np.bincount(row)
-    order = np.argsort(mean)
-    boundaries = np.flatnonzero(np.diff(mean[order]) > MIN_GAP * mean.mean())
-    groups = np.split(order, boundaries + 1)
-    wide = any(np.ptp(mean[group]) > MAX_RANGE * mean[group].mean() for group in groups)
-    if len(groups) > MAX_SIZES or wide or len(which) < MIN_DISCS:
+    size_class = group_readings(mean)
+    if size_class is None:
         return radius.copy(), []
-    size = np.empty(len(which))
-    for group in groups:
-        size[group] = mean[group].mean()
-    return size[row], [float(mean[group].mean()) for group in groups]
+    size = np.bincount(size_class, mean) / np.bincount(size_class)
+    return size[size_class][row], size.tolist()
 
 
 def _read_matrices(folder: Path, stem: str, count: int) -> Bonds | None:

@@ -9,6 +9,7 @@ import numpy as np
 from ...solver.bodies.grains import Grains
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
 from ...solver.boundary.camera_distortion import find_camera_distortion
+from ...solver.boundary.size_classes import group_readings
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence
@@ -51,6 +52,7 @@ def correct_camera(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
     if walls.count or walls.cell is not None:
         return tracks, ""
     classes = radius_classes(tracks.radius)
+    classes = group_readings(tracks.radius) if classes is None else classes
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     alike = np.zeros(tracks.grain_count, np.int64)
     found = find_camera_distortion(position, tracks.radius, alike if classes is None else classes)

@@ -18,7 +18,7 @@ from .calibration import calibrate_tracks, known_radii
 from .close_photographs import advise_stride
 from .friction import measure_friction, measure_friction_of_walls, tuned_radii
 from .outliers import replace_outliers
-from .radii import calibrate_with_radii
+from .radii import calibrate_with_radii, use_size_classes
 from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
 from .softness import find_softness
@@ -64,7 +64,9 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         )
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
-    remarks = [outlier_remark, gap_remark, "", "", ""]
+    remarks = [outlier_remark, gap_remark, "", "", "", ""]
+    if settings.calibration is not None:
+        tracks, remarks[5] = use_size_classes(inputs.material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
             tracks, remarks[2] = correct_camera(tracks, walls)

@@ -15,6 +15,7 @@ from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
+from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
 from ...solver.calibration.priors import CalibrationSettings
 from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors
@@ -23,6 +24,24 @@ from ..snapshots import make_snapshots, measure_sequence
 from .calibration import calibrate_tracks
 
 SEED = 0  # of the draws: the same input gives the same bits
+
+
+def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str]:
+    """Replace readings of the radii of soft grains by their nominal sizes, as far as touching pairs support them.
+
+    Errors of the radii of hard grains are calibrated with those of their centres; overlaps of soft grains are forces,
+    so that only the classes of their sizes show them.
+
+    Returns
+    -------
+    Tracks
+    str
+        A sentence on the correction; empty: none.
+    """
+    if material.stiffness in (None, "rigid") or tracks.grain_count == 0:
+        return tracks, ""
+    found = find_size_classes(np.where(tracks.present[..., None], tracks.position, np.nan), tracks.radius)
+    return (tracks, "") if found is None else (replace(tracks, radius=found.radius), found.describe())
 
 
 def calibrate_with_radii(

@@ -32,6 +32,8 @@ from ...solver.statistics.stress import love_weber_stress, principal_stresses
 from ..baselines import packing_of
 
 COPY_DIGITS = 1e-6  # relative difference of the copies of a reading: that of their rounding
+EXCESS = 0.03  # of the trust over r that is an error of the trust
+LEAST_FRAMES = 3  # for a correlation over time
 SOURCES = ("ours", "static", "overlap", "uniform", "ceiling")  # of force fields; the last one uses the truth
 
 
@@ -59,6 +61,7 @@ class FieldAgreement:
     matched: float  # of f_n over the true contacts with force
     pressure: float  # of the grains' pressures
     direction: float  # [°] of the larger principal stress, 0 … 180
+    total: float  # sum of f_n between grains [N], or in any unit that all frames share
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +75,8 @@ class RealFrame:
     uniform: FieldAgreement
     ceiling: FieldAgreement  # of the equilibrium field that is nearest to the truth
     direction: float  # [°] of the truth
+    total: float  # of the truth
+    trust: float  # of the run; NaN: not computed
     sides: float  # correlation of the two readings of a contact; NaN with one reading
     precision: float  # fraction of the contacts with force in the run that truly carry force
     recall: float  # fraction of the true contacts with force that the run lists
@@ -92,6 +97,17 @@ class RealStudy:
     drawn: dict[str, FrameField]  # by source
     position: Float[Array, "n 2"]  # [m] of the grains in that frame
     radius: Float[Array, " n"]  # [m]
+
+    def total_correlation(self, source: str) -> float:
+        """Return the correlation over the frames of a field's total force with the true one; NaN of few frames."""
+        pairs = np.array([(getattr(row, source).total, row.total) for row in self.frames])
+        pairs = pairs[np.isfinite(pairs).all(axis=1)]
+        return pearson(*pairs.T) if len(pairs) >= LEAST_FRAMES else float("nan")
+
+    def count_excess(self) -> tuple[int, int]:
+        """Count the frames whose trust exceeds r of the run by more than EXCESS, and the frames with a trust."""
+        known = [row for row in self.frames if np.isfinite(row.trust) and np.isfinite(row.ours.r)]
+        return sum(row.trust > row.ours.r + EXCESS for row in known), len(known)
 
 
 def study_real(results: Results, truth: TruthContacts, sides: Sequence[float], shown: int | None = None) -> RealStudy:
@@ -134,7 +150,7 @@ def study_real(results: Results, truth: TruthContacts, sides: Sequence[float], s
             "uniform": FrameField(baseline.contacts, baseline.uniform),
             "ceiling": _nearest_equilibrium(packing, snapshots[k], exact, ours.contacts, baseline.candidates),
         }
-        rows.append(_compare(k, found, exact, baseline.candidates, snapshots[k], len(packing.grains.radius), sides[k]))
+        rows.append(_compare(k, found, exact, baseline.candidates, snapshots[k], frame.trust, sides[k]))
         if k == shown:
             drawn = exact, found
     assert drawn is not None
@@ -166,14 +182,16 @@ def as_json(study: RealStudy) -> dict[str, object]:
     }
     truth = {
         name: [_plain(getattr(row, name)) for row in study.frames]
-        for name in ("direction", "sides", "precision", "recall")
+        for name in ("direction", "total", "trust", "sides", "precision", "recall")
     }
     mean = {
         source: {name: mean_of([getattr(getattr(row, source), name) for row in study.frames]) for name in names[:3]}
         | {"turned": mean_of([abs(row.direction_error(source)) for row in study.frames])}
+        | {"total_correlation": _plain(study.total_correlation(source))}
         for source in SOURCES
     }
-    return {"frame": [row.frame for row in study.frames], **truth, **by_source, "mean": mean}
+    excess = dict(zip(("frames_above_r", "frames_with_trust"), study.count_excess(), strict=True))
+    return {"frame": [row.frame for row in study.frames], **truth, **by_source, "mean": mean, **excess}
 
 
 def mean_of(values: Sequence[float]) -> float | None:
@@ -240,10 +258,10 @@ def _compare(
     exact: FrameField,
     near: Keys,
     snapshot: Snapshot,
-    count: int,
+    trust: float,
     sides: float,
 ) -> RealFrame:
-    pairs = join_keys(near, candidates["ours"].key, exact.key)
+    pairs, count = join_keys(near, candidates["ours"].key, exact.key), len(snapshot.position)
     true = match_values(pairs, exact.key, exact.force[:, 0])
     pressure = _pressure(exact, count)
     bearing = exact.force[:, 0] > 0.0
@@ -255,15 +273,20 @@ def _compare(
             pearson(on_true, exact.force[bearing, 0]),
             pearson(_pressure(field, count), pressure),
             _direction(field, snapshot.position),
+            _total(field),
         )
     ours = candidates["ours"]
     carrying = ours.force[:, 0] > 0.0
     agreement = compare_forces(ours.key[carrying], ours.force[carrying], exact.key, exact.force)
     listed = compare_forces(ours.key, ours.force, exact.key, exact.force)
     return RealFrame(
-        k, **found, direction=_direction(exact.normal_only(), snapshot.position), sides=sides,
-        precision=agreement.contact_precision, recall=listed.contact_recall,
+        k, **found, direction=_direction(exact.normal_only(), snapshot.position), total=_total(exact), trust=trust,
+        sides=sides, precision=agreement.contact_precision, recall=listed.contact_recall,
     )  # fmt: skip
+
+
+def _total(field: FrameField) -> float:
+    return float(field.force[~field.contacts.with_wall, 0].sum())
 
 
 def _pressure(field: FrameField, count: int) -> Array:

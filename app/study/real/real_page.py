@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ...solver.bodies.grains import Array
-from .real_forces import SOURCES, FrameField, RealStudy, mean_of
+from .real_forces import EXCESS, SOURCES, FrameField, RealStudy, mean_of
 
 WIDTH = 110  # columns of the table
 SIDE = 420  # px of a picture
@@ -23,15 +23,17 @@ NAMES = {
 }  # fmt: skip
 MEANINGS = (
     "r: correlation of normal forces over all candidate pairs and all contacts of either side; matched: over the true "
-    "contacts with force; pressure: of the grains' pressures; direction: absolute error of the principal direction."
+    "contacts with force; pressure: of the grains' pressures; direction: absolute error of the principal direction; "
+    "total: correlation of the sum of f_n over time with the true one."
 )
+HEADINGS = ("r", "matched", "pressure", "direction [°]", "total")
 
 
 def print_real(console: Console, study: RealStudy) -> None:
     """Print a row per force field, means over frames; then the limits of the measurement."""
     table = Table(title=f"{study.name}: {len(study.frames)} frames against measured forces", box=None, pad_edge=False)
     table.add_column("forces", no_wrap=True)
-    for heading in ("r", "matched", "pressure", "direction [°]"):
+    for heading in HEADINGS:
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows_of(study):
         table.add_row(*row)
@@ -48,6 +50,7 @@ def rows_of(study: RealStudy) -> list[tuple[str, ...]]:
             *(_format(mean_of([getattr(getattr(row, source), name) for row in study.frames]), 3)
               for name in ("r", "matched", "pressure")),
             _format(mean_of([abs(row.direction_error(source)) for row in study.frames]), 1),
+            _format(study.total_correlation(source), 2),
         )
         for source in SOURCES
     ]  # fmt: skip
@@ -63,7 +66,18 @@ def describe_limits(study: RealStudy) -> str:
     )  # fmt: skip
     return (
         f"{read}True principal direction {_format(direction, 1)}°. Of the contacts with force in the run, "
-        f"{_format(precision, 3)} truly carry force; of the true contacts with force, {_format(recall, 3)} are listed."
+        f"{_format(precision, 3)} truly carry force; of the true contacts with force, {_format(recall, 3)} are listed. "
+        f"{_describe_trust(study)}"
+    )
+
+
+def _describe_trust(study: RealStudy) -> str:
+    above, known = study.count_excess()
+    if not known:
+        return "There is no trust to compare."
+    mean = mean_of([row.trust for row in study.frames])
+    return (
+        f"The trust is {_format(mean, 2)} on average and exceeds r by more than {EXCESS} in {above} of {known} frames."
     )
 
 
@@ -81,7 +95,7 @@ def real_page(study: RealStudy) -> str:
             f"{NAMES[best]} (no motion), r = {_format(getattr(study.frames[study.shown], best).r, 2)}",
         ),
     ]  # fmt: skip
-    head = "".join(f"<th>{each}</th>" for each in ("forces", "r", "matched", "pressure", "direction [°]"))
+    head = "".join(f"<th>{each}</th>" for each in ("forces", *HEADINGS))
     body = "".join(
         "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows_of(study)
     )

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from rodsight.inference.correction import radii
 from rodsight.inference.correction.calibration import calibrate_tracks
-from rodsight.inference.correction.radii import calibrate_with_radii
+from rodsight.inference.correction.radii import calibrate_with_radii, use_size_classes
 from rodsight.solver.bodies.motion import Snapshot
 from rodsight.solver.bodies.packing import Packing
 from rodsight.solver.bodies.rods import RodMaterial
+from rodsight.solver.boundary import size_classes
 from rodsight.solver.calibration.priors import CalibrationSettings
 from rodsight.solver.posterior.radius_posterior import RadiusPosterior
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
@@ -88,3 +89,21 @@ def test_radii_are_estimated_without_the_errors_that_all_grains_share(monkeypatc
     np.testing.assert_allclose(radius, tracks.radius + 3e-5)
     np.testing.assert_allclose(position, tracks.position[0])
     assert endpoints[:, :, 1].min() == pytest.approx(walls.endpoints[0, :, :, 1].min() - 2e-5)  # the bottom
+
+
+def test_sizes_replace_readings_of_soft_grains_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks, _ = lattice()
+    read = replace(
+        tracks, radius=tracks.radius * (1.0 + 5e-3 * np.tile([-1.0, 1.0], tracks.grain_count)[: len(tracks.radius)])
+    )
+    monkeypatch.setattr(size_classes, "FEWEST_PAIRS", 10)
+    for stiffness in (None, "rigid"):
+        found, remark = use_size_classes(RodMaterial(stiffness=stiffness), read)
+        assert found is read
+        assert remark == ""
+    found, remark = use_size_classes(RodMaterial(stiffness="estimate"), read)
+    assert found.radius == pytest.approx(tracks.radius, rel=1e-3)
+    assert "1 size" in remark
+    exact, remark = use_size_classes(RodMaterial(stiffness=1e6), tracks)
+    assert exact is tracks
+    assert remark == ""

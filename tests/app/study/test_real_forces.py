@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,28 @@ def test_the_page_holds_three_pictures_and_every_row(same: RealStudy) -> None:
         assert all(f"<td>{cell}</td>" in page for cell in row)
     assert "correlate by 0.700" in describe_limits(same)
     assert "http" not in page
+
+
+def test_the_total_force_is_followed_over_time_and_trust_is_held_against_r() -> None:
+    results = make_results(frame_count=4)
+    exact = own_forces(results)
+    rising = 1.0 + exact.frame  # the true forces grow while those of the run stay
+    truth = TruthContacts(exact.frame, exact.i, exact.j, rising * exact.fn, rising * exact.ft)
+    follows = [replace(frame, fn=(k + 1.0) * frame.fn, trust=0.9) for k, frame in enumerate(results.frames)]
+    reverse = [replace(frame, fn=frame.fn / (k + 1.0), trust=np.nan) for k, frame in enumerate(results.frames)]
+    sides = [float("nan")] * 4
+    good, inverted = (study_real(replace(results, frames=each), truth, sides) for each in (follows, reverse))
+    assert good.total_correlation("ours") == pytest.approx(1.0)
+    assert inverted.total_correlation("ours") < 0.0
+    assert good.count_excess() == (0, 4)
+    assert inverted.count_excess() == (0, 0)
+    assert "There is no trust" in describe_limits(inverted)
+    sure = [replace(frame, fn=frame.fn[::-1].copy(), trust=1.0) for frame in results.frames]
+    wrong = study_real(replace(results, frames=sure), truth, sides)
+    assert wrong.count_excess() == (4, 4)
+    assert as_json(wrong)["frames_above_r"] == 4
+    assert "in 4 of 4 frames" in describe_limits(wrong)
+    assert rows_of(good)[0][-1] == "1.00"
 
 
 def test_json_has_no_number_that_does_not_exist(same: RealStudy) -> None:

@@ -14,6 +14,7 @@ from rodsight.solver.mixture.frame_mixture import (
     mix_on_contacts,
     motion_weight,
     offered_pairs,
+    overlap_scale,
 )
 from rodsight.solver.posterior.frame_posterior import FramePosterior
 
@@ -180,3 +181,14 @@ def test_without_motion_the_loads_give_the_scale(fields) -> None:
     np.testing.assert_allclose(found.fn_sd, 0.3)
     unknown = mix_on_contacts(some_contacts(), guess, positions, np.nan, scale_known=False, soft_trust=None)
     assert unknown.fn.sum() == pytest.approx(guess.fn.sum())
+
+
+@pytest.mark.unit
+def test_unscaled_forces_of_soft_grains_follow_their_overlap(fields) -> None:
+    positions = make_posterior(fields[2])  # its overlap is 2 µm
+    total = float(positions.fn.sum())
+    assert overlap_scale(positions, total, np.nan) == pytest.approx(1.0)
+    assert overlap_scale(positions, 2.0 * total, 1e-6) == pytest.approx(1.0)
+    assert overlap_scale(positions, total, 1e-6) == pytest.approx(2.0)
+    assert overlap_scale(replace(positions, overlap=0.0), total, 1e-6) == 1.0
+    assert overlap_scale(positions, 0.0, 1e-6) == 1.0

@@ -1,0 +1,112 @@
+"""Nominal sizes behind readings of radii: found from the readings, and used as far as touching pairs confirm them.
+
+Grains are often made in a few sizes. A reading from a photograph then adds its own error to the size, and the mean of
+its class is better. Whether readings within a class differ by true sizes or by errors shows in the gaps: surfaces of
+touching grains meet only with the true radii.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..bodies.grains import Array
+from .touching_pairs import count_classes, find_near_pairs, fit_touching_pairs
+
+MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes, and of the readings of one size
+MAX_SIZES, MIN_GRAINS = 4, 10
+MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
+FEWEST_PAIRS = 50  # in a frame
+SIGNIFICANT = 5.0  # standard errors
+
+
+@dataclass(frozen=True, slots=True)
+class SizeClasses:
+    """Classes of readings, and radii that their touching pairs support."""
+
+    size_class: Int[np.ndarray, " n"]  # from 0, ascending
+    size: Float[Array, " q"]  # [m] mean reading of every class
+    error_fraction: float  # of a reading's deviation from its class that is error, 0 … 1
+    error_fraction_sd: float
+    radius: Float[Array, " n"]  # [m]
+
+    def describe(self) -> str:
+        """Describe the correction in a sentence."""
+        sizes = ", ".join(f"{1e3 * each:.4g}" for each in self.size)
+        count = len(self.size)
+        return (
+            f"radii have {count} size{'s' if count > 1 else ''} ({sizes} mm); by the gaps of touching grains "
+            f"{100 * self.error_fraction:.0f} ± {100 * self.error_fraction_sd:.0f} % of the readings' deviation from "
+            "them is error, which was removed"
+        )
+
+
+def group_readings(radius: Float[Array, " n"]) -> Int[np.ndarray, " n"] | None:
+    """Group readings into size classes from 0, ascending; None where there are no distinct classes.
+
+    Notes
+    -----
+    Sorted readings are separated where neighbours differ by more than 0.1 of the mean. There are classes if no more
+    than four remain, each with a range of at most 0.12 of its mean.
+    """
+    if len(radius) < MIN_GRAINS:
+        return None
+    order = np.argsort(radius, kind="stable")
+    boundaries = np.flatnonzero(np.diff(radius[order]) > MIN_GAP * radius.mean())
+    groups = np.split(order, boundaries + 1)
+    wide = any(np.ptp(radius[group]) > MAX_RANGE * radius[group].mean() for group in groups)
+    if len(groups) > MAX_SIZES or wide:
+        return None
+    size_class = np.empty(len(radius), np.int64)
+    for number, group in enumerate(groups):
+        size_class[group] = number
+    return size_class
+
+
+def find_size_classes(position: Float[Array, "f n 2"], radius: Float[Array, " n"]) -> SizeClasses | None:
+    """Find the sizes of which the radii are readings.
+
+    Parameters
+    ----------
+    position : (f, n, 2)
+        Positions [m], NaN where a grain is missing.
+    radius : (n,)
+        Readings [m].
+
+    Returns
+    -------
+    SizeClasses or None
+        None where there are no classes, readings do not differ within them, or gaps do not show that they are wrong.
+
+    Notes
+    -----
+    With d the deviation of a reading from the mean m of its class, the radius is m + (1 − e) d. The fraction e follows
+    from g + e (d_i + d_j) − δ_i − δ_j = 0 over touching pairs, with g their gaps by the readings and δ the error of a
+    class. It is the fraction of the variance of d that is error, whatever the sizes within a class, so that grains of
+    truly different sizes keep their readings. The readings are changed where e exceeds five standard errors.
+    """
+    size_class = group_readings(radius)
+    if size_class is None:
+        return None
+    size = np.bincount(size_class, radius) / np.bincount(size_class)
+    deviation = radius - size[size_class]
+    if not np.abs(deviation).max() > 1e-9 * radius.mean():
+        return None
+    rows = np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))
+    gap, design = [], []
+    for place in position[rows]:
+        near = find_near_pairs(place, radius)
+        own = count_classes(near, size_class, len(size))
+        gap.append(near.gap)
+        design.append(np.column_stack([deviation[near.i] + deviation[near.j], -own]))
+    gaps = np.concatenate(gap)
+    if len(gaps) < FEWEST_PAIRS * len(rows):
+        return None
+    of_class = np.arange(len(size) + 1) > 0
+    found = fit_touching_pairs(gaps, np.concatenate(design), of_class, 2.0 * float(radius.mean()), len(rows))
+    fraction, sd = float(np.clip(found.value[0], 0.0, 1.0)), float(found.sd[0])
+    if not found.value[0] > SIGNIFICANT * sd:
+        return None
+    return SizeClasses(size_class, size, fraction, sd, size[size_class] + (1.0 - fraction) * deviation)

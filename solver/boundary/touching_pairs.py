@@ -1,0 +1,110 @@
+"""Gaps of touching pairs as linear functions of unknown errors that many pairs share, by robust least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import KDTree
+
+from ..bodies.grains import Array
+
+WIDEST = 0.15  # mean diameters: gap of a pair that may touch although it is distorted
+FIRST_QUANTILE = 0.2  # of all gaps: where touching ones are looked for first
+FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.06, 0.75, 2.0  # mean diameters; factor of a round; robust standard deviations
+ROUNDS = 15
+OVERLAPS = 3.0  # widths: larger overlaps are errors, too
+MAD_TO_SD = 1.4826  # median of the absolute value to the standard deviation of a normal distribution
+
+
+@dataclass(frozen=True, slots=True)
+class NearPairs:
+    """Pairs of one photograph that may touch."""
+
+    i: Int[np.ndarray, " m"]
+    j: Int[np.ndarray, " m"]
+    normal: Float[Array, "m 2"]  # from i to j
+    gap: Float[Array, " m"]  # [m]
+
+
+@dataclass(frozen=True, slots=True)
+class TouchingFit:
+    """Errors that explain the gaps of touching pairs."""
+
+    value: Float[Array, " u"]
+    sd: Float[Array, " u"]  # standard error, as if errors were the same in all frames
+    scatter: float  # [m] robust standard deviation of the pairs that count as touching
+    misfit: float  # [m] of all pairs, on whose number models compare
+    residual: Float[Array, " m"]  # [m]
+    weight: Float[Array, " m"]
+
+
+def find_near_pairs(position: Array, radius: Array) -> NearPairs:
+    """Find the pairs of grains that may touch.
+
+    Parameters
+    ----------
+    position : (n, 2)
+        Positions [m] in one photograph, NaN where a grain is missing.
+    radius : (n,)
+        Radii [m].
+    """
+    reach = WIDEST * 2.0 * float(radius.mean())
+    here = np.flatnonzero(np.isfinite(position[:, 0]))
+    i, j = here[KDTree(position[here]).query_pairs(2.0 * float(radius.max()) + reach, output_type="ndarray")].T
+    branch = position[j] - position[i]
+    length = np.linalg.norm(branch, axis=1)
+    gap = length - radius[i] - radius[j]
+    near = (gap < reach) & (length > 0.0)
+    return NearPairs(i[near], j[near], branch[near] / length[near, None], gap[near])
+
+
+def count_classes(pairs: NearPairs, size_class: Int[np.ndarray, " n"], classes: int) -> Float[Array, "m q"]:
+    """Count how many grains of every class each pair has."""
+    own = np.zeros((len(pairs.i), classes))
+    for side in (pairs.i, pairs.j):
+        np.add.at(own, (np.arange(len(side)), size_class[side]), 1.0)
+    return own
+
+
+def fit_touching_pairs(
+    gap: Float[Array, " m"], design: Float[Array, "m u"], radius_error: Bool[np.ndarray, " u"], diameter: float,
+    frames: int,
+) -> TouchingFit:  # fmt: skip
+    """Fit g + D x = 0 over the pairs that touch.
+
+    Parameters
+    ----------
+    gap : (m,)
+        Gaps [m] of pairs that may touch, of all frames.
+    design : (m, u)
+        D, the change of every gap by a unit of each unknown.
+    radius_error : (u,)
+        Which unknowns are an error [m] that all radii, or those of a class, share.
+    diameter : float
+        Mean diameter [m].
+    frames : int
+        From which gaps are taken; they show the same errors again.
+
+    Notes
+    -----
+    Weighted least squares with weights (1 + (g/s)²)⁻² of positive residuals g, with s shrinking from a fraction of a
+    diameter to twice the robust standard deviation: pairs that do not touch stand apart. Overlaps have the weight
+    1/(1 + (g/3s)²).
+    """
+    value = np.where(radius_error, 0.5 * np.quantile(gap, FIRST_QUANTILE), 0.0)
+    width, scatter = FIRST_WIDTH * diameter, 0.0
+    normal, residual, weight = np.eye(len(value)), gap, np.ones(len(gap))
+    for _ in range(ROUNDS):
+        residual = gap + design @ value
+        apart = (1.0 + (residual / width) ** 2) ** -2
+        overlap = 1.0 / (1.0 + (residual / (OVERLAPS * width)) ** 2)
+        weight = np.where(residual > 0.0, apart, overlap)
+        normal = design.T @ (weight[:, None] * design)
+        value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
+        residual = gap + design @ value
+        scatter = MAD_TO_SD * float(np.median(np.abs(residual[weight > 0.5])))
+        width = max(SHRINK * width, LAST_WIDTH * scatter)
+    sd = scatter * np.sqrt(frames * np.diag(np.linalg.pinv(normal)))
+    return TouchingFit(value, sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight)
