@@ -28,7 +28,7 @@ def peak_of(*arguments: object) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "wait4"), reason="the system does not tell the memory of a process")
+@pytest.mark.skipif(not hasattr(os, "wait4"), reason="the system does not report the memory of a process")
 def test_the_memory_of_whole_commands_grows_little_with_length(tmp_path: Path):
     base = tmp_path / "base"
     synthesize(base, grains=GRAINS, frames=4, photographs=False, noise=1e-5, seed=1)
