@@ -225,7 +225,7 @@ def _start_time(process: int) -> str:
     try:
         status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
         fields = status.rpartition(")")[2].split()
-        return "" if fields[0] == "Z" else fields[19]  # Z: it has ended, and nobody has asked for its status
+        return "" if fields[0] == "Z" else fields[19]  # Z: it has ended, and nobody has read its status
     except (OSError, IndexError):
         return "" if not _exists_without_proc(process) else "unknown"
 

@@ -69,7 +69,7 @@ def encode_film(file: Path, pictures: Iterable[bytes], rate: float) -> int:
 
 
 def _check_whole(film: Path, count: int, file: Path) -> None:
-    """Raise OSError where a film has fewer pictures than were written: OpenCV says nothing of a full disk."""
+    """Raise OSError where a film has fewer pictures than were written: OpenCV reports no full disk."""
     reader = cv2.VideoCapture(str(film), cv2.CAP_FFMPEG)
     found = 0
     while reader.grab():

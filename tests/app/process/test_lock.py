@@ -104,7 +104,7 @@ def test_a_process_holds_a_folder_once(tmp_path):
         pass
 
 
-def test_a_process_that_has_ended_does_not_live_although_its_status_was_not_asked_for():
+def test_a_process_that_has_ended_does_not_live_although_its_status_was_not_read():
     process = subprocess.Popen([sys.executable, "-c", ""], stdout=subprocess.PIPE)
     assert process.stdout is not None
     holder = Holder.of(process.pid)

@@ -108,7 +108,7 @@ def test_the_same_key_is_not_overwritten_unseen(draft):
     assert "friction = 0.2 # of" in draft.file.read_text()
 
 
-def test_the_page_is_told_of_a_change_that_it_has_not_shown(visitor, photographs_only):
+def test_the_page_reports_a_change_that_it_has_not_shown(visitor, photographs_only):
     at = visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")["at"]
     visitor.request("set_photographs", at=at, interval=30.0)
     file = photographs_only / "my photographs" / "experiment.toml"
