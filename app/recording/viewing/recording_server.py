@@ -158,7 +158,7 @@ def start_server_process(recordings: Sequence[Path], *, browser: bool = False) -
 
 def run_server_process() -> None:
     """Print the address and serve the recordings of the command line until IDLE_LIMIT passes without a request."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # files registered for removal at the end are removed
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # removes files that are registered for it
     wanted, *files = sys.argv[1:]
     server = RecordingServer([Path(each) for each in files])
     print(server.address, flush=True)

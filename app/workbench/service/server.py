@@ -13,7 +13,7 @@ from collections.abc import AsyncIterator, Callable
 from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from typing import Any
+from typing import Any, cast
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -150,7 +150,7 @@ class WorkbenchServer:
         config = uvicorn.Config(
             make_application(workbench, self.gate, entry, known), log_config=None, access_log=False,
             server_header=False, lifespan="off", timeout_graceful_shutdown=1, backlog=BACKLOG,
-            http=partial(HttpConnection, known),
+            http=cast(Any, partial(HttpConnection, known)),
         )  # fmt: skip
         self._server = uvicorn.Server(config)
 

@@ -18,7 +18,7 @@ MISSING = object()  # value of a key that is not there
 def set_values(content: str, keys: Mapping[str, Any]) -> str:
     """Return an experiment file with dotted keys set; a value None removes its key.
 
-    The rest of the file is the same, character by character. Where its way of writing does not allow that, all of
+    Everything else in the file stays, character by character. Where its way of writing does not allow that, all of
     it is written anew, below its first comment.
     """
     wanted = with_values(tomllib.loads(content), keys)

@@ -96,8 +96,8 @@ def test_no_table_outside_is_read(root, table, way):
     (folder / "experiment.toml").write_text(tomli_w.dumps(config | {section: config[section] | {table: named}}))
     visitor = Visitor(Workbench(root)).enter()
     described = visitor.request("project", at="tracked")
-    texts = [text for step in described["steps"] for text in step["messages"]] + described["other_messages"]
-    assert "lies outside" in " ".join(texts)
+    messages = [text for step in described["steps"] for text in step["messages"]] + described["other_messages"]
+    assert "lies outside" in " ".join(messages)
     assert not described["ready"]
     assert "lies outside" in visitor.refused("run_start", at="tracked")
 

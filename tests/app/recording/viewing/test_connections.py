@@ -60,7 +60,7 @@ def serving(kind: str, folder: Path) -> Iterator[Gate]:
     bench.close()
 
 
-def visit(port: int, path: str, *headers: str) -> bytes:
+def answer_to(port: int, path: str, *headers: str) -> bytes:
     """The answer to one request; empty where the server ends the connection."""
     with socket.create_connection(("127.0.0.1", port), timeout=20.0) as connection:
         lines = (f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Connection: close", *headers)
@@ -94,7 +94,7 @@ def test_connections_without_a_request_do_not_lock_the_owner_out(kind, tmp_path)
                 connection = socket.create_connection(("127.0.0.1", port), timeout=20.0)
                 stack.callback(connection.close)
             began = time.monotonic()
-            assert b" 303 " in visit(port, f"/?{path}")
+            assert b" 303 " in answer_to(port, f"/?{path}")
             assert time.monotonic() - began < 5.0
         finally:
             process.kill()
@@ -220,4 +220,4 @@ def test_another_user_who_knows_the_secrets_gets_nothing(kind, tmp_path):
                 [sys.executable, "-c", THIEF, str(gate.port), request], capture_output=True, text=True, timeout=60
             )  # fmt: skip
             assert (done.stdout, done.stderr) == ("0\n", "")
-        assert b" 303 " in visit(gate.port, f"/?token={gate.token}")
+        assert b" 303 " in answer_to(gate.port, f"/?token={gate.token}")

@@ -40,9 +40,9 @@ def test_the_token_opens_one_browser_which_may_come_again(server):
     status, headers, _ = get(server, path)
     assert status == 303
     cookie = headers["Set-Cookie"].split(";")[0]
-    status, headers, body = get(server, path)
+    status, headers, sentence = get(server, path)
     assert (status, headers["Set-Cookie"]) == (403, None)
-    assert "opens once" in body
+    assert "opens once" in sentence
     assert get(server, path, Cookie=cookie)[0] == 303
     assert get(server, "/", Cookie=cookie)[0] == 200
 
