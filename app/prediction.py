@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
 DOUBTFUL = 0.97  # expected r(f_n) below which rival inputs are compared
+NO_EXPECTATION = (math.nan, math.nan, math.nan)
 NOT_PREDICTED = (
     "The accuracy of the forces is not predicted: a prediction needs grains and walls seen in two consecutive "
     "photographs."
@@ -45,7 +46,7 @@ class Prediction:
     @property
     def expected(self) -> tuple[float, float, float]:
         """Expected r(f_n), and an interval with a coverage of two thirds; NaN where there is no trial."""
-        return (math.nan,) * 3 if self.trial is None else self.trial.expected
+        return NO_EXPECTATION if self.trial is None else self.trial.expected
 
     @property
     def good(self) -> bool:

@@ -71,7 +71,8 @@ def expected_interval(evidence: Evidence) -> tuple[float, float, float]:
     """
     score, table = correlation_score(evidence), _table(evidence)
     sd = _margin(score, table) / ONE_SIDED
-    return tuple(max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
+    expected, low, high = (max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
+    return expected, low, high
 
 
 def losses(evidence: Evidence) -> dict[str, float]:

@@ -107,4 +107,6 @@ def fit_touching_pairs(
         scatter = MAD_TO_SD * float(np.median(np.abs(residual[weight > 0.5])))
         width = max(SHRINK * width, LAST_WIDTH * scatter)
     sd = scatter * np.sqrt(frames * np.diag(np.linalg.pinv(normal)))
-    return TouchingFit(value, sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight)
+    return TouchingFit(
+        np.asarray(value, np.float64), sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight
+    )

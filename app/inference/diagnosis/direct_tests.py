@@ -48,7 +48,7 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     stated, inferred = stated[known], inferred[known]
     if len(stated) < 2 or not inferred.any():
         return []
-    rank = float(spearmanr(stated, inferred).statistic)
+    rank = float(spearmanr(stated, inferred)[0])
     if abs(rank) < max(AGREES, SIGMAS / np.sqrt(len(stated))):
         return []
     against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"

@@ -14,7 +14,7 @@ from scipy.stats import spearmanr
 
 from ...experiment.experiment import load_experiment
 from ...inference.diagnosis.data_quality import REFERENCE_STEP
-from ...prediction import Prediction, predict_accuracy
+from ...prediction import NO_EXPECTATION, Prediction, predict_accuracy
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...synthetic.scenarios.preset_names import ScenarioName
@@ -55,7 +55,7 @@ class PredictionOutcome:
     @property
     def expected(self) -> tuple[float, float, float]:
         """Expected r and its interval; NaN where nothing is predicted."""
-        return (math.nan,) * 3 if self.prediction is None else self.prediction.expected
+        return NO_EXPECTATION if self.prediction is None else self.prediction.expected
 
     @property
     def inside(self) -> bool | None:
@@ -109,7 +109,7 @@ def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -
     known = [each for each in outcomes if each.inside is not None]
     reached, expected = [each.score.r_late for each in known], [each.expected[0] for each in known]
     excessive = sum(r < POOR_RESULT and e > HIGH for r, e in zip(reached, expected, strict=True) if r is not None)
-    rank = float(spearmanr(reached, expected).statistic) if len(set(expected)) > 2 else math.nan
+    rank = float(spearmanr(reached, expected)[0]) if len(set(expected)) > 2 else math.nan
     wrong_input = [each for each in outcomes if SCENARIOS[each.score.scenario].group == "wrong input"]
     console.print(
         f"The diagnosis named the right cause in {sum(each.rightly is True for each in wrong_input)} of "
