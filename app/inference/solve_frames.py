@@ -42,15 +42,16 @@ def solve_frames(sequence: CorrectedSequence, store: FrameStore, observer: Infer
     """Solve the frames that the store lacks, each from the state of the one before it."""
     total = len(sequence.snapshots)
     done = min(store.finished(), total)
-    last = store.load(done - 1) if done else None
+    span = sequence.settings.used_span
+    states = [store.load(k).state for k in range(max(done - span, 0), done)]
     observer.restored(store, done)
     observer.progress("solving", done, total)
     if done == total:
         return
     solved = solve_sequence(
         sequence.packing, sequence.snapshots, sequence.settings,
-        state=None if last is None else last.state, first=done, verdicts=sequence.verdicts, failed=sequence.failed,
-        observer=partial(observer.failed, "solving"), ahead=True,
+        state=states[-1] if states else None, earlier=states[:-1], first=done, verdicts=sequence.verdicts,
+        failed=sequence.failed, observer=partial(observer.failed, "solving"), ahead=True,
     )  # fmt: skip
     for forces, state in prefetch(solved, sequence.settings.workers):
         try:

@@ -54,6 +54,7 @@ def prepare_packing(
     aspect: float = 1.2,
     sizes: Callable[[int, np.random.Generator], Array] = choose_radii,
     loose: bool = False,
+    corner_radius: float = 0.0,
 ) -> ShearCell:
     """Compress rods under the settings' pressure.
 
@@ -71,6 +72,8 @@ def prepare_packing(
         Draws the radii (n,) [m].
     loose : bool
         Compress with friction, so that fewer contacts bear; default: without.
+    corner_radius : float
+        Of discs where the bars meet [m]; 0: none.
 
     Returns
     -------
@@ -83,7 +86,8 @@ def prepare_packing(
         If the packing does not come to rest.
     """
     radius = sizes(count, rng)
-    width = float(np.sqrt(np.pi * np.sum(radius**2) / SOLID_FRACTION / aspect))
+    discs = np.pi * corner_radius**2  # [m²] of the frame that four of them cover
+    width = float(np.sqrt((np.pi * np.sum(radius**2) / SOLID_FRACTION + discs) / aspect))
     height = LOOSENESS * aspect * width
     columns = max(1, round(np.sqrt(count * width / height)))
     rows = -(-count // columns)
@@ -93,12 +97,18 @@ def prepare_packing(
 
     frictionless = replace(settings, friction=0.0, wall_friction=0.0)
     soft = replace(frictionless, normal_stiffness=SOFTENING * settings.normal_stiffness, pressure=float("nan"))
-    cell = ShearCell(radius, position, width=width, height=height, settings=soft, drag=SOFT_DRAG)
+
+    def place(settings: DemSettings, at: Array, height: float, drag: float = 0.0) -> ShearCell:
+        return ShearCell(
+            radius, at, width=width, height=height, settings=settings, drag=drag, corner_radius=corner_radius
+        )
+
+    cell = place(soft, position, height, SOFT_DRAG)
     cell.run(np.zeros(SOFT_STEPS))
     loading = settings if loose else frictionless
-    cell = ShearCell(radius, cell.position, width=width, height=height, settings=loading, drag=LOADING_DRAG)
+    cell = place(loading, cell.position, height, LOADING_DRAG)
     for _ in range(round(LOADING_ROUNDS * max(count / ROUNDS_OF, 1.0) ** 0.5)):
         cell.run(np.zeros(LOADING_STEPS))
         if cell.unbalance < PREPARED and cell.plate_unbalance < PREPARED:
-            return ShearCell(radius, cell.position, width=width, height=cell.height, settings=settings)
+            return place(settings, cell.position, cell.height)
     raise UnbalancedError(f"the packing of {count} rods did not come to rest: unbalance {cell.unbalance:.2g}")

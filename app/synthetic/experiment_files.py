@@ -67,6 +67,17 @@ def write_arcs(path: Path, names: Sequence[str], endpoints: Array, side: NDArray
     _write(path, ("frame", "wall", "x", "y", "radius", "side", "theta"), rows)
 
 
+def write_corners(path: Path, names: Sequence[str], endpoints: Array) -> None:
+    """Write discs by their diameters (f, c, 2, 2) [m] as corners.csv."""
+    centre, radius, _ = circle_parameters(endpoints)
+    rows = (
+        (frame, name, _metres(x), _metres(y), _metres(radius[frame, c]))
+        for frame in range(len(endpoints))
+        for c, (name, (x, y)) in enumerate(zip(names, centre[frame], strict=True))
+    )
+    _write(path, ("frame", "corner", "x", "y", "radius"), rows)
+
+
 def write_loads(path: Path, names: Sequence[str], load: Array) -> None:
     """Write loads on walls (f, w) [N] as load.csv."""
     rows = (
@@ -101,6 +112,16 @@ def write_truth_contacts(path: Path, truth: DemTruth) -> None:
 
 def write_wall_forces(path: Path, truth: DemTruth) -> None:
     """Write the packing's force on every wall [N], as sensors record it."""
+    rows = (
+        (k, name, f"{fx:.4f}", f"{fy:.4f}")
+        for k, walls in enumerate(forces_on_walls(truth))
+        for name, (fx, fy) in zip(truth.wall_names, walls, strict=True)
+    )
+    _write(path, ("frame", "wall", "fx", "fy"), rows)
+
+
+def forces_on_walls(truth: DemTruth) -> Array:
+    """Return the packing's force on every wall (f, w, 2) [N]."""
     n, w = len(truth.radius), len(truth.wall_names)
     frame = np.repeat(np.arange(truth.frame_count), np.diff(truth.offset))
     on_wall = truth.j >= n
@@ -111,12 +132,7 @@ def write_wall_forces(path: Path, truth: DemTruth) -> None:
     tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
     each = truth.fn[on_wall, None] * normal + truth.ft[on_wall, None] * tangent
     np.add.at(force, (k, wall), each)
-    rows = (
-        (k, name, f"{fx:.4f}", f"{fy:.4f}")
-        for k, walls in enumerate(force)
-        for name, (fx, fy) in zip(truth.wall_names, walls, strict=True)
-    )
-    _write(path, ("frame", "wall", "fx", "fy"), rows)
+    return force
 
 
 def write_grains(path: Path, ids: Ids, radius: Array) -> None:

@@ -1,9 +1,13 @@
-"""A synthetic experiment: a simulated shear test, written as an experiment folder with its truth."""
+"""A synthetic experiment: a simulated shear test, written as an experiment folder with its truth.
+
+The preset `1g2e` is the apparatus of the method's authors: discs in the corners of the frame, a plate that is a bar
+with its two discs under one measured load, walls rougher than rods, and a photograph every .0267° while it moves.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -14,8 +18,9 @@ from ..process.atomic import write_atomically
 from ..process.errors import InputError
 from ..process.progress import Progress, no_progress
 from ..solver.bodies.grains import Array
-from ..solver.dem.dem_truth import DemSettings, DemTruth
-from ..solver.dem.shear_cell import shear_photographs
+from ..solver.bodies.wall_shapes import STRAIGHT, circle_parameters
+from ..solver.dem.dem_truth import WALL_NAMES, DemSettings, DemTruth
+from ..solver.dem.shear_cell import CORNER_NAMES, CORNERED_SIDES, shear_photographs
 from . import experiment_files
 from .dense_packing import prepare_packing
 from .placement import cut_sides, place_in_picture
@@ -27,6 +32,15 @@ STEEPEST = 30.0  # [°]
 LEAST_GRAINS = 12
 MARGIN = 0.006  # [m], of visible backing around the frame
 FINEST_PRECISION = 1e-6  # [m], claimed of tracks without noise: tables are rounded, rods are elastic
+LARGEST_RADIUS_ERROR = 0.05  # of the stated radii, either way
+# The apparatus 1γ2ε as its authors describe it.
+PLATE_LOAD, PLATE_LENGTH = 1438.0, 0.5  # [N], [m]; a smaller frame has the same load per length
+CORNER_RADIUS = 0.0206  # [m]
+PLATE_OF_CORNERS = ("top", *CORNER_NAMES[2:])  # the walls that are one plate
+APPARATUS = DemSettings(
+    density=2900.0, friction=0.3, wall_friction=0.5, moving=True, unbalance_limit=10.0,
+    pressure=PLATE_LOAD / (PLATE_LENGTH * DemSettings().length),
+)  # fmt: skip
 # Speckle and noise have no repeats: Huffman coding alone compresses them best and fastest (measured).
 PNG_OPTIONS = [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
 
@@ -41,11 +55,33 @@ class Preset:
     pixel_size: float  # [m]
     search_degrees: float = 0.0  # simulated range from which the photographs around the greatest event are taken
     jpeg_quality: int | None = None  # of 8-bit photographs; None: PNG
+    settings: DemSettings = field(default_factory=DemSettings)
+    initial_degrees: float = 0.0  # of shear at the first photograph
+    interval: float | None = None  # [s] between photographs; None: at the rate of the paper's test
+    corner_radius: float = 0.0  # [m] of discs where the bars meet, which make the load a measured one; 0: none
+    noise: float = 0.0  # [m] of tracked positions
+
+    @property
+    def seconds(self) -> float:
+        """Time between photographs [s]."""
+        return self.step_degrees / SHEAR_RATE if self.interval is None else self.interval
 
 
 PRESETS = {
     "small": Preset(grains=250, frames=24, step_degrees=0.25, pixel_size=2.5e-4, search_degrees=15.0, jpeg_quality=92),
     "paper": Preset(grains=1172, frames=61, step_degrees=0.25, pixel_size=2.0e-4),
+    "1g2e": Preset(
+        grains=1172,
+        frames=60,
+        step_degrees=0.0267,
+        pixel_size=1.45e-4,
+        jpeg_quality=92,
+        settings=APPARATUS,
+        initial_degrees=2.0,
+        interval=5.0,
+        corner_radius=CORNER_RADIUS,
+        noise=1e-5,
+    ),
 }
 
 
@@ -66,7 +102,7 @@ def synthesize(
     preset: str = "small",
     seed: int = 0,
     photographs: bool = True,
-    noise: float = 0.0,
+    noise: float | None = None,
     depth: int = 8,
     jpeg_quality: int | None = None,
     png: bool = False,
@@ -75,6 +111,7 @@ def synthesize(
     step_degrees: float | None = None,
     pixel_size: float | None = None,
     reversal: bool = False,
+    radius_error: float = 0.0,
     speckle: SpeckleSettings | None = None,
     progress: Progress | None = None,
 ) -> Synthesis:
@@ -84,12 +121,12 @@ def synthesize(
     ----------
     out : Path
         Folder to write; must be absent or empty.
-    preset : {'small', 'paper'}
+    preset : {'small', 'paper', '1g2e'}
     seed : int
     photographs : bool
         Write photographs, whose grains are to be detected; otherwise tracks.
-    noise : float
-        Standard deviation [m] of tracked positions; that of rotations is noise / radius [rad].
+    noise : float, optional
+        Standard deviation [m] of tracked positions; that of rotations is noise / radius [rad]. Default: the preset's.
     depth : {8, 16}
         Bits of a photograph; 16 bits are always PNG.
     jpeg_quality : int, optional
@@ -104,6 +141,8 @@ def synthesize(
         Side of a pixel [m]; default: the preset's.
     reversal : bool
         Reverse the shear half way.
+    radius_error : float
+        Error that all stated radii share, as a fraction: −.02 states them 2 % too small.
     speckle : SpeckleSettings, optional
         Paint and camera; its pixel size and depth are replaced.
     progress : callable, optional
@@ -117,7 +156,10 @@ def synthesize(
         If the simulation does not come to rest; nothing is written then.
     """
     out = Path(out)
-    _check_choices(preset, seed, photographs, noise, depth, jpeg_quality)
+    _check_choices(preset, seed, photographs, noise or 0.0, depth, jpeg_quality)
+    if not abs(radius_error) <= LARGEST_RADIUS_ERROR:
+        limit = f"expected a fraction from -{LARGEST_RADIUS_ERROR} to {LARGEST_RADIUS_ERROR}"
+        raise InputError("synth", f"radius_error = {radius_error}", limit)
     given = {"grains": grains, "frames": frames, "step_degrees": step_degrees, "pixel_size": pixel_size}
     plan = _plan(PRESETS[preset], {name: value for name, value in given.items() if value is not None}, reversal)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -134,23 +176,24 @@ def synthesize(
 
     out.mkdir(parents=True, exist_ok=True)
     ids = np.arange(len(truth.radius))
-    experiment_files.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
-    experiment_files.write_wall_forces(out / "wall_forces.csv", truth)
+    walls = _write_walls(out, truth)
     experiment_files.write_truth_contacts(out / "truth_contacts.csv", truth)
     experiment_files.write_tracks(out / "truth_tracks.csv", ids, truth.position, truth.rotation)
     if photographs:
         source, shape = _write_photographs(
-            out, truth, speckle, seed, plan.step_degrees, jpeg_quality, progress or no_progress
+            out, _Photographed(truth, plan.seconds, seed, radius_error), speckle, jpeg_quality, progress or no_progress
         )
     else:
-        source, shape = _write_tracks(out, truth, noise, seed, plan.step_degrees), None
+        noise = plan.noise if noise is None else noise
+        source, shape = _write_tracks(out, _Photographed(truth, plan.seconds, seed, radius_error), noise), None
     # Written last, so that an unfinished folder is not an experiment.
     experiment_files.write_experiment(
         out / "experiment.toml",
         name=out.resolve().name,
         remark=_remark(preset, seed, truth, old_unbalance, event),
         source=source,
-        known=experiment_files.StatedInputs.of(truth.settings, plates=("top",)),
+        known=experiment_files.StatedInputs.of(truth.settings, plates=() if plan.corner_radius else ("top",)),
+        walls=walls,
     )
     return Synthesis(out, truth, old_unbalance, event, shape)
 
@@ -162,35 +205,64 @@ def shear_angles(plan: Preset, reversal: bool) -> Array:
     if reversal:
         peak = (count - 1) // 2
         step = peak - abs(step - peak)
-    return np.deg2rad(plan.step_degrees) * step
+    return np.deg2rad(plan.initial_degrees + plan.step_degrees * step)
+
+
+@dataclass(frozen=True, slots=True)
+class _Photographed:
+    """What is written as measured."""
+
+    truth: DemTruth
+    interval: float  # [s]
+    seed: int
+    radius_error: float
+
+    @property
+    def stated_radius(self) -> Array:
+        """Radii (n,) [m] as the tables state them."""
+        return self.truth.radius * (1.0 + self.radius_error)
 
 
 def _simulate(plan: Preset, seed: int, reversal: bool, progress: Progress) -> DemTruth:
-    settings = DemSettings()
+    settings = plan.settings
     angles = shear_angles(plan, reversal)
     progress("simulate", 0, len(angles))
-    cell = prepare_packing(plan.grains, np.random.default_rng(seed), settings)
+    cell = prepare_packing(plan.grains, np.random.default_rng(seed), settings, corner_radius=plan.corner_radius)
     frames = []
     for frame in shear_photographs(cell, angles):
         frames.append(frame)
         progress("simulate", len(frames), len(angles))
     truth = DemTruth.of_frames(cell.grains.radius, frames, settings)
+    if plan.corner_radius:
+        truth = replace(truth, wall_names=WALL_NAMES + CORNER_NAMES, side=CORNERED_SIDES)
     if truth.frame_count == plan.frames:
         return truth
     first, _ = choose_window(measure_old_unbalance(truth), plan.frames)
     return truth.frames(first, first + plan.frames)
 
 
+def _write_walls(out: Path, truth: DemTruth) -> str:
+    """Write the tables of the walls; return the keys of [walls] that name them."""
+    if truth.side is None:
+        experiment_files.write_walls(out / "walls.csv", truth.wall_names, truth.endpoints)
+        experiment_files.write_wall_forces(out / "wall_forces.csv", truth)
+        return 'file = "walls.csv"\n'
+    experiment_files.write_corners(out / "corners.csv", CORNER_NAMES, truth.endpoints[:, truth.side != STRAIGHT])
+    plate = [truth.wall_names.index(name) for name in PLATE_OF_CORNERS]
+    force = experiment_files.forces_on_walls(truth)[:, plate, 1].sum(axis=1)
+    experiment_files.write_loads(out / "load.csv", PLATE_OF_CORNERS[:1], force[:, None])
+    return 'corners = "corners.csv"\nload = "load.csv"\n'
+
+
 def _write_photographs(
     out: Path,
-    truth: DemTruth,
+    taken: _Photographed,
     speckle: SpeckleSettings,
-    seed: int,
-    step_degrees: float,
     jpeg_quality: int | None,
     progress: Progress,
 ) -> tuple[str, tuple[int, int]]:
     """Write photos/ and the true grains of the first photograph; return the [photographs] table and the shape."""
+    truth, seed = taken.truth, taken.seed
     pixel = speckle.pixel_size
     extent = truth.endpoints.max(axis=(0, 1, 2)) + MARGIN + speckle.bar_thickness
     width, height = (math.ceil(float(length) / pixel) + 1 for length in extent)
@@ -202,7 +274,7 @@ def _write_photographs(
     for k in range(truth.frame_count):
         image = render_photograph(
             speckle,
-            RodScene(width, height, truth.radius, truth.position[k], truth.rotation[k], truth.endpoints[k], seed),
+            RodScene(width, height, *_painted(truth, k), seed),
             noise_seed=int(np.random.SeedSequence([seed, k]).generate_state(1)[0]),
         )
         name = out / "photos" / f"{k:04d}.{suffix}"
@@ -210,30 +282,45 @@ def _write_photographs(
         progress("photograph", k + 1, truth.frame_count)
     scale = Scale(pixel, height)
     experiment_files.write_grains_in_pixels(
-        out / "grains.csv", scale.to_pixels(truth.position[0]), truth.radius / pixel
+        out / "grains.csv", scale.to_pixels(truth.position[0]), taken.stated_radius / pixel
     )
-    classes = ", ".join(f"{radius:g}" for radius in np.unique(truth.radius))
+    classes = ", ".join(f"{radius:g}" for radius in np.unique(taken.stated_radius))
     source = f"""[photographs]
 files = "photos/*.{suffix}"
 pixel_size = {pixel:g}
-interval = {step_degrees / SHEAR_RATE:.6f}
+interval = {taken.interval:.6f}
 radii = [{classes}]
 # grains = "grains.csv"  # the true grains of the first photograph: with this line nothing is detected
 """
     return source, (height, width)
 
 
-def _write_tracks(out: Path, truth: DemTruth, noise: float, seed: int, step_degrees: float) -> str:
+def _painted(truth: DemTruth, k: int) -> tuple[Array, Array, Array, Array]:
+    """Return radius, position and rotation of rods and corner discs of a photograph, and bars from disc to disc."""
+    if truth.side is None:
+        return truth.radius, truth.position[k], truth.rotation[k], truth.endpoints[k]
+    straight = truth.side == STRAIGHT
+    centre, radius, angle = circle_parameters(truth.endpoints[k][~straight])
+    following = np.roll(centre, -1, axis=0)
+    along = (following - centre) / np.linalg.norm(following - centre, axis=1)[:, None] * radius[:, None]
+    return (
+        np.concatenate([truth.radius, radius]),
+        np.concatenate([truth.position[k], centre]),
+        np.concatenate([truth.rotation[k], angle]),
+        np.stack([centre + along, following - along], axis=1),
+    )
+
+
+def _write_tracks(out: Path, taken: _Photographed, noise: float) -> str:
     """Write tracks with noise, their grains and times; return the [tracks] table."""
-    rng = np.random.default_rng([seed, 1])
+    truth = taken.truth
+    rng = np.random.default_rng([taken.seed, 1])
     position = truth.position + noise * rng.standard_normal(truth.position.shape)
     rotation = truth.rotation + noise / truth.radius * rng.standard_normal(truth.rotation.shape)
     ids = np.arange(len(truth.radius))
     experiment_files.write_tracks(out / "tracks.csv", ids, position, rotation)
-    experiment_files.write_grains(out / "grains.csv", ids, truth.radius)
-    experiment_files.write_times(
-        out / "times.csv", step_degrees / SHEAR_RATE * np.arange(truth.frame_count, dtype=np.float64)
-    )
+    experiment_files.write_grains(out / "grains.csv", ids, taken.stated_radius)
+    experiment_files.write_times(out / "times.csv", taken.interval * np.arange(truth.frame_count, dtype=np.float64))
     return f"""[tracks]
 positions = "tracks.csv"
 grains = "grains.csv"

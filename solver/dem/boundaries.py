@@ -1,9 +1,10 @@
 """Boundaries of the discrete-element simulation: shear frame, ring with core, and periodic cell.
 
 The frame is a linkage: the sides rotate about the bottom corners, the plate on top keeps its length and its ends on the
-lines of the sides, and the right side can move along the bottom. The ring is centred at the origin, does not rotate,
-and changes its radius as a whole; the core inside it is moved and rotated. The periodic cell shears by b along a and
-changes its size isotropically until the pressure is the required one.
+lines of the sides, and the right side can move along the bottom. Discs may be fixed to the ends of bottom and plate,
+where the sides meet them; those of the plate share its motion and its load. The ring is centred at the origin, does not
+rotate, and changes its radius as a whole; the core inside it is moved and rotated. The periodic cell shears by b along
+a and changes its size isotropically until the pressure is the required one.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from ..bodies.grains import Array
 FRAME, RING, CELL = range(3)  # kinds of boundary
 
 # Rows of walls and entries of state and drive, by kind. Rates of the state are half a step old.
-BOTTOM, RIGHT, TOP, LEFT = range(4)
-SHEAR, HEIGHT, HEIGHT_RATE, WIDTH, WIDTH_RATE = range(5)  # [rad], [m], [m/s], [m], [m/s]
+BOTTOM, RIGHT, TOP, LEFT, BOTTOM_LEFT, BOTTOM_RIGHT, TOP_RIGHT, TOP_LEFT = range(8)  # the last four are discs
+SHEAR, HEIGHT, HEIGHT_RATE, WIDTH, WIDTH_RATE, DISC_RADIUS = range(6)  # [rad], [m], [m/s], [m], [m/s], [m]
 SHEAR_RATE, PLATE_DRIVE, SIDE_DRIVE = range(3)  # [rad/s], [m/s], [m/s]
 
 RING_WALL, CORE_WALL = range(2)
@@ -110,8 +111,20 @@ def wall_surface(
         distance = (state[WIDTH] - x) * cosine + y * sine
         arm = (x - state[WIDTH]) * sine + y * cosine
         return distance, cosine, -sine, arm * rate * cosine + state[WIDTH_RATE], -arm * rate * sine, -rate
-    arm = x * sine + y * cosine
-    return x * cosine - y * sine, -cosine, sine, arm * rate * cosine, -arm * rate * sine, -rate
+    if wall == LEFT:
+        arm = x * sine + y * cosine
+        return x * cosine - y * sine, -cosine, sine, arm * rate * cosine, -arm * rate * sine, -rate
+    wx, wy = 0.0, 0.0
+    if wall in (BOTTOM_RIGHT, TOP_RIGHT):
+        x -= state[WIDTH]
+        wx = state[WIDTH_RATE]
+    if wall in (TOP_RIGHT, TOP_LEFT):
+        x -= state[HEIGHT] * sine / cosine
+        y -= state[HEIGHT]
+        wx += plate_speed
+        wy = state[HEIGHT_RATE]
+    apart = np.sqrt(x * x + y * y)
+    return apart - state[DISC_RADIUS], -x / apart, -y / apart, wx, wy, 0.0
 
 
 @njit(cache=True)

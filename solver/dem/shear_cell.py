@@ -12,10 +12,25 @@ from typing import ClassVar
 import numpy as np
 
 from ..bodies.grains import Array, Grains
-from .boundaries import FRAME, HEIGHT, LOAD, RIGHT, SHEAR, TOP, WIDTH, Boundary
+from ..bodies.wall_shapes import OUT, STRAIGHT, circle_ends, wall_distance
+from .boundaries import (
+    DISC_RADIUS,
+    FRAME,
+    HEIGHT,
+    LOAD,
+    RIGHT,
+    SHEAR,
+    TOP,
+    TOP_LEFT,
+    TOP_RIGHT,
+    WIDTH,
+    Boundary,
+)
 from .dem_truth import DemFrame, DemSettings
 from .simulation import PAUSE_STEPS, Simulation, plate_constants
 
+CORNER_NAMES = ("bottom-left", "bottom-right", "top-right", "top-left")  # of the discs
+CORNERED_SIDES = np.array([STRAIGHT] * 4 + [OUT] * 4, np.int8)  # bars, then discs
 LOAD_STEPS = 40  # in which a load is changed
 SIDE_MARGIN = 1.12  # length of the sides over the first height, for dilation and for the slant at 15°
 
@@ -40,6 +55,7 @@ class ShearCell(Simulation):
         velocity: Array | None = None,
         drag: float = 0.0,
         span: float | None = None,
+        corner_radius: float = 0.0,
     ) -> None:
         """Place grains in a rectangular frame.
 
@@ -59,13 +75,15 @@ class ShearCell(Simulation):
             Damping rate of every grain [1/s], for the preparation of a packing only.
         span
             Length of the bars at bottom and top [m], the width by default; longer where the right side moves outwards.
+        corner_radius
+            Radius of discs where the bars meet [m]; 0: none.
         """
         grains = Grains.of_rods(radius, density=settings.density, length=settings.length)
         plates = np.array([
             plate_constants(grains, settings, width, settings.pressure * width * settings.length),
             plate_constants(grains, settings, height, np.nan),
         ])  # fmt: skip
-        boundary = Boundary(FRAME, np.array([0.0, height, 0.0, width, 0.0, 0.0]), plates, np.zeros(4))
+        boundary = Boundary(FRAME, np.array([0.0, height, 0.0, width, 0.0, corner_radius]), plates, np.zeros(4))
         super().__init__(grains, position, boundary, settings=settings, velocity=velocity, drag=drag)
         self._side_length = SIDE_MARGIN * height
         self._span = width if span is None else span
@@ -87,17 +105,31 @@ class ShearCell(Simulation):
 
     @property
     def area(self) -> float:
-        """Area between the walls [m²]."""
-        return self.width * self.height
+        """Area between the walls [m²]; four discs whose centres are the corners cover the area of one."""
+        return self.width * self.height - np.pi * self.corner_radius**2
+
+    @property
+    def corner_radius(self) -> float:
+        """Radius of the discs where the bars meet [m]; 0: there are none."""
+        return float(self._boundary.state[DISC_RADIUS])
 
     @property
     def endpoints(self) -> Array:
-        """The walls (4, 2, 2) [m], counter-clockwise from the bottom, of constant lengths; the sides extend upwards."""
+        """The walls (w, 2, 2) [m], counter-clockwise from the bottom, of constant lengths; the sides extend upwards.
+
+        Bars, then diameters of the discs, where there are any.
+        """
         shear, height = self.shear, self.height
         slant = self._side_length * np.array([np.sin(shear), np.cos(shear)])
         left, right, end = np.zeros(2), np.array([self.width, 0.0]), np.array([self._span, 0.0])
         top = np.array([height * np.tan(shear), height])
-        return np.array([[left, end], [right, right + slant], [top + end, top], [left + slant, left]])
+        bars = np.array([[left, end], [right, right + slant], [top + end, top], [left + slant, left]])
+        if self.corner_radius == 0.0:
+            return bars
+        discs = circle_ends(
+            np.array([left, right, top + right, top]), np.full(4, self.corner_radius), np.zeros(4)
+        )  # fmt: skip
+        return np.concatenate([bars, discs])
 
     @property
     def plate_unbalance(self) -> float:
@@ -138,12 +170,35 @@ class ShearCell(Simulation):
             plates[:, LOAD] = np.where(start == end, end, start + fraction * (end - start))
             self.run(np.zeros(PAUSE_STEPS))
 
+    @property
+    def plate_force(self) -> float:
+        """Force of the packing on the plate [N], its discs included, normal to it."""
+        pairs, force = self._wall_pairs, self._force_on(TOP)
+        if self.corner_radius == 0.0:
+            return force
+        on_disc = (pairs.j == TOP_RIGHT) | (pairs.j == TOP_LEFT)
+        disc = self.endpoints[pairs.j[on_disc]]
+        _, normal = wall_distance(disc, np.full(len(disc), OUT), self.position[pairs.i[on_disc]])
+        return force + float(pairs.fn[on_disc] @ normal[:, 1] + pairs.ft[on_disc] @ normal[:, 0])
+
+    def _load_residual(self, row: int, wall: int) -> float:
+        load = float(self._boundary.plates[row, LOAD])
+        if wall != TOP or not np.isfinite(load):
+            return super()._load_residual(row, wall)
+        return abs(self.plate_force - load) / load
+
     def _wall_distance(self, position: Array) -> Array:
         walls = self.endpoints
-        along = walls[:, 1] - walls[:, 0]
+        bars = walls[:4]
+        along = bars[:, 1] - bars[:, 0]
         along /= np.linalg.norm(along, axis=1)[:, None]
         outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        return np.einsum("nwk,wk->nw", walls[None, :, 0] - position[:, None], outward)
+        to_bars = np.einsum("nwk,wk->nw", bars[None, :, 0] - position[:, None], outward)
+        if len(walls) == len(bars):
+            return to_bars
+        centre = walls[4:].mean(axis=1)
+        to_discs = np.linalg.norm(position[:, None] - centre, axis=-1) - self.corner_radius
+        return np.concatenate([to_bars, to_discs], axis=1)
 
 
 def shear_photographs(cell: ShearCell, angles: Array) -> Iterator[DemFrame]:

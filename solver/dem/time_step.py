@@ -23,6 +23,8 @@ from .boundaries import (
     RIGHT,
     RING_WALL,
     TOP,
+    TOP_LEFT,
+    TOP_RIGHT,
     Boundary,
     apply_loads,
     cell_rates,
@@ -166,7 +168,8 @@ def grain_forces(
 def wall_forces(bodies: DemBodies, pairs: DemPairs, law: Law, boundary: Boundary, drive: Array) -> tuple[float, float]:
     """Add the forces of the walls to `bodies.force`.
 
-    Return the sums of the normal forces [N] on plate and right side of a frame; on the ring, and zero.
+    Return the sums of the forces [N] normal to plate and right side of a frame; on the ring, and zero. The discs of the
+    plate are part of it.
     """
     state, force, radius = bodies.state, bodies.force, bodies.radius
     linkage = linkage_motion(boundary, drive)
@@ -195,6 +198,8 @@ def wall_forces(bodies: DemBodies, pairs: DemPairs, law: Law, boundary: Boundary
             first += fn
         elif wall == second_wall:
             second += fn
+        elif boundary.kind == FRAME and wall in (TOP_RIGHT, TOP_LEFT):
+            first += fn * ny + ft * nx
     return first, second
 
 

@@ -136,8 +136,8 @@ def find_reversals(endpoints: Array, position: Array) -> NDArray[np.bool_]:
     return reversed_at
 
 
-def member_intervals(frame: int, reversed_at: NDArray[np.bool_]) -> tuple[tuple[int, int] | None, ...]:
-    """Return the intervals (k−1, k), (k, k+1), (k−1, k+1), (k−2, k+2) of the convex ensemble members at frame k.
+def member_intervals(frame: int, reversed_at: NDArray[np.bool_], span: int = 1) -> tuple[tuple[int, int] | None, ...]:
+    """Return the intervals (k−m, k), (k, k+m), (k−m, k+m), (k−2m, k+2m) of the convex ensemble members at frame k.
 
     Parameters
     ----------
@@ -145,6 +145,8 @@ def member_intervals(frame: int, reversed_at: NDArray[np.bool_]) -> tuple[tuple[
         k.
     reversed_at : (f,) bool
         Result of `find_reversals`.
+    span
+        m.
 
     Returns
     -------
@@ -164,7 +166,7 @@ def member_intervals(frame: int, reversed_at: NDArray[np.bool_]) -> tuple[tuple[
         highest = max(highest, 1)
     intervals: list[tuple[int, int] | None] = []
     for back, ahead in ((1, 0), (0, 1), (1, 1), (2, 2)):
-        interval = max(frame - back, lowest), min(frame + ahead, highest)
+        interval = max(frame - span * back, lowest), min(frame + span * ahead, highest)
         intervals.append(None if interval[0] == interval[1] or interval in intervals else interval)
     return tuple(intervals)
 

@@ -76,10 +76,13 @@ class RefinedBlock:
         return np.sqrt(total)
 
 
-def block_of(frame: int, frame_count: int) -> tuple[int, int, int]:
-    """Return the number of a frame's block, and the range of frames (first, end) that are refined for it."""
-    number = frame // BLOCK
-    return number, max(number * BLOCK - BACK, 0), min((number + 1) * BLOCK + AHEAD, frame_count)
+def block_of(frame: int, frame_count: int, span: int = 1) -> tuple[int, int, int]:
+    """Return the number of a frame's block, and the range of frames (first, end) that are refined for it.
+
+    span: photographs over which sliding is read; the widest interval reaches twice as far either way.
+    """
+    number, back, ahead = frame // BLOCK, max(BACK, 2 * span), max(AHEAD, 2 * span)
+    return number, max(number * BLOCK - back, 0), min((number + 1) * BLOCK + ahead, frame_count)
 
 
 def refine(

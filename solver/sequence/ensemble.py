@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from ..assessment.status import SETTLED_DIFFERENCE
 from ..bodies.grains import Array
-from ..bodies.motion import Snapshot
 from ..contacts.contacts import Contacts
 from ..contacts.pairs import are_among
 from ..convex.ensemble_members import NormalisedSlip, RefinedMotion, Slip, advance_convex_member, read_slip, steady_slip
 from ..convex.program import Balance, ConvexForces, assemble_balance, project_onto_equilibrium
 from ..detection.contact_networks import PairProbability, ProbabilityNetwork
-from ..detection.displacement import find_reversals, member_intervals
+from ..detection.displacement import member_intervals
 from ..nlgs.chain import ChainStep, advance_chain_through, force_scale
 from ..nlgs.force_memory import ForceMemory
 from ..nlgs.interval import Interval
@@ -345,7 +344,7 @@ def _slips(problem: FrameProblem, contacts: Contacts) -> tuple[Slip | None, ...]
         motion = RefinedMotion((refined.position_at(interval[0]), refined.position_at(interval[1])), slide_sd)
         return read_slip(contacts, problem.packing.grains, problem.walls, ends, convex, motion)
 
-    slips = [None if interval is None else slip(interval) for interval in _intervals(snapshots, problem.k)]
+    slips = [None if interval is None else slip(interval) for interval in _intervals(problem)]
     before, after = slips[:2]
     return (*slips, None if before is None or after is None else steady_slip(before, after))
 
@@ -358,7 +357,6 @@ def _seen_slip(slips: Sequence[Slip | None]) -> NormalisedSlip:
     return seen
 
 
-def _intervals(snapshots: Sequence[Snapshot], k: int) -> tuple[tuple[int, int] | None, ...]:
-    position = np.stack([np.where(s.present[:, None], s.position, np.nan) for s in snapshots])
-    bounds = np.stack([s.endpoints if s.cell is None else s.cell[None] for s in snapshots])
-    return member_intervals(k, find_reversals(bounds, position))
+def _intervals(problem: FrameProblem) -> tuple[tuple[int, int] | None, ...]:
+    assert problem.sequence.reversed_at is not None
+    return member_intervals(problem.k, problem.sequence.reversed_at, problem.settings.used_span)

@@ -27,6 +27,7 @@ class SequenceProblem:
     inferred: int = 0  # grains that no photograph shows
     positions: PositionEstimates | None = None  # position-only estimates; None: not used
     known: int = 0  # grains that any frame shows
+    reversed_at: NDArray[np.bool_] | None = None  # (f,) whether the loading reverses there; None: not examined
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,3 +64,10 @@ class FrameProblem:
     def seen(self) -> NDArray[np.bool_]:
         """Which grains the photograph shows (n,)."""
         return self.sequence.snapshots[self.k].present
+
+    @property
+    def intervals_read(self) -> float:
+        """Intervals between photographs that the motion covers."""
+        if self.settings.used_span == 1 or self.k == 0:
+            return 1.0  # the motion since the last solved frame, whether frames between them failed or not
+        return self.motion.interval / (self.snapshot.time - self.sequence.snapshots[self.k - 1].time)

@@ -152,7 +152,7 @@ def _describe(
         agreement=evidence.agreement,
         strain=strain,
         shear=shear_strain(strain),
-        shear_step=evidence.shear if problem.motion.ends_here else 0.0,
+        shear_step=evidence.shear / problem.intervals_read if problem.motion.ends_here else 0.0,
         warm_residual=starts.warm,
         cold_residual=starts.cold,
         sweeps_saved=starts.sweeps_saved,

@@ -5,16 +5,19 @@ A frame that cannot be solved is reported as failed; the frames around it are so
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..bodies.interpolation import interpolate_ignored_frames
 from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
 from ..contacts.verdicts import NO_VERDICTS, Verdicts, find_ignored
+from ..detection.displacement import find_reversals
 from ..detection.precision import corrected_precision, describe_contradiction, measure_precision, scale_precision
 from ..detection.refinement import BLOCK, RefinedBlock, block_of, refine
 from ..detection.touch_probability import AHEAD
@@ -35,6 +38,7 @@ def solve_sequence(
     settings: SequenceSettings,
     *,
     state: SequenceState | None = None,
+    earlier: Sequence[SequenceState] = (),
     first: int = 0,
     verdicts: Mapping[int, Verdicts] | None = None,
     failed: Mapping[int, str] | None = None,
@@ -43,9 +47,10 @@ def solve_sequence(
 ) -> Iterator[tuple[FrameForces, SequenceState]]:
     """Solve the frames first, first + 1, … one after the other.
 
-    The motion that leads to a frame is that since the last solved frame. No motion leads to frame 0: it is solved with
-    the motion that follows it. After it a single chain starts from zero; the ensemble continues from the convex
-    members' forces.
+    The motion that leads to a frame is that since the last solved frame. Where the settings read sliding over a span of
+    m photographs, it is that since frame k − m, whose forces the frame continues, but not from before a reset or a
+    reversal of the loading. No motion leads to frame 0: it is solved with the motion that follows it. After it a single
+    chain starts from zero; the ensemble continues from the convex members' forces.
 
     Parameters
     ----------
@@ -55,6 +60,8 @@ def solve_sequence(
     settings : SequenceSettings
     state : SequenceState, optional
         After the frame before `first`; None: nothing is solved yet.
+    earlier : sequence of SequenceState
+        After the frames before that one, in order; as many as the span of the settings less one are used.
     first : int
         Frame to begin with.
     verdicts : mapping of int to Verdicts, optional
@@ -79,10 +86,11 @@ def solve_sequence(
     """
     verdicts = {} if verdicts is None else verdicts
     ready = _prepare(packing, snapshots, settings, verdicts, failed)
-    state = SequenceState.first(packing) if state is None else state
+    history = _History(ready.sequence, [*earlier, SequenceState.first(packing) if state is None else state])
     blocks = _Blocks(ready.sequence, ahead=ahead)
     for k in range(first, len(snapshots)):
         frame = following = None
+        state = history.before(k)
         reason = ready.failed.get(k, "")
         if not reason:
             try:
@@ -98,11 +106,11 @@ def solve_sequence(
         if frame is None or following is None or reason:
             n, w = packing.grains.count, len(packing.pressure)
             frame = failed_frame(k, reason, n, w, with_members=settings.keep_members)
-            following = forget_forces(state)
+            following = forget_forces(history.last)
         if ready.remark and k == 0:
             frame = replace(frame, reason=f"{ready.remark}; {frame.reason}")
-        state = following
-        yield frame, state
+        history.add(following)
+        yield frame, following
 
 
 def solve_first_frame(
@@ -159,7 +167,47 @@ def _prepare(
     positions = None
     if settings.uses_positions and len(snapshots) > 1:
         positions = PositionEstimates(packing, snapshots, settings.posterior, settings.workers, posteriors)
-    return _Ready(SequenceProblem(packing, snapshots, settings, packing.inferred, positions, known), failed, remark)
+    sequence = SequenceProblem(
+        packing, snapshots, settings, packing.inferred, positions, known, _find_reversals(snapshots, settings)
+    )
+    return _Ready(sequence, failed, remark)
+
+
+def _find_reversals(snapshots: Sequence[Snapshot], settings: SequenceSettings) -> NDArray[np.bool_] | None:
+    if not snapshots or settings.estimator != "ensemble":
+        return None
+    position = np.stack([np.where(s.present[:, None], s.position, np.nan) for s in snapshots])
+    bounds = np.stack([s.endpoints if s.cell is None else s.cell[None] for s in snapshots])
+    return find_reversals(bounds, position)
+
+
+class _History:
+    """The states after the last frames, from which the next ones continue."""
+
+    def __init__(self, sequence: SequenceProblem, states: Sequence[SequenceState]) -> None:
+        span = sequence.settings.used_span
+        reversed_at = sequence.reversed_at
+        self._reversals = np.empty(0, np.intp) if reversed_at is None else np.flatnonzero(reversed_at)
+        self._states = deque(states[-span:], maxlen=span)
+
+    @property
+    def last(self) -> SequenceState:
+        """The state after the last frame."""
+        return self._states[-1]
+
+    def add(self, state: SequenceState) -> None:
+        """Add the state after the next frame."""
+        self._states.append(state)
+
+    def before(self, k: int) -> SequenceState:
+        """Return the state from which frame k continues: forces and motion of the frame where its interval begins."""
+        last = self.last
+        reversals = self._reversals[self._reversals < k]
+        earliest = max(
+            k - len(self._states), k - 1 - last.frames_since_reset, int(reversals[-1]) if len(reversals) else 0
+        )
+        begin = self._states[min(earliest, k - 1) - k]
+        return last if begin is last else last.with_history(begin)
 
 
 def _check_times(snapshots: Sequence[Snapshot]) -> None:
@@ -183,7 +231,7 @@ class _Blocks:
         snapshots = self._sequence.snapshots
         if self._sequence.settings.estimator != "ensemble" or len(snapshots) < 2:
             return None
-        number, _, _ = block_of(k, len(snapshots))
+        number, _, _ = block_of(k, len(snapshots), self._sequence.settings.used_span)
         if number != self._number:
             if self._number is None or number != self._number + 1:
                 self._coming = prefetch(self._refine_from(k), self._workers)
@@ -195,14 +243,14 @@ class _Blocks:
         """Refine the block of frame k, and those after it."""
         count = len(self._sequence.snapshots)
         for first in range(k, count, BLOCK):
-            _, start, end = block_of(first, count)
+            _, start, end = block_of(first, count, self._sequence.settings.used_span)
             yield self._refine(start, end)
 
     def find_first(self) -> RefinedBlock | None:
         """Refine the window that frame 0 depends on."""
         if self._sequence.settings.estimator != "ensemble" or len(self._sequence.snapshots) < 2:
             return None
-        return self._refine(0, AHEAD + 1)
+        return self._refine(0, max(AHEAD, 2 * self._sequence.settings.used_span) + 1)
 
     def _refine(self, start: int, end: int) -> RefinedBlock:
         probability = self._sequence.settings.ensemble.probability

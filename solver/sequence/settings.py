@@ -43,9 +43,17 @@ class SequenceSettings:
     threshold: float | None = None  # [m], instead of threshold_sigmas
     # Threads for the members of a frame; None: one for every core. Results do not depend on it.
     workers: int | None = None
+    # Photographs over which sliding is read and history is carried, where neighbouring ones are closer than noise. Only
+    # the ensemble uses it.
+    span: int = 1
     reset_to_zero: bool = False  # the paper's reset at a rearrangement
     reset_frames: frozenset[int] = frozenset()  # frames that always start from zero forces
     kept_frames: frozenset[int] = frozenset()  # frames that never do
+
+    @property
+    def used_span(self) -> int:
+        """Photographs over which the estimator reads sliding."""
+        return self.span if self.estimator == "ensemble" else 1
 
     @property
     def uses_positions(self) -> bool:

@@ -45,6 +45,13 @@ class SequenceState:
             np.nan, np.full((walls, 2, 2), np.nan), np.nan, np.nan, NO_EVIDENCE, 0, 0, ForceMemory.empty(),
         )  # fmt: skip
 
+    def with_history(self, earlier: SequenceState) -> SequenceState:
+        """The state after the last frame, with members and motion continued from an earlier frame's state."""
+        return replace(
+            self, members=earlier.members, seen=earlier.seen, time=earlier.time, endpoints=earlier.endpoints,
+            cell=earlier.cell,
+        )  # fmt: skip
+
     def without_forces(self) -> SequenceState:
         """The same history of the motion without previous forces to start from."""
         return replace(self, members=EnsembleState.first())

@@ -25,15 +25,16 @@ def synth(
     preset: Annotated[
         PhotographedPreset | MeasuredPreset | ScenarioName,
         tyro.conf.arg(
-            help="small and paper can be photographed; photoelastic: discs and their forces as PeGS writes them, for "
-            "rodsight import pegs; the others are scenarios of tracks: --no-photographs"
+            help="small, paper and 1g2e can be photographed; 1g2e: the apparatus of the method's authors, with corner "
+            "discs, a measured load and .0267° of shear a photograph; photoelastic: discs and their forces as PeGS "
+            "writes them, for rodsight import pegs; the others are scenarios of tracks: --no-photographs"
         ),
     ] = "small",
     seed: Annotated[int, tyro.conf.arg(help="of the packing, its paint and its noise")] = 0,
     photographs: Annotated[bool, tyro.conf.arg(help="render photographs; otherwise write tracks")] = True,
     noise: Annotated[
         float | None,
-        tyro.conf.arg(help="of a tracked position [m], with --no-photographs; default 0, or the scenario's"),
+        tyro.conf.arg(help="of a tracked position [m], with --no-photographs; default: the preset's"),
     ] = None,
     depth: Annotated[Literal[8, 16], tyro.conf.arg(help="bits of a photograph")] = 8,
     jpeg_quality: Annotated[
@@ -47,9 +48,14 @@ def synth(
     step_degrees: Annotated[float | None, tyro.conf.arg(help="shear between photographs [°]")] = None,
     pixel_size: Annotated[float | None, tyro.conf.arg(help="side of a pixel [m]")] = None,
     reversal: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help="reverse the shear half way")] = False,
+    radius_error: Annotated[
+        float, tyro.conf.arg(help="error that all stated radii share, as a fraction: -0.02 states them 2 %% too small")
+    ] = 0.0,
     quiet: Quiet = False,
 ) -> int:
     """Make a synthetic experiment with its truth: explicit DEM, walls, speckle photographs.
+
+    The apparatus 1γ2ε, tracks: rodsight synth my_test --preset 1g2e --no-photographs --grains 300
 
     A scenario of tracks: rodsight synth no_plate --preset isotropic --no-photographs
 
@@ -59,17 +65,18 @@ def synth(
     from ...synthetic.synthesis import synthesize
 
     with _at_rest(out), progress_of(quiet) as progress:
-        if preset in ("small", "paper"):
+        if preset in ("small", "paper", "1g2e"):
             made = synthesize(
-                out, progress=progress, preset=preset, seed=seed, photographs=photographs, noise=noise or 0.0,
+                out, progress=progress, preset=preset, seed=seed, photographs=photographs, noise=noise,
                 depth=depth, jpeg_quality=jpeg_quality, png=png, grains=grains, frames=frame_count,
                 step_degrees=step_degrees, pixel_size=pixel_size, reversal=reversal,
+                radius_error=radius_error,
             )  # fmt: skip
         else:
             refused = {
                 "--photographs": photographs and preset != "photoelastic", "--frames": frame_count,
                 "--step-degrees": step_degrees, "--pixel-size": pixel_size, "--jpeg-quality": jpeg_quality,
-                "--png": png, "--reversal": reversal,
+                "--png": png, "--reversal": reversal, "--radius-error": radius_error,
             }  # fmt: skip
             for option, value in refused.items():
                 if value:

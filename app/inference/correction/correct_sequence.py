@@ -15,7 +15,7 @@ from ..inputs import Inputs
 from ..snapshots import make_snapshots
 from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii
-from .close_photographs import advise_stride
+from .close_photographs import choose_span
 from .friction import measure_friction, measure_friction_of_walls, tuned_radii
 from .outliers import replace_outliers
 from .radii import calibrate_with_radii, use_size_classes
@@ -72,8 +72,10 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             tracks, remarks[2] = correct_camera(tracks, walls)
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
-        remarks[4] = advise_stride(tracks)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
+    if not nothing_seen:
+        span, remarks[4] = choose_span(tracks)
+        settings = replace(settings, sequence=replace(settings.sequence, span=span))
     if settings.calibration is not None:
         sequence = find_softness(inputs.material, settings.sequence, tracks, walls, failed)
         # Overlaps of soft grains are forces: calibration would remove them as errors.

@@ -14,7 +14,7 @@ from ...process.errors import UndeterminedError
 from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.expected_correlation import correlation_score, expected_interval
 from ...solver.assessment.penalties import assess, find_penalties
-from ..correction.close_photographs import sufficient_stride
+from ..correction.close_photographs import choose_span
 from ..correction.correct_sequence import correct_sequence
 from ..frame_store import MemoryStore
 from ..inputs import Inputs
@@ -78,7 +78,7 @@ def solve_trial(
     Trial or None
         None: fewer than two photographs, no walls, or no forces.
     """
-    stride = sufficient_stride(inputs.tracks)
+    stride, _ = choose_span(inputs.tracks)
     part = (first, min(first + stride * (photographs - 1) + 1, inputs.tracks.frame_count), stride)
     tracks, walls = inputs.tracks.frames(*part), inputs.walls.frames(*part)
     if tracks.frame_count < 2:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-PhotographedPreset = Literal["small", "paper"]
+PhotographedPreset = Literal["small", "paper", "1g2e"]
 MeasuredPreset = Literal["photoelastic"]  # no experiment, but the output of another program
 Group = Literal["correct", "missing physics", "wrong input"]
 ScenarioName = Literal[

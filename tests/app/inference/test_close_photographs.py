@@ -1,10 +1,10 @@
-"""Photographs closer together than noise: a stride is advised, and only there."""
+"""Photographs closer together than noise: sliding is read over several, and only there."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.close_photographs import advise_stride
+from rodsight.inference.correction.close_photographs import choose_span
 from rodsight.tracks import Tracks, TrackStatus
 
 pytestmark = pytest.mark.unit
@@ -27,15 +27,16 @@ def tracks_moving(step: float, noise: float = NOISE) -> Tracks:
     )
 
 
-@pytest.mark.parametrize(("step", "stride"), [(7.5e-6, 4), (9.5e-6, 3), (3.4e-6, 8)])
-def test_a_stride_is_advised_where_noise_hides_the_sliding(step: float, stride: int) -> None:
-    sentence = advise_stride(tracks_moving(step))
-    assert f"--frames ::{stride}" in sentence
+@pytest.mark.parametrize(("step", "span"), [(7.5e-6, 4), (9.5e-6, 3), (3.4e-6, 8)])
+def test_sliding_is_read_over_a_span_where_noise_hides_it(step: float, span: int) -> None:
+    found, sentence = choose_span(tracks_moving(step))
+    assert found == span
+    assert f"read over {span} photographs" in sentence
     assert "noise is 28 µm" in sentence
 
 
-def test_nothing_is_advised_where_rods_move_enough_or_not_at_all() -> None:
-    assert advise_stride(tracks_moving(7e-5)) == ""
-    assert advise_stride(tracks_moving(7e-5, noise=4e-5)) == ""
-    assert advise_stride(tracks_moving(0.0)) == ""  # no stride would show anything
-    assert advise_stride(tracks_moving(7.5e-6).frames(0, 5)) == ""
+def test_sliding_is_read_from_one_photograph_to_the_next_where_rods_move_enough_or_not_at_all() -> None:
+    assert choose_span(tracks_moving(7e-5)) == (1, "")
+    assert choose_span(tracks_moving(7e-5, noise=4e-5)) == (1, "")
+    assert choose_span(tracks_moving(0.0)) == (1, "")  # no span would show anything
+    assert choose_span(tracks_moving(7.5e-6).frames(0, 5)) == (1, "")

@@ -12,6 +12,7 @@ import pytest
 from rodsight.experiment.experiment import load_experiment
 from rodsight.inference import infer_sequence as inference
 from rodsight.inference import solve_frames as solving
+from rodsight.inference.correction import correct_sequence as correct_module
 from rodsight.inference.frame_store import MemoryStore
 from rodsight.inference.infer_sequence import infer_sequence
 from rodsight.inference.inputs import Inputs
@@ -87,6 +88,19 @@ def test_an_interrupted_sequence_continues_bit_for_bit(contradicted):
     for one, other in zip(results.frames, resumed.frames, strict=True):
         np.testing.assert_array_equal(one.fn, other.fn)
         assert one.trust == other.trust
+
+
+def test_an_interrupted_sequence_of_close_photographs_continues_bit_for_bit(contradicted, monkeypatch):
+    inputs, neighbours = contradicted
+    monkeypatch.setattr(correct_module, "choose_span", lambda tracks: (3, "read over 3 photographs"))
+    whole = MemoryStore()
+    results = infer_sequence(inputs, store=whole, complete=False)
+    assert results.frames[0].reason.startswith("read over 3 photographs")
+    assert not np.array_equal(results.frames[6].ut, neighbours.frames[6].ut)
+    resumed = infer_sequence(inputs, store=MemoryStore(whole.frames[:5]), complete=False)
+    for one, other in zip(results.frames, resumed.frames, strict=True):
+        np.testing.assert_array_equal(one.fn, other.fn)
+        np.testing.assert_array_equal(one.ut, other.ut)
 
 
 def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradicted, monkeypatch):

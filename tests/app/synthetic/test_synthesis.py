@@ -263,6 +263,57 @@ def test_the_window_holds_the_greatest_event_with_margins_around_it() -> None:
         choose_window(calm[:5], 8)
 
 
+@pytest.fixture(scope="module")
+def apparatus(tmp_path_factory: pytest.TempPathFactory) -> Synthesis:
+    folder = tmp_path_factory.mktemp("apparatus") / "lab"
+    return synthesize(
+        folder, preset="1g2e", grains=60, frames=3, photographs=False, radius_error=-0.02, seed=1
+    )  # fmt: skip
+
+
+def test_the_apparatus_is_described(apparatus: Synthesis) -> None:
+    described = tomllib.loads((apparatus.folder / "experiment.toml").read_text())
+    assert described["walls"] == {"corners": "corners.csv", "load": "load.csv"}
+    assert described["material"] == {"density": 2900.0, "length": 0.06, "friction": 0.3, "wall_friction": 0.5}
+    assert described["tracks"]["precision"] == 1e-5
+    corners = read_columns(apparatus.folder / "corners.csv")
+    assert set(corners["radius"]) == {"0.020600000"}
+    np.testing.assert_allclose(np.diff(np.rad2deg(apparatus.truth.shear)), 0.0267, atol=1e-9)
+    times = np.array(read_columns(apparatus.folder / "times.csv")["time"], dtype=float)
+    np.testing.assert_allclose(np.diff(times), 5.0)
+    stated = np.array(read_columns(apparatus.folder / "grains.csv")["radius"], dtype=float)
+    np.testing.assert_allclose(stated, 0.98 * apparatus.truth.radius, atol=ROUNDING)
+
+
+def test_the_load_of_the_apparatus_is_that_of_bar_and_discs(apparatus: Synthesis) -> None:
+    """The force is measured on the bar and its two discs together; it is the load per length of 719 N twice on .5 m."""
+    load = np.array(read_columns(apparatus.folder / "load.csv")["force"], dtype=float)
+    truth, n = apparatus.truth, len(apparatus.truth.radius)
+    length = np.linalg.norm(np.diff(truth.endpoints[0, truth.wall_names.index("top")], axis=0))
+    np.testing.assert_allclose(load, 1438.0 / 0.5 * length, rtol=1e-2)
+    plate = [n + truth.wall_names.index(name) for name in ("top", "top-right", "top-left")]
+    frame = np.repeat(np.arange(truth.frame_count), np.diff(truth.offset))
+    on_bar = np.bincount(frame[truth.j == plate[0]], truth.fn[truth.j == plate[0]], truth.frame_count)
+    assert (on_bar < 0.95 * load).all()
+    assert np.isin(plate[1:], truth.j).all()
+
+
+def test_rods_of_the_apparatus_are_in_balance_while_it_moves(apparatus: Synthesis) -> None:
+    truth = apparatus.truth
+    assert truth.settings.moving
+    assert truth.unbalance.max() < 0.01
+    assert np.linalg.norm(np.diff(truth.position, axis=0), axis=2).mean() > 1e-5
+
+
+def test_corner_discs_are_photographed(tmp_path: Path) -> None:
+    made = synthesize(tmp_path / "lab", preset="1g2e", grains=30, frames=1, pixel_size=5e-4, png=True)
+    image = cv2.imread(str(made.folder / "photos" / "0000.png"), cv2.IMREAD_GRAYSCALE)
+    corners = read_columns(made.folder / "corners.csv")
+    for x, y in zip(corners["x"], corners["y"], strict=True):
+        column, row = (int(each) for each in Scale(5e-4, image.shape[0]).to_pixels(np.array([float(x), float(y)])))
+        assert image[row - 10 : row + 11, column - 10 : column + 11].mean() > 60  # brighter than the backing
+
+
 def test_radii_come_in_the_papers_classes() -> None:
     radius = choose_radii(1172, np.random.default_rng(0))
     assert sorted(set(radius)) == list(RADIUS_CLASSES)
@@ -299,6 +350,7 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
         ({"step_degrees": -0.25}, "step_degrees = -0.25"),
         ({"pixel_size": float("inf")}, "pixel_size = inf"),
         ({"frames": 200}, "shears to 49.75°"),
+        ({"radius_error": 0.2}, "radius_error = 0.2"),
         ({"jpeg_quality": 0}, "jpeg_quality = 0"),
         ({"jpeg_quality": 90, "depth": 16}, "jpeg_quality = 90"),
     ],

@@ -51,6 +51,6 @@ MUTANTS = [
         ("keep = are_present(contacts.key, ~bridged, contacts.body_count)", "keep = ~bridged[contacts.i]"),
         ("known.mean() > GROSS_UNBALANCE", "known.mean() > 100.0"),
         ("if seen < FEWEST_SEEN * known or seen == 0:", "if seen < 0:"),
-        ("following = forget_forces(state)", "following = state"),
+        ("following = forget_forces(history.last)", "following = history.last"),
     ),
 ]

@@ -107,6 +107,8 @@ def test_no_interval_crosses_a_reversal_or_the_ends():
     assert member_intervals(7, reversed_at) == ((6, 7), (7, 8), (6, 8), (6, 9))
     assert member_intervals(0, reversed_at) == (None, (0, 1), None, (0, 2))
     assert member_intervals(11, reversed_at) == ((10, 11), None, None, (9, 11))
+    assert member_intervals(4, reversed_at, 3) == ((1, 4), (4, 6), (1, 6), (0, 6))
+    assert member_intervals(9, reversed_at, 2) == ((7, 9), (9, 11), (7, 11), (6, 11))
     assert member_intervals(1, np.zeros(2, bool)) == ((0, 1), None, None, None)
     with pytest.raises(ValueError, match="single frame"):
         member_intervals(0, np.zeros(1, bool))

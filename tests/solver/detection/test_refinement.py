@@ -95,6 +95,13 @@ def test_block_contains_the_window_of_every_frame(count: int):
         assert end >= min(k + 4, count)
 
 
+def test_block_contains_the_widest_interval_that_is_read():
+    for k in range(60):
+        _, start, end = block_of(k, 60, 4)
+        assert start <= max(k - 8, 0)
+        assert end > min(k + 8, 59)
+
+
 def test_contacts_have_their_own_probability():
     grains, _, snapshots = sheared(SIGMA)
     block = refine(grains, snapshots[:3], SETTINGS, start=5)
