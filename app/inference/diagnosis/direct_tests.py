@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from ...results.finding import Finding
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
+from ...solver.statistics.agreement import pearson
 from ...tracks import Tracks, WallTracks
 from .causes import finding
 
@@ -48,7 +49,7 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     stated, inferred = stated[known], inferred[known]
     if len(stated) < 2 or not inferred.any():
         return []
-    rank = float(spearmanr(stated, inferred)[0])
+    rank = pearson(rankdata(stated), rankdata(inferred))
     if abs(rank) < max(AGREES, SIGMAS / np.sqrt(len(stated))):
         return []
     against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"

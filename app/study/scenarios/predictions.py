@@ -10,13 +10,14 @@ from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.table import Table
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from ...experiment.experiment import load_experiment
 from ...inference.diagnosis.data_quality import REFERENCE_STEP
 from ...prediction import NO_EXPECTATION, Prediction, predict_accuracy
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
+from ...solver.statistics.agreement import pearson
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ...synthetic.scenarios.scenario_folder import make_scenario
 from ...synthetic.scenarios.scenario_table import SCENARIOS
@@ -109,7 +110,7 @@ def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -
     known = [each for each in outcomes if each.inside is not None]
     reached, expected = [each.score.r_late for each in known], [each.expected[0] for each in known]
     excessive = sum(r < POOR_RESULT and e > HIGH for r, e in zip(reached, expected, strict=True) if r is not None)
-    rank = float(spearmanr(reached, expected)[0]) if len(set(expected)) > 2 else math.nan
+    rank = pearson(rankdata(reached), rankdata(expected)) if len(set(expected)) > 2 else math.nan
     wrong_input = [each for each in outcomes if SCENARIOS[each.score.scenario].group == "wrong input"]
     console.print(
         f"The diagnosis named the right cause in {sum(each.rightly is True for each in wrong_input)} of "
