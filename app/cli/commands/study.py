@@ -17,6 +17,9 @@ from ..stored_results import load_run
 from ..terminal import print_line, progress_of, table_console
 from .run import Request, open_run
 
+# Of the simulated apparatus on which --program compares.
+APPARATUS_GRAINS, APPARATUS_FRAMES, APPARATUS_RADIUS_ERROR = 300, 30, -0.02
+
 if TYPE_CHECKING:
     from ...study.scenarios.scenario_score import StudyPlan
 
@@ -63,7 +66,7 @@ def study(
         tyro.conf.Positional,
         tyro.conf.arg(
             metavar="PATH",
-            help="real: folder of a run, or results.h5; perturbation: an experiment, instead of --worlds",
+            help="real: folder of a run, or results.h5; perturbation, paper --program: an experiment with a truth",
         ),
     ] = None,
     /,
@@ -100,6 +103,13 @@ def study(
         ),
     ] = None,
     frame: Annotated[int | None, tyro.conf.arg(help="real: the frame of the pictures; default: the middle one")] = None,
+    program: Annotated[
+        Literal["authors"] | None,
+        tyro.conf.arg(
+            help="paper: score the recipe of the authors' own program beside the paper's and this one, on PATH or on "
+            "the apparatus of the preset 1g2e with radii 2 %% too small"
+        ),
+    ] = None,
     quiet: Quiet = False,
 ) -> int:
     """Measure the method on simulated truth: minutes for each packing, stored for the next time.
@@ -108,6 +118,8 @@ def study(
 
     Some scenarios: rodsight study worlds --seeds 1 --worlds shear gravity; an experiment: rodsight study perturbation
     sample_data/shear
+
+    The recipe of the authors' program: rodsight study paper --program authors --seeds 0
 
     Photoelastic forces: rodsight import pegs, rodsight run, then rodsight study real runs/my_test --page real.html
 
@@ -126,10 +138,16 @@ def study(
     for option, value in (("--page", page), ("--frame", frame)):
         if value is not None:
             raise InputError("study", f"{option} with {subject}", "applies to real only")
+    if program is not None:
+        if subject != "paper":
+            raise InputError("study", f"--program with {subject}", "applies to paper only")
+        return _study_programs(folder, request, APPARATUS_GRAINS if grains is None else grains)
     if subject == "perturbation":
         return _study_perturbation(folder, request)
     if folder is not None:
-        raise InputError("study", f"{folder} with {subject}", "a path applies to real and perturbation only")
+        raise InputError(
+            "study", f"{folder} with {subject}", "a path applies to real, perturbation and paper --program"
+        )
     if subject == "worlds":
         return _study_worlds(request, jobs=jobs, as_json=as_json)
     if subject == "trust":
@@ -220,6 +238,39 @@ def _study_perturbation(experiment: Path | None, request: _StudyRequest) -> int:
                     scenario, seed, grains=plan.grains, folder=plan.folder, settings=plan.settings, progress=progress
                 )
             print_perturbations(console, f"{scenario}, seed {seed}", effects)
+    return 0
+
+
+def _study_programs(experiment: Path | None, request: _StudyRequest, grains: int) -> int:
+    from ... import pipeline
+    from ...study.program_comparison import RecipeScore, compare_programs, mean_scores, print_programs
+    from ...synthetic.synthesis import synthesize
+
+    def score(folder: Path, out: Path | None) -> list[RecipeScore]:
+        with open_run(Request(folder, request.plan.settings, request.quiet, out)) as run:
+            inputs, results, truth = pipeline.solved_inputs(run)
+            if truth is None:
+                raise InputError(run.experiment.file, "key truth", "is missing: there are no forces to compare with")
+            return compare_programs(inputs, results, truth, run.progress)
+
+    console = table_console()
+    if experiment is not None:
+        print_programs(console, f"{experiment}: mean over the frames, errors rms", score(experiment, None))
+        return 0
+    found = []
+    for seed in request.seeds:
+        folder = request.out / "1g2e" / f"{grains}_{seed}"
+        if not (folder / "experiment.toml").exists():
+            with progress_of(request.quiet) as progress:
+                synthesize(
+                    folder, preset="1g2e", seed=seed, photographs=False, grains=grains, frames=APPARATUS_FRAMES,
+                    radius_error=APPARATUS_RADIUS_ERROR, progress=progress,
+                )  # fmt: skip
+        found.append(score(folder, folder.with_name(f"{folder.name}_run")))
+    title = (
+        f"Apparatus 1γ2ε, {grains} rods, radii 2 % too small, noise 10 µm, seeds {' '.join(map(str, request.seeds))}"
+    )
+    print_programs(console, title, mean_scores(found))
     return 0
 
 
