@@ -109,7 +109,7 @@ class Workbench:
     def begin(self, folder: str, suffix: str, name: str) -> Project:
         """Make an experiment of a series of photographs, named by their folder, not by their place in a list."""
         home, pattern, _ = experiment_place(find_series(self.root, folder, suffix), self.root)
-        edits.begin(Draft(home), valid_name(name), pattern)
+        edits.begin(Draft(home, root=self.root), valid_name(name), pattern)
         return self.project(home.relative_to(self.root).as_posix())
 
     def duplicate(self, at: str) -> Project:

@@ -29,7 +29,7 @@ class Draft:
     folder: Path
     journal: Journal = field(default_factory=Journal)  # default: in memory
     lock: threading.RLock = field(default_factory=threading.RLock)
-    root: Path | None = None  # nothing outside of it is read or written; None: the folder
+    root: Path | None = None  # nothing outside of it is read or written; None: read anywhere, written in the folder
     _shown: dict[str, Any] | None = None  # the experiment file as the user saw it last
     _step: Contents | None = None  # files before the first change of a step that is not finished
 

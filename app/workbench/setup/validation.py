@@ -160,7 +160,7 @@ def _read_inputs(found: ValidationResult, draft: Draft, filled: dict[str, Any]) 
             usable.pop(name, None)
     if find_config_errors(draft.file, usable):
         return
-    experiment = Experiment(draft.file, ExperimentFile.model_validate(usable), InputFiles(draft.root or draft.folder))
+    experiment = Experiment(draft.file, ExperimentFile.model_validate(usable), InputFiles(draft.root))
     found.experiment = experiment
     if found.tracked:
         _validate_tracks(found, experiment)

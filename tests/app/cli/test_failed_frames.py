@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from rodsight.experiment.reading.tables import read_table
-from rodsight.inference import infer_sequence
+from rodsight.inference import solve_frames
 from rodsight.run_folder import FAILURES
 
 from tests.app.experiment.tables import edit
@@ -53,13 +53,13 @@ def test_a_black_photograph_fails_its_own_frame(made_photographs, tmp_path, caps
 
 
 def test_a_frame_that_cannot_be_solved_is_reported_and_its_traceback_logged(tracked, tmp_path, capsys, monkeypatch):
-    solve_sequence = infer_sequence.solve_sequence
+    solve_sequence = solve_frames.solve_sequence
 
     def failing(*given, observer, **options):
         yield from solve_sequence(*given, observer=observer, **(options | {"failed": {3: "it failed"}}))
         observer(3, ZeroDivisionError("by nothing"))
 
-    monkeypatch.setattr(infer_sequence, "solve_sequence", failing)
+    monkeypatch.setattr(solve_frames, "solve_sequence", failing)
     assert rodsight("solve", tracked, "--out", tmp_path / "out", *FEW) == 0
     printed = capsys.readouterr()
     assert "Frame 3 failed, without forces: it failed." in printed.out

@@ -202,7 +202,7 @@ def test_the_source_of_contacts_is_stored_by_name(solved_by_default):
     out, _ = solved_by_default
     with h5py.File(out / "results.h5") as store:
         names = h5py.check_enum_dtype(store["contacts/source"].dtype)
-    assert set(names) == {"detected", "added_by_reviewer", "forbidden_by_reviewer", "from_balance"}
+    assert set(names) == {"detected", "added_by_reviewer", "forbidden_by_reviewer", "from_balance", "interpolated"}
 
 
 @pytest.mark.screen
