@@ -43,7 +43,8 @@ SOLVED = {  # arguments after the command by name; {run}, {experiment} and {out}
     "init": "init {photographs} --photographs *.*g --pixel-size 1e-4 --interval 30 --quiet",
 }
 SLOW = ("campaign", "sensitivity")  # seconds each
-HEAVY = ("html",)  # the viewer is packed into the page
+# seconds each, left to the slow test; html: the viewer is packed into the page
+HEAVY = ("html", "synth", "campaign", "webm", "mp4", "figures", "init")
 SOLVED["html"] = "share {run} --html --although-out-of-date --out {out}/small.html"
 
 
