@@ -202,7 +202,9 @@ def score_recipe(
     table = np.array(rows).reshape(-1, 5)
     with np.errstate(invalid="ignore"):
         mean, rms = table[:, :3].sum(axis=0) / len(rows), np.sqrt((table[:, 3:] ** 2).sum(axis=0) / len(rows))
-    return RecipeScore(recipe, *map(float, mean), *map(float, rms), len(rows))
+    r_fn, r_ft, scale = mean.tolist()
+    angle_error, direction_error = rms.tolist()
+    return RecipeScore(recipe, r_fn, r_ft, scale, angle_error, direction_error, len(rows))
 
 
 def print_programs(console: Console, title: str, scores: Sequence[RecipeScore]) -> None:
@@ -223,10 +225,11 @@ def mean_scores(scores: Sequence[Sequence[RecipeScore]]) -> list[RecipeScore]:
     """Average the scores of the same recipes over experiments."""
     numbers = [each.name for each in fields(RecipeScore) if each.name not in ("recipe", "frames")]
     return [
-        RecipeScore(
-            " / ".join(dict.fromkeys(row.recipe for row in rows)),
-            *(float(np.mean([getattr(row, name) for row in rows])) for name in numbers),
-            sum(row.frames for row in rows),
+        replace(
+            rows[0],
+            recipe=" / ".join(dict.fromkeys(row.recipe for row in rows)),
+            frames=sum(row.frames for row in rows),
+            **{name: float(np.mean([getattr(row, name) for row in rows])) for name in numbers},
         )
         for rows in zip(*scores, strict=True)
     ]
