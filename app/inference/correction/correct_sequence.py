@@ -10,6 +10,7 @@ from ...process.errors import UndeterminedError
 from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.contacts.radius_tuning import RadiusTuning
 from ...solver.sequence.failure import find_unseen
+from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..inputs import Inputs
 from ..snapshots import make_snapshots
@@ -53,15 +54,10 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     walls, settings = inputs.walls, inputs.settings
     tracks, outlier_remark = replace_outliers(inputs.tracks)
     tracks, gap_remark = interpolate_short_gaps(tracks)
-    given = make_snapshots(tracks, walls)
-    failed = find_unseen(given) | tracks.failed
+    walls, failed = complete_walls(tracks, walls)
     nothing_seen = len(failed) == tracks.frame_count
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
-    else:  # walls of an unusable photograph are interpolated
-        walls = replace(
-            walls, endpoints=np.stack([each.endpoints for each in interpolate_ignored_frames(given, failed)])
-        )
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
     remarks = [outlier_remark, gap_remark, "", "", "", ""]
@@ -113,3 +109,16 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         inputs.material.friction_measured, "; ".join(each for each in remarks if each),
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
+
+
+def complete_walls(tracks: Tracks, walls: WallTracks) -> tuple[WallTracks, dict[int, str]]:
+    """Interpolate the walls of unusable photographs; also return these, with the reason.
+
+    The walls stay as they are where no photograph is usable.
+    """
+    given = make_snapshots(tracks, walls)
+    failed = find_unseen(given) | tracks.failed
+    if len(failed) == tracks.frame_count:
+        return walls, failed
+    endpoints = np.stack([each.endpoints for each in interpolate_ignored_frames(given, failed)])
+    return replace(walls, endpoints=endpoints), failed

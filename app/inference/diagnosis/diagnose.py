@@ -15,6 +15,7 @@ from ...process.progress import Progress, no_progress
 from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.bodies.grains import Array
+from ..correction.correct_sequence import complete_walls
 from ..inputs import Inputs
 from .causes import finding
 from .direct_tests import examine_order, examine_rotations, examine_walls
@@ -56,8 +57,11 @@ def diagnose(
     list of Finding
         Empty where nothing contradicts the model.
     """
-    found = [*examine_rotations(inputs.tracks, inputs.walls), *examine_order(inputs.tracks)]
-    found += examine_walls(inputs.tracks, inputs.walls)
+    walls, failed = complete_walls(inputs.tracks, inputs.walls)
+    if len(failed) == inputs.tracks.frame_count:
+        return []
+    found = [*examine_rotations(inputs.tracks, walls), *examine_order(inputs.tracks)]
+    found += examine_walls(inputs.tracks, walls)
     if found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS:
         return found
     rivals = list(rivals_of(inputs))

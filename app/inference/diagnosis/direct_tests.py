@@ -67,6 +67,8 @@ def examine_order(tracks: Tracks) -> list[Finding]:
     if f < 4:
         return []
     step = np.array([_distance(tracks, k, k + 1) for k in range(f - 1)])
+    if not np.isfinite(step).any():
+        return []
     usual, noise = float(np.nanmedian(step)), float(np.sqrt(2.0) * np.nanmedian(tracks.position_sigma))
     found = []
     swapped = [k for k in range(1, f - 2) if _shorter_if_swapped(tracks, step, k)]
@@ -90,8 +92,10 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     found = []
     for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
         gap = np.array([_near_gap(tracks, walls, k, w) for k in range(tracks.frame_count)])
-        drift = gap - gap[0]
-        last = float(np.nanmedian(drift[-3:]))
+        gap = gap[np.isfinite(gap)]
+        if len(gap) < 3:
+            continue
+        last = float(np.median(gap[-3:] - gap[0]))
         loaded = np.isfinite(walls.pressure[w]) or (walls.load is not None and np.isfinite(walls.load[:, w]).any())
         still = float(np.abs(walls.endpoints[:, w] - walls.endpoints[0, w]).max()) < allowed
         if still and (last < -allowed or (loaded and last > allowed)):
@@ -102,8 +106,10 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
 
 
 def _distance(tracks: Tracks, k: int, other: int) -> float:
-    """Rms displacement of the rods from one photograph to another [m]."""
-    return float(np.sqrt(np.nanmean((tracks.position[other] - tracks.position[k]) ** 2)))
+    """Rms displacement of the rods from one photograph to another [m]; NaN where they have no rod in common."""
+    both = tracks.present[k] & tracks.present[other]
+    moved = tracks.position[other, both] - tracks.position[k, both]
+    return float(np.sqrt(np.mean(moved**2))) if len(moved) else np.nan
 
 
 def _shorter_if_swapped(tracks: Tracks, step: Array, k: int) -> bool:

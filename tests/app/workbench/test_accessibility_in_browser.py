@@ -70,7 +70,7 @@ def test_a_wall_a_length_and_a_rod_are_drawn_by_keyboard(page: Page, solved: Pat
         tab.keyboard.type("60")
         tab.keyboard.press("Enter")
         idle(tab)
-        assert tab.evaluate("workbench.project.pixel") == pytest.approx(0.06 / (b[0] - a[0]))
+        assert tab.evaluate("workbench.project.pixel") == pytest.approx(0.06 / (b[0] - a[0]), rel=1e-4)  # to .01 px
         go(tab, "walls")
         tab.locator("#canvas").focus()
         draw(tab, right=12, down=2)
