@@ -3,7 +3,10 @@
 import { request, at, digits, h, sign, notify } from "/page/dom.js";
 import { Stage } from "/page/stage.js";
 import { showHome } from "/page/home.js";
-import { layers, showLayers, toggleLayers } from "/page/parts/layers.js";
+import { showLayers, toggleLayers } from "/page/layers/panel.js";
+import { paintLayer } from "/page/layers/settings.js";
+import { clearPlot, togglePlot } from "/page/time/plot.js";
+import { closeSheet, isSheetOpen, sheetButton, toggleSheet } from "/page/time/sheet.js";
 import { photographs } from "/page/steps/photographs.js";
 import { scale } from "/page/steps/scale.js";
 import { walls } from "/page/steps/walls.js";
@@ -106,8 +109,7 @@ app.goTo = (name) => app.go(STEPS.find((each) => each.name === name));
 
 app.open = (project, step = null) => {
   document.body.classList.remove("at-home");
-  showLayers(app);
-  if (project.at !== app.project?.at) app.stage.clear();
+  if (project.at !== app.project?.at) { app.stage.clear(); clearPlot(); }
   at("home").hidden = true;
   app.frame = 0; app.looked = 0;
   app.project = project;
@@ -125,6 +127,8 @@ app.go = (step) => {
   app.step = step;
   app.frame = app.edits() ?? Math.min(app.looked ?? 0, Math.max(app.project.frames - 1, 0));
   location.hash = new URLSearchParams({ at: app.project.at, step: step.name }).toString();
+  closeSheet(app);
+  showLayers(app);
   step.enter?.(app);
   app.stage.use(step.tool?.(app));
   app.paint();
@@ -135,7 +139,7 @@ app.tool = (tool) => app.stage.use(tool);
 app.home = () => {
   app.step.leave?.(app);
   app.project = null;
-  app.stage.draw = () => {}; // the drawing of a step needs its project
+  app.stage.draw = app.stage.fixed = () => {}; // the drawing of a step needs its project
   if (location.hash) location.hash = "";
   document.body.classList.add("at-home");
   for (const id of ["steps", "panel", "time"]) at(id).replaceChildren();
@@ -194,7 +198,8 @@ app.paint = () => {
   focused();
   const edited = app.edits(), hint = step.hint?.(app) ?? "";
   app.hint(edited === null || project.tracked ? hint : [`Photograph ${edited}`, hint].filter(Boolean).join(" · "));
-  app.stage.draw = (c, k) => { if (layers.marks || step === inspect || step === run) step.draw?.(app, c, k); };
+  app.stage.draw = (c, k) => { if (step.layers) step.draw?.(app, c, k); else paintLayer(c, "marks", () => step.draw?.(app, c, k)); };
+  app.stage.fixed = (c, k) => step.legend?.(app, c, k); // stays where it is when the picture is moved
   app.stage.dim = step.dim ?? 1;
   const beside = app.step.frames || app.step.timeline ? [app.frame + 1, app.frame - 1].filter((each) => project.files[each]) : [];
   app.stage.show(app.photograph(app.frame), project.width, project.height, beside.map(app.photograph), project.bounds);
@@ -209,7 +214,9 @@ app.timeline = () => {
   const interval = project.photographs.interval;
   const slider = h("input", { type: "range", min: 0, max: count - 1, value: app.frame, id: "frame-slider", style: { flex: "1" }, "aria-label": "Photograph", oninput: (event) => app.show(Number(event.target.value)) });
   if (document.activeElement?.id !== "frame-slider" || !at("frame-slider")) {
-    at("time").replaceChildren(h("button", { class: "quiet", onclick: () => app.show(app.frame - 1), title: "←" }, "◂"), h("button", { class: "quiet", onclick: () => app.show(app.frame + 1), title: "→" }, "▸"), h("span", { class: "frame", id: "frame-name" }), slider, h("span", { class: "soft", id: "frame-file" }));
+    at("time").replaceChildren(
+      h("div", { class: "row lead" }, h("button", { class: "quiet", onclick: () => app.show(app.frame - 1), title: "←", "aria-label": "before" }, "◂"), h("button", { class: "quiet", onclick: () => app.show(app.frame + 1), title: "→", "aria-label": "next" }, "▸"), h("span", { class: "frame", id: "frame-name" })),
+      slider, h("div", { class: "row tools" }, h("span", { class: "soft", id: "frame-file" }), sheetButton(app, null, null)));
   }
   at("frame-name").textContent = `photograph ${app.frame} of ${count - 1}`;
   at("frame-file").textContent = `${project.files[app.frame]}${interval ? ` · ${digits(interval * app.frame, 4)} s` : ""}`;
@@ -233,7 +240,7 @@ function standing(project) {
 
 export const KEYS = [
   ["1 … 9, 0", "the steps"], ["wheel, + −", "zoom"], ["drag; Alt+drag over things", "move the picture"], ["F", "whole picture"], ["L", "loupe"], ["K", "a cursor for the keyboard: arrows move it (Shift: finely), Enter presses, Enter again lets go or clicks, Esc ends"], ["Y", "layers, brightness, contrast"], ["two fingers", "move the picture on a touchpad; pinch to zoom"],
-  ["← →", "photographs"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "deselect"], ["?", "these keys"],
+  ["← →", "photographs"], ["P", "values over the photographs, below the time line"], ["A", "all photographs beside one another, or the chosen rod or contact in all of them"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "deselect"], ["?", "these keys"],
 ];
 
 function showKeys() {
@@ -257,10 +264,12 @@ addEventListener("keydown", (event) => {
     if (event.key === "k" && !app.step.digits) { event.preventDefault(); app.stage.toggleCursor(); return; }
     if (app.stage.cursorKey(event)) { event.preventDefault(); return; }
   }
+  if (event.key === "Escape" && isSheetOpen()) { closeSheet(app); app.stage.canvas.focus(); return; }
   const number = "1234567890".indexOf(event.key);
   if (number >= 0 && number < STEPS.length && !app.step.digits?.includes(event.key)) { app.go(STEPS[number]); return; }
   if (app.step.key?.(app, event)) { event.preventDefault(); return; }
-  const keys = { y: () => toggleLayers(app), f: () => app.stage.fit(), F: () => app.stage.fit(), l: () => { app.stage.loupe = !app.stage.loupe; app.stage.redraw(); }, "+": () => app.stage.zoom(1.3), "=": () => app.stage.zoom(1.3), "-": () => app.stage.zoom(1 / 1.3), ArrowLeft: () => app.show(app.frame - 1), ArrowRight: () => app.show(app.frame + 1) };
+  const keys = { y: () => toggleLayers(app), f: () => app.stage.fit(), F: () => app.stage.fit(), l: () => { app.stage.loupe = !app.stage.loupe; app.stage.redraw(); }, "+": () => app.stage.zoom(1.3), "=": () => app.stage.zoom(1.3), "-": () => app.stage.zoom(1 / 1.3), ArrowLeft: () => app.show(app.frame - 1), ArrowRight: () => app.show(app.frame + 1), p: () => togglePlot(app), a: () => toggleSheet(app) };
+  if (app.edits() !== null || !at("time").classList.contains("shown")) { delete keys.p; delete keys.a; } // there is no time line
   if (keys[event.key] && event.target.type !== "range") { event.preventDefault(); keys[event.key](); }
 });
 

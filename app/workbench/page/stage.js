@@ -1,18 +1,15 @@
-// The photograph on its canvas: pan, zoom, a loupe, and the drawing of a step. Places are in pixels of the photograph.
+// The stage: pan, zoom, a loupe, and the drawing of a step over the photograph. Places are in pixels of the photograph.
 
 import { at } from "/page/dom.js";
-import { layers } from "/page/parts/layers.js";
+import { paintLayer } from "/page/layers/settings.js";
+import { Picture } from "/page/picture.js";
 
 const LOUPE = 172, LOUPE_TOP = 52, MAGNIFIED = 6;
 const HINT = 36; // [px] above the picture, for the hint and the layers
 const IDLE = 300; // [ms] after which the neighbours of a picture are requested
-const SMALL = 1400, ENOUGH = 1.2; // [px] of the small picture; enlargement above which all pixels are requested
-
-async function fetchPicture(url, size, priority = "auto") {
-  const answer = await fetch(`${url}&size=${size}`, { priority });
-  if (!answer.ok) throw new Error(await answer.text());
-  return createImageBitmap(await answer.blob());
-}
+const MARGIN = 0.2; // [of the stage] drawn around it, so that a movement uncovers what is there already
+const CHEAP = 5, SETTLED = 140; // [ms] of a drawing that is made anew at once; without a movement, after which it is
+const MAGNIFICATION = [0.55, 1.8]; // of a former drawing, beyond which it is made anew
 
 /** Two fingers on a touchpad pan, and pinched they zoom (the browser sets Ctrl); a wheel's notch is longer and straight. */
 const isTouchpad = (event) => !event.ctrlKey && event.deltaMode === 0 && (event.deltaX !== 0 || Math.abs(event.deltaY) < 40);
@@ -22,50 +19,35 @@ export class Stage {
     this.canvas = at("canvas");
     this.context = this.canvas.getContext("2d");
     this.view = { x: 0, y: 0, k: 1 };
-    this.image = null; this.sharp = null; this.requested = false; this.wanted = ""; this.width = 0; this.height = 0;
-    this.draw = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
-    this.pending = false; this.drawn = 0; this.fitted = "";
-    this.foreseen = new Map(); this.idle = 0;
+    this.picture = new Picture(() => this.shift());
+    this.wanted = ""; this.width = 0; this.height = 0;
+    this.draw = () => {}; this.fixed = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
+    this.pending = false; this.drawn = 0; this.fitted = ""; this.idle = 0;
+    this.drawing = { canvas: document.createElement("canvas"), view: null, took: 0, stale: true, settling: 0 };
+    this.window = [0, 0, 0, 0]; // [px] left, top, right, bottom of what is being drawn
     this.cursor = null; this.pressed = null; // of the keyboard: a place, and where it was pressed
     new ResizeObserver(() => { this.resize(); }).observe(this.canvas.parentElement);
     this.listen();
   }
 
-  /** Show a picture: a small one at once, all of its pixels at high zoom; beside: pictures to request in advance. */
+  /** Show a picture; beside: pictures to request in advance. */
   async show(url, width, height, beside = [], bounds = null) {
     if (width && height) { this.width = width; this.height = height; }
     this.bounds = bounds;
     if (!url && this.fitted !== `${this.width}x${this.height}`) this.fit();
     if (url === this.wanted) { this.redraw(); return; }
-    this.wanted = url; this.sharp = null; this.requested = false;
+    this.wanted = url;
     clearTimeout(this.idle);
     this.unreadable("");
-    if (!url) { this.image = null; this.redraw(); return; }
-    let image = null, wrong = "";
-    try { image = (await this.foreseen.get(url)) ?? (await fetchPicture(url, SMALL)); } catch (error) { wrong = error.message; }
+    try { if (!(await this.picture.show(url))) return; } catch (error) { this.unreadable(error.message); this.redraw(); return; } // never the picture of another one
     if (this.wanted !== url) return;
-    if (!image) { this.image = null; this.unreadable(wrong); this.redraw(); return; } // never the picture of another one
-    // Each is used once: a file that changes is read anew when one comes back to it.
-    this.idle = setTimeout(() => { this.foreseen = new Map(beside.map((each) => [each, this.foreseen.get(each) ?? fetchPicture(each, SMALL, "low").catch(() => null)])); }, IDLE);
-    this.foreseen.delete(url);
-    this.image = image;
+    if (url) this.idle = setTimeout(() => this.picture.foresee(beside), IDLE);
     if (this.fitted !== `${this.width}x${this.height}`) this.fit();
     this.redraw();
   }
 
-  /** Load all pixels, where the small picture has fewer than the screen. */
-  async sharpen() {
-    const { wanted: url, image } = this;
-    if (this.requested || !url || !image || image.width >= this.width) return;
-    const k = this.loupe && this.mouse ? Math.max(this.view.k * MAGNIFIED, 6) : this.view.k;
-    if (k * (devicePixelRatio || 1) * this.width <= ENOUGH * image.width) return;
-    this.requested = true;
-    const sharp = await fetchPicture(url, 20000).catch(() => null);
-    if (sharp && this.wanted === url) { this.sharp = sharp; this.redraw(); }
-  }
-
   /** Forget the picture: another experiment is opened. */
-  clear() { this.wanted = ""; this.image = null; this.sharp = null; this.foreseen = new Map(); this.unreadable(""); this.redraw(); }
+  clear() { this.wanted = ""; this.picture.clear(); this.unreadable(""); this.redraw(); }
 
   unreadable(text) {
     at("unreadable").hidden = !text;
@@ -87,67 +69,104 @@ export class Stage {
     const k = 0.96 * Math.min(this.boxWidth / (right - left), Math.max(this.boxHeight - HINT, 40) / (bottom - top));
     this.view = { k, x: (left + right) / 2 - this.boxWidth / 2 / k, y: (top + bottom) / 2 - (this.boxHeight + HINT) / 2 / k };
     this.fitted = `${this.width}x${this.height}`; this.whole = box === null;
-    this.redraw();
+    this.shift();
   }
 
   /** Bring a place to the middle, at least so many screen pixels per pixel. */
   centre(x, y, k = 0) {
     this.view.k = Math.max(this.view.k, k); this.whole = false; this.fitted = `${this.width}x${this.height}`;
     this.view.x = x - this.boxWidth / 2 / this.view.k; this.view.y = y - this.boxHeight / 2 / this.view.k;
-    this.redraw();
+    this.shift();
   }
 
   zoom(factor, x = this.boxWidth / 2, y = this.boxHeight / 2) {
     const { view } = this, k = Math.min(Math.max(view.k * factor, 0.02), 60);
     view.x += x / view.k - x / k; view.y += y / view.k - y / k; view.k = k; this.whole = false;
-    this.redraw();
+    this.shift();
   }
+
+  /** Move the view by so many screen pixels. */
+  pan(dx, dy) { this.view.x -= dx / this.view.k; this.view.y -= dy / this.view.k; this.whole = false; this.shift(); }
+
+  get image() { return this.picture.image; } // for tests
 
   toScreen(p) { return [(p[0] - this.view.x) * this.view.k, (p[1] - this.view.y) * this.view.k]; }
   toPhotograph(x, y) { return [x / this.view.k + this.view.x, y / this.view.k + this.view.y]; }
 
-  redraw() {
+  /** What is drawn has changed. */
+  redraw() { this.drawing.stale = true; this.request(); }
+
+  /** The view alone has changed: a drawing that takes long is moved, and made anew once the view is still. */
+  shift() {
+    clearTimeout(this.drawing.settling);
+    this.drawing.settling = setTimeout(() => { if (!this.isExact()) this.redraw(); else this.request(); }, SETTLED);
+    this.request();
+  }
+
+  request() {
     if (this.pending) return;
     this.pending = true;
     requestAnimationFrame(() => { this.pending = false; this.paint(); });
   }
 
+  isExact() { const { view } = this.drawing; return Boolean(view) && view.x === this.view.x && view.y === this.view.y && view.k === this.view.k; }
+
   paint() {
-    const { context: c, view } = this, dense = devicePixelRatio || 1;
+    const { context: c, view, drawing } = this, dense = devicePixelRatio || 1;
+    const by = drawing.view ? view.k / drawing.view.k : 0;
+    if (drawing.stale || (!this.isExact() && (drawing.took < CHEAP || by < MAGNIFICATION[0] || by > MAGNIFICATION[1]))) this.renew(dense);
     c.setTransform(dense, 0, 0, dense, 0, 0);
     c.clearRect(0, 0, this.boxWidth, this.boxHeight);
-    this.scene(c, view);
-    c.setTransform(dense, 0, 0, dense, 0, 0);
-    if (this.loupe && this.mouse && this.image) this.paintLoupe(c, dense);
+    this.scene(c, view, () => this.place(c));
+    if (this.loupe && this.mouse && this.picture.image) this.paintLoupe(c);
     if (this.cursor) this.paintCursor(c);
     this.drawn += 1;
-    this.sharpen();
+    const k = this.loupe && this.mouse ? Math.max(view.k * MAGNIFIED, 6) : view.k;
+    this.picture.sharpen(this.visible(), k * dense, this.width, this.height);
   }
 
-  scene(c, view) {
+  visible(view = this.view, wide = this.boxWidth, high = this.boxHeight) { return [view.x, view.y, view.x + wide / view.k, view.y + high / view.k]; }
+
+  /** Draw the step anew, with a margin, on a canvas of its own. */
+  renew(dense) {
+    const { drawing, view } = this, { canvas } = drawing, since = performance.now();
+    const wide = Math.round((1 + 2 * MARGIN) * this.boxWidth * dense), high = Math.round((1 + 2 * MARGIN) * this.boxHeight * dense);
+    if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
+    const c = canvas.getContext("2d"), left = view.x - MARGIN * this.boxWidth / view.k, top = view.y - MARGIN * this.boxHeight / view.k;
+    c.setTransform(1, 0, 0, 1, 0, 0);
+    c.clearRect(0, 0, wide, high);
+    c.setTransform(dense * view.k, 0, 0, dense * view.k, -dense * view.k * left, -dense * view.k * top);
+    this.window = [left, top, left + wide / dense / view.k, top + high / dense / view.k];
+    this.draw(c, view.k);
+    Object.assign(drawing, { view: { ...view }, left, top, wide: wide / dense / view.k, high: high / dense / view.k, stale: false, took: performance.now() - since });
+  }
+
+  /** Put the drawing where it belongs, and what is fixed to the screen over it. */
+  place(c) {
+    const { drawing, view } = this;
+    c.imageSmoothingEnabled = !this.isExact();
+    c.drawImage(drawing.canvas, drawing.left, drawing.top, drawing.wide, drawing.high);
+    this.window = this.visible();
+    this.fixed(c, view.k);
+  }
+
+  scene(c, view, over) {
     c.save();
     c.scale(view.k, view.k); c.translate(-view.x, -view.y);
-    if (this.image && layers.photograph) {
-      const fine = this.sharp && view.k * (devicePixelRatio || 1) * this.width > ENOUGH * this.image.width, image = fine ? this.sharp : this.image;
-      c.imageSmoothingEnabled = view.k * this.width / image.width < 3;
-      c.imageSmoothingQuality = "medium";
-      c.globalAlpha = (this.dim ?? 1) * layers.dim;
-      if (layers.brightness !== 1 || layers.contrast !== 1) c.filter = `brightness(${layers.brightness}) contrast(${layers.contrast})`;
-      c.drawImage(image, -0.5, -0.5, this.width, this.height);
-      c.globalAlpha = 1; c.filter = "none";
-    }
-    this.draw(c, view.k);
+    if (this.picture.image) paintLayer(c, "photograph", () => this.picture.draw(c, view.k * (devicePixelRatio || 1), this.width, this.height, true), this.dim ?? 1);
+    over();
     c.restore();
   }
 
-  paintLoupe(c, dense) {
-    const [x, y] = this.toPhotograph(...this.mouse), k = Math.max(this.view.k * MAGNIFIED, 6);
+  paintLoupe(c) {
+    const [x, y] = this.toPhotograph(...this.mouse), k = Math.max(this.view.k * MAGNIFIED, 6), half = LOUPE / 2 / k;
     const left = this.mouse[0] > this.boxWidth - LOUPE - 40 && this.mouse[1] < LOUPE + LOUPE_TOP + 26 ? 14 : this.boxWidth - LOUPE - 14;
     c.save();
     c.beginPath(); c.roundRect(left, LOUPE_TOP, LOUPE, LOUPE, 12); c.clip();
     c.fillStyle = "#08090b"; c.fillRect(left, LOUPE_TOP, LOUPE, LOUPE);
     c.translate(left, LOUPE_TOP);
-    this.scene(c, { k, x: x - LOUPE / 2 / k, y: y - LOUPE / 2 / k });
+    this.window = [x - half, y - half, x + half, y + half];
+    this.scene(c, { k, x: x - half, y: y - half }, () => this.draw(c, k));
     c.strokeStyle = "#ffffffb0"; c.lineWidth = 1;
     c.beginPath(); c.moveTo(LOUPE / 2, 0); c.lineTo(LOUPE / 2, LOUPE / 2 - 6); c.moveTo(LOUPE / 2, LOUPE / 2 + 6); c.lineTo(LOUPE / 2, LOUPE);
     c.moveTo(0, LOUPE / 2); c.lineTo(LOUPE / 2 - 6, LOUPE / 2); c.moveTo(LOUPE / 2 + 6, LOUPE / 2); c.lineTo(LOUPE, LOUPE / 2); c.stroke();
@@ -155,10 +174,13 @@ export class Stage {
     c.strokeStyle = "#ffffff90"; c.lineWidth = 1.5; c.beginPath(); c.roundRect(left, LOUPE_TOP, LOUPE, LOUPE, 12); c.stroke();
   }
 
-  /** A circle of the photograph is visible. */
-  sees(x, y, r) {
-    const { view } = this;
-    return x + r > view.x && y + r > view.y && x - r < view.x + this.boxWidth / view.k && y - r < view.y + this.boxHeight / view.k;
+  /** A circle of the photograph is in the part that is being drawn. */
+  sees(x, y, r) { const [left, top, right, bottom] = this.window; return x + r > left && y + r > top && x - r < right && y - r < bottom; }
+
+  /** A line of the photograph, so wide, may be in that part. */
+  seesLine([x1, y1, x2, y2], wide) {
+    const [left, top, right, bottom] = this.window;
+    return Math.max(x1, x2) + wide > left && Math.max(y1, y2) + wide > top && Math.min(x1, x2) - wide < right && Math.min(y1, y2) - wide < bottom;
   }
 
   use(tool) { this.cursor = this.pressed = null; this.tool = tool ?? {}; this.canvas.classList.toggle("tool", Boolean(this.tool.cross)); this.loupe = Boolean(this.tool.loupe); this.redraw(); }
@@ -221,10 +243,8 @@ export class Stage {
       if (held) {
         const by = [screen[0] - held.screen[0], screen[1] - held.screen[1]];
         held.moved = Math.max(held.moved, Math.hypot(...by));
-        if (held.pan) { this.view.x = held.view.x - by[0] / this.view.k; this.view.y = held.view.y - by[1] / this.view.k; if (held.moved > 3) this.whole = false; }
-        else this.tool.drag?.(p, event, held.p);
-      } else this.tool.hover?.(p, event);
-      this.redraw();
+        if (held.pan) { this.view.x = held.view.x - by[0] / this.view.k; this.view.y = held.view.y - by[1] / this.view.k; if (held.moved > 3) this.whole = false; this.shift(); } else { this.tool.drag?.(p, event, held.p); this.redraw(); }
+      } else if (this.tool.hover) { this.tool.hover(p, event); this.redraw(); } else if (this.loupe) this.request();
     });
     canvas.addEventListener("pointerup", (event) => {
       const p = this.toPhotograph(...place(event));
@@ -233,11 +253,11 @@ export class Stage {
       else if (held && held.moved <= 3 && held.button === 0) this.tool.click?.(p, event);
       held = null;
     });
-    canvas.addEventListener("pointerleave", () => { this.mouse = null; this.redraw(); });
+    canvas.addEventListener("pointerleave", () => { this.mouse = null; if (this.loupe) this.request(); });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       if (this.tool.wheel?.(this.toPhotograph(...place(event)), event)) return;
-      if (isTouchpad(event)) { this.view.x += event.deltaX / this.view.k; this.view.y += event.deltaY / this.view.k; this.whole = false; this.redraw(); return; }
+      if (isTouchpad(event)) { this.pan(-event.deltaX, -event.deltaY); return; }
       this.zoom(Math.exp(-event.deltaY * (event.ctrlKey ? 0.01 : 0.0016)), ...place(event));
     }, { passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());

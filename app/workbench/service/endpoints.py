@@ -146,6 +146,15 @@ class ExperimentQuery(Query):
 class PhotographQuery(ExperimentQuery):
     frame: Whole = 0
     size: Annotated[int, Field(ge=1, le=WIDEST)] = WIDEST  # [px] of the longer side
+    # The part that is sent [px]; without right and bottom, all of it.
+    left: Whole = 0
+    top: Whole = 0
+    right: Whole | None = None
+    bottom: Whole | None = None
+
+    @property
+    def part(self) -> tuple[slice, slice]:
+        return slice(self.top, self.bottom), slice(self.left, self.right)
 
 
 class ThumbnailQuery(Query):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ...process.errors import InputError
 from ...results.results import Results
 from ...reviewing.rounding import rounded
 from ...tracks import TrackStatus
+from ..inspecting.grain_motion import grain_motion
 from ..inspecting.pair_history import forces_without, pair_history
 from .endpoints import BadRequest, Name, Text, Whole, endpoint
 from .project import Project
@@ -42,16 +45,36 @@ def without_contact(workbench: Workbench, at: Text, frame: Whole, i: Name, j: Na
 
 
 @endpoint
+def motion(workbench: Workbench, at: Text, frame: Whole, since: Whole) -> dict[str, Any]:
+    """Describe how the rods of a photograph have moved since another one, and what they carry."""
+    opened = workbench.project(at)
+    run = opened.reviewed_run()
+    first, stop = run.first_frame, run.first_frame + len(run.results.frames)
+    for photograph in (frame, since):
+        if not first <= photograph < stop:
+            raise InputError(opened.results, f"photograph {photograph}", f"is not solved: {first} to {stop - 1} are")
+    data = opened.run_data()
+    assert data is not None
+    return grain_motion(data, frame, since, opened.scene().scale, run.experiment.config.material.length)
+
+
+@endpoint
 def rod(workbench: Workbench, at: Text, id: Whole) -> dict[str, Any]:
     """Describe one rod in every photograph up to the last one that is solved."""
-    results, first = _results(workbench.project(at))
+    opened = workbench.project(at)
+    results, first = _results(opened)
     tracks = results.tracks
     rows = (tracks.id == id).nonzero()[0]
     if len(rows) != 1:
         raise BadRequest(f"there is no rod {id}")
     row = int(rows[0])
     before: list[Any] = [None] * first
+    seen = tracks.present[:, row]
+    place = opened.scene().scale.to_pixels(tracks.position[:, row]).round(2).tolist()
+    moved = np.linalg.norm(tracks.position[:, row] - tracks.position[np.argmax(seen), row], axis=1)
     return {
+        "place": before + [each if seen[k] else None for k, each in enumerate(place)],
+        "displacement": before + rounded(np.where(seen, moved, np.nan)),
         "radius": float(tracks.radius[row]), "zncc": before + rounded(tracks.zncc[:, row]),
         "sigma": before + rounded(tracks.sigma[:, row]), "rotation": before + rounded(tracks.rotation[:, row]),
         "status": before + [TrackStatus(each).name.lower() for each in tracks.status[:, row].tolist()],

@@ -43,6 +43,7 @@ from ..setup.validation import ValidationResult, outside_walls, validate
 NOT_OWN = "of_another_experiment"  # below the run's folder of another experiment: nothing is there
 KEPT = 6  # photographs in memory: the one shown, two to either side, the first
 KEPT_PICTURES, SMALL_PICTURE = 32, 2_000_000  # of them as they were sent; [bytes]
+WHOLE = (slice(None), slice(None))
 QUALITY = 90  # of JPEG
 BEYOND = 58  # grey level of a crop beyond the edge of the photograph
 
@@ -76,7 +77,7 @@ class Project:
         self.lock = threading.RLock()
         self.editing = threading.RLock()  # held from what an edit reads to what it writes
         self._photographs: OrderedDict[tuple[Path, int, Channel], Image] = OrderedDict()
-        self._pictures: OrderedDict[tuple[Path, int, Channel, int], bytes] = OrderedDict()
+        self._pictures: OrderedDict[tuple[object, ...], bytes] = OrderedDict()
         self._stamp: Any = None
         self._validation: ValidationResult | None = None
         self._job: Job | None = None
@@ -146,14 +147,20 @@ class Project:
         InputFiles(self.root).refuse_outside(file)  # also where it was exchanged for a link since
         return file, hash(stamp_of(file)), section.get("channel", "grey")
 
-    def picture(self, frame: int, widest: int) -> bytes:
-        """Encode one photograph as JPEG, no wider or higher than so many pixels; small ones sent last are kept."""
-        key = *self._photograph_key(frame), widest
+    def picture(self, frame: int, widest: int, part: tuple[slice, slice] = WHOLE) -> bytes:
+        """Encode one photograph as JPEG, no wider or higher than so many pixels; small ones sent last are kept.
+
+        part: its rows and columns that are sent.
+        """
+        key = *self._photograph_key(frame), widest, *(end for each in part for end in (each.start, each.stop))
         with self.lock:
             if key in self._pictures:
                 self._pictures.move_to_end(key)
                 return self._pictures[key]
-        picture = encode_jpeg(self.photograph(frame), widest)
+        cut = self.photograph(frame)[part]
+        if not cut.size:
+            raise InputError(self.draft.file, f"photograph {frame}", "has no such part")
+        picture = encode_jpeg(cut, widest)
         if len(picture) <= SMALL_PICTURE:
             with self.lock:
                 self._pictures[key] = picture

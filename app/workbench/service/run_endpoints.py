@@ -7,7 +7,15 @@ from typing import Any
 from ...experiment.plausibility import check_packing
 from ...prediction import predict_accuracy, track_first_photographs
 from ...process.errors import InputError
-from ...recording.look.colours import FORCE_RAMP, OPEN, PROBABILITY_RAMP, UNCERTAINTY_RAMP, WEAK
+from ...recording.look.colours import (
+    DIFFERENCE_RAMP,
+    FORCE_RAMP,
+    GAP_RAMP,
+    OPEN,
+    PROBABILITY_RAMP,
+    UNCERTAINTY_RAMP,
+    WEAK,
+)
 from ...recording.look.force_style import THICKEST, THINNEST
 from ...run_folder import refuse_foreign_folder
 from ..inspecting.run_data import RunData, contact_history, frame_network, frame_summaries
@@ -72,7 +80,10 @@ def run_state(workbench: Workbench, at: Text) -> dict[str, Any]:
 @endpoint
 def force_look(workbench: Workbench) -> dict[str, Any]:
     """Return colours and widths of forces, as the recording draws them."""
-    ramps = {"force": FORCE_RAMP, "uncertainty": UNCERTAINTY_RAMP, "probability": PROBABILITY_RAMP}
+    ramps = {
+        "force": FORCE_RAMP, "uncertainty": UNCERTAINTY_RAMP, "probability": PROBABILITY_RAMP, "gap": GAP_RAMP,
+        "difference": DIFFERENCE_RAMP,
+    }  # fmt: skip
     single = {"weak": WEAK, "open": OPEN}
     return {
         "ramps": {name: ["#" + bytes(each[:3]).hex() for each in ramp.tolist()] for name, ramp in ramps.items()},

@@ -83,7 +83,7 @@ def make_application(workbench: Workbench, gate: Gate, entry: str = "/", known: 
 
     def photograph(request: Request) -> Response:
         query = PhotographQuery.of(request)
-        return _jpeg(workbench.project(query.at).picture(query.frame, query.size))
+        return _jpeg(workbench.project(query.at).picture(query.frame, query.size, query.part))
 
     def thumbnail(request: Request) -> Response:
         query = ThumbnailQuery.of(request)

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from rodsight.process.frame_range import FrameRange
@@ -10,6 +11,7 @@ from rodsight.recording.look.colours import FORCE_RAMP
 from rodsight.recording.look.force_style import THICKEST, THINNEST, ForceRange
 from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
+from rodsight.solver.statistics.local_motion import measure_local_motion
 from rodsight.verdicts.decisions import BodyNames, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
 from rodsight.workbench.inspecting.run_data import run_stamp
@@ -295,3 +297,46 @@ def test_a_duplicate_has_its_own_name_and_no_run(visitor):
     assert (first["undo"], first["run"]) == (None, None)
     visitor.request("set_photographs", at=first["at"], interval=31.0)
     assert visitor.request("project", at=at)["photographs"]["interval"] == 30.0
+
+
+def test_the_motion_of_rods_is_that_of_their_tracks(solved):
+    visitor, at, results, _ = solved
+    tracks, last = results.tracks, FIRST + len(results.frames) - 1
+    answer = visitor.request("motion", at=at, frame=last, since=FIRST)
+    here = tracks.present[-1]
+    moved = tracks.position[-1, here] - tracks.position[0, here]
+    pixels = np.column_stack([answer["dx"], -np.array(answer["dy"])])
+    known = np.isfinite(moved).all(axis=1)
+    np.testing.assert_allclose(pixels[known] * answer["pixel"], moved[known], rtol=0.02, atol=2e-6)
+    turned = np.degrees(tracks.rotation[-1, here] - tracks.rotation[0, here])
+    np.testing.assert_allclose(np.array(answer["rotation"], float)[known], turned[known], rtol=1e-3, atol=1e-6)
+    strain = measure_local_motion(tracks.position[0], tracks.position[-1], tracks.radius).strain[here]
+    volume = np.array([np.nan if value is None else value for value in answer["volume"]])
+    np.testing.assert_allclose(volume, 100.0 * np.trace(strain, axis1=1, axis2=2), rtol=1e-3, atol=1e-6)
+    assert all(value is None or value >= 0.0 for value in answer["shear"])
+    assert "is not solved" in visitor.refused("motion", at=at, frame=last, since=FIRST - 1)
+
+
+def test_a_rod_has_its_places_in_all_photographs(solved):
+    visitor, at, _, _ = solved
+    rods = visitor.request("network", at=at, frame=SHOWN)["rods"]
+    answer = visitor.request("rod", at=at, id=rods["id"][4])
+    assert answer["place"][SHOWN] == pytest.approx([rods["x"][4], rods["y"][4]], abs=0.02)
+    assert answer["place"][:FIRST] == answer["displacement"][:FIRST] == [None] * FIRST
+    assert answer["displacement"][FIRST] == 0.0
+
+
+def test_a_part_of_a_photograph_is_sent_as_sharp_as_it_is(solved):
+    visitor, at, _, _ = solved
+
+    def picture(**query):
+        answer = visitor.client.get("/photograph", params={"at": at, "frame": 0, **query})
+        assert answer.status_code == 200, answer.text
+        return cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_GRAYSCALE)
+
+    whole = picture()
+    part = picture(left=40, top=60, right=140, bottom=110)
+    assert part.shape == (50, 100)
+    assert np.abs(part.astype(int) - whole[60:110, 40:140]).mean() < 3.0  # JPEG of other blocks
+    assert max(picture(left=40, top=60, right=140, bottom=110, size=30).shape) == 30
+    assert visitor.client.get("/photograph", params={"at": at, "frame": 0, "left": 9999}).status_code == 422

@@ -2,7 +2,7 @@
 
 import { h } from "/page/dom.js";
 
-function download(blob, name) {
+export function download(blob, name) {
   const link = h("a", { href: URL.createObjectURL(blob), download: name });
   document.body.append(link);
   link.click();
@@ -10,7 +10,7 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-const fileName = (app, ending) => `${app.project.name.replace(/[^\w.-]+/g, "_")}_photograph_${app.frame}.${ending}`;
+export const fileName = (app, ending) => `${app.project.name.replace(/[^\w.-]+/g, "_")}_photograph_${app.frame}.${ending}`;
 
 /** The picture as it is shown, with a line below it that states what it is. */
 export function savePicture(app, words) {

@@ -1,7 +1,7 @@
 // Step 9: rods that tracking lost or confused: picked, dragged and rotated, and correlated from there at once.
 
 import { request, at, digits, fact, h, sign, strokeCircles, notify } from "/page/dom.js";
-import { showLost } from "/page/parts/lanes.js";
+import { showLost } from "/page/time/lanes.js";
 
 const KEPT = "#2fbf93", WEAK = "#f0e442", SEEN = "#56b4e980";
 let poses = null, chosen = null, ghost = null, held = null, fit = null, patch = null, wanted = "", waiting = false, next = null, only = false, jumping = 0, lacking = "", again = null; // again: the photograph as it is tracked with its corrections

@@ -1,23 +1,27 @@
 // Step 7: the force network: any contact or rod with its numbers, its history and its pictures; verdicts by keys.
 
 import { request, at, chart, colour, digits, fact, h, notify } from "/page/dom.js";
-import { COLOURINGS, drawChange, drawLegend, drawNetwork, loadLook } from "/page/parts/network.js";
-import { layers } from "/page/parts/layers.js";
+import { drawLegends } from "/page/layers/colours.js";
+import { COLOURINGS, drawChange, drawNetwork, loadLook, meanRadius as meanRadiusOf, networkLegends } from "/page/layers/network.js";
+import { drawContacts, drawDisplacement, drawRods, drawTrack, drawValues, drawWalls, motionOf, rodLegends } from "/page/layers/rods.js";
+import { layers, paintLayer, setLayer } from "/page/layers/settings.js";
+import { showLayers } from "/page/layers/panel.js";
 import { savePicture, saveTable } from "/page/parts/take_away.js";
-import { showLanes, jump } from "/page/parts/lanes.js";
+import { showLanes, jump } from "/page/time/lanes.js";
 import { Recording } from "/page/parts/recording.js";
 import { VERDICTS, COLOURS, beforeAfter, bodyName, drawMark, drawSelected, givenSection, hasReviewer, loadGiven, loadReviewer, pairName, reviewerField, samePair, viewOf } from "/page/parts/verdicts.js";
 import { measured } from "/page/units.js";
 
-let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, by = "fn", since = 0, frameOf = -1, without = null, recording = null, wanted = null;
+let facts = null, net = null, list = null, chosen = null, past = null, rodPast = null, wallLines = [], since = 0, frameOf = -1, without = null, recording = null, wanted = null;
 
 export const inspect = {
   name: "inspect", title: "Inspect",
   mark: (app) => (app.project.run?.frames !== undefined ? "good" : "missing"),
+  layers: ["photograph", "rods", "walls", "forces", "uncertainty", "contacts", "displacement", "strain", "marks"],
   dim: 0.72,
   hint: (app) => (!facts ? "" : chosen ? "C contact · N no contact · U unsure · Z undo · W without this contact" : "Click a contact or a rod"),
   reverted: (app, pair) => (pair.i === null ? app.queue(() => load(app, true)) : show(app, pair)),
-  keyHelp: [["C N U", "contact, no contact, unsure"], ["Z", "undo the last action"], ["W", "the forces without this contact"], ["V", "the recording, or the photograph"], ["J", "the next flagged frame"]],
+  keyHelp: [["C N U", "contact, no contact, unsure"], ["Z", "undo the last action"], ["W", "the forces without this contact"], ["V", "the recording, or the photograph"], ["J, Shift+J", "the next flagged frame, the one before"]],
   enter(app) { facts = null; net = null; chosen = null; past = null; frameOf = -1; app.queue(async () => { await Promise.all([loadReviewer(), loadLook()]); facts = (await request("run_state", { at: app.project.at })).frames; if (facts && app.frame < facts.first) app.frame = facts.first; await load(app); }); },
   leave() { closeRecording(); },
   rodsOfFrame: () => net.rods.x.flatMap((x, n) => [x, net.rods.y[n], net.rods.r[n]]), // for tests
@@ -31,7 +35,7 @@ export const inspect = {
     if (facts.provisional) return h("p", {}, "The run is not finished: step 6 shows the frames that are solved.");
     return [
       chosen ? null : facts.diagnosis.map((text) => h("p", { class: "diagnosis" }, sign("doubtful"), text)),
-      h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", onchange: (event) => { by = event.target.value; app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === by }, how.words)))),
+      h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", onchange: (event) => { setLayer("forces", { by: event.target.value, map: null, low: null, high: null }); showLayers(app); app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === layers.forces.by }, how.words)))),
       h("div", { class: "row" }, h("button", { class: recording ? "on" : "", id: "show-recording", onclick: () => toggleRecording(app), title: "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null),
       net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table")) : null,
       chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
@@ -40,29 +44,39 @@ export const inspect = {
   },
   draw(app, c, k) {
     if (!net || net.frame !== app.frame) return;
-    drawNetwork(c, k, net, { by, faint: Boolean(without) });
+    const { stage } = app, motions = motionOf(app, facts);
+    drawValues(c, stage, net, layers.strain.on ? motions[layers.strain.since] : null);
+    drawWalls(c, k, wallLines);
+    drawRods(c, k, stage, net);
+    drawNetwork(c, k, stage, net, { faint: Boolean(without) });
     if (without) drawChange(c, k, net, without.change);
-    if (layers.marks) for (const each of list ?? []) if (each.verdict) drawMark(c, k, each, meanRadius(), each.verdict);
-    if (chosen) drawChosen(c, k);
-    drawLegend(app, c, k, net, by);
+    drawDisplacement(c, k, stage, net, layers.displacement.on ? motions[layers.displacement.since] : null);
+    drawContacts(c, k, stage, net);
+    paintLayer(c, "marks", () => {
+      if (rodPast && chosen?.id !== undefined) drawTrack(c, k, rodPast.place, app.frame);
+      for (const each of list ?? []) if (each.verdict) drawMark(c, k, each, meanRadius(), each.verdict);
+      if (chosen) drawChosen(c, k);
+    });
   },
+  legend(app, c, k) { if (net && net.frame === app.frame) drawLegends(app, c, k, [...networkLegends(net), ...rodLegends(net, motionOf(app, facts))]); },
+  restyled(app) { app.paint(); },
   key(app, event) {
     const key = event.key.toLowerCase();
     if (key === "v") { toggleRecording(app); return true; }
-    if (key === "j") { jump(app, facts); return true; }
+    if (key === "j") { jump(app, facts, event.shiftKey ? -1 : 1); return true; }
     if (key === "z") { app.undo(); return true; }
     if (event.key === "Escape" && chosen) { chosen = null; past = null; without = null; app.paint(); return true; }
     if (key === "w" && chosen?.j !== undefined) { toggleWithout(app); return true; }
     if (VERDICTS[key] && chosen?.j !== undefined) { judge(app, VERDICTS[key]); return true; }
     return false;
   },
-  timeline(app) { if (facts) showLanes(app, facts); else at("time").classList.remove("shown"); },
+  timeline(app) { if (facts) showLanes(app, facts, plotted()); else at("time").classList.remove("shown"); },
 };
 
 /** What a picture shows: experiment, photograph, time, status, trust. */
 function caption(app) {
   const { interval } = app.project.photographs, k = app.frame;
-  return [app.project.name, `photograph ${k} of ${app.project.frames - 1}`, interval ? `${digits(k * interval, 4)} s` : "", facts.status[k], `trust ${digits(facts.trust[k], 2)}`, COLOURINGS[by].words].filter(Boolean).join(" · ");
+  return [app.project.name, `photograph ${k} of ${app.project.frames - 1}`, interval ? `${digits(k * interval, 4)} s` : "", facts.status[k], `trust ${digits(facts.trust[k], 2)}`, COLOURINGS[layers.forces.by].words].filter(Boolean).join(" · ");
 }
 
 function closeRecording() { recording?.close(); recording = null; }
@@ -82,7 +96,7 @@ async function load(app, again = false) {
   if (!facts || facts.provisional || app.frame >= facts.count || app.frame < facts.first) { net = null; list = null; chosen = null; frameOf = -1; app.paint(); return; }
   if (frameOf === app.frame && !again) return;
   const { at } = app.project, { frame } = app;
-  [net, list] = await Promise.all([request("network", { at, frame }), request("candidate_pairs", { at, view: viewOf(frame) }).then((answer) => answer.pairs), loadGiven(app)]);
+  [net, list] = await Promise.all([request("network", { at, frame }), request("candidate_pairs", { at, view: viewOf(frame) }).then((answer) => { wallLines = answer.walls; return answer.pairs; }), loadGiven(app)]);
   frameOf = frame; without = null; since = performance.now();
   if (wanted?.frame === frame) { const target = wanted; wanted = null; const same = list.find((each) => samePair(each, target)); if (same) { pick(app, same, true); return; } }
   if (chosen?.j !== undefined) { const same = list.find((each) => samePair(each, chosen)); if (same) chosen = same; else chosen = past?.point[frame] ? { ...chosen, point: past.point[frame], normal: [0, 0], verdict: null, fn: null } : null; }
@@ -97,7 +111,14 @@ function pick(app, pair, look = false) {
   request("pair", { at: app.project.at, i: pair.i, j: pair.j }).then((answer) => { if (chosen === pair) { past = answer; app.paint(); } }, (error) => notify(error.message, true));
 }
 
-const meanRadius = () => net.rods.r.reduce((a, b) => a + b, 0) / Math.max(net.rods.r.length, 1);
+const meanRadius = () => meanRadiusOf(net);
+
+/** What the plot and the contact sheet show: the chosen contact or rod in all photographs. */
+function plotted() {
+  if (!chosen || !net) return null;
+  if (chosen.j !== undefined) return { kind: "pair", name: pairName(chosen), data: past, radius: meanRadius() };
+  return { kind: "rod", name: bodyName(chosen.id), data: rodPast, radius: net.rods.r[net.rods.id.indexOf(chosen.id)] ?? meanRadius() };
+}
 
 const tool = (app) => ({ click: (p) => { if (net && list) choose(app, p); } });
 

@@ -3,7 +3,7 @@
 
 import { at, h, notify, request, strokeCircles } from "/page/dom.js";
 import { agreementSection } from "/page/parts/agreement.js";
-import { jump, showLanes } from "/page/parts/lanes.js";
+import { jump, showLanes } from "/page/time/lanes.js";
 import { CROP, cropAddress, cropWindow, drawOutlines, gapScale, intervalBar, svg } from "/page/parts/pair_drawing.js";
 import { COLOURS, beforeAfter, drawMark, drawSelected, givenSection, hasReviewer, loadGiven, loadReviewer, pairName, reviewerField, samePair, verdicts, viewOf } from "/page/parts/verdicts.js";
 
@@ -60,8 +60,8 @@ export const review = {
     }
     for (const each of frame.pairs) if (app.stage.sees(...each.point, radius)) drawMark(c, k, each, radius, each.verdict ?? (settings.blind ? "hidden" : each.detected ? "detected" : "undetected"));
     if (pair && pair.frame === app.frame) drawSelected(c, k, pair.point, pair.circles, radius);
-    drawLegend(app, c, k);
   },
+  legend(app, c, k) { if (state.frame?.frame === app.frame) drawLegend(app, c, k); },
   key(app, event) {
     if (!state.status || event.altKey || event.repeat || (event.key === " " && event.target.tagName === "BUTTON")) return false; // the button's own key
     const act = {

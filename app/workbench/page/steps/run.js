@@ -1,13 +1,14 @@
 // Step 6: the run: started, paused, resumed, cancelled; forces appear while it is in progress.
 
 import { request, digits, fact, h, sign, notify } from "/page/dom.js";
-import { drawLegend, drawNetwork, loadLook } from "/page/parts/network.js";
-import { showLanes } from "/page/parts/lanes.js";
+import { drawLegends } from "/page/layers/colours.js";
+import { drawNetwork, loadLook, networkLegends } from "/page/layers/network.js";
+import { showLanes } from "/page/time/lanes.js";
 
 let source = null, job = null, facts = null, net = null, watching = null, following = true, alarmed = 0, predicted = null;
 
 export const run = {
-  name: "run", title: "Run",
+  name: "run", title: "Run", layers: ["photograph", "forces", "uncertainty"],
   dim: 0.75,
   mark: (app) => (app.project.run?.out_of_date?.length ? "doubtful" : app.project.run?.frames !== undefined ? "good" : app.project.run?.unfinished ? "doubtful" : "missing"),
   enter(app) { app.queue(loadLook); listen(app); },
@@ -38,9 +39,9 @@ export const run = {
   },
   draw(app, c, k) {
     if (!net || net.frame !== app.frame) return;
-    drawNetwork(c, k, net);
-    drawLegend(app, c, k, net, "fn");
+    drawNetwork(c, k, app.stage, net);
   },
+  legend(app, c, k) { if (net && net.frame === app.frame) drawLegends(app, c, k, networkLegends(net)); },
   timeline(app) { showLanes(app, facts); },
 };
 

@@ -47,8 +47,8 @@ export const scale = {
       c.beginPath(); c.arc(rod.x, rod.y, rod.r, 0, 2 * Math.PI); c.strokeStyle = "#f0e442"; c.lineWidth = 2 / k; c.stroke();
       c.beginPath(); c.moveTo(rod.x - 5 / k, rod.y); c.lineTo(rod.x + 5 / k, rod.y); c.moveTo(rod.x, rod.y - 5 / k); c.lineTo(rod.x, rod.y + 5 / k); c.stroke();
     }
-    if (app.project.pixel) drawBar(app, c, k);
   },
+  legend(app, c, k) { if (app.project.pixel) drawBar(app, c, k); },
   key(app, event) {
     if (event.key !== "Escape") return false;
     drawn = null; rods = []; app.paint();

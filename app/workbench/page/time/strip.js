@@ -1,0 +1,20 @@
+// A strip of photographs beside one another: its canvas, its mouse, the colours of their states.
+
+import { colour } from "/page/dom.js";
+
+export const TONES = { settled: "#2fbf93", settling: "#56b4e9", rearranging: "#e69f00", suspect: "#d55e00", failed: "#b02a6f", reset: "#8a8f9a" };
+
+/** A press on a canvas, and a movement after it, go to the photograph that is there. */
+export function dragFrames(app, canvas, count) {
+  const go = (event) => app.show(Math.floor((event.clientX - canvas.getBoundingClientRect().left) / canvas.clientWidth * count));
+  canvas.addEventListener("pointerdown", (event) => { go(event); const move = (later) => go(later); addEventListener("pointermove", move); addEventListener("pointerup", () => removeEventListener("pointermove", move), { once: true }); });
+}
+
+/** An empty strip, sharp on every screen: its context, the width of a photograph, its size. */
+export function begin(canvas, count) {
+  const dense = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, c = canvas.getContext("2d");
+  canvas.width = width * dense; canvas.height = height * dense;
+  c.scale(dense, dense);
+  c.fillStyle = colour("ground"); c.fillRect(0, 0, width, height);
+  return { c, step: width / count, width, height };
+}
