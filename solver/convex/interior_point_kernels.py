@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from ..array_copies import copy_matrix, copy_vector
 from ..bodies.grains import Array
 from ..factor.blocks import TRIPLE, block_size
 from ..factor.cholesky import factorize, solve
@@ -80,7 +81,7 @@ def iterate(grains, program, current, workspace, tolerance, max_steps):  # type:
         clipped, best_clipped = max(residual, RESIDUAL_TOLERANCE), max(best_residual, RESIDUAL_TOLERANCE)
         if clipped < best_clipped or (clipped == best_clipped and gap < best_gap):
             best_gap, best_residual = gap, residual
-            workspace.best[:] = current.edge_force
+            copy_matrix(current.edge_force, workspace.best)
         if gap <= tolerance and residual <= RESIDUAL_TOLERANCE:
             return CONVERGED, steps, best_gap, best_residual
         if steps == max_steps:
@@ -194,7 +195,7 @@ def _set_complementarity_residual(current, workspace, target, corrected):  # typ
 def _find_step(grains, program, current, workspace, step):  # type: ignore[no-untyped-def]
     """Compute the Newton step to zero residuals; return the primal and dual step lengths to the boundary."""
     v = step.velocity
-    v[:] = workspace.equilibrium_residual
+    copy_vector(workspace.equilibrium_residual, v)
     for c in range(len(current.edge_force)):
         mu = program.friction[c]
         r0 = -workspace.gradient_residual[c, 0] - workspace.complementarity_residual[c, 0] / current.edge_force[c, 0]
@@ -249,9 +250,9 @@ def recentre(current, workspace, primal, dual, target):  # type: ignore[no-untyp
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _copy_step(step, to):  # type: ignore[no-untyped-def]
-    to.edge_force[:] = step.edge_force
-    to.multiplier[:] = step.multiplier
-    to.velocity[:] = step.velocity
+    copy_matrix(step.edge_force, to.edge_force)
+    copy_matrix(step.multiplier, to.multiplier)
+    copy_vector(step.velocity, to.velocity)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

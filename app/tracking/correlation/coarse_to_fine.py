@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..short_sort import ascending_order
 from .search import angle_steps, is_same_angle, search_patch
 from .search_parts import search_parts
 
@@ -111,7 +112,7 @@ def select_distinct_places(places, spacing, best):
     best[:, :3] = 0.0
     best[:, 3] = -1.0
     found = 0
-    for m in np.argsort(-places[:, 3], kind="mergesort"):
+    for m in ascending_order(-places[:, 3]):
         if found == len(best) or not places[m, 3] > 0.0:
             return
         distinct = True
@@ -119,7 +120,8 @@ def select_distinct_places(places, spacing, best):
             distance = np.hypot(best[other, 0] - places[m, 0], best[other, 1] - places[m, 1])
             distinct = distinct and not (distance < spacing and is_same_angle(best[other, 2], places[m, 2]))
         if distinct:
-            best[found] = places[m]
+            for k in range(4):
+                best[found, k] = places[m, k]
             found += 1
 
 
@@ -131,5 +133,6 @@ def _search(reference, image, factor, place, radius, pose, window, angle_window,
         reference, image, (place[0] - shift) / factor, (place[1] - shift) / factor, radius / factor,
         (pose[0] - shift) / factor, (pose[1] - shift) / factor, pose[2], window / factor, angle_window, spacing, best,
     )  # fmt: skip
-    best[:, :2] *= factor
-    best[:, :2] += shift
+    for place_found in best:
+        place_found[0] = place_found[0] * factor + shift
+        place_found[1] = place_found[1] * factor + shift

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...solver.array_copies import copy_matrix
 from .spline_vectors import add_projections, read_cubic, read_quintic
 
 CONVERGED = 0
@@ -162,7 +163,7 @@ def fill_patch(image, coefficients, cx, cy, radius, data, hessian_inverse, stati
                 h[k, m] += data[p, 3 + k] * np.float64(data[p, 3 + m])
     if not is_positive_definite(h):
         return False
-    hessian_inverse[:, :] = np.linalg.inv(h)
+    copy_matrix(np.linalg.inv(h), hessian_inverse)
     return True
 
 
@@ -182,7 +183,7 @@ def fill_coarse(data, coarse):
         for k in range(5):
             for m in range(5):
                 normal[k, m] += row[k] * row[m]
-    coarse[:, :] = np.linalg.inv(normal)
+    copy_matrix(np.linalg.inv(normal), coarse)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

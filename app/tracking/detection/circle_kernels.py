@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ..short_sort import ascending_order
 from .edges import centre_variance, fit_points, trace, weighted_median
 
 # Least slope of an edge per pixel, as a fraction of the local contrast, and the slope from which its weight is full.
@@ -102,11 +103,11 @@ def see_edges(edges, dark, contrast, x, y, excess, seen):
 @njit(cache=True, nogil=True)
 def lowest_tenth(values):
     """Return the tenth percentile of values (p,) without NaN, as numpy interpolates it."""
-    ordered = np.sort(values)
+    order = ascending_order(values.astype(np.float64))
     place = (len(values) - 1) * 0.1
     low = int(place)
     part = place - low
-    below, above = ordered[low], ordered[min(low + 1, len(values) - 1)]
+    below, above = values[order[low]], values[order[min(low + 1, len(values) - 1)]]
     rise = above - below
     if part >= 0.5:
         return above - rise * values.dtype.type(1.0 - part)

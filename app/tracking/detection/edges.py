@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...experiment.photographs import Image
 from ...solver.bodies.grains import Array
 from ..correlation.interpolation import interpolate_cubic
+from ..short_sort import ascending_order
 
 # Samples along a radius [1/px].
 DENSITY = 4
@@ -230,9 +231,12 @@ def fit_points(angle, distance, weight, radius, start, radius_sd, min_scale, res
         inverse = np.linalg.inv(normal + 1e-9 * np.eye(3))
         step = inverse @ right
         shift += step
-        if np.abs(step).max() < 1e-4:
+        if max(abs(step[0]), abs(step[1]), abs(step[2])) < 1e-4:
             break
-    score = np.zeros((int(angle.max() * radius / POINTS_PER_ARC) + 1, 3))
+    greatest = angle[0]
+    for p in range(1, count):
+        greatest = max(greatest, angle[p])
+    score = np.zeros((int(greatest * radius / POINTS_PER_ARC) + 1, 3))
     for p in range(count):
         row = int(angle[p] * radius / POINTS_PER_ARC)
         for i in range(3):
@@ -264,6 +268,12 @@ def centre_variance(angle, radius, w, score, inverse, scale, radius_sd):
 @njit(cache=True, nogil=True)
 def weighted_median(value, weight):
     """Return the value (p,) with half of the weight (p,) on either side."""
-    order = np.argsort(value)
-    total = np.cumsum(weight[order])
-    return value[order[min(np.searchsorted(total, 0.5 * total[-1]), len(value) - 1)]]
+    order = ascending_order(value)
+    total = weight[order[0]]
+    for k in range(1, len(order)):
+        total += weight[order[k]]
+    below, k = weight[order[0]], 0
+    while below < 0.5 * total and k < len(order) - 1:
+        k += 1
+        below += weight[order[k]]
+    return value[order[k]]

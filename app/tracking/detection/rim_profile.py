@@ -22,6 +22,7 @@ from numba import njit
 
 from ...experiment.photographs import Image
 from ...solver.bodies.grains import Array
+from ..short_sort import median
 
 # Fitted part of a ray and range of its dark [px from the edge], and the same in widths of the blur where that is more:
 # a soft edge still falls where a sharp one has ended, and a dark that is read there displaces the edge.
@@ -112,13 +113,13 @@ def _robust_regression(design, value, strength):
         total += weight[p]
     weight /= max(total / count, 1e-12)
     answer = np.zeros(3)
-    answer[0] = np.median(value)
+    answer[0] = median(value)
     for _ in range(8):
         for p in range(count):
             modelled = design[p, 0] * answer[0] + design[p, 1] * answer[1] + design[p, 2] * answer[2]
             residual[p] = value[p] - modelled
             size[p] = abs(residual[p])
-        scale = max(1.4826 * np.median(size), 1e-3)
+        scale = max(1.4826 * median(size), 1e-3)
         # A prior as wide as usual shading prevents a false one from half an outline.
         prior = (scale / 0.3) ** 2
         n00, n01, n02, n11, n12, n22 = prior, 0.0, 0.0, prior, 0.0, prior

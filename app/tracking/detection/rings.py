@@ -96,7 +96,9 @@ def strike_out(x, y, radius, allowed, cell, head, following, alive):
         True at first.
     """
     rows, columns = head.shape
-    left, top = x.min(), y.min()
+    left, top = x[0], y[0]
+    for k in range(1, len(x)):
+        left, top = min(left, x[k]), min(top, y[k])
     for k in range(len(x)):
         column, row = int((x[k] - left) / cell), int((y[k] - top) / cell)
         for j in range(max(row - 2, 0), min(row + 3, rows)):

@@ -12,6 +12,7 @@ from numba import njit
 
 from ..correlation.interpolation import interpolate_cubic
 from ..detection.edges import fit_points, weighted_median
+from ..short_sort import ascending_order
 
 # Samples along a ray [1/px]; a slope is read over half a pixel to each side.
 DENSITY = 4
@@ -173,7 +174,7 @@ def _steepest(coefficients, cx, cy, ray_angle, radius, window, ray):
 def _fit_rim(angle, distance, strength, view, radius_sd, found):
     """Fit a circle to edges with Tukey's weights and weights of each edge's slope relative to the rim's strong ones."""
     count = len(angle)
-    strong = np.sort(strength)[int(0.9 * (count - 1))]
+    strong = strength[ascending_order(strength)[int(0.9 * (count - 1))]]
     weight = np.empty(count)
     for p in range(count):
         fraction = (strength[p] / strong - LEAST_EDGE) / (FULL_EDGE - LEAST_EDGE)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...array_copies import copy_matrix
 from .contact_law import relax_contact
 from .grain_records import WIDTH, gather_differences, gather_records, scatter_records
 from .ordering import GROUP as L
@@ -28,8 +29,8 @@ U1, U2, U3, U4 = U(1), U(2), U(3), U(4)
 @njit(cache=True, nogil=True, error_model="numpy")
 def apply_forces(problem, body, plate, force):  # type: ignore[no-untyped-def]
     """Set body and plate to the velocities under these forces."""
-    body[:] = problem.body
-    plate[:] = problem.plate
+    copy_matrix(problem.body, body)
+    copy_matrix(problem.plate, plate)
     first = len(force) - len(problem.wall)
     for c in range(first):
         block, lane = c // L, c % L

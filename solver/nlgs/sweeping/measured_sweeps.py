@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...array_copies import copy_matrix, copy_vector
 from .contact_law import relax_contact
 from .grain_records import (
     RECORD,
@@ -109,8 +110,8 @@ def advance_and_measure(problem, body, plate, force, equilibrium, relaxation, re
         norm, mean = np.sqrt(squares), total / max(bearing, 1.0)
         residuals[row, 0] = np.sqrt(greatest)
         residuals[row, 2] = greatest_force_residual(equilibrium, body) / mean if mean > 0.0 else 0.0
-        flat_previous[:] = flat
-        previous_plate[:] = plate
+        copy_vector(flat, flat_previous)
+        copy_matrix(plate, previous_plate)
     residuals[-1, 1] = measure_natural_map(problem, body, plate, force, norm)
 
 

@@ -84,7 +84,10 @@ def _independent_groups(i, j, size):  # type: ignore[no-untyped-def]
     count = len(i)
     following = np.arange(1, count + 1)  # linked list of the remaining contacts
     head = 0
-    group_of = np.full(max(i.max(), j.max()) + 1, -1)  # last group of each body
+    last = -1
+    for c in range(count):
+        last = max(last, i[c], j[c])
+    group_of = np.full(last + 1, -1)  # last group of each body
     order = np.empty(count, np.int64)
     member = np.empty(size, np.int64)
     placed = np.zeros(count, np.bool_)
