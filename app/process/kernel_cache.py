@@ -1,7 +1,10 @@
-"""The folder of the compiled kernels of exactly these sources, this compiler and this processor.
+"""The folder of the compiled kernels of exactly these sources, this compiler and this level of processors.
 
 The compiler itself knows only the file of a compiled function, not those of the functions that it calls: kernels kept
 beside the sources would stay as they are after an edit of a function that is inlined into them.
+
+A wheel brings kernels with it, in archives that are named by the same key as the folder: they are unpacked where the
+key of the installed sources, the compiler and the processor is theirs, and ignored otherwise.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import re
 import shutil
 import stat
 import sys
+import sysconfig
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -19,9 +23,14 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from .sources import hash_of_kernels
+from .processor import FEATURES, described_processor, processor_level
+from .sources import APP, hash_of_kernels, source_folder
 
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"
+NAME_VARIABLE, FEATURES_VARIABLE = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
+# Options that change the compiled code, though not the names of its files.
+OPTION_VARIABLES = ("NUMBA_OPT", "NUMBA_BOUNDSCHECK", "NUMBA_DEBUGINFO", "NUMBA_ENABLE_AVX", "NUMBA_DISABLE_INTEL_SVML")
+SHIPPED = "shipped_kernels"  # folder of a wheel's archives in the package
 COMPILERS = ("numba", "llvmlite")
 PREFIX = "rodsight-kernels-"
 KEY_LENGTH = 16  # hexadecimal digits
@@ -34,21 +43,89 @@ def choose_kernel_cache() -> None:
 
     The folder is closed to others, because the compiler executes the code it reads there.
     """
-    name = f"{PREFIX}{kernel_key()}"
+    _choose_processor()
+    key = kernel_key()
     for parent in _parents():
-        if _make_private(parent / name):
-            os.environ[CACHE_VARIABLE] = str(parent / name)
-            compiler = sys.modules.get("numba")
-            if compiler is not None:  # it has read the variable already
-                compiler.config.CACHE_DIR = str(parent / name)
-            _note_use(parent / name)
+        folder = parent / f"{PREFIX}{key}"
+        if _make_private(folder):
+            _set(CACHE_VARIABLE, "CACHE_DIR", str(folder))
+            unpack_shipped(APP / SHIPPED / archive_name(key), folder)
+            _note_use(folder)
             return
 
 
 def kernel_key() -> str:
     """Return the name of everything that compiled kernels depend on: sources, compiler, processor."""
-    facts = [hash_of_kernels(), sys.version, *map(_version, COMPILERS), *_processor()]
+    facts = [hash_of_kernels(), sysconfig.get_platform(), str(sys.implementation.cache_tag)]
+    facts += [*map(_version, COMPILERS), *_processor()]
+    facts += [f"{name}={os.environ[name]}" for name in OPTION_VARIABLES if name in os.environ]
     return hashlib.sha256("\n".join(facts).encode()).hexdigest()[:KEY_LENGTH]
+
+
+def archive_name(key: str) -> str:
+    """Return the name of a wheel's archive of kernels with this key."""
+    return f"{key}.zip"
+
+
+def kernel_folder() -> Path | None:
+    """Return the chosen folder of kernels, or None where the compiler keeps none."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    return Path(chosen) if chosen and Path(chosen).name.startswith(PREFIX) else None
+
+
+def folder_of_sources(source: str) -> str:
+    """Return the name that the compiler gives to the folder of the kernels of a folder of sources, such as solver/nlgs.
+
+    It contains a hash of the place where the package is installed, see numba's `get_suitable_cache_subpath`.
+    """
+    place = source_folder(source)
+    return f"{place.name}_{hashlib.sha1(str(place).encode()).hexdigest()}"
+
+
+def unpack_shipped(archive: Path, folder: Path) -> None:
+    """Unpack a wheel's archive of kernels, once for each place where the package is installed."""
+    if not archive.is_file():
+        return
+    done = folder / f"unpacked-{hashlib.sha256(str(APP).encode()).hexdigest()[:KEY_LENGTH]}"
+    if done.exists():
+        return
+    import tempfile  # most starts need no temporary folder
+    import zipfile
+
+    with (
+        suppress(OSError),  # a kernel that cannot be written is compiled
+        zipfile.ZipFile(archive) as kernels,
+        tempfile.TemporaryDirectory(dir=folder) as part,
+    ):
+        for name in kernels.namelist():
+            source, _, file = name.rpartition("/")
+            target = folder / folder_of_sources(source)
+            target.mkdir(exist_ok=True)
+            (Path(part) / file).write_bytes(kernels.read(name))
+            os.replace(Path(part) / file, target / file)
+        done.touch()
+
+
+def _choose_processor() -> None:
+    """Make the compiler write code for all processors of this one's level, unless the user chose a processor."""
+    level = None if NAME_VARIABLE in os.environ or _has_begun() else processor_level()
+    if level is not None:
+        _set(NAME_VARIABLE, "CPU_NAME", level)
+        _set(FEATURES_VARIABLE, "CPU_FEATURES", FEATURES[level])
+
+
+def _has_begun() -> bool:
+    """Whether the compiler has chosen the processor already, for kernels of the user's own."""
+    registry = sys.modules.get("numba.core.registry")
+    return registry is not None and "_toplevel_target_context" in vars(registry.cpu_target)
+
+
+def _set(variable: str, name: str, value: str) -> None:
+    """Set an option of the compiler, also where it has read its variables already."""
+    os.environ[variable] = value
+    compiler = sys.modules.get("numba")
+    if compiler is not None:
+        setattr(compiler.config, name, value)
 
 
 def remove_old(parent: Path, now: float) -> None:
@@ -117,13 +194,8 @@ def _imported_version(name: str) -> str:
     return str(import_module(name).__version__)
 
 
-def _processor() -> Iterable[str]:
-    """Yield what the processor is and can do."""
-    machine = os.uname().machine if hasattr(os, "uname") else os.environ.get("PROCESSOR_IDENTIFIER", "")
-    yield machine
-    try:
-        described = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
-    except OSError:  # the compiler names the processor in its own files, too
-        return
-    known = ("vendor_id", "model name", "flags", "Features", "CPU part")
-    yield from (line for line in described.splitlines() if line.startswith(known))
+def _processor() -> list[str]:
+    """Return what kernels are compiled for: a level, or this processor alone."""
+    if NAME_VARIABLE in os.environ:
+        return [os.environ[NAME_VARIABLE], os.environ.get(FEATURES_VARIABLE, "as this processor")]
+    return described_processor()

@@ -88,8 +88,18 @@ def hash_of_code(roots: tuple[str, ...], alone: tuple[str, ...] = ()) -> str:
     return sources.hash_of(sources.needed_by(roots) | frozenset(alone))
 
 
+def source_folder(name: str) -> Path:
+    """Return the folder of sources by its name in the package, such as solver/nlgs or tracking."""
+    first, _, rest = name.partition("/")
+    return _solver_beside(APP) / rest if first == SOLVER else APP / name
+
+
+def _solver_beside(app: Path) -> Path:
+    return app / SOLVER if (app / SOLVER).is_dir() else app.parent / SOLVER
+
+
 def _files(app: Path) -> Iterator[tuple[str, bytes]]:
-    solver = app / SOLVER if (app / SOLVER).is_dir() else app.parent / SOLVER
+    solver = _solver_beside(app)
     for place, prefix in ((app, ""), (solver, f"{SOLVER}/")):
         for folder, below, names in os.walk(place):
             below[:] = [each for each in below if each not in WITHOUT_CODE and Path(folder, each) != solver]

@@ -6,11 +6,22 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 from rodsight.process import kernel_cache
-from rodsight.process.kernel_cache import KEPT, PREFIX, choose_kernel_cache, remove_old
+from rodsight.process.kernel_cache import (
+    KEPT,
+    NAME_VARIABLE,
+    PREFIX,
+    archive_name,
+    choose_kernel_cache,
+    folder_of_sources,
+    kernel_key,
+    remove_old,
+)
+from rodsight.process.processor import V3, V4, level_of
 from rodsight.process.sources import Sources
 
 from tests.program import ROOT
@@ -111,6 +122,78 @@ def test_kernels_that_were_not_used_for_a_while_are_removed(tmp_path):
         os.utime(tmp_path / name, (now - KEPT - 60.0,) * 2)
     remove_old(tmp_path, now)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["others", f"{PREFIX}new"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "level"),
+    [(V4, "x86-64-v4"), (V4 - {"avx512vl"}, "x86-64-v3"), (V3 | {"avx512f"}, "x86-64-v3"), (V3 - {"avx2"}, None)],
+)
+def test_a_level_needs_all_its_flags(flags, level):
+    assert level_of(flags) == level
+
+
+def test_processors_of_one_level_have_the_same_key_and_those_of_none_keys_of_their_own(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "_has_begun", lambda: False)
+    keys = {}
+    for level in ("x86-64-v4", None):
+        for model in ("EPYC", "Xeon"):
+            monkeypatch.delenv(NAME_VARIABLE, raising=False)
+            monkeypatch.setattr(kernel_cache, "processor_level", lambda level=level: level)
+            monkeypatch.setattr(kernel_cache, "described_processor", lambda model=model: [model])
+            monkeypatch.setattr(kernel_cache, "_set", lambda variable, _, value: monkeypatch.setenv(variable, value))
+            choose_kernel_cache()
+            keys[level, model] = kernel_key()
+    assert keys["x86-64-v4", "EPYC"] == keys["x86-64-v4", "Xeon"]
+    assert len(set(keys.values())) == 3
+
+
+def test_a_compiler_that_has_begun_for_this_processor_keeps_to_it(monkeypatch, tmp_path):
+    import numba
+
+    numba.njit(lambda x: x)  # kernels of the user's own
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.delenv(NAME_VARIABLE, raising=False)
+    choose_kernel_cache()
+    assert NAME_VARIABLE not in os.environ
+
+
+@pytest.fixture
+def shipped(tmp_path, monkeypatch, new_process) -> Path:
+    """A wheel's archive with one kernel of this program."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(kernel_cache, "SHIPPED", str(tmp_path))  # an absolute path replaces the package's folder
+    archive = tmp_path / archive_name(kernel_key())
+    with zipfile.ZipFile(archive, "w") as kernels:
+        kernels.writestr("solver/nlgs/solve.f-1.py311.nbi", b"shipped")
+    return archive
+
+
+def unpacked() -> Path:
+    return Path(os.environ["NUMBA_CACHE_DIR"]) / folder_of_sources("solver/nlgs") / "solve.f-1.py311.nbi"
+
+
+def test_kernels_of_the_wheel_are_unpacked_once(shipped):
+    choose_kernel_cache()
+    assert unpacked().read_bytes() == b"shipped"
+    unpacked().write_bytes(b"with a kernel compiled since")
+    choose_kernel_cache()
+    assert unpacked().read_bytes() == b"with a kernel compiled since"
+
+
+def test_kernels_of_other_sources_than_the_installed_ones_are_not_used(shipped, monkeypatch):
+    monkeypatch.setattr(kernel_cache, "hash_of_kernels", lambda: "an edited file")
+    choose_kernel_cache()
+    assert not unpacked().exists()
+
+
+def test_the_folder_of_kernels_has_the_name_that_the_compiler_gives_it():
+    from numba.core.caching import CacheImpl
+    from rodsight.solver.nlgs.sweeping import kernels
+
+    locate = CacheImpl._locator_classes[0].get_suitable_cache_subpath
+    assert folder_of_sources("solver/nlgs/sweeping") == locate(kernels.__file__)
 
 
 @pytest.mark.slow
