@@ -17,6 +17,7 @@ APP = Path(__file__).resolve().parents[1]
 FACE = "__init__.py"
 DATA_SUFFIX = ".toml"
 WITHOUT_CODE = ("__pycache__", "docs", "page", "pages")  # folders
+WITHOUT_KERNELS = ("cli/", "compilation/")  # these watch and call the compiler
 SOLVER = "solver"  # its folder below the package, or beside it in a source tree
 _IMPORT = re.compile(rb"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 _COMPILED = re.compile(rb"^[ \t]*(?:from|import) numba\b", re.MULTILINE)
@@ -37,11 +38,12 @@ class Sources:
 
     @property
     def compiled(self) -> frozenset[str]:
-        """Names of the files that import the compiler."""
+        """Names of the files with kernels: those that import the compiler, but for parts without kernels."""
         return frozenset(
             name
             for name, text in self.content.items()
             if b"numba" in text and name.endswith(".py") and _COMPILED.search(text)
+            if not name.startswith(WITHOUT_KERNELS)
         )
 
     def needed_by(self, names: Iterable[str]) -> frozenset[str]:
