@@ -24,7 +24,7 @@ def rank_of(nodeid: str) -> int:
 
 def schedule_by_folder(config: pytest.Config, log: Any) -> Any:
     """Return pytest-xdist's scheduler that gives all tests of a folder to one process, in the order of collection."""
-    from xdist.scheduler import LoadScopeScheduling  # imported late: tests run without pytest-xdist, too
+    from xdist.scheduler import LoadScopeScheduling  # imported where tests are distributed alone
 
     class FolderScheduling(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:

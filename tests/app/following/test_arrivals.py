@@ -1,5 +1,7 @@
 """Photographs are used when they are complete, in order, with a delay for late ones."""
 
+import os
+
 import cv2
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from rodsight.following.arrivals import MAX_DELAY, STEADY_TIME, Arrivals
 
 
 class Clock:
-    now = 0.0
+    now = 100.0
 
     def __call__(self):
         return self.now
@@ -51,6 +53,21 @@ def test_an_incomplete_file_is_never_used(arrivals, tmp_path, clock):
     assert settled(arrivals, clock) == ["a1.png"]
 
 
+@pytest.mark.parametrize("later", [PICTURE + b"more", PICTURE], ids=["longer", "as long"])
+def test_a_file_that_changes_is_waited_for_again(arrivals, tmp_path, clock, later):
+    file = tmp_path / "a1.png"
+    file.write_bytes(PICTURE)
+    assert arrivals.complete_files() == []
+    clock.now += 0.8 * STEADY_TIME
+    file.write_bytes(later)
+    os.utime(file, ns=(1, 1))
+    assert arrivals.complete_files() == []
+    clock.now += 0.8 * STEADY_TIME
+    assert arrivals.complete_files() == []
+    clock.now += 0.8 * STEADY_TIME
+    assert arrivals.complete_files() == [file]
+
+
 def test_files_after_an_incomplete_one_are_held_back(arrivals, tmp_path, clock):
     (tmp_path / "a1.png").write_bytes(PICTURE)
     (tmp_path / "a2.png").write_bytes(PICTURE[:100])
@@ -74,3 +91,21 @@ def test_a_late_photograph_fills_its_gap(arrivals, tmp_path, clock):
     assert settled(arrivals, clock) == ["a1.png", "a2.png"]
     (tmp_path / "a3.png").write_bytes(PICTURE)
     assert settled(arrivals, clock) == ["a1.png", "a2.png", "a3.png", "a4.png"]
+
+
+def test_every_gap_is_waited_for(arrivals, tmp_path, clock):
+    for number in (1, 2, 4):
+        (tmp_path / f"a{number}.png").write_bytes(PICTURE)
+    assert settled(arrivals, clock) == ["a1.png", "a2.png"]
+    (tmp_path / "a3.png").write_bytes(PICTURE)
+    assert len(settled(arrivals, clock)) == 4
+    clock.now += MAX_DELAY
+    (tmp_path / "a7.png").write_bytes(PICTURE)
+    assert len(settled(arrivals, clock)) == 4
+
+
+@pytest.mark.parametrize("names", [("a1", "a5"), ("early", "late", "soon"), ("a1", "b1", "c5")])
+def test_too_few_or_unnumbered_files_have_no_gap(arrivals, tmp_path, clock, names):
+    for name in names:
+        (tmp_path / f"{name}.png").write_bytes(PICTURE)
+    assert settled(arrivals, clock) == [f"{name}.png" for name in names]
