@@ -14,7 +14,8 @@ from .stages import FORCES
 from .verdicts.decisions import fingerprint
 from .verdicts.log import VERDICTS, VerdictLog
 
-LISTED = 3  # files that a reason names
+LISTED = 3  # files, and settings, that are named
+LONGEST = 40  # characters of a value
 
 
 def out_of_date(folder: Path, root: Path | None = None) -> list[str]:
@@ -40,9 +41,7 @@ def out_of_date(folder: Path, root: Path | None = None) -> list[str]:
     files = piece.get("files")
     if owner is None or not owner.is_file() or not isinstance(files, dict):
         return []
-    reasons = []
-    if settings_in_file(owner) != piece.get("file_settings"):
-        reasons.append(f"{owner.name} has changed")
+    reasons = _changed_settings(owner, piece.get("file_settings"))
     try:
         reasons += _changed_inputs(load_experiment(owner, root=root), files, piece.get("stamps"))
     except (InputError, RunError, OSError) as error:
@@ -52,6 +51,30 @@ def out_of_date(folder: Path, root: Path | None = None) -> list[str]:
     if piece.get("code") != hash_of_code(FORCES.code, FORCES.alone) or piece.get("libraries") != library_versions():
         reasons.append("other code or libraries made it")
     return reasons
+
+
+def _changed_settings(file: Path, stored: object) -> list[str]:
+    """Return reasons for settings that differ from those of the results."""
+    now = settings_in_file(file)
+    if now is None or not isinstance(stored, dict):
+        return [] if now == stored else [f"{file.name} has changed"]
+    changed = sorted(key for key in now.keys() | stored.keys() if now.get(key) != stored.get(key))
+    reasons = [_change_of(key, stored.get(key), now.get(key)) for key in changed[:LISTED]]
+    rest = len(changed) - LISTED
+    return [*reasons, f"{rest} more setting{'s have' if rest > 1 else ' has'} changed"] if rest > 0 else reasons
+
+
+def _change_of(key: str, before: object, now: object) -> str:
+    """Describe the change of one setting; None: it was not, or is no longer given."""
+    if before is None:
+        return f"{key} was not given and is {_value(now)}"
+    return f"{key} was {_value(before)} and is {'no longer given' if now is None else _value(now)}"
+
+
+def _value(value: object) -> str:
+    """A value as a reader takes it in: numbers with their digits, long ones cut."""
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} …"
 
 
 def _changed_inputs(experiment: Experiment, listed: dict[str, str], stamps: object) -> list[str]:

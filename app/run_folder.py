@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from . import __version__
+from .experiment.config.dotted_keys import leaves
 from .experiment.config.experiment_file import as_toml
 from .experiment.experiment import Experiment, checksums, named_inputs
 from .process.atomic import PART
@@ -305,13 +306,13 @@ def input_stamps(experiment: Experiment) -> dict[str, list[int]]:
     return stamps
 
 
-def settings_in_file(file: Path) -> str:
-    """Return a hash of the settings of an experiment file, without comments and order; empty where it is no TOML."""
+def settings_in_file(file: Path) -> dict[str, Any] | None:
+    """Return the settings of an experiment file by dotted keys, without comments; None where it is no TOML."""
     try:
         content = tomllib.loads(file.read_text(encoding="utf-8"))
-        return _hash_of([json.loads(json.dumps(content, default=str))])
+        return leaves(json.loads(json.dumps(content, default=str)))
     except (OSError, ValueError, RecursionError):
-        return ""
+        return None
 
 
 def _inputs_of(experiment: Experiment) -> dict[str, str]:

@@ -7,6 +7,7 @@ import { showLayers, toggleLayers } from "/page/layers/panel.js";
 import { paintLayer } from "/page/layers/settings.js";
 import { clearPlot, togglePlot } from "/page/time/plot.js";
 import { closeSheet, isSheetOpen, sheetButton, toggleSheet } from "/page/time/sheet.js";
+import { runMark, standing } from "/page/parts/run_state.js";
 import { photographs } from "/page/steps/photographs.js";
 import { scale } from "/page/steps/scale.js";
 import { walls } from "/page/steps/walls.js";
@@ -190,7 +191,7 @@ app.paint = () => {
   at("steps").replaceChildren(...STEPS.map((each, k) => h("button", {
     class: each === step ? "here" : "", "aria-current": each === step ? "step" : null, onclick: () => app.go(each), title: `Key ${(k + 1) % 10}`, id: `step-${each.name}`,
   }, h("span", { class: "number" }, String((k + 1) % 10)), each.title, sign(markOf(each)))));
-  const entry = project.steps.find((each) => each.name === step.name);
+  const entry = project.steps.find((each) => each.name === step.name) ?? (step.ofRun ? { mark: runMark(app), messages: project.run?.faults ?? [] } : null);
   const top = at("panel").scrollTop;
   at("panel").replaceChildren(h("h1", {}, step.title), ...(entry?.messages.length ? [h("div", { class: "messages" }, entry.messages.map((text) => h("p", {}, sign(entry.mark), text)))] : []), ...[step.panel(app)].flat(9).filter(Boolean));
   showRefused();
@@ -230,13 +231,6 @@ app.show = (frame) => {
   app.step.moved?.(app);
   app.paint();
 };
-
-function standing(project) {
-  const run = project.run;
-  if (!run || run.frames === undefined) return run?.unfinished ? "unfinished run" : project.ready ? "ready to run" : "being set up";
-  const worst = run.trust === null ? "" : ` · T ≥ ${run.trust.toFixed(2)}`;
-  return `${run.frames} frames solved${worst}`;
-}
 
 export const KEYS = [
   ["1 … 9, 0", "the steps"], ["wheel, + −", "zoom"], ["drag; Alt+drag over things", "move the picture"], ["F", "whole picture"], ["L", "loupe"], ["K", "a cursor for the keyboard: arrows move it (Shift: finely), Enter presses, Enter again lets go or clicks, Esc ends"], ["Y", "layers, brightness, contrast"], ["two fingers", "move the picture on a touchpad; pinch to zoom"],

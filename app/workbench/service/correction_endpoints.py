@@ -48,7 +48,7 @@ Pose = tuple[float, float, float]
 def poses(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
     """List the rods of a photograph as they were tracked, lost ones where they were seen last, and all corrections."""
     opened = workbench.project(at)
-    tracks, scale, first = _tracks(opened), opened.given_scale(), _first(opened)
+    tracks, scale, first = _tracks(opened), opened.tracks_scale(), _first(opened)
     k = frame - first
     if not 0 <= k < tracks.frame_count:
         raise InputError(opened.results, f"photograph {frame}", f"is not tracked yet: {tracks.frame_count} are")
@@ -103,7 +103,7 @@ def tracked_again(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> di
     opened = workbench.project(at)
     _exists(opened, frame)
     _not_first(opened, frame)
-    tracks, scale, first = _tracks(opened), opened.given_scale(), _first(opened)
+    tracks, scale, first = _tracks(opened), opened.tracks_scale(), _first(opened)
     k, editor = frame - first, _editor(opened)
     row_of = {int(name): row for row, name in enumerate(tracks.id)}
     _row(_tracked(opened), id)
@@ -356,7 +356,7 @@ def _as_values(found: PoseFit) -> dict[str, Any]:
 
 
 def _as_written(opened: Project, found: PoseFit) -> Pose:
-    return found.x, found.y, float(opened.given_scale().angle_to_world(np.array(found.angle)))
+    return found.x, found.y, float(opened.tracks_scale().angle_to_world(np.array(found.angle)))
 
 
 def _as_text(picture: NDArray[np.uint8]) -> str:
@@ -383,7 +383,7 @@ def _angle(theta: float | None) -> float | None:
 
 
 def _as_tracked(opened: Project) -> TrackedPoses:
-    tracks, scale = _tracks(opened), opened.given_scale()
+    tracks, scale = _tracks(opened), opened.tracks_scale()
     pose = np.dstack([scale.to_pixels(tracks.position), -tracks.rotation])
     good = np.isin(tracks.status, GOOD) & ~(tracks.zncc < WEAK) & tracks.present
     return TrackedPoses(tracks.id, pose, tracks.radius / scale.mean_size, tracks.zncc, good)

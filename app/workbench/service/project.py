@@ -9,7 +9,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Channel, Image, ImageSelection, read_photograph
 from ...experiment.reading.input_files import InputFiles
-from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...out_of_date import out_of_date
 from ...prediction import measure_photographs
 from ...process.errors import InputError
-from ...recording.look.canvas import Canvas
 from ...results.manifest import MANIFEST
 from ...reviewing.reviewed_run import ReviewedRun
 from ...reviewing.session import ReviewSession
@@ -32,11 +30,13 @@ from ...tracking.picture_quality import PictureQuality
 from ...verdicts.log import VERDICTS
 from ..correcting.pose_editor import PoseEditor
 from ..inspecting.run_data import RunData, read_finished_run, read_run, run_stamp
+from ..inspecting.run_overview import run_overview
+from ..inspecting.run_scene import Scene, run_scene, tracks_scale
 from ..running.job import Job
 from ..setup.circles import circles_of
 from ..setup.draft import Draft, stamp_of
 from ..setup.edits import TABLES
-from ..setup.experiment_folders import run_folder, run_overview, valid_name
+from ..setup.experiment_folders import run_folder, valid_name
 from ..setup.journal import PLACE, Journal
 from ..setup.validation import ValidationResult, outside_walls, validate
 
@@ -46,13 +46,6 @@ KEPT_PICTURES, SMALL_PICTURE = 32, 2_000_000  # of them as they were sent; [byte
 WHOLE = (slice(None), slice(None))
 QUALITY = 90  # of JPEG
 BEYOND = 58  # grey level of a crop beyond the edge of the photograph
-
-
-class Scene(NamedTuple):
-    """The picture over which a run is drawn: the photograph, or a plain ground where there is none."""
-
-    scale: Scale
-    bounds: tuple[float, float, float, float]  # [px] left, top, right, bottom
 
 
 def encode_jpeg(image: Image, widest: int) -> bytes:
@@ -267,7 +260,12 @@ class Project:
         with self.lock:
             stamp = self.results, run_stamp(self.results), self.draft.stamps(_tables(self.draft.data()))
             if self._session is None or self._session[0] != stamp:
-                self._session = stamp, ReviewSession(self.reviewed_run(), self._scene(self._finished_data()).scale)
+                self._session = (
+                    stamp,
+                    ReviewSession(
+                        self.reviewed_run(), run_scene(self.validation(), self.results, self._finished_data()).scale
+                    ),
+                )
             return self._session[1]
 
     def _finished_data(self) -> RunData | None:
@@ -282,24 +280,8 @@ class Project:
             return self._finished[1]
 
     def scene(self) -> Scene:
-        """Return scale and size of the picture over which the run is drawn; raise InputError where there is none.
-
-        The scale contains the run's calibration of the lens. Where tracks are given the ground is plain.
-        """
-        return self._scene(self.run_data())
-
-    def _scene(self, data: RunData | None) -> Scene:
-        validation = self.validation()
-        section = validation.experiment.config.photographs if validation.experiment is not None else None
-        if section is not None and validation.shape is not None:
-            height, width = validation.shape
-            calibration = data.results.calibration if data is not None and data.results is not None else None
-            return Scene(make_scale(section, height, calibration), (-0.5, -0.5, width - 0.5, height - 0.5))
-        if not validation.tracked or data is None:
-            raise InputError(self.draft.file, "photographs", "are not there: forces cannot be drawn over them")
-        canvas = Canvas.around(data.tracks, None)
-        bounds = (canvas.left - 0.5, canvas.top - 0.5, canvas.right - 0.5, canvas.bottom - 0.5)
-        return Scene(canvas.scale, bounds)
+        """Return scale and size of the picture over which the run is drawn; raise InputError where there is none."""
+        return run_scene(self.validation(), self.results, self.run_data())
 
     def pose_editor(self, make: Callable[[], PoseEditor]) -> PoseEditor:
         """Return the editor of the rods' poses; a new one where the rods of the run have changed."""
@@ -309,12 +291,9 @@ class Project:
                 self._editor = stamp, make()
             return self._editor[1]
 
-    def given_scale(self) -> Scale:
-        """Return the scale of the experiment file; raise InputError where there is none."""
-        scale = self.validation().scale
-        if scale is None:
-            raise InputError(self.draft.file, "key photographs.pixel_size", "is missing: set the scale first")
-        return scale
+    def tracks_scale(self) -> Scale:
+        """Return the scale with which the tracks were made, which the experiment may not have any more."""
+        return tracks_scale(self.validation(), self.results)
 
     def stamp(self) -> str:
         """Return a text that changes with every file of the experiment and its run, whoever changed it."""
@@ -332,8 +311,7 @@ class Project:
             return self._outdated[1]
 
     def _run_overview(self) -> dict[str, Any] | None:
-        found = run_overview(self.results)
-        return None if found is None else found | {"out_of_date": self.out_of_date()}
+        return run_overview(self.results, self.out_of_date())
 
     def close(self) -> None:
         """Pause the run."""

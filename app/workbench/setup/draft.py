@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ...experiment.config.dotted_keys import leaves, with_values
 from ...experiment.config.experiment_file import find_wrong_values
 from ...experiment.experiment import CONFIG_NAME
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from .journal import Action, Contents, Journal, checksum_of
-from .toml_edit import MISSING, leaves, set_values, with_values
+from .toml_edit import MISSING, set_values
 
 Stamp = tuple[str, int, int, int, int]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -11,13 +10,11 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import RAW_SUFFIXES, in_order, natural_key
 from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
-from ...run_folder import SUMMARY, TRACKS, UNFINISHED
 from .toml_edit import set_values
 
 PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
@@ -142,25 +139,6 @@ def _link_picture(source: str, target: str) -> None:
 def run_folder(root: Path, name: str) -> Path:
     """Return the folder to which `rodsight run`, started in the root, writes its results."""
     return root / "runs" / name
-
-
-def run_overview(folder: Path) -> dict[str, Any] | None:
-    """Summarise a run for the first page; None where there is none."""
-    unfinished = (folder / UNFINISHED).is_dir()
-    try:
-        summary = json.loads((folder / SUMMARY).read_bytes())
-    except (OSError, ValueError):
-        return {"unfinished": unfinished} if unfinished or (folder / TRACKS).is_file() else None
-    trust = [each for each in summary.get("trust", []) if isinstance(each, int | float)]
-    return {
-        "unfinished": unfinished,
-        "frames": summary.get("frame_count"),
-        "rods": summary.get("grain_count"),
-        "status": summary.get("status_count", {}),
-        "trust": min(trust) if trust else None,
-        "lost": summary.get("lost_grains"),
-        "finished_at": (folder / SUMMARY).stat().st_mtime,
-    }
 
 
 def _listed(folder: Path) -> list[Path]:

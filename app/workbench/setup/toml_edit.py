@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, MutableMapping
-from copy import deepcopy
 from typing import Any
 
 import tomli_w
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
+
+from ...experiment.config.dotted_keys import with_values
 
 MISSING = object()  # value of a key that is not there
 
@@ -33,29 +34,6 @@ def set_values(content: str, keys: Mapping[str, Any]) -> str:
     except (TOMLKitError, ValueError, KeyError, TypeError, AttributeError, IndexError):
         pass
     return _first_comment(content) + tomli_w.dumps(wanted)
-
-
-def with_values(data: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of the values of a file with dotted keys set; a value None removes its key."""
-    data = deepcopy(data)
-    for key, value in keys.items():
-        *path, last = key.split(".")
-        place = data
-        for part in path:
-            place = place.setdefault(part, {})
-        if value is None:
-            place.pop(last, None)
-        else:
-            place[last] = value
-    return data
-
-
-def leaves(data: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Return every value that is no table, by its dotted key."""
-    found: dict[str, Any] = {}
-    for name, value in data.items():
-        found |= leaves(value, f"{before}{name}.") if isinstance(value, Mapping) else {f"{before}{name}": value}
-    return found
 
 
 def _first_comment(content: str) -> str:

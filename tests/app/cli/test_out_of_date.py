@@ -40,8 +40,9 @@ def pressure(root: Path) -> None:
     edit(root / "tracked" / "experiment.toml", "pressure = 50000.0", "pressure = 500000.0")
 
 
+PRESSURE = "walls.top.pressure was 50000 and is 500000"
 CHANGES = {
-    "experiment.toml has changed": pressure,
+    PRESSURE: pressure,
     "walls.csv has changed": lambda root: edit(root / "tracked" / "walls.csv", "0.", "0.0"),
     "truth_contacts.csv has been removed": lambda root: (root / "tracked" / "truth_contacts.csv").unlink(),
     "verdicts have changed": lambda root: VerdictLog(root / "runs/tracked" / VERDICTS).append(
@@ -67,6 +68,18 @@ def test_a_change_is_a_reason(root, reason):
     assert reason in out_of_date(root / "runs" / "tracked")
 
 
+def test_settings_that_are_new_gone_or_many_are_named(root):
+    file = root / "tracked" / "experiment.toml"
+    text = file.read_text().replace('name = "tracked"', 'name = "other"')
+    assert "[walls.top]" in text
+    text = text.replace("pressure = 50000.0", 'ends = "bar"') + "\n[solver]\nkappa = 0.1\nsweeps = 10\n"
+    file.write_text(text)
+    assert out_of_date(root / "runs" / "tracked")[:4] == [
+        "name was tracked and is other", "solver.kappa was not given and is 0.1",
+        "solver.sweeps was not given and is 10", "2 more settings have changed",
+    ]  # fmt: skip
+
+
 def test_other_code_is_a_reason(root, monkeypatch):
     monkeypatch.setattr(state, "hash_of_code", lambda *_: "other")
     assert out_of_date(root / "runs" / "tracked") == ["other code or libraries made it"]
@@ -76,7 +89,7 @@ def test_an_interrupted_run_of_newer_input_leaves_old_results_out_of_date(root):
     pressure(root)
     run = run_folder.Run(load_experiment(root / "tracked"), root / "runs" / "tracked")
     run.write_manifest()
-    assert out_of_date(run.folder) == ["experiment.toml has changed"]
+    assert out_of_date(run.folder) == [PRESSURE]
 
 
 def test_it_is_shared_only_with_a_flag(root, capsys):
@@ -84,7 +97,7 @@ def test_it_is_shared_only_with_a_flag(root, capsys):
     assert rodsight("share", root / "runs" / "tracked") == 2
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1
-    assert "is out of date: experiment.toml has changed" in printed
+    assert f"is out of date: {PRESSURE}" in printed
     assert rodsight("share", root / "runs" / "tracked", "--although-out-of-date") == 0
 
 
@@ -94,14 +107,15 @@ def test_the_viewer_is_opened_with_a_line(root, capsys, monkeypatch):
     assert "Out of date" not in capsys.readouterr().out
     pressure(root)
     assert rodsight("view", root / "runs" / "tracked") == 0
-    assert "Out of date: experiment.toml has changed" in capsys.readouterr().out
+    assert f"Out of date: {PRESSURE}" in capsys.readouterr().out
 
 
 def test_the_page_shows_it_and_refuses_to_share(root):
     assert Project(root, root / "tracked").overview()["run"]["out_of_date"] == []
     pressure(root)
     project = Project(root, root / "tracked")
-    assert project.overview()["run"]["out_of_date"] == ["experiment.toml has changed"]
+    assert project.overview()["run"]["out_of_date"] == [PRESSURE]
     visitor = Visitor(Workbench(root)).enter()
-    assert visitor.request("project", at="tracked")["run"]["out_of_date"] == ["experiment.toml has changed"]
+    assert visitor.request("project", at="tracked")["run"]["out_of_date"] == [PRESSURE]
+    assert visitor.request("project", at="tracked")["run"]["faults"][0] == f"Out of date: {PRESSURE}. Run again."
     assert "out of date" in visitor.refused("share", at="tracked")

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rodsight.experiment.config.dotted_keys import with_values
 from rodsight.process.errors import InputError
 from rodsight.workbench.setup.draft import Draft
-from rodsight.workbench.setup.toml_edit import set_values, with_values
+from rodsight.workbench.setup.toml_edit import set_values
 
 OWN = """# My experiment, 3 May
 # second line

@@ -8,6 +8,7 @@ import { layers, paintLayer, setLayer } from "/page/layers/settings.js";
 import { showLayers } from "/page/layers/panel.js";
 import { savePicture, saveTable } from "/page/parts/take_away.js";
 import { showLanes, jump } from "/page/time/lanes.js";
+import { runMark } from "/page/parts/run_state.js";
 import { Recording } from "/page/parts/recording.js";
 import { VERDICTS, COLOURS, beforeAfter, bodyName, drawMark, drawSelected, givenSection, hasReviewer, loadGiven, loadReviewer, pairName, reviewerField, samePair, viewOf } from "/page/parts/verdicts.js";
 import { measured } from "/page/units.js";
@@ -16,7 +17,7 @@ let facts = null, net = null, list = null, chosen = null, past = null, rodPast =
 
 export const inspect = {
   name: "inspect", title: "Inspect",
-  mark: (app) => (app.project.run?.frames !== undefined ? "good" : "missing"),
+  ofRun: true, mark: runMark,
   layers: ["photograph", "rods", "walls", "forces", "uncertainty", "contacts", "displacement", "strain", "marks"],
   dim: 0.72,
   hint: (app) => (!facts ? "" : chosen ? "C contact · N no contact · U unsure · Z undo · W without this contact" : "Click a contact or a rod"),

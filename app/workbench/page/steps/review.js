@@ -5,6 +5,7 @@ import { at, h, notify, request, strokeCircles } from "/page/dom.js";
 import { agreementSection } from "/page/parts/agreement.js";
 import { jump, showLanes } from "/page/time/lanes.js";
 import { CROP, cropAddress, cropWindow, drawOutlines, gapScale, intervalBar, svg } from "/page/parts/pair_drawing.js";
+import { runMark } from "/page/parts/run_state.js";
 import { COLOURS, beforeAfter, drawMark, drawSelected, givenSection, hasReviewer, loadGiven, loadReviewer, pairName, reviewerField, samePair, verdicts, viewOf } from "/page/parts/verdicts.js";
 
 const ORDERS = { influence: "By influence", frame: "Whole frame", sample: "Sample of all" };
@@ -25,7 +26,7 @@ globalThis.review = state; // for tests
 
 export const review = {
   name: "review", title: "Review", digits: "123",
-  mark: (app) => (app.project.run?.frames !== undefined ? "good" : "missing"),
+  ofRun: true, mark: runMark,
   hint: () => (!state.status ? "" : settings.blind ? "Blind, in random order: judge by the photograph alone. C contact · N no contact · U unsure · Z undo" : "C contact · N no contact · U unsure · Z undo · Space next · click: select or add a pair"),
   keyHelp: [["C N U, 1 2 3", "contact, no contact, unsure; then the next pair"], ["Z", "undo the last action"], ["Space, →", "next pair without a verdict"], ["←", "back to the pair before"], ["[ ], PageUp PageDown", "photograph before, next photograph"], ["M", "order: by influence, whole frame, sample of all"], ["B", "blind: the detector's answer is hidden"], ["O", "outlines on the crop"], ["+ −", "crop closer, farther"], ["W", "the whole photograph, or around the pair"], ["G", "go to a pair by name: two rods, or a rod and a wall"], ["R T I", "flag this photograph: rearrangement, reset, ignore"], ["J", "the next flagged frame"], ["click", "selects a candidate pair; in a gap without one adds the missed contact; on the crop as well"]],
   enter(app) { Object.assign(state, { pair: null, status: null, frame: null, visited: [], error: "" }); app.queue(() => begin(app)); },

@@ -4,20 +4,20 @@ import { request, digits, fact, h, sign, notify } from "/page/dom.js";
 import { drawLegends } from "/page/layers/colours.js";
 import { drawNetwork, loadLook, networkLegends } from "/page/layers/network.js";
 import { showLanes } from "/page/time/lanes.js";
+import { runMark } from "/page/parts/run_state.js";
 
 let source = null, job = null, facts = null, net = null, watching = null, following = true, alarmed = 0, predicted = null;
 
 export const run = {
   name: "run", title: "Run", layers: ["photograph", "forces", "uncertainty"],
   dim: 0.75,
-  mark: (app) => (app.project.run?.out_of_date?.length ? "doubtful" : app.project.run?.frames !== undefined ? "good" : app.project.run?.unfinished ? "doubtful" : "missing"),
+  ofRun: true, mark: runMark,
   enter(app) { app.queue(loadLook); listen(app); },
   leave() { source?.close(); source = null; watching = null; net = null; job = null; facts = null; predicted = null; },
   moved(app) { following = facts ? app.frame >= facts.count - 1 : true; load(app); },
   panel(app) {
     const { project } = app, state = job?.state ?? "idle", busy = state === "running" || state === "pausing";
     return [
-      project.run?.out_of_date?.length ? h("p", { id: "out-of-date" }, sign("doubtful"), `Out of date: ${project.run.out_of_date.join("; ")}. Run again.`) : null,
       project.ready ? h("p", {}, "The same as ", h("kbd", {}, `rodsight run ${quoted(project.at)}`), " typed in this folder. Pausing costs one frame at most.") : [h("p", {}, "Something is missing:"), h("div", { class: "list", id: "lacks" }, lacks(app))],
       h("div", { class: "row" },
         busy

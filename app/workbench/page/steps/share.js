@@ -1,13 +1,14 @@
 // Step 10: the recording as one HTML file that any browser opens, without a network, a server or this program.
 
 import { request, fact, h, parse, notify } from "/page/dom.js";
+import { runMark } from "/page/parts/run_state.js";
 
 let file = null, first = "", last = "", scale = 1, of = null;
 
 export const share = {
   name: "share", title: "Share",
   dim: 0.75,
-  mark: () => (file?.file && !file.old ? "good" : "missing"),
+  ofRun: true, mark: (app) => (file?.file && !file.old ? runMark(app) : "missing"),
   enter(app) {
     if (of !== app.project.at) { of = app.project.at; file = null; first = ""; last = ""; scale = 1; }
     app.queue(async () => { file = await request("shared", { at: app.project.at }); app.paint(); });
