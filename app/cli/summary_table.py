@@ -272,6 +272,15 @@ def _listed(frames: list[int]) -> str:
 
 
 def _scale_line(facts: dict[str, Any]) -> list[str]:
+    if facts.get("radius_factor", 0.0):
+        factor, deviation = 100.0 * facts["radius_factor"], 100.0 * facts["radius_factor_sd"]
+        reason = (
+            "rods at walls and corner discs distinguish it from a wrong pixel size"
+            if facts["walls_decide"]
+            else f"a pixel size wrong by {-factor / (1.0 + 0.01 * factor):+.2f} % would look the same"
+        )
+        low, high = (1.0 + 0.01 * (factor + sign * deviation) for sign in (-2.0, 2.0))
+        return [f"Radii: all {factor:+.2f} ± {deviation:.2f} %, a common factor of {low:.4f} to {high:.4f}; {reason}."]
     value, sd = 100 * facts["pixel_size"], 100 * facts["pixel_size_sd"]
     if sd == 0.0:
         return []  # not estimated

@@ -110,9 +110,10 @@ def _sample(
 def _without_own_corrections(tracks: Tracks, walls: WallTracks, calibration: Calibration) -> Tracks:
     """Restore every grain's own errors; corrections that all grains share stay."""
     own = rotate_offsets(measure_sequence(tracks, walls), calibration.offset)
+    shared = calibration.shared_radius(tracks.radius - calibration.radius)
     return replace(
         tracks,
-        radius=tracks.radius - (calibration.radius - calibration.radius_offset),
+        radius=tracks.radius - (calibration.radius - shared),
         position=tracks.position - own,
     )
 

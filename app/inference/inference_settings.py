@@ -65,6 +65,7 @@ def settings_of(config: InferenceSections) -> InferenceSettings:
             calibration.radius_class,
             _radius_offset(config),
             radii_are_metres(config),
+            _radius_factor(config),
         )
         if calibration.enabled
         else None,
@@ -80,6 +81,18 @@ def _radius_offset(config: InferenceSections) -> float:
     tracks = getattr(config, "tracks", None)
     given = tracks is not None and tracks.radius_offset != "estimate"
     return 0.0 if given else CalibrationSettings().radius_offset
+
+
+def _radius_factor(config: InferenceSections) -> float:
+    """Relative standard deviation of a factor of all radii; zero where their offset is given.
+
+    Radii that photographs were scaled by determine the pixel size, unless corner discs show which of both is wrong.
+    """
+    if _radius_offset(config) == 0.0:
+        return 0.0
+    tables = not isinstance(config, ExperimentFile) or config.photographs is None
+    discs = isinstance(config, ExperimentFile) and config.walls is not None and config.walls.corners is not None
+    return config.calibration.radius_factor if tables or discs else 0.0
 
 
 def sequence_settings(config: InferenceSections) -> SequenceSettings:

@@ -23,7 +23,7 @@ from .fit import ROUNDS, GapFit, fit_gaps
 from .gap_statistics import GapStatistics, gap_statistics, width_gain
 from .gaps import MeasuredSequence, measure_gaps
 from .priors import FINEST_SURFACE, CalibrationPriors, narrow_priors, prior_vector
-from .scale import ScaleErrors, find_scale
+from .scale import ScaleErrors, find_scale, scale_walls
 
 MIN_GAIN = 0.1  # relative narrowing of the gaps of touching pairs below which grains are not corrected
 SIGNIFICANT_SDS = 3.0  # standard deviations above which a correction is significant, or exceeds its prior
@@ -80,6 +80,20 @@ class Calibration:
     rounds: Annotated[int, Quantity("rounds of re-weighted least squares", absent=0)]
     applied: Annotated[bool, Quantity("whether the corrections were applied; if not, all are zero", absent=True)]
     verdict: Annotated[str, Quantity("why it was applied or not, for the user", absent="")]
+    radius_factor: Annotated[
+        float, Quantity("relative error that all radii share, part of radius", since=2, absent=0.0)
+    ] = 0.0
+    radius_factor_sd: Annotated[
+        float, Quantity("standard deviation of radius_factor; 0: not estimated", since=2, absent=0.0)
+    ] = 0.0
+    walls_decide: Annotated[
+        bool,
+        Quantity("rods at walls and discs separate radius_factor from pixel_size", since=2, absent=False),
+    ] = False
+
+    def shared_radius(self, radius: Array) -> Array:
+        """Return the part (n,) [m] of the correction of given radii (n,) [m] that all grains share."""
+        return self.radius_offset + self.radius_factor * radius
 
     def position_sd(self, sigma: float) -> float:
         """Compute the standard deviation [m] of a position for contact detection from the stated noise `sigma` [m].
@@ -111,7 +125,9 @@ class Calibration:
         walls by `move_walls`.
         """
         scale = 1.0 + self.pixel_size
-        endpoints = scale * sequence.endpoints if self.walls_follow else sequence.endpoints
+        endpoints = sequence.endpoints
+        if self.walls_follow:
+            endpoints = scale_walls(endpoints, scale, sequence.side)
         return MeasuredSequence(
             sequence.radius + self.radius,
             scale * sequence.position + self.lens * radial_distortion(sequence) + rotate_offsets(sequence, self.offset),
@@ -184,9 +200,10 @@ def _calibrate(
     scale = find_scale(sequence, limits, typical_overlap, radius_class)
     equations = GapEquations(scale.correct(sequence, radius_class), radius_class, walls_follow=scale.walls_follow)
     # A scale that may be right stays; a corrected one has its posterior standard deviation as prior.
+    # A factor of all radii is a scale of everything else: it is refined as one, and converted in the end.
     rest = replace(
-        limits, pixel_size=scale.pixel_size_sd if scale.found else 0.0, radius_class=0.0,
-        radius_offset=0.0,
+        limits, pixel_size=scale.pixel_size_sd + scale.radius_factor_sd if scale.found else 0.0, radius_class=0.0,
+        radius_offset=0.0, radius_factor=0.0,
     )  # fmt: skip
     start, width_ratio = narrow_priors(equations, rest, typical_overlap)
     lens_sd = _lens_sd(equations, start, typical_overlap, rng)
@@ -219,9 +236,14 @@ def _lens_sd(
 
 
 def default_priors(
-    sequence: MeasuredSequence, *, pixel_size: float = 0.0, radius_class: float = 0.0, radius_offset: float = 0.0
+    sequence: MeasuredSequence,
+    *,
+    pixel_size: float = 0.0,
+    radius_class: float = 0.0,
+    radius_offset: float = 0.0,
+    radius_factor: float = 0.0,
 ) -> CalibrationPriors:
-    """Build default priors; pixel_size, radius_class and radius_offset are relative."""
+    """Build default priors; pixel_size, radius_class, radius_offset and radius_factor are relative."""
     radius = float(sequence.radius.mean())
     if sequence.cell is not None:  # a simulation: no camera, and its size is given with the positions
         pixel_size, lens = 0.0, 0.0
@@ -231,7 +253,7 @@ def default_priors(
     return CalibrationPriors(
         centre, RADIUS_SD_FRACTION * centre, wall=DEFAULT_WALL_SD * 2.0 * radius, wall_tilt=DEFAULT_TILT_SD,
         pixel_size=pixel_size, lens=lens, radius_class=radius_class * radius,
-        radius_offset=radius_offset * radius,
+        radius_offset=radius_offset * radius, radius_factor=radius_factor,
     )  # fmt: skip
 
 
@@ -263,20 +285,23 @@ def _assess(
     radius_sd = sd[layout.radius]
     if equations.radius_class is not None:
         radius_sd = np.hypot(radius_sd, sd[layout.radius_class][equations.radius_class])
+    of_radii = scale.radius_factor_sd > 0.0
+    refined = float(unknowns[layout.scale][0])
+    shrunk = 1.0 + refined if of_radii else 1.0  # all lengths of the fit, so that positions stay as measured
     return Calibration(
-        offset=unknowns[layout.offset].reshape(-1, 2),
-        radius=equations.radius(unknowns) - sequence.radius,
-        wall=unknowns[layout.wall],
+        offset=unknowns[layout.offset].reshape(-1, 2) / shrunk,
+        radius=equations.radius(unknowns) / shrunk - sequence.radius,
+        wall=unknowns[layout.wall] / shrunk,
         wall_tilt=unknowns[layout.wall_tilt],
-        radius_offset=scale.radius_offset if applied else 0.0,
-        pixel_size=(1.0 + scale.pixel_size) * (1.0 + float(unknowns[layout.scale][0])) - 1.0,
-        lens=float(unknowns[layout.lens][0]),
-        walls_follow=scale.walls_follow,
+        radius_offset=scale.radius_offset / shrunk if applied else 0.0,
+        pixel_size=0.0 if of_radii else (1.0 + scale.pixel_size) * (1.0 + refined) - 1.0,
+        lens=float(unknowns[layout.lens][0]) / shrunk,
+        walls_follow=scale.walls_follow and not of_radii,
         offset_sd=sd[layout.offset].reshape(-1, 2),
         radius_sd=radius_sd,
         wall_sd=sd[layout.wall],
         wall_tilt_sd=sd[layout.wall_tilt],
-        pixel_size_sd=float(sd[layout.scale][0]) if scale.found else scale.pixel_size_sd,
+        pixel_size_sd=float(sd[layout.scale][0]) if scale.found and not of_radii else scale.pixel_size_sd,
         radius_offset_sd=scale.radius_offset_sd,
         lens_sd=float(sd[layout.lens][0]),
         gap_sd=fit.gap_sd,
@@ -287,13 +312,18 @@ def _assess(
         rounds=ROUNDS,
         applied=applied,
         verdict=verdict,
+        radius_factor=(1.0 + scale.radius_factor) / shrunk - 1.0 if of_radii else 0.0,
+        radius_factor_sd=float(sd[layout.scale][0]) if of_radii else 0.0,
+        walls_decide=scale.walls_decide,
     )
 
 
 def _scale_parts(scale: ScaleErrors) -> list[str]:
     parts = [] if abs(scale.pixel_size) <= scale.pixel_size_sd else ["pixel size"]
     parts += [] if abs(scale.radius_offset) <= scale.radius_offset_sd else ["all radii alike"]
-    if len(parts) and not scale.separable:
+    if abs(scale.radius_factor) > scale.radius_factor_sd:
+        parts.append("a factor of all radii")
+    elif len(parts) and not scale.separable:
         parts = ["pixel size or all radii alike, which rods of one size cannot separate"]
     return parts + (["radius classes"] if np.any(np.abs(scale.radius_class) > scale.radius_class_sd) else [])
 

@@ -30,6 +30,7 @@ class CalibrationSettings:
     radius_offset: float = 4e-3  # relative error common to all radii; 0: none
     # Whether radii were measured independently: those from photographs share the scale's error and cannot determine it.
     radii_are_known: bool = True
+    radius_factor: float = 0.0  # relative standard deviation of a factor common to all radii; 0: none
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +57,14 @@ class CalibrationPriors:
     radius_offset: Annotated[
         float, Quantity("prior standard deviation of the error that all radii share", "m", since=2)
     ] = 0.0
+    radius_factor: Annotated[
+        float, Quantity("prior standard deviation of a factor of all radii, relative", since=2, absent=0.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
         given = (
             self.centre, self.radius, self.wall, self.wall_tilt, self.pixel_size, self.lens, self.radius_class,
-            self.radius_offset,
+            self.radius_offset, self.radius_factor,
         )  # fmt: skip
         if not min(given) >= 0.0:
             raise ValueError("a prior standard deviation is negative or not a number")

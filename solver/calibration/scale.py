@@ -14,6 +14,9 @@ with ε the relative error of the pixel size, ω the error that all radii share,
 inside, and δR those of the classes. Typical errors are half a per cent for pixel sizes, zero or large for rims, and a
 thousandth for machined rods unless a class was mistaken: ε has a Gaussian prior, ω and every δR a Laplace prior, which
 selects the fewest causes that explain all gaps. Rods of one size cannot separate ε from ω.
+
+A factor 1 + ρ of all radii changes the gaps between grains as the pixel size does, with ρ = −ε. Walls separate them:
+the pixel size does not change the radius of a disc that was measured by itself, nor walls that were.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
-from ..bodies.wall_shapes import all_sides, wall_distance
+from ..bodies.wall_shapes import OUT, STRAIGHT, Sides, all_sides, circle_ends, circle_parameters, wall_distance
 from .gaps import MeasuredSequence, find_gap_rows, measure_gaps
 from .priors import CalibrationPriors
 
@@ -41,6 +44,10 @@ SIGNIFICANT_SDS = 3.0  # standard deviations above which an error is significant
 MIN_LIKELIHOOD_GAIN = 20.0  # gain in twice the log posterior above which the given scale is corrected
 REWEIGHTINGS = 60  # rounds for the Laplace priors
 NEGLIGIBLE = 1e-3  # of a prior: smaller errors of a class count as zero
+DISC_SD = 3e-3  # relative standard deviation of the radius of a disc of the boundary
+LEAST_WALL_SD = 1e-3  # of a mean radius: standard deviation of a wall, at least
+LARGEST_MISFIT = 25.0  # of a wall, squared: perhaps no grain touches it
+CONCLUSIVE = 9.0  # difference in twice the log likelihood of the walls above which factor and pixel size are separated
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +63,9 @@ class ScaleErrors:
     radius_offset: float = 0.0  # [m] from given to true radius, of all grains
     radius_offset_sd: float = 0.0
     separable: bool = True  # whether the gaps separate the pixel size from the offset of the radii
+    radius_factor: float = 0.0  # relative; true radii are (1 + radius_factor) times the given ones, beside the others
+    radius_factor_sd: float = 0.0
+    walls_decide: bool = False  # rods at the walls separate the pixel size from the factor of the radii
 
     def correct(self, sequence: MeasuredSequence, radius_class: NDArray[np.integer] | None) -> MeasuredSequence:
         """Apply the errors; radius_class (n,): the class of each grain, as for `find_scale`."""
@@ -65,10 +75,21 @@ class ScaleErrors:
         classes = np.zeros(sequence.grain_count, np.int64) if radius_class is None else radius_class
         return replace(
             sequence,
-            radius=sequence.radius + self.radius_offset + self.radius_class[classes],
+            radius=(1.0 + self.radius_factor) * sequence.radius + self.radius_offset + self.radius_class[classes],
             position=scale * sequence.position,
-            endpoints=scale * sequence.endpoints if self.walls_follow else sequence.endpoints,
+            endpoints=scale_walls(sequence.endpoints, scale, sequence.side)
+            if self.walls_follow
+            else sequence.endpoints,
         )
+
+
+def scale_walls(endpoints: Array, scale: float, side: Sides) -> Array:
+    """Scale bars and the centres of circles (f, w, 2, 2) [m]; discs that grains touch from outside keep their radii."""
+    scaled = scale * endpoints
+    if side is None or not np.any(side == OUT):
+        return scaled
+    centre, radius, angle = circle_parameters(endpoints)
+    return np.where((side == OUT)[:, None, None], circle_ends(scale * centre, radius, angle), scaled)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,30 +143,85 @@ def find_scale(
         0.0, priors.pixel_size, np.zeros(count), np.full(count, priors.radius_class),
         walls_follow=False, found=False, radius_offset_sd=priors.radius_offset,
     )  # fmt: skip
-    if priors.pixel_size == 0.0 and priors.radius_class == 0.0 and priors.radius_offset == 0.0:
+    if not any((priors.pixel_size, priors.radius_class, priors.radius_offset, priors.radius_factor)):
         return unchanged
-    peaks = _find_peaks(sequence.thinned(FRAMES), classes, overlap)
+    seen = sequence.thinned(FRAMES)
+    peaks = _find_peaks(seen, classes, overlap)
     if peaks is None:
         return unchanged
-    errors, sd, gain = _estimate_errors(peaks, count, priors)
-    # Each standard deviation contains the other error: one of the two has to be significant.
-    separable = bool(np.any(np.abs(errors[:2]) > SIGNIFICANT_SDS * sd[:2])) or 0.0 in (
-        priors.pixel_size,
-        priors.radius_offset,
-    )
-    if gain < MIN_LIKELIHOOD_GAIN:
-        return replace(
-            unchanged,
-            pixel_size_sd=float(sd[0]),
-            radius_offset_sd=float(sd[1]),
-            separable=separable,
-            radius_class_sd=sd[2:],
+    pixel, pixel_gain = _of_pixel_size(seen, peaks, priors, radius_class)
+    chosen, gain = pixel, pixel_gain
+    if priors.radius_factor > 0.0:
+        factor, factor_gain = _of_radius_factor(peaks, count, priors)
+        by_walls = _wall_evidence(seen, factor, priors, radius_class) - _wall_evidence(
+            seen, pixel, priors, radius_class
         )
+        if factor_gain + by_walls > pixel_gain:
+            chosen, gain = factor, factor_gain
+        chosen = replace(chosen, walls_decide=abs(by_walls) > CONCLUSIVE)
+    if gain >= MIN_LIKELIHOOD_GAIN:
+        return chosen
+    return replace(
+        unchanged,
+        pixel_size_sd=pixel.pixel_size_sd,
+        radius_offset_sd=pixel.radius_offset_sd,
+        separable=pixel.separable,
+        radius_class_sd=pixel.radius_class_sd,
+    )
+
+
+def _of_pixel_size(
+    sequence: MeasuredSequence,
+    peaks: _GapPeaks,
+    priors: CalibrationPriors,
+    radius_class: NDArray[np.integer] | None,
+) -> tuple[ScaleErrors, float]:
+    """Estimate the errors with one of the pixel size; also return twice the gain in log evidence."""
+    count = 1 if radius_class is None else int(radius_class.max(initial=0)) + 1
+    limit = np.concatenate([[priors.pixel_size, priors.radius_offset], np.full(count, priors.radius_class)])
+    errors, sd, gain = _estimate_errors(peaks, limit)
+    # Each standard deviation contains the other error: one of the two has to be significant.
+    separable = bool(np.any(np.abs(errors[:2]) > SIGNIFICANT_SDS * sd[:2])) or 0.0 in limit[:2]
     found = ScaleErrors(
         float(errors[0]), float(sd[0]), errors[2:], sd[2:], walls_follow=False, found=True,
         radius_offset=float(errors[1]), radius_offset_sd=float(sd[1]), separable=separable,
     )  # fmt: skip
-    return replace(found, walls_follow=_walls_follow(sequence.thinned(FRAMES), found, radius_class))
+    return replace(found, walls_follow=_walls_follow(sequence, found, radius_class)), gain
+
+
+def _of_radius_factor(peaks: _GapPeaks, count: int, priors: CalibrationPriors) -> tuple[ScaleErrors, float]:
+    """Estimate the errors with a factor of all radii in place of one of the pixel size, as `_of_pixel_size`.
+
+    Notes
+    -----
+    A wide prior has less evidence: the gain is reduced by 2 ln(σ_ρ/σ_ε), unless the pixel size is exact.
+    """
+    limit = np.concatenate([[priors.radius_factor, priors.radius_offset], np.full(count, priors.radius_class)])
+    errors, sd, gain = _estimate_errors(peaks, limit)
+    found = ScaleErrors(
+        0.0, 0.0, errors[2:], sd[2:], walls_follow=True, found=True, radius_offset=float(errors[1]),
+        radius_offset_sd=float(sd[1]), radius_factor=-float(errors[0]), radius_factor_sd=float(sd[0]),
+    )  # fmt: skip
+    return found, gain - 2.0 * np.log(priors.radius_factor / (priors.pixel_size or priors.radius_factor))
+
+
+def _wall_evidence(
+    sequence: MeasuredSequence,
+    found: ScaleErrors,
+    priors: CalibrationPriors,
+    radius_class: NDArray[np.integer] | None,
+) -> float:
+    """Return twice the log likelihood of the walls: −Σ min((g/σ)², 25), g: median gap of the nearest grain."""
+    if sequence.wall_count == 0:
+        return 0.0
+    side = all_sides(sequence.side, sequence.wall_count)
+    _, radius, _ = circle_parameters(sequence.endpoints[0])
+    sd = np.hypot(
+        max(priors.wall, LEAST_WALL_SD * float(sequence.radius.mean())),
+        np.where(side == STRAIGHT, 0.0, DISC_SD * radius),
+    )
+    misfit = (_median_gaps(found.correct(sequence, radius_class)) / sd) ** 2
+    return -float(np.minimum(misfit, LARGEST_MISFIT).sum())
 
 
 def _find_peaks(sequence: MeasuredSequence, classes: NDArray[np.int64], overlap: float) -> _GapPeaks | None:
@@ -190,8 +266,12 @@ def _densest(gap: Array, kernel: float) -> float:
     return float(bins[np.argmax(smooth)] + 0.125 * kernel)
 
 
-def _estimate_errors(peaks: _GapPeaks, count: int, priors: CalibrationPriors) -> tuple[Array, Array, float]:
-    """Estimate the errors (2 + c,), ε, ω and δR, their standard deviations, and the gain J(0) − J(x)."""
+def _estimate_errors(peaks: _GapPeaks, limit: Array) -> tuple[Array, Array, float]:
+    """Estimate the errors (2 + c,), ε, ω and δR, their standard deviations, and the gain J(0) − J(x).
+
+    limit (2 + c,): standard deviation or scale of their priors.
+    """
+    count = len(limit) - 2
     rows = np.arange(len(peaks.first))
     matrix = np.zeros((len(rows), 2 + count))
     matrix[:, 0] = peaks.distance
@@ -200,7 +280,6 @@ def _estimate_errors(peaks: _GapPeaks, count: int, priors: CalibrationPriors) ->
     np.add.at(matrix, (rows, 2 + peaks.second), -1.0)
     precision = np.linalg.inv(np.diag(peaks.sd**2) + peaks.common_sd**2)
     target = -peaks.excess
-    limit = np.concatenate([[priors.pixel_size, priors.radius_offset], np.full(count, priors.radius_class)])
     free = limit > 0.0
     gaussian = (np.arange(2 + count) < 1)[free]
     matrix, limit = matrix[:, free], limit[free]
@@ -234,8 +313,13 @@ def _walls_follow(sequence: MeasuredSequence, found: ScaleErrors, radius_class: 
 
 def _misfit(sequence: MeasuredSequence) -> float:
     """Sum over the walls the absolute median gap [m] of their nearest grains."""
+    return float(np.abs(_median_gaps(sequence)).sum())
+
+
+def _median_gaps(sequence: MeasuredSequence) -> Array:
+    """Return the median over photographs of the gap (w,) [m] of the nearest grain of every wall."""
     side = all_sides(sequence.side, sequence.wall_count)
     depth, _ = wall_distance(sequence.endpoints[:, None], side, sequence.position[:, :, None])
     gap = depth - sequence.radius[:, None]
     gap = np.where(sequence.present[..., None], gap, np.inf)
-    return float(np.abs(np.median(gap.min(axis=1), axis=0)).sum())
+    return np.median(gap.min(axis=1), axis=0)

@@ -60,6 +60,7 @@ def calibrate_tracks(
         pixel_size=settings.pixel_size if settings.radii_are_known else 0.0,
         radius_class=settings.radius_class if settings.radii_are_known else 0.0,
         radius_offset=settings.radius_offset,
+        radius_factor=settings.radius_factor if settings.radii_are_known else 0.0,
     )
     priors = replace(priors, lens=priors.lens if settings.lens else 0.0, radius=min(priors.radius, radius_prior))
     found = calibrate(

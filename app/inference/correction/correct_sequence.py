@@ -69,9 +69,6 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
-    if not nothing_seen:
-        span, remarks[4] = choose_span(tracks)
-        settings = replace(settings, sequence=replace(settings.sequence, span=span))
     if settings.calibration is not None:
         sequence = find_softness(inputs.material, settings.sequence, tracks, walls, failed)
         # Overlaps of soft grains are forces: calibration would remove them as errors.
@@ -82,6 +79,9 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             tracks, walls, calibration = calibrate_with_radii(inputs.material, *observed)
         else:
             tracks, walls, calibration = calibrate_tracks(*observed)
+    if not nothing_seen:  # calibration has measured the noise that hides the sliding
+        span, remarks[4] = choose_span(tracks)
+        settings = replace(settings, sequence=replace(settings.sequence, span=span))
     if settings.infer_unseen:
         tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius), settings.sequence.measured_overlap)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)

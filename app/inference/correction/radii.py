@@ -81,7 +81,7 @@ def _seen(
 def _correct_shared(found: Calibration, tracks: Tracks, walls: WallTracks) -> tuple[Tracks, WallTracks]:
     """Correct the errors that all grains share; their own centres and radii stay as given."""
     shared = replace(
-        found, offset=np.zeros_like(found.offset), radius=np.full(tracks.grain_count, found.radius_offset)
+        found, offset=np.zeros_like(found.offset), radius=found.shared_radius(tracks.radius)
     )  # fmt: skip
     better = shared.correct(measure_sequence(tracks, walls))
     return replace(tracks, radius=better.radius, position=better.position), replace(walls, endpoints=better.endpoints)

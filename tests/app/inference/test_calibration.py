@@ -10,7 +10,7 @@ from rodsight.cli.summary_table import calibration_lines
 from rodsight.experiment.config.experiment_file import ExperimentFile
 from rodsight.experiment.scaling import make_scale
 from rodsight.inference.correction.calibration import calibrate_tracks, radius_classes
-from rodsight.inference.inference_settings import radii_are_metres
+from rodsight.inference.inference_settings import radii_are_metres, settings_of
 from rodsight.results.calibration_summary import calibration_facts
 from rodsight.solver.calibration.calibrate import Calibration, calibrate
 from rodsight.solver.calibration.gaps import MeasuredSequence
@@ -52,6 +52,20 @@ def test_radii_determine_the_pixel_size_unless_they_were_measured_in_the_photogr
     assert radii_are_metres(photographed(radii=[7e-3, 8e-3]))
     assert not radii_are_metres(photographed())
     assert not radii_are_metres(photographed(radii=[7e-3], grains="grains.csv"))
+
+
+def test_all_radii_may_share_a_factor_unless_they_determine_the_pixel_size():
+    assert settings_of(config()).calibration.radius_factor == 0.02
+    assert settings_of(photographed(radii=[7e-3])).calibration.radius_factor == 0.0
+
+
+def test_the_summary_states_a_factor_of_all_radii_with_its_interval():
+    tracks, walls = square_lattice()
+    measured = replace(tracks, radius=0.98 * tracks.radius)
+    _, _, found = calibrate_tracks(CalibrationSettings(radius_factor=0.02), measured, walls, 0.0)
+    lines = " ".join(calibration_lines(calibration_facts(found, walls.name)))
+    assert "Radii: all +2.0" in lines
+    assert "pixel size wrong by -2.0" in lines
 
 
 def test_classes_are_the_different_radii():

@@ -103,6 +103,20 @@ def test_an_interrupted_sequence_of_close_photographs_continues_bit_for_bit(cont
         np.testing.assert_array_equal(one.ut, other.ut)
 
 
+def test_noise_that_hides_sliding_is_the_one_that_the_calibration_measured(contradicted, monkeypatch):
+    inputs, _ = contradicted
+    seen = []
+
+    def louder(material, settings, tracks, walls, *rest):
+        return replace(tracks, sigma=3.0 * tracks.sigma), walls, None
+
+    monkeypatch.setattr(correct_module, "calibrate_with_radii", louder)
+    monkeypatch.setattr(correct_module, "choose_span", lambda tracks: (seen.append(tracks.sigma.max()), (1, ""))[1])
+    corrected = correct_module.correct_sequence(inputs)
+    assert seen == [corrected.tracks.sigma.max()]
+    assert seen[0] >= 3.0 * inputs.tracks.sigma.max()
+
+
 def test_a_first_frame_that_cannot_be_estimated_stays_and_is_reported(contradicted, monkeypatch):
     inputs, _ = contradicted
     store, failures = MemoryStore(), []

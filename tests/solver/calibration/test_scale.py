@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT, circle_ends
 from rodsight.solver.calibration.calibrate import calibrate
 from rodsight.solver.calibration.gaps import MeasuredSequence
 from rodsight.solver.calibration.priors import CalibrationPriors
-from rodsight.solver.calibration.scale import ScaleErrors, find_scale
+from rodsight.solver.calibration.scale import ScaleErrors, find_scale, scale_walls
 
 RADII = np.array([7e-3, 8e-3, 11e-3])  # [m]
 FIELD = 0.05  # [m] side of the square that a pair has for itself
@@ -159,3 +160,63 @@ def test_calibration_reports_and_applies_the_pixel_size(rng):
         result.pixel_size, 0.0, np.zeros(1), np.zeros(1), walls_follow=result.walls_follow, found=True
     )  # fmt: skip
     np.testing.assert_allclose(result.correct(measured).position, scale.correct(measured, None).position)
+
+
+FACTOR_PRIORS = replace(PRIORS, radius_offset=4e-5, radius_factor=2e-2, wall=2e-5)
+DISC_RADIUS = 5e-3  # [m]
+
+
+def touch_discs(sequence: MeasuredSequence, rng: np.random.Generator) -> MeasuredSequence:
+    """Fix discs to the boundary, each touched by one grain of a pair, on the side away from the other."""
+    grains = 2 * rng.choice(sequence.grain_count // 2, 4, replace=False)
+    away = sequence.position[0, grains] - sequence.position[0, grains + 1]
+    away *= ((DISC_RADIUS + sequence.radius[grains]) / np.linalg.norm(away, axis=1))[:, None]
+    centre = sequence.position[:, grains] + away
+    discs = circle_ends(centre, np.full(centre.shape[:2], DISC_RADIUS), np.zeros(centre.shape[:2]))
+    return replace(
+        sequence,
+        endpoints=np.concatenate([sequence.endpoints, discs], axis=1),
+        side=np.array([STRAIGHT, STRAIGHT, OUT, OUT, OUT, OUT], np.int8),
+    )
+
+
+@pytest.mark.parametrize("error", [-2e-2, 1.5e-2])
+def test_discs_separate_a_factor_of_all_radii_from_the_pixel_size(rng, error):
+    true, classes = scatter_pairs(rng, noise=5e-6)
+    cornered = touch_discs(true, rng)
+    found = find_scale(replace(cornered, radius=cornered.radius * (1.0 + error)), FACTOR_PRIORS, 0.0, classes)
+    assert found.walls_decide
+    assert found.pixel_size == 0.0
+    assert found.radius_factor == pytest.approx(1.0 / (1.0 + error) - 1.0, abs=1e-3)
+
+    scaled = scale_walls(cornered.endpoints, 1.0 / (1.0 + error), cornered.side)
+    wrong_pixel = replace(cornered, position=cornered.position / (1.0 + error), endpoints=scaled)
+    found = find_scale(wrong_pixel, FACTOR_PRIORS, 0.0, classes)
+    assert found.walls_decide
+    assert found.radius_factor == 0.0
+    assert found.pixel_size == pytest.approx(error, abs=3e-3)  # the rest is within the priors of radii
+    np.testing.assert_allclose(found.correct(wrong_pixel, classes).endpoints, cornered.endpoints, atol=3e-3)
+
+
+def test_without_discs_the_wider_prior_explains_a_large_error_only(rng):
+    true, classes = scatter_pairs(rng, noise=5e-6)
+    large = find_scale(replace(true, radius=0.98 * true.radius), FACTOR_PRIORS, 0.0, classes)
+    assert large.radius_factor == pytest.approx(1.0 / 0.98 - 1.0, abs=1e-3)
+    assert not large.walls_decide
+    small = find_scale(replace(true, position=true.position / 1.003), FACTOR_PRIORS, 0.0, classes)
+    assert small.radius_factor == 0.0
+    assert small.pixel_size == pytest.approx(3e-3, abs=1e-3)
+
+
+def test_calibration_leaves_positions_where_radii_share_a_factor(rng):
+    true, classes = scatter_pairs(rng, noise=5e-6)
+    cornered = touch_discs(true, rng)
+    measured = replace(cornered, radius=0.98 * cornered.radius)
+    result = calibrate(measured, FACTOR_PRIORS, rng=rng, radius_class=classes)
+    assert result.applied
+    assert "factor of all radii" in result.verdict
+    assert result.pixel_size == 0.0
+    assert result.radius_factor == pytest.approx(1.0 / 0.98 - 1.0, abs=max(3.0 * result.radius_factor_sd, 5e-4))
+    corrected = result.correct(measured)
+    np.testing.assert_allclose(corrected.radius, true.radius, atol=1e-5)
+    np.testing.assert_allclose(corrected.position, measured.position, atol=1e-5)
