@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from ..solver.bodies.wall_shapes import IN, OUT, STRAIGHT, circle_ends
 from ..tracks import BAR, CORNER, UNSPECIFIED, WallTracks
 from .config.input_sections import WallsSection
 from .experiment import CELL_COLUMNS, Experiment, arrange_cell
-from .reading.corners import CORNER_COLUMNS, arrange_corners, bar_of_each_corner, bars_of_corners
+from .reading.corners import CORNER_COLUMNS, FrameCorners, arrange_corners, bar_of_each_corner, bars_of_corners
 from .reading.tables import Table, check_frames, check_unique
 
 ENDS = {"bar": BAR, "corner": CORNER, "auto": UNSPECIFIED}
@@ -25,7 +27,8 @@ def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
     """Return the walls in every frame, bars before circles; None where the packing has no boundary.
 
     Endpoints are NaN where they are to be tracked in the photographs: with `walls.track`, wherever the table has no
-    row; without it, where the table ends with frame 0. Circles are not tracked.
+    row; without it, where the table ends with frame 0. Of the circles, corner discs given in frame 0 alone are tracked,
+    unless `walls.track` is false, and with them the bars through their centres.
     """
     section = experiment.config.walls
     if section is None:
@@ -70,6 +73,42 @@ def read_walls(experiment: Experiment, frame_count: int) -> WallTracks | None:
         load=load,
         plate=plate,
     )
+
+
+def place_corners(experiment: Experiment, walls: WallTracks, centre: Array, angle: Array) -> WallTracks:
+    """Return the walls with corner discs, and the bars through their centres, where they were found in photographs.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        With `walls.corners`.
+    walls : WallTracks
+        Of f frames; the discs are the last ones.
+    centre : (f, c, 2)
+        Centres of the discs [m]; NaN: not found.
+    angle : (f, c)
+        Their rotations since frame 0 [rad].
+    """
+    section = experiment.config.walls
+    assert section is not None
+    assert section.corners is not None
+    table = experiment.table(section.corners, CORNER_COLUMNS, optional=("theta",))
+    given = arrange_corners(table, len(walls.endpoints), followed=True)
+    corners = FrameCorners(given.name, centre, given.radius, np.nan_to_num(given.angle[:1]) + angle)
+    endpoints = walls.endpoints.copy()
+    if section.file is None and section.arcs is None:
+        _, bars = bars_of_corners(table.file, corners)
+        endpoints[:, : bars.shape[1]] = bars
+    endpoints[:, walls.count - len(corners.name) :] = circle_ends(
+        centre, np.broadcast_to(corners.radius, angle.shape), corners.angle
+    )
+    return replace(walls, endpoints=endpoints)
+
+
+def follows_corners(experiment: Experiment) -> bool:
+    """Return whether corner discs that are given in frame 0 alone are tracked in photographs."""
+    section = experiment.config.walls
+    return experiment.config.photographs is not None and section is not None and section.track is not False
 
 
 def _no_walls(experiment: Experiment, frame_count: int) -> WallTracks:
@@ -194,7 +233,8 @@ def _read_bars(
         raise InputError(experiment.file, "key walls.track = true", "walls can be tracked in photographs only")
     if section.file is None and section.corners is not None and section.arcs is None:
         table = experiment.table(section.corners, CORNER_COLUMNS, optional=("theta",))
-        names, endpoints = bars_of_corners(table.file, arrange_corners(table, frame_count))
+        corners = arrange_corners(table, frame_count, followed=follows_corners(experiment))
+        names, endpoints = bars_of_corners(table.file, corners)
         return names, endpoints, np.full(len(names), STRAIGHT, np.int8)
     if section.file is None:
         return (), np.empty((frame_count, 0, 2, 2)), np.empty(0, np.int8)
@@ -211,7 +251,7 @@ def _read_corners(
     """Return names (c,), ends of diameters (f, c, 2, 2) [m] and the plate of every wall (w + c,), −1: its own."""
     assert section.corners is not None
     table = experiment.table(section.corners, CORNER_COLUMNS, optional=("theta",))
-    corners = arrange_corners(table, len(bars))
+    corners = arrange_corners(table, len(bars), followed=follows_corners(experiment))
     for at, each in enumerate(table.text("corner")):
         if each in others:
             raise table.error(at, "corner", "is the name of a wall, too: every wall and corner has a name of its own")

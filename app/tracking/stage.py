@@ -26,9 +26,10 @@ from ..process.frame_range import FrameRange
 from ..process.progress import Progress, no_progress
 from ..results.checkpoint import Checkpoint
 from ..solver.bodies.grains import Array
-from ..solver.bodies.wall_shapes import STRAIGHT, wall_distance
+from ..solver.bodies.wall_shapes import OUT, STRAIGHT, wall_distance
 from ..tracks import Tracks, WallTracks
 from . import DETECTIONS, PICTURES
+from .corner_discs import CORNERS, follow_corners
 from .detection.channels import count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from .detection.false_detections import describe_channels, describe_false_detections
@@ -107,7 +108,13 @@ def track_photographs(
     series = Series(photographs, read_times(experiment, count)[:stop], scale)
     if walls is not None:
         walls = walls.frames(0, stop)
-        if np.isnan(walls.endpoints).any():
+        discs = np.flatnonzero(np.isnan(walls.endpoints).any(axis=(0, 2, 3)) & (walls.sides == OUT))
+        if len(discs):
+            walls, tables[CORNERS] = follow_corners(
+                experiment, series, walls, Execution(workers, keep("corners"), progress)
+            )  # fmt: skip
+            missing_walls = _missing_walls_by_frame(walls, photographs)
+        if np.isnan(walls.endpoints[:, walls.sides == STRAIGHT]).any() and not missing_walls:
             straight = np.flatnonzero(walls.sides == STRAIGHT)
             bars = walls.select(straight)
             followed = follow_walls(
@@ -115,7 +122,8 @@ def track_photographs(
                 Execution(workers, keep("walls"), progress),
                 source=experiment.folder / ((experiment.config.walls and experiment.config.walls.file) or ""),
             )  # fmt: skip
-            endpoints, sigma = walls.endpoints.copy(), np.full(walls.endpoints.shape[:2], np.nan)
+            endpoints = walls.endpoints.copy()
+            sigma = np.full(walls.endpoints.shape[:2], np.nan) if walls.sigma is None else walls.sigma.copy()
             endpoints[:, straight] = followed.walls.endpoints
             sigma[:, straight] = np.sqrt((followed.sigma**2).mean(axis=2))
             walls = replace(walls, endpoints=endpoints, sigma=sigma)

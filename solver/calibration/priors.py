@@ -30,7 +30,7 @@ class CalibrationSettings:
     radius_offset: float = 4e-3  # relative error common to all radii; 0: none
     # Whether radii were measured independently: those from photographs share the scale's error and cannot determine it.
     radii_are_known: bool = True
-    radius_factor: float = 0.0  # relative standard deviation of a factor common to all radii; 0: none
+    radius_factor: float = 2e-2  # relative standard deviation of a factor common to all radii; 0: none
 
 
 @dataclass(frozen=True, slots=True)

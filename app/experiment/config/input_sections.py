@@ -209,7 +209,8 @@ class WallsSection(Section):
     corners: str | None = key(
         "Table frame,corner,x,y,radius of discs in metres that are fixed to the frame where two bars meet; rods touch "
         "them. Without `file`, the bars run through the centres of neighbouring corners. A disc turns with its bar, "
-        "unless a column theta in radians gives its rotation, and shares the load of a loaded bar.",
+        "unless a column theta in radians gives its rotation, and shares the load of a loaded bar. In photographs a "
+        "disc that is given in frame 0 alone is centred on its rim and followed; in tables it does not move.",
         default=None,
     )
     load: str | None = key(

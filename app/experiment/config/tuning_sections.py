@@ -15,7 +15,6 @@ from ...solver.calibration.priors import CalibrationSettings
 from ...solver.sequence.settings import SequenceSettings
 from .section import Finite, Frame, Pixels, Section, Switch, above, between, key, whole
 
-RADIUS_FACTOR = 0.02  # radii of an apparatus are known up to a common two per cent
 RODS, CALIBRATION, SEQUENCE = RodMaterial(), CalibrationSettings(), SequenceSettings()
 CHAIN, BOUNDARY = SEQUENCE.chain, BoundarySettings()
 
@@ -103,7 +102,7 @@ class CalibrationSection(Section):
     radius_factor: Annotated[float, between(0, 1)] = key(
         "Relative standard deviation of a factor common to all radii, of tracks in tables or where corner discs "
         "distinguish it from the pixel size; 0: none.",
-        default=RADIUS_FACTOR,
+        default=CALIBRATION.radius_factor,
     )
 
     camera: Switch = key(

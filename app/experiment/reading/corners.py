@@ -45,14 +45,15 @@ class FrameCorners:
         along = bars[:, :, 1] - bars[:, :, 0]
         direction = np.unwrap(np.arctan2(along[..., 1], along[..., 0]), axis=0)
         turned = np.column_stack([direction - direction[:1], np.zeros(len(bars))])[:, bar]
-        angle = np.where(np.isfinite(self.angle), self.angle, turned)
+        angle = np.where(np.isfinite(self.angle), self.angle, np.nan_to_num(turned))  # NaN: bars that are followed
         return circle_ends(self.centre, np.broadcast_to(self.radius, angle.shape), angle)
 
 
-def arrange_corners(table: Table, frame_count: int) -> FrameCorners:
+def arrange_corners(table: Table, frame_count: int, *, followed: bool = False) -> FrameCorners:
     """Return corner discs from a table frame,corner,x,y,radius and perhaps theta [rad].
 
-    A corner that is given in frame 0 alone does not move.
+    A corner that is given in frame 0 alone does not move, or is NaN in later frames where corners are followed in
+    photographs.
 
     Raises
     ------
@@ -74,6 +75,8 @@ def arrange_corners(table: Table, frame_count: int) -> FrameCorners:
     given[frame, row] = np.column_stack([table.numbers("x"), table.numbers("y"), table.optional_numbers("theta")])
     for corner, name in enumerate(names):
         if np.isfinite(given[0, corner, 0]) and np.isnan(given[1:, corner, 0]).all():
+            if followed:
+                continue
             given[:, corner] = given[0, corner]
         for k in np.flatnonzero(np.isnan(given[:, corner, 0])).tolist():
             raise InputError(
