@@ -34,6 +34,7 @@ from .inference.solve_frames import InferenceObserver
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError, RunError, UndeterminedError
+from .process.sources import hash_of_code
 from .results.checkpoint import Checkpoint
 from .results.hdf5.lazy_sequences import LazySequence
 from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
@@ -47,7 +48,7 @@ from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRA
 from .run_truth import load_truth, refuse_unnamed_truth
 from .solver.frame_forces import FrameStatus
 from .solver.parallel import available_cores
-from .stages import FORCES, PHOTOGRAPHS_SHOWN, TRACKING
+from .stages import EFFECTS, FORCES, PHOTOGRAPHS_SHOWN, TRACKING
 from .tracking import DETECTIONS, PICTURES
 from .tracks import Tracks, WallTracks
 from .verdicts.decisions import BodyNames, decide
@@ -173,10 +174,11 @@ def solve(run: Run) -> Results:
 
 
 def nominal_run(run: Run) -> tuple[Nominal, str]:
-    """Nominal run of the robustness study, with its fingerprint."""
+    """Nominal run of the robustness study, with the fingerprint of effects that are measured from it."""
     log = VerdictLog(run.file(VERDICTS)).snapshot()
     results, inputs = _solve_with_inputs(run, log)
-    return Nominal.of(inputs, results, load_truth(run, results)), run.origin(FORCES, log).fingerprint
+    fingerprint = f"{run.origin(FORCES, log).fingerprint} {hash_of_code(EFFECTS.code)}"
+    return Nominal.of(inputs, results, load_truth(run, results)), fingerprint
 
 
 def stored_inputs(file: Path) -> tuple[Inputs, Results]:
@@ -209,7 +211,10 @@ def solved_inputs(run: Run) -> tuple[Inputs, Results, TruthContacts | None]:
 
 
 def _solve_with_inputs(run: Run, log: VerdictLog) -> tuple[Results, Inputs]:
+    began = time.perf_counter()
     results = _solve(run, log)
+    if run.timings.seconds:  # they are new
+        conclude(run, results, load_truth(run, results), began)
     tracks, walls = track(run)
     assert walls is not None
     return results, _inputs_of_solved(run, log, results, tracks, walls)
@@ -310,8 +315,9 @@ class _RunObserver(InferenceObserver):
 
 
 def _store(run: Run, results: Results, origin: Provenance, log: VerdictLog) -> Results:
-    """Results as they are read back from their file: a frame at a time."""
+    """Results as they are read back from their file: a frame at a time. A summary of earlier results is removed."""
     save_results(run.file(RESULTS), results, origin)
+    run.file(SUMMARY).unlink(missing_ok=True)
     run.manifest.add(RESULTS, origin.fingerprint, origin.program | run.state_of_input(log))
     return load_results(run.file(RESULTS))
 
@@ -387,6 +393,7 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     run.file(SIDE).unlink(missing_ok=True)  # of a previous recording
     if run.full_frames:
         run.notes.append(write_side_file(results, file, run.file(SIDE), run.full_frames))
+    run.manifest.note(RECORDING, {"results": run.manifest.piece(RESULTS).get("sha256")})
     run.timings.add("recording", since)
     return file
 

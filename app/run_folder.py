@@ -8,7 +8,6 @@ import os
 import re
 import shutil
 import time
-import tomllib
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -18,9 +17,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from . import __version__
-from .experiment.config.dotted_keys import leaves
 from .experiment.config.experiment_file import as_toml
-from .experiment.experiment import Experiment, checksums, named_inputs
+from .experiment.experiment import Experiment, Stamp, checksums, stamp_of_input
+from .experiment.reading.input_files import regular
 from .process.atomic import PART
 from .process.errors import InputError
 from .process.frame_range import ALL_FRAMES, FrameRange
@@ -47,6 +46,7 @@ OWN = (
     TRACKS, RESULTS, RECORDING, f"{RECORDING}.whole", SUMMARY, REPORT, SIDE, MANIFEST, "detections.csv",
     "tracked_walls.csv",
 )  # fmt: skip
+SAMPLED = 8  # input files, about, that are compared to recognise an experiment in another place
 UNFINISHED = ".unfinished"  # folder of checkpoints
 TRACKED = ".tracked"  # folder of the frames of a finished tracking, for the next one with other corrections
 # Settings that leave tracks and forces as they are.
@@ -89,6 +89,7 @@ class Run:
     full_frames: tuple[int, ...] = ()  # frames whose every sweep is written to a side file; the recording is thinned
     notes: list[str] = field(default_factory=list)  # sentences for the user
     keep_old: bool = False  # results of other code are used as they are
+    stamps: dict[str, Stamp] = field(default_factory=dict)  # of input files by name, before they were read
 
     def file(self, name: str) -> Path:
         """Return the path of a file in the run's folder."""
@@ -117,6 +118,10 @@ class Run:
         """
         without = ERROR_BARS if corrected else ERROR_BARS | BY_HAND
         config = self.experiment.config.model_dump(mode="json", include=set(stage.sections), exclude=without)
+        for file, name in self.experiment.named_inputs().items():
+            if name not in self.stamps:
+                with suppress(OSError):  # it is missing, which the next line reports
+                    self.stamps[name] = stamp_of_input(file)
         sums = checksums(self.experiment, corrected=corrected)
         verdicts = fingerprint(log) if log is not None else ""
         inputs = _hash_of([config, sums, self.frames.stored, verdicts])
@@ -131,15 +136,17 @@ class Run:
 
     def _ownership(self) -> dict[str, str]:
         file = self.experiment.file.resolve()
-        place = Path(os.path.relpath(file, self.folder.resolve())).as_posix()
-        return {"name": self.experiment.name, "experiment": place}
+        relative = Path(os.path.relpath(file, self.folder.resolve())).as_posix()
+        return {"name": self.experiment.name, "experiment": relative, "place": os.fspath(file)}
 
     def state_of_input(self, log: VerdictLog) -> dict[str, Any]:
         """Return what results were made from, as the manifest stores it beside them."""
         return {
             "files": checksums(self.experiment),
-            "stamps": input_stamps(self.experiment),
-            "file_settings": settings_in_file(self.experiment.file),
+            "stamps": {
+                name: self.stamps[name] for name in self.experiment.named_inputs().values() if name in self.stamps
+            },
+            "file_settings": self.experiment.file_settings,
             "verdicts": fingerprint(log),
         }
 
@@ -281,9 +288,46 @@ def refuse_foreign_folder(folder: Path, experiment: Experiment) -> None:
 
 
 def owner_of(folder: Path) -> Path | None:
-    """Return the experiment file that a run's folder belongs to, whether or not it exists; None: it is free."""
-    stored = Manifest(folder).fact("experiment")
-    return Path(os.path.normpath(folder.resolve() / stored)) if isinstance(stored, str) else None
+    """Return the experiment file that a run's folder belongs to, whether or not it exists; None: it is free.
+
+    Where the folder was copied or moved, the experiment at the same relative place is the owner if its input is that of
+    the run; else it is still the one at its former place.
+    """
+    manifest = Manifest(folder)
+    stored, place = manifest.fact("experiment"), manifest.fact("place")
+    if not isinstance(stored, str):
+        return None
+    beside = Path(os.path.normpath(folder.resolve() / stored))
+    former = Path(place) if isinstance(place, str) else beside
+    inputs = manifest.fact("inputs")
+    if is_same_file(beside, former) or not isinstance(inputs, dict) or has_input(beside, inputs):
+        return beside
+    return former
+
+
+def has_input(file: Path, sums: dict[str, str]) -> bool:
+    """Whether an experiment file has the input of a run, of which some may have changed.
+
+    Parameters
+    ----------
+    file : Path
+        The experiment file.
+    sums : dict
+        SHA-256 of the run's input by name, of the experiment file or of half of a sample of the other files.
+    """
+    if _hash_of_file(file) == sums.get(file.name, ""):
+        return True
+    inside = [name for name in sorted(sums) if name != file.name and ".." not in Path(name).parts]
+    sample = [file.parent / name for name in inside[:: len(inside) // SAMPLED + 1]]
+    alike = sum(_hash_of_file(each) == sums[each.relative_to(file.parent).as_posix()] for each in sample)
+    return file.is_file() and 2 * alike >= len(sample) > 0
+
+
+def _hash_of_file(file: Path) -> str | None:
+    try:
+        return hashlib.sha256(regular(file).read_bytes()).hexdigest()
+    except (OSError, ValueError, InputError):  # ValueError: a name that no file can have
+        return None
 
 
 def is_same_file(one: Path, other: Path) -> bool:
@@ -296,36 +340,23 @@ def is_same_file(one: Path, other: Path) -> bool:
         return False
 
 
-def input_stamps(experiment: Experiment) -> dict[str, list[int]]:
-    """Return size, number and times of every input file by its name: unchanged, its content is, too."""
-    stamps = {}
-    for file, name in named_inputs(experiment).items():
-        with suppress(OSError):  # it is missing
-            status = file.stat()
-            stamps[name] = [status.st_size, status.st_ino, status.st_mtime_ns, status.st_ctime_ns]
-    return stamps
-
-
-def settings_in_file(file: Path) -> dict[str, Any] | None:
-    """Return the settings of an experiment file by dotted keys, without comments; None where it is no TOML."""
-    try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-        return leaves(json.loads(json.dumps(content, default=str)))
-    except (OSError, ValueError, RecursionError):
-        return None
-
-
 def _inputs_of(experiment: Experiment) -> dict[str, str]:
     """Checksums of all input by name, the experiment file included."""
     return {experiment.file.name: experiment.inputs.checksum(experiment.file), **checksums(experiment)}
 
 
 def find_experiment(results: Path, origin: Provenance) -> Path:
-    """Return the experiment file of results, by the folder's manifest or else by the results themselves."""
-    stored = Manifest(results.parent).fact("experiment")
-    file = results.parent / stored if isinstance(stored, str) else Path(origin.experiment)
-    if not file.is_file():
+    """Return the experiment file of results, by the folder's manifest or else by the results themselves.
+
+    Without a manifest the name of a file says little: what it names must have the input of the results.
+    """
+    file = owner_of(results.parent)
+    if file is None and has_input(Path(origin.experiment), origin.checksums):
+        file = Path(origin.experiment)
+    if file is None or not file.is_file():
         raise InputError(
-            results, f"experiment {file}", "is missing: its folder was moved; run it again with this --out"
+            results,
+            f"experiment {file or origin.experiment}",
+            "is not at hand, or was moved: run it again with this --out",
         )
     return file.resolve()

@@ -15,7 +15,8 @@ class Stage(NamedTuple):
 
 TRACKING = Stage(
     ("photographs", "tracking", "walls", "boundary"),
-    ("tracking/stage.py", "tracking/corrected_frames.py", "experiment/boundary.py"),
+    ("tracking/stage.py", "tracking/corrected_frames.py", "experiment/boundary.py", "results/hdf5/store.py"),
+    alone=("pipeline.py",),
 )
 FORCES = Stage(
     (
@@ -25,8 +26,9 @@ FORCES = Stage(
     (
         *TRACKING.code, "experiment/experiment.py", "inference/infer_sequence.py", "inference/inference_settings.py",
         "inference/inputs.py", "results/hdf5/store.py", "robustness/ensemble_sd.py", "robustness/error_budget.py",
-        "verdicts/decisions.py",
+        "verdicts/decisions.py", "inference/diagnosis/diagnose.py",
     ),
     alone=("pipeline.py",),
 )  # fmt: skip
+EFFECTS = Stage((), ("robustness/study.py",))  # of the runs of a sensitivity study
 PHOTOGRAPHS_SHOWN = Stage(("photographs",), ("experiment/photographs.py", "experiment/jpeg_photographs.py"))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from ..process.errors import InputError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..results.results import Results
     from ..run_folder import Run
 
@@ -24,6 +26,19 @@ def recording_file(path: Path) -> Path:
     from ..run_folder import RECORDING
 
     return path / RECORDING if path.is_dir() else path
+
+
+def warn_out_of_date(path: Path, console: Console | None = None) -> None:
+    """Print why a run is out of date, by its folder, results.h5 or recording; by default to standard error."""
+    from rich.console import Console as RichConsole
+
+    from ..out_of_date import state_of_source
+    from .terminal import print_line
+
+    reasons = state_of_source(path)
+    if reasons:
+        text = f"Out of date: {'; '.join(reasons)}. Run the experiment again."
+        print_line(console or RichConsole(stderr=True), text)
 
 
 def has_experiment(path: Path) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +17,7 @@ from ..process.errors import InputError
 from ..solver.bodies.cell import unwrap_cell
 from ..solver.bodies.grains import Array
 from ..tracks import Tracks, TrackStatus
+from .config.dotted_keys import leaves
 from .config.experiment_file import ExperimentFile, load_config
 from .photographs import Channel, ImageSelection, Photographs
 from .reading.input_files import InputFiles
@@ -24,6 +28,9 @@ POSITION_COLUMNS = ("frame", "id", "x", "y")  # of a pose without its rotation
 GRAIN_COLUMNS, POSE_COLUMNS = ("id", "radius"), ("frame", "id", "x", "y", "theta")
 TIME_COLUMNS, CELL_COLUMNS = ("frame", "time"), ("frame", "ax", "ay", "bx", "by")
 FLAT = 1e-9  # sine of the angle between the vectors of a cell, at most, that has no area
+
+
+Stamp = list[int]  # size, number and times of a file: as long as they are unchanged, its content is, too
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +50,7 @@ class Experiment:
     file: Path
     config: ExperimentFile
     inputs: InputFiles = field(default_factory=InputFiles, compare=False)
+    file_settings: dict[str, Any] | None = field(default=None, compare=False)  # in the file as it was read
 
     @property
     def folder(self) -> Path:
@@ -64,6 +72,10 @@ class Experiment:
     def table(self, name: str, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
         """Read a table of the experiment's folder. Raises InputError with file, row and value."""
         return read_table(self.folder / name, columns, self.inputs, optional)
+
+    def named_inputs(self) -> dict[Path, str]:
+        """Return a name of every input file, as `checksums` lists it."""
+        return _names_of(self.input_files(), self.folder)
 
     def input_files(self) -> list[Path]:
         """Return all input files of the experiment, photographs included."""
@@ -91,7 +103,22 @@ def load_experiment(path: Path, settings: Sequence[str] = (), *, root: Path | No
     if not file.exists():
         raise InputError(file, "", "there is no such file; an experiment is a folder with experiment.toml")
     inputs = InputFiles(root)
-    return Experiment(file, load_config(file, tuple(settings), inputs), inputs)
+    config = load_config(file, tuple(settings), inputs)
+    return Experiment(file, config, inputs, settings_of_file(inputs.read(file)))
+
+
+def settings_of_file(content: bytes) -> dict[str, Any] | None:
+    """Return the settings of an experiment file by dotted keys, without comments; None where it is no TOML."""
+    try:
+        return leaves(json.loads(json.dumps(tomllib.loads(content.decode("utf-8")), default=str)))
+    except (ValueError, RecursionError):
+        return None
+
+
+def stamp_of_input(file: Path) -> Stamp:
+    """Return size, number and times of a file. Raises OSError."""
+    status = file.stat()
+    return [status.st_size, status.st_ino, status.st_mtime_ns, status.st_ctime_ns]
 
 
 def checksums(experiment: Experiment, *, corrected: bool = True) -> dict[str, str]:
@@ -109,11 +136,6 @@ def checksums(experiment: Experiment, *, corrected: bool = True) -> dict[str, st
         except OSError as error:
             raise InputError(file, "", f"cannot be read ({error.strerror})") from None
     return result
-
-
-def named_inputs(experiment: Experiment) -> dict[Path, str]:
-    """Return a name of every input file, as `checksums` lists it."""
-    return _names_of(experiment.input_files(), experiment.folder)
 
 
 def _names_of(files: Sequence[Path], folder: Path) -> dict[Path, str]:

@@ -21,7 +21,7 @@ from ..results.truth import TRUTH_COLUMNS, accuracy, read_truth
 from ..results.truth import score as score_frames
 from ..run_folder import Run as RunFolder
 from ..run_folder import find_experiment
-from ..run_truth import load_truth
+from ..run_truth import load_truth, truth_beside
 from ..solver.contacts.pairs import align
 from .run import Run, open_run
 
@@ -194,7 +194,13 @@ def _truth_of(run: Run, truth: str | PathLike[str] | pd.DataFrame | None) -> Tru
             raise InputError("truth", "", "is missing: a run in memory has no experiment; give a table of true forces")
         return _read(Path(truth), run)
     origin = origin_of(run.file)
-    folder = RunFolder(load_experiment(find_experiment(run.file, origin)), run.file.parent, origin.frames)
+    try:
+        experiment = find_experiment(run.file, origin)
+    except InputError:  # results.h5 stands alone
+        if truth is None:
+            raise
+        return truth_beside(run.file, results, Path(truth))
+    folder = RunFolder(load_experiment(experiment), run.file.parent, origin.frames)
     known = load_truth(folder, results, None if truth is None else Path(truth))
     if known is None:
         raise InputError(folder.experiment.file, "key truth", "is missing: give a table of true forces")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -16,6 +17,7 @@ from .. import pipeline
 from ..exchange.tidy_tables import TableName, make_table
 from ..experiment.config.unused_keys import refuse_unused_keys
 from ..experiment.experiment import load_experiment
+from ..out_of_date import state_of_source
 from ..process.frame_range import ALL_FRAMES, FrameRange
 from ..process.progress import Progress
 from ..results.hdf5.store import load_results
@@ -178,7 +180,18 @@ class Run:
         >>> rodsight.open("runs/shear").summary()["resets"]
         [0]
         """
-        return summarize(self.results, None, {})
+        return summarize(self.results, None, {}) | {"out_of_date": self.out_of_date}
+
+    @cached_property
+    def out_of_date(self) -> list[str]:
+        """Reasons for which the run is out of date, such as "walls.csv has changed"; empty: it belongs to its input.
+
+        Examples
+        --------
+        >>> rodsight.open("runs/shear").out_of_date
+        []
+        """
+        return [] if self.file is None else state_of_source(self.file)
 
     def dataset(self) -> xarray.DataTree:
         """Return all results as an xarray.DataTree with dimensions, labels and units; paths as in results.h5.
@@ -271,7 +284,8 @@ class Run:
 
     def __repr__(self) -> str:
         tracks = self.results.tracks
-        return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames>"
+        state = f", out of date: {'; '.join(self.out_of_date)}" if self.out_of_date else ""
+        return f"<rodsight.Run {self.name!r}: {tracks.grain_count} grains, {tracks.frame_count} frames{state}>"
 
     def checked_frame(self, frame: int) -> int:
         """Return the frame. Raises IndexError if there is no such frame.
@@ -361,6 +375,8 @@ def run(
 def open_run(path: str | PathLike[str]) -> Run:
     """Open the results of a run of any version.
 
+    A run whose input, settings or code have changed since is opened with a warning; `Run.out_of_date` states why.
+
     Parameters
     ----------
     path : path
@@ -382,4 +398,7 @@ def open_run(path: str | PathLike[str]) -> Run:
     file = Path(path) / RESULTS if Path(path).is_dir() else Path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file}: there are no results")
-    return Run(file)
+    found = Run(file)
+    if found.out_of_date:
+        warnings.warn(f"{file} is out of date: {'; '.join(found.out_of_date)}; run the experiment again", stacklevel=2)
+    return found

@@ -40,6 +40,10 @@ class Manifest:
         entry = {"made_from": fingerprint, "sha256": _digest(self.folder / name), **(program or {})}
         self.store({"pieces": self._pieces() | {name: entry}})
 
+    def note(self, name: str, facts: dict[str, Any]) -> None:
+        """List a file with facts about it, without its checksum."""
+        self.store({"pieces": self._pieces() | {name: facts}})
+
     def piece(self, name: str) -> dict[str, Any]:
         """Return the entry of a file; empty where it is not listed."""
         return self._pieces().get(name, {})

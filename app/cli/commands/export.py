@@ -10,7 +10,7 @@ from rich.console import Console
 
 from ...process.errors import InputError
 from ..arguments import Frames, Quiet, parse_frames, refuse_step
-from ..stored_results import recording_file, results_file
+from ..stored_results import recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, progress_of
 
 Kind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
@@ -79,6 +79,7 @@ def export(
 
     _refuse_other_options(what, given)
     console = Console(quiet=quiet)
+    warn_out_of_date(source)
     folder = source if source.is_dir() else source.parent
     if what in ("pictures", "video"):
         recording = source if source.suffix == ".rrd" else recording_file(folder)
@@ -154,10 +155,9 @@ def share(
 
 def refuse_out_of_date(recording: Path) -> None:
     """Raise InputError where the input of a recording's run has changed since it was computed."""
-    from ...out_of_date import out_of_date
-    from ...run_folder import RECORDING
+    from ...out_of_date import state_of_source
 
-    reasons = out_of_date(recording.parent) if recording.name == RECORDING else []
+    reasons = state_of_source(recording)
     if reasons:
         raise InputError(
             recording, "", f"is out of date: {'; '.join(reasons)}; run the experiment again, or --although-out-of-date"

@@ -256,9 +256,13 @@ def record(
     if _is_results(experiment):
         return _record_alone(request, sweeps)
     request = request.with_setting("recording.sweeps", sweeps)
+    began = time.perf_counter()
     with open_run(request) as run:
         results = pipeline.solve(run)
-        recording = pipeline.record(run, results, load_truth(run, results))
+        truth = load_truth(run, results)
+        if run.timings.seconds:  # the results are new, and so is their summary
+            pipeline.conclude(run, results, truth, began)
+        recording = pipeline.record(run, results, truth)
     console = request.console
     _print_notes(run, console)
     return show(recording, "none", console)

@@ -16,7 +16,7 @@ from rich.table import Table
 from ...process.browser import open_page
 from ...process.errors import InputError
 from ..arguments import AsJson, Browser, Port, ResultsPath
-from ..stored_results import has_experiment, load_run, recording_file, results_file
+from ..stored_results import has_experiment, load_run, recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, table_console
 
 if TYPE_CHECKING:
@@ -55,18 +55,15 @@ def view(
 
     Example: rodsight view runs/shear --web
     """
-    from ...out_of_date import out_of_date
     from ...recording.parts import parts_of
-    from ...run_folder import RECORDING, SIDE
+    from ...run_folder import SIDE
 
     file = recording_file(recording)
     if recording.is_dir() and (only_list or not file.is_file()):
         return _view_folder(recording, web=web, only_list=only_list, console=table_console())
     if not file.is_file():
         raise InputError(file, "", "there is no such recording")
-    reasons = out_of_date(file.parent) if file.name == RECORDING else []
-    if reasons:
-        print_line(Console(), f"Out of date: {'; '.join(reasons)}. Run the experiment again.")
+    warn_out_of_date(file, Console())
     side = file.with_name(SIDE)
     also = (side,) if recording.is_dir() and side.is_file() else ()
     if web:
@@ -131,6 +128,7 @@ def score(
     from ...run_truth import load_truth
     from ...study.baselines import baseline_lists, score_baselines
 
+    warn_out_of_date(results)
     if truth is not None and not has_experiment(results):
         return _score_alone(results_file(results), truth, as_json=as_json, fit_threshold=fit_threshold)
     run, solved = load_run(results)
@@ -214,6 +212,8 @@ def compare(
     if (second is None) != truth:
         raise InputError("compare", "", "give two results, or one and --truth")
     names = _names(first, second)
+    for path in (first,) if second is None else (first, second):
+        warn_out_of_date(path)
     if second is None:
         comparison = _compare_with_truth(first, names[0])
     else:
@@ -298,14 +298,19 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
 
 def _list_entries(folder: Path, entries: list[CatalogueRow], console: Console) -> None:
     """Print the recordings of a folder with their properties as columns."""
+    from ...out_of_date import state_of_source
+
+    states = ["; ".join(state_of_source(entry.file)) for entry in entries]
     shown = [column for column in COLUMNS if any(column[1] in (entry.properties or ()) for entry in entries)]
     table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("recording")
     for heading, _, form in shown:
         table.add_column(heading, justify="right" if form else "left", no_wrap=True)
-    for entry in entries:
+    if any(states):
+        table.add_column("out of date")
+    for entry, state in zip(entries, states, strict=True):
         cells = [_cell((entry.properties or {}).get(name), form) for _, name, form in shown]
-        table.add_row(str(entry.file.relative_to(folder)), *cells)
+        table.add_row(str(entry.file.relative_to(folder)), *cells, *([state] if any(states) else []))
     console.print(table)
     for entry in entries:
         if entry.properties is None:

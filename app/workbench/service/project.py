@@ -19,7 +19,7 @@ from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Channel, Image, ImageSelection, read_photograph
 from ...experiment.reading.input_files import InputFiles
 from ...experiment.units import Scale
-from ...out_of_date import out_of_date
+from ...out_of_date import recording_out_of_date
 from ...prediction import measure_photographs
 from ...process.errors import InputError
 from ...results.manifest import MANIFEST
@@ -298,7 +298,7 @@ class Project:
     def stamp(self) -> str:
         """Return a text that changes with every file of the experiment and its run, whoever changed it."""
         data = self.draft.data()
-        written = [stamp_of(self.results / name) for name in (VERDICTS, SUMMARY)]
+        written = [stamp_of(self.results / name) for name in (VERDICTS, SUMMARY, MANIFEST)]
         stamps = self.draft.stamps(_tables(data)), self._pattern_stamp(data), run_stamp(self.results)[1:]
         return f"{zlib.crc32(repr((stamps, written)).encode()):08x}"
 
@@ -307,7 +307,7 @@ class Project:
         with self.lock:
             stamp = self.stamp()
             if self._outdated is None or self._outdated[0] != stamp:
-                self._outdated = stamp, out_of_date(self.results, self.root)
+                self._outdated = stamp, recording_out_of_date(self.results, self.root)
             return self._outdated[1]
 
     def _run_overview(self) -> dict[str, Any] | None:

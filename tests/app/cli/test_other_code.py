@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
+import threading
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import h5py
 import pytest
-from rodsight import run_folder
+from rodsight import pipeline, run_folder
 from rodsight.experiment.experiment import load_experiment
-from rodsight.pipeline import FORCES, TRACKING
-from rodsight.process.sources import program_sources
+from rodsight.pipeline import EFFECTS, FORCES, TRACKING
+from rodsight.process.sources import APP, program_sources
+from rodsight.run_folder import hold_run
+from rodsight.stages import Stage
 
 from tests.program import rodsight
 
@@ -102,6 +108,50 @@ def test_frames_of_two_programs_do_not_mix(made_tracks, tmp_path, monkeypatch):
 def test_forces_depend_on_every_source_between_their_input_and_their_file(changed):
     sources = program_sources()
     assert changed in sources.needed_by(FORCES.code) | set(FORCES.alone)
+
+
+# Sources that run while a stage does and change no stored number: they refuse input, hold the folder, or name files.
+WITHOUT_EFFECT = ("process/", "experiment/plausibility.py", "results/manifest.py", "run_folder.py", "run_truth.py")
+OF_TRUTH = ("results/truth.py",)  # read, and compared with results by name only
+
+
+@pytest.mark.parametrize(
+    ("stage", "of"), [(TRACKING, "made_photographs"), (FORCES, "made_tracks")], ids=["tracks", "forces"]
+)
+def test_every_source_that_runs_is_part_of_the_fingerprint(stage, of, request, tmp_path):
+    run = run_folder.Run(load_experiment(request.getfixturevalue(of)), tmp_path / "out")
+    used: set[str] = set()
+
+    def note(frame: FrameType, event: str, argument: Any) -> None:
+        if event == "call" and frame.f_code.co_name != "<module>":
+            used.add(frame.f_code.co_filename)
+
+    threading.setprofile(note)
+    sys.setprofile(note)
+    try:
+        with hold_run(run):
+            pipeline.track(run) if stage is TRACKING else pipeline.solve(run)
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
+    assert unhashed(used, stage) == []
+
+
+def unhashed(files: set[str], stage: Stage) -> list[str]:
+    """Return the sources among these files that a stage's fingerprint leaves out although they have an effect."""
+    sources, found = program_sources(), set()
+    for file in map(Path, files):
+        for place, prefix in ((APP, ""), (APP.parent / "solver", "solver/")):
+            if file.is_relative_to(place):
+                found.add(prefix + file.relative_to(place).as_posix())
+    assert len(found) > 20
+    missing = found - sources.needed_by(stage.code) - set(stage.alone)
+    return sorted(name for name in missing if not name.startswith((*WITHOUT_EFFECT, *OF_TRUTH)))
+
+
+def test_effects_of_a_sensitivity_study_depend_on_how_inputs_are_varied():
+    needed = program_sources().needed_by(EFFECTS.code)
+    assert {"robustness/factors.py", "robustness/design.py", "robustness/networks.py"} <= needed
 
 
 @pytest.mark.parametrize("stage", [FORCES, TRACKING], ids=["forces", "tracks"])
