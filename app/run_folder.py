@@ -348,7 +348,7 @@ def _inputs_of(experiment: Experiment) -> dict[str, str]:
 def find_experiment(results: Path, origin: Provenance) -> Path:
     """Return the experiment file of results, by the folder's manifest or else by the results themselves.
 
-    Without a manifest the name of a file says little: what it names must have the input of the results.
+    Without a manifest the name of a file is not enough: what it names must have the input of the results.
     """
     file = owner_of(results.parent)
     if file is None and has_input(Path(origin.experiment), origin.checksums):

@@ -105,18 +105,18 @@ def test_it_is_opened_in_python_with_a_warning(root):
 
 
 @pytest.fixture
-def stranger(root: Path, tmp_path: Path) -> Path:
+def neighbour(root: Path, tmp_path: Path) -> Path:
     """Another experiment of the same name, in the same place of another folder."""
     synthesize(tmp_path / "other" / "tracked", grains=30, frames=5, photographs=False, noise=1e-5, seed=7)
     return tmp_path / "other"
 
 
-def test_a_run_copied_beside_another_experiment_still_belongs_to_its_own(made, root, stranger, capsys):
+def test_a_run_copied_beside_another_experiment_still_belongs_to_its_own(made, root, neighbour, capsys):
     own = made / "tracked" / "experiment.toml"
-    copy = Path(shutil.copytree(root / "runs" / "tracked", stranger / "runs" / "tracked"))
+    copy = Path(shutil.copytree(root / "runs" / "tracked", neighbour / "runs" / "tracked"))
     assert owner_of(copy) == own
-    assert Project(stranger, stranger / "tracked").overview()["run"] is None
-    assert rodsight("run", stranger / "tracked", "--out", copy, *FEW) == 2
+    assert Project(neighbour, neighbour / "tracked").overview()["run"] is None
+    assert rodsight("run", neighbour / "tracked", "--out", copy, *FEW) == 2
     assert "of another experiment" in capsys.readouterr().err
     Manifest(copy).store({"place": str(root / "gone" / "experiment.toml")})
     assert rodsight("score", copy, "--json") == 2
@@ -131,11 +131,11 @@ def test_a_whole_folder_that_was_moved_and_edited_keeps_its_run(root, tmp_path):
 
 
 def test_results_alone_use_no_experiment_that_happens_to_be_in_the_current_folder(
-    root, stranger, tmp_path, monkeypatch, capsys
+    root, neighbour, tmp_path, monkeypatch, capsys
 ):
     (tmp_path / "sent").mkdir()
     shutil.copy(root / "runs" / "tracked" / "results.h5", tmp_path / "sent")
-    monkeypatch.chdir(stranger / "tracked")
+    monkeypatch.chdir(neighbour / "tracked")
     assert rodsight("score", tmp_path / "sent") == 2
     assert "is not at hand" in capsys.readouterr().err
     assert rodsight("export", "figures", tmp_path / "sent", "--formats", "png", "--quiet") == 0
