@@ -126,7 +126,7 @@ def draw_figure_frames(
     out : Path, optional
         The film, or the folder of the pictures.
     figure : str
-        Name of a figure: forces, density, rose, stress, time, truth.
+        Name of a figure: forces, density, rose, stress, time, truth, difference.
     drawing : Drawing
         Frames, step, width [px] and rate; the other values are not used.
     progress : Progress
@@ -138,6 +138,7 @@ def draw_figure_frames(
     InputError
         A value is out of range, or the figure cannot be drawn.
     """
+    from .figures.gallery import NEED_TRUTH
     from .process.atomic import write_atomically
     from .recording.viewing.film_file import encode_film
     from .recording.viewing.headless import NoPictureError
@@ -145,7 +146,7 @@ def draw_figure_frames(
     from .run_truth import truth_of
     from .solver.frame_forces import FrameStatus
 
-    results, truth = load_results(file), truth_of(file) if figure == "truth" else None
+    results, truth = load_results(file), truth_of(file) if figure in NEED_TRUTH else None
     begin, end = drawing.times or (0, None)
     chosen = range(len(results.frames))[begin : end : drawing.step]
     frames = [k for k in chosen if results.frames[k].status is not FrameStatus.FAILED]

@@ -57,6 +57,6 @@ def add_scale_bar(axes: Axes, length: float) -> None:
     label = f"{1e3 * length:g} mm" if length < 1.0 else f"{length:g} m"
     x0, y0 = axes.get_xlim()[0], axes.get_ylim()[0]
     width = abs(axes.get_xlim()[1] - x0)
-    x, y = x0 + 0.02 * width, y0 + 0.035 * width
+    x, y = x0 + 0.02 * width, y0 + 0.045 * width
     axes.plot([x, x + length], [y, y], color=INK, linewidth=1.8, solid_capstyle="butt", zorder=9)
-    axes.text(x + length + 0.012 * width, y, label, fontsize=7.0, va="center", zorder=9)
+    axes.text(x + 0.5 * length, y - 0.022 * width, label, fontsize=6.0, va="top", ha="center", zorder=9)

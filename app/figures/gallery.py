@@ -10,8 +10,10 @@ from typing import Literal, get_args
 from matplotlib.figure import Figure
 
 from ..process.atomic import write_atomically
+from ..results.comparison import compare_runs, compare_with_truth
 from ..results.results import Results, TruthContacts
 from ..solver.frame_forces import FrameStatus
+from .difference import draw_difference
 from .directions import draw_rose, draw_stress
 from .distributions import draw_density
 from .figure_style import Width, paper_style
@@ -19,8 +21,10 @@ from .force_network import draw_forces
 from .time_curves import draw_time
 from .truth_comparison import draw_truth
 
-FigureName = Literal["forces", "density", "rose", "stress", "time", "truth"]
+FigureName = Literal["forces", "density", "rose", "stress", "time", "truth", "difference"]
 FileKind = Literal["pdf", "svg", "png"]
+
+NEED_TRUTH = ("truth", "difference")
 
 _DRAW: dict[str, Callable[[Results, int, Width], Figure]] = {
     "forces": draw_forces, "density": draw_density, "rose": draw_rose, "stress": draw_stress, "time": draw_time,
@@ -34,6 +38,7 @@ def draw_figure(
     *,
     width: Width = "single",
     truth: TruthContacts | None = None,
+    against: Results | None = None,
 ) -> Figure:
     """Draw one figure of a run.
 
@@ -48,7 +53,9 @@ def draw_figure(
     width : str
         "single" or "double" column.
     truth : TruthContacts, optional
-        True forces, for the figure "truth".
+        True forces, for the figures "truth" and "difference".
+    against : Results, optional
+        Another run of the same packing, for the figure "difference"; None: the true forces.
 
     Returns
     -------
@@ -58,7 +65,7 @@ def draw_figure(
     Raises
     ------
     ValueError
-        If there is no such figure, no truth for "truth", or no force in the frame.
+        If there is no such figure, no truth for one that needs it, no force in the frame, or another packing.
     IndexError
         If there is no such frame.
     """
@@ -70,11 +77,23 @@ def draw_figure(
     if results.frames[shown].status is FrameStatus.FAILED:
         raise ValueError(f"frame {shown} has no forces: {results.frames[shown].failed_reason}")
     with paper_style():
-        if name == "truth":
+        if name == "difference" and against is not None:
+            return _draw_difference_of_runs(results, against, shown, width)
+        if name in NEED_TRUTH:
             if truth is None:
                 raise ValueError("no truth is known: the experiment file names none")
-            return draw_truth(results, truth, shown, width)
+            if name == "truth":
+                return draw_truth(results, truth, shown, width)
+            return draw_difference(compare_with_truth(results, truth, name="inferred"), shown, width)
         return _DRAW[name](results, shown, width)
+
+
+def _draw_difference_of_runs(results: Results, against: Results, frame: int, width: Width) -> Figure:
+    names = (results.name, against.name if against.name != results.name else f"other {against.name}")
+    comparison = compare_runs(results, against, names=names)
+    if frame >= len(comparison.base.frames):
+        raise ValueError(f"frame {frame} is not in both runs")
+    return draw_difference(comparison, frame, width)
 
 
 def default_frame(results: Results) -> int:
@@ -108,7 +127,7 @@ def write_figures(
     width : str
         "single" or "double" column.
     truth : TruthContacts, optional
-        True forces, for the figure "truth".
+        True forces, for the figures "truth" and "difference".
 
     Returns
     -------
@@ -118,7 +137,7 @@ def write_figures(
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name in get_args(FigureName):
-        if name == "truth" and truth is None:
+        if name in NEED_TRUTH and truth is None:
             continue
         figure = draw_figure(results, name, frame, width=width, truth=truth)
         for kind in kinds:

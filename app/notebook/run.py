@@ -254,17 +254,22 @@ class Run:
             raise FileNotFoundError("there is no recording of this run: rodsight.run and `rodsight record` write one")
         return show_recording(file)
 
-    def figure(self, name: str = "forces", frame: int | None = None, *, width: Width = "single") -> Figure:
+    def figure(
+        self, name: str = "forces", frame: int | None = None, *, width: Width = "single", against: Run | None = None
+    ) -> Figure:
         """Draw a figure for a paper, to be saved with `.savefig("x.pdf")`.
 
         Parameters
         ----------
-        name : {'forces', 'density', 'rose', 'stress', 'time', 'truth'}
-            Force network, P(f), rose of contact directions, stress, curves over time, or inferred over true forces.
+        name : {'forces', 'density', 'rose', 'stress', 'time', 'truth', 'difference'}
+            Force network, P(f), rose of contact directions, stress, curves over time, inferred over true forces, or
+            their difference as a map.
         frame : int, optional
             Default: the last settled frame.
         width : {'single', 'double'}
             85 or 175 mm.
+        against : Run, optional
+            Another run of the same packing, from which 'difference' is drawn; default: the truth of the experiment.
 
         Raises
         ------
@@ -277,10 +282,12 @@ class Run:
         --------
         >>> rodsight.open("runs/shear").figure("forces", frame=3).savefig("forces.pdf")
         """
-        from ..figures.gallery import draw_figure
+        from ..figures.gallery import NEED_TRUTH, draw_figure
 
-        truth = truth_of(self._source) if name == "truth" and isinstance(self._source, Path) else None
-        return draw_figure(self.results, name, frame, width=width, truth=truth)
+        needs_truth = name in NEED_TRUTH and against is None
+        truth = truth_of(self._source) if needs_truth and isinstance(self._source, Path) else None
+        other = None if against is None else against.results
+        return draw_figure(self.results, name, frame, width=width, truth=truth, against=other)
 
     def __repr__(self) -> str:
         tracks = self.results.tracks

@@ -15,39 +15,35 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from ..drawing.force_range import ForceRange
 from ..experiment.units import Scale
 from ..results.comparison import Comparison, FieldFrame
 from ..solver.bodies.grains import Array
-from ..solver.contacts.contacts import Contacts, measure_pairs
 from ..solver.contacts.pairs import align
 from .files.writing import writing
 from .look import entities
 from .look.axes import Axes, round_step
 from .look.canvas import Canvas
 from .look.clock import Clock, accumulated_strains
-from .look.colours import DIFFERENCE_RAMP, INK, OPEN, SERIES, packed, packed_one
-from .look.force_style import ForceRange, ForceStyle
+from .look.colours import INK, SERIES, packed_one
+from .look.force_style import ForceStyle
 from .look.printable_text import printable
 from .look.scene import Scene, tracks_in_cell
 from .look.values import log_scalar, nullable
+from .packing_layers.forces.difference import log_difference, log_difference_legend
 from .packing_layers.forces.network import body_values
 from .packing_layers.grains_and_walls import log_grains_and_walls
-from .packing_layers.legends import PIECES, log_force_legend, log_ramp_legend
+from .packing_layers.legends import log_force_legend
 from .tabs.views import curve_view, drawn_view, packing_view
 
 APPLICATION_ID = "rodsight-compare"  # a separate one, so that the viewer does not apply a layout of runs to comparisons
 FIRST, SECOND = "/compare/first", "/compare/second"
 DIFFERENCE = "/compare/difference"
-DIFFERENCE_LEGEND, DIFFERENCE_TICKS = "/legend/difference", "/legend/difference/ticks"
 SCATTER, SCATTER_AXES = "/compare/scatter/contacts", "/compare/scatter/axes"
 SCATTER_TICKS = "/compare/scatter/axes/ticks"
 R_FN, R_FT, ERROR, SUM_RATIO = (f"/compare/{name}" for name in ("r_fn", "r_ft", "relative_l2", "sum_ratio"))
 ANGLES = tuple(f"/compare/{which}/{name}" for which in ("first", "second") for name in ("friction_angle", "wall_ratio"))
 SUMMARY = "/compare/summary"
-
-DIFFERENCE_FRACTION = 0.4  # of the drawn range of forces: the difference drawn widest and brightest
-
-_RAMP = packed(DIFFERENCE_RAMP)
 
 
 def record_comparison(comparison: Comparison, path: Path | str, *, scale: Scale | None = None) -> int:
@@ -112,7 +108,7 @@ def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blu
     side = rrb.Vertical(
         rrb.Horizontal(
             packing_view(first, canvas, [*packing, FIRST, legend]),
-            packing_view(f"{first} − {second}", canvas, [*packing, DIFFERENCE, f"{DIFFERENCE_LEGEND}/**"]),
+            packing_view(f"{first} − {second}", canvas, [*packing, DIFFERENCE, f"{entities.DIFFERENCE_LEGEND}/**"]),
             packing_view(second, canvas, [*packing, SECOND, legend]),
         ),
         rrb.Horizontal(
@@ -125,25 +121,13 @@ def make_comparison_blueprint(comparison: Comparison, canvas: Canvas) -> rrb.Blu
         name="Side by side",
     )  # fmt: skip
     return rrb.Blueprint(
-        rrb.Tabs(side, rrb.TextDocumentView(origin=SUMMARY, name="Figures"), name="Rodsight"),
+        rrb.Tabs(side, rrb.TextDocumentView(origin=SUMMARY, name="Figures"), name=entities.ROOT_CONTAINER),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=4.0, play_state="paused", loop_mode="all"),
         auto_views=False,
         auto_layout=False,
     )
-
-
-def difference_colours(difference: Array, top: float) -> NDArray[np.uint32]:
-    """Return colours of first − second (c,) [N], from −top to top."""
-    level = np.round((np.clip(np.nan_to_num(difference) / top, -1.0, 1.0) + 1.0) * 0.5 * (len(_RAMP) - 1))
-    return np.where(difference == 0.0, packed_one(OPEN), _RAMP[level.astype(np.int64)]).astype(np.uint32)
-
-
-def _difference_style(scene: Scene) -> ForceStyle:
-    style = scene.style
-    reach = ForceRange(DIFFERENCE_FRACTION * style.range.mean, DIFFERENCE_FRACTION * style.range.top)
-    return ForceStyle(reach, style.grain_radius, style.quantum)
 
 
 def _range_of(comparison: Comparison) -> ForceRange:
@@ -154,12 +138,7 @@ def _range_of(comparison: Comparison) -> ForceRange:
 def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison) -> Axes:
     first, second = printable(comparison.first.name), printable(comparison.second.name)
     log_force_legend(stream, scene)
-    top = scene.style.range.top
-    fraction, limit = np.linspace(-1.0, 1.0, PIECES), _difference_style(scene).range.top
-    log_ramp_legend(
-        stream, scene.canvas, DIFFERENCE_LEGEND, DIFFERENCE_TICKS, difference_colours(fraction * limit, limit),
-        [(0.0, f"{second} more: {limit:.3g} N"), (0.5, "equal"), (1.0, f"{first} more: {limit:.3g} N")],
-    )  # fmt: skip
+    log_difference_legend(stream, scene, first, second)
     names = (f"φ {first}", f"wall ratio {first}", f"φ {second}", f"wall ratio {second}")
     curves = [
         (R_FN, "r(f_n)", SERIES[0], 2.0), (R_FT, "r(f_t)", SERIES[1], 2.0), (ERROR, "relative L2", SERIES[3], 2.0),
@@ -169,7 +148,7 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
     curves += list(zip(ANGLES, names, hues, widths, strict=True))
     for path, name, colour, width in curves:
         stream.log(path, rr.SeriesLines(colors=[colour], names=name, widths=width), static=True)
-    reach = 1.15 * top
+    reach = 1.15 * scene.style.range.top
     axes = Axes((0.0, reach), (0.0, reach), width=400.0, height=400.0)
     step = round_step(reach / 2.5)
     ticks = [(step * k, f"{step * k:g}") for k in range(int(reach / step) + 1)]
@@ -193,7 +172,7 @@ def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -
         _log_network(clock, scene, path, field)
     key, fn = _on_union(a, b, "fn")
     _, ft = _on_union(a, b, "ft")
-    _log_difference(clock, scene, key, fn, ft)
+    log_difference(clock, scene, DIFFERENCE, key, fn, ft)
     reach = axes.x_range[1]
     stream.log(
         SCATTER,
@@ -224,29 +203,7 @@ def _log_network(clock: Clock, scene: Scene, path: str, field: FieldFrame) -> No
     )  # fmt: skip
 
 
-def _log_difference(clock: Clock, scene: Scene, key: NDArray[np.int64], fn: Array, ft: Array) -> None:
-    contacts = _contacts_of(scene, clock.frame, key)
-    shown = np.flatnonzero(np.isfinite(contacts.point).all(axis=1))
-    contacts, fn, ft = contacts.select(shown), fn[:, shown], ft[:, shown]
-    difference, style = fn[0] - fn[1], _difference_style(scene)
-    clock.stream.log(
-        DIFFERENCE,
-        rr.LineStrips2D(
-            scene.branches(clock.frame, contacts), radii=style.radii(np.abs(difference)),
-            colors=difference_colours(difference, style.range.top), draw_order=20.0,
-        ),
-        rr.AnyValues(
-            **body_values(scene, contacts), fn_first=nullable(fn[0]), fn_second=nullable(fn[1]),
-            ft_first=nullable(ft[0]), ft_second=nullable(ft[1]),
-        ),
-    )  # fmt: skip
-
-
 def _on_union(a: FieldFrame, b: FieldFrame, name: str) -> tuple[NDArray[np.int64], Array]:
     """Return keys (u,) of the contacts of either field, and both forces on them (2, u) [N], 0 without contact."""
     key, *both = align(a.contacts.key, np.nan_to_num(getattr(a, name)), b.contacts.key, np.nan_to_num(getattr(b, name)))
     return key, np.stack(both)
-
-
-def _contacts_of(scene: Scene, frame: int, key: NDArray[np.int64]) -> Contacts:
-    return measure_pairs(scene.grains, scene.tracks.position[frame], scene.walls_at(frame), key)

@@ -22,6 +22,7 @@ import rerun as rr
 from rich.console import Console
 from rodsight import pipeline
 from rodsight.cli.watching import watching
+from rodsight.drawing.force_range import ForceRange
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.walls import read_walls
 from rodsight.inference.frame_store import MemoryStore
@@ -30,7 +31,7 @@ from rodsight.inference.inference_settings import material_of, settings_of
 from rodsight.inference.inputs import Inputs
 from rodsight.recording.files.recorder import BATCHES, Recorder
 from rodsight.recording.look.canvas import Canvas
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.look.scene import Scene
 from rodsight.recording.packing_layers.forces.network import SweepChoice
 from rodsight.recording.tabs.blueprint import RecordingLayout, make_blueprint
@@ -47,7 +48,7 @@ SECONDS = 10.0  # of processor time for logging all of it
 # Limit of the time of a picture of another sweep, in single drawings of the same tab: the viewer draws it several times
 # (data are fetched on demand, then it draws the same twice), and the time of a drawing depends on machine and load.
 SEEK_DRAWINGS = 10.0
-SEEK_TABS = ("Experiment", "Convergence", "Settling")
+SEEK_TABS = ("Forces", "Convergence", "Contacts")
 MAX_SLOWDOWN = 1.15  # factor on the solving stage by a live view
 FREE_CORES = 0.5  # needed beside the load: other processes would use the core that draws
 ROUNDS = 3  # of runs with and without live view; the least time counts

@@ -39,10 +39,10 @@ def export(
         Literal["frame", "sweep"] | None, tyro.conf.arg(help="pictures, video: from picture to picture; default frame")
     ] = None,
     step: Annotated[int | None, tyro.conf.arg(help="pictures, video: every so many values; default 1")] = None,
-    tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show")] = None,
+    tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show; default Forces")] = None,
     view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
     figure: Annotated[
-        Literal["forces", "density", "rose", "stress", "time", "truth"] | None,
+        Literal["forces", "density", "rose", "stress", "time", "truth", "difference"] | None,
         tyro.conf.arg(help="pictures, video: this figure of every frame, instead of the viewer"),
     ] = None,
     size: Annotated[

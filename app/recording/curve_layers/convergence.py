@@ -6,7 +6,7 @@ import numpy as np
 import rerun as rr
 
 from ...solver.bodies.grains import Array
-from ...solver.nlgs.sweep_record import SweepHistory
+from ...solver.frame_forces import FrameForces
 from ..look import entities
 from ..look.clock import Clock
 from ..look.colours import INK, SERIES, Rgba
@@ -33,20 +33,24 @@ def log_tolerance_style(stream: rr.RecordingStream) -> None:
     _log_style(stream, entities.TOLERANCE, "stopping level", INK, 1.0)
 
 
-def log_residuals(clock: Clock, history: SweepHistory) -> None:
-    """Log the residuals of every measured sweep of one frame (at least one), on `frame` those of the last."""
-    for path, residual in (
-        (entities.SWEEP_NATURAL_MAP, history.natural_map),
-        (entities.SWEEP_UNBALANCE, history.unbalance),
-        (entities.SWEEP_FORCE_CHANGE, history.force_change),
+def log_residuals(clock: Clock, forces: FrameForces) -> None:
+    """Log the residuals of every measured sweep of one frame (at least one), then those of the reported field.
+
+    The change of the last sweep stays, as the reported field has none.
+    """
+    history = forces.history
+    for path, residual, reported in (
+        (entities.SWEEP_NATURAL_MAP, history.natural_map, forces.natural_map),
+        (entities.SWEEP_UNBALANCE, history.unbalance, forces.unbalance),
+        (entities.SWEEP_FORCE_CHANGE, history.force_change, history.force_change[-1]),
     ):
         powers = power_of_ten(residual)
         known = np.flatnonzero(np.isfinite(powers))  # unmeasured sweeps are left out: gaps would interrupt the curve
         if len(known):
             when = rr.TimeColumn(entities.SWEEP, sequence=clock.first + known)
             send_scalars(clock.stream, path, when, powers[known])
-        clock.frame_only()
-        log_scalar(clock, path, float(powers[-1]))
+        clock.end()
+        log_scalar(clock, path, float(power_of_ten(np.array(reported))))
 
 
 def power_of_ten(residual: Array) -> Array:

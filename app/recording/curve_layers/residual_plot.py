@@ -13,6 +13,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from ...solver.bodies.grains import Array
+from ...solver.frame_forces import FrameForces
 from ...solver.nlgs.start_residuals import COLD_SWEEPS
 from ...solver.nlgs.sweep_record import SweepHistory
 from ...solver.statistics.force_statistics import mean_normal_force
@@ -42,20 +43,19 @@ class ResidualPlot:
         if self._axes is not None:
             self._log_axes(stream, self._axes)
 
-    def log(self, clock: Clock, history: SweepHistory, cold: Array | None, marked: NDArray[np.int64]) -> None:
+    def log(self, clock: Clock, forces: FrameForces, marked: NDArray[np.int64]) -> None:
         """Draw one frame.
 
         Parameters
         ----------
         clock : Clock
             The frame on the timelines.
-        history : SweepHistory
-            Residuals of at least one sweep.
-        cold : array (s,), optional
-            Residuals after COLD_SWEEPS sweeps from zero forces; None: not known.
+        forces : FrameForces
+            The frame, with the residuals of at least one sweep.
         marked : array (r,)
             Sweeps, ascending, at which points are drawn on the curves.
         """
+        history, cold = forces.history, forces.cold_residual
         cold = np.full(len(COLD_SWEEPS), np.nan) if cold is None else cold
         axes = self._axes or self._begin(clock.stream, history.count)
         residuals = np.stack([history.natural_map, history.unbalance, mean_changes(history)])
@@ -73,6 +73,7 @@ class ResidualPlot:
                 draw_order=10.0,
             ),
         )
+        self._mark_reported(clock, axes, forces)
         self._mark(clock, axes, residuals, np.unique(np.clip(marked, 0, history.count - 1)))
 
     def _mark(self, clock: Clock, axes: Axes, residuals: Array, at: NDArray[np.int64]) -> None:
@@ -89,6 +90,20 @@ class ResidualPlot:
             clock.stream.send_columns(
                 entities.RESIDUAL_MARKS, clock.columns(rows[1:]), columns.partition(np.full(len(rows) - 1, 3))
             )
+
+    def _mark_reported(self, clock: Clock, axes: Axes, forces: FrameForces) -> None:
+        """Log the unbalance of the reported field, beyond the last sweep, with its name."""
+        sweep, value = np.array([forces.history.count + 1.0]), np.array([forces.unbalance])
+        known = np.isfinite(value)
+        clock.end()
+        clock.stream.log(
+            entities.RESIDUAL_REPORTED,
+            rr.Points2D(
+                axes_points(axes, sweep[known], value[known], keep=True), radii=np.float32(6.5),
+                colors=packed(np.array(COLOURS[1:2], np.uint8)[known]), labels=["reported"] * int(known.sum()),
+                show_labels=True, draw_order=30.0,
+            ),
+        )  # fmt: skip
 
     def _begin(self, stream: rr.RecordingStream, count: int) -> Axes:
         decades = float(np.ceil(np.log10(max(count, MIN_SWEEPS)) - 1e-9))

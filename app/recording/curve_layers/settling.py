@@ -25,6 +25,11 @@ STATUS_COLOURS: dict[FrameStatus, Rgba] = {
     FrameStatus.SETTLED: (15, 106, 49, 255),
     FrameStatus.FAILED: (82, 16, 44, 255),
 }
+# One sign each, as a lane is often narrower than a word; the titles of the lanes explain them.
+STATUS_MARKS: dict[FrameStatus, str] = {
+    FrameStatus.RESET: "0", FrameStatus.SUSPECT: "?", FrameStatus.REARRANGING: "≠", FrameStatus.SETTLING: "≈",
+    FrameStatus.SETTLED: "=", FrameStatus.FAILED: "×",
+}  # fmt: skip
 LOW_TRUST = 0.9  # T below which its reasons are flagged
 # States of the tracking lane; of those that apply to a frame the first is shown.
 SOME_LOST, SOME_CUT, SOME_INFERRED = "grains lost", "grains beyond the border", "visible ones tracked, some inferred"
@@ -35,6 +40,7 @@ TRACKING_COLOURS: dict[str, Rgba] = {
     SOME_CUT: (249, 221, 115, 255),
     SOME_LOST: (229, 109, 122, 255),
 }
+TRACKING_MARKS = {ALL_TRACKED: "=", SOME_INFERRED: "+", SOME_CUT: "/", SOME_LOST: "−"}
 
 _LEVELS = {
     FrameStatus.FAILED: "ERROR",
@@ -50,7 +56,7 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         entities.STATUS_LANE,
         rr.StateConfiguration(
             values=[status.name.lower() for status in FrameStatus],
-            labels=[status.name.lower() for status in FrameStatus],
+            labels=[STATUS_MARKS[status] for status in FrameStatus],
             colors=list(STATUS_COLOURS.values()),
         ),
         static=True,
@@ -59,7 +65,7 @@ def log_settling_styles(stream: rr.RecordingStream) -> None:
         entities.TRACKING_LANE,
         rr.StateConfiguration(
             values=list(TRACKING_COLOURS),
-            labels=list(TRACKING_COLOURS),
+            labels=list(TRACKING_MARKS.values()),
             colors=list(TRACKING_COLOURS.values()),
         ),
         static=True,

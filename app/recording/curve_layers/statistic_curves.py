@@ -13,13 +13,14 @@ from ...solver.bodies.grains import Array
 from ...solver.bodies.walls import Walls
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
+from ..look.axes import log_texts
 from ..look.clock import Clock
 from ..look.colours import SERIES, Rgba
 from ..look.printable_text import printable
 from ..look.scene import Scene
 from ..look.values import log_scalar, log_scalars
 
-BAND_NAME = "95 %"
+WALLS_IN_ROW = 6  # names of walls in one line of their key
 KILO, DEGREES = 1e-3, math.degrees(1.0)
 
 
@@ -72,18 +73,22 @@ def log_statistics_styles(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log names and colours of the curves."""
     for curve in CURVES:
         stream.log(curve.path, rr.SeriesLines(colors=[curve.colour], names=curve.name, widths=2.0), static=True)
-        faint = (*curve.colour[:3], 130)
-        band = rr.SeriesLines(colors=[faint] * 2, names=[BAND_NAME] * 2, widths=[0.8] * 2)
+        band = rr.SeriesLines(colors=[curve.colour] * 2, names=[curve.name] * 2, widths=[0.6] * 2)
         stream.log(curve.path + entities.BAND, band, static=True)
     walls = [printable(name) for name in scene.walls.name]
     hues = [SERIES[row % len(SERIES)] for row in range(len(walls))]
     for path in (entities.WALL_NORMAL_FORCE, entities.WALL_TANGENTIAL_FORCE):
         stream.log(path, rr.SeriesLines(colors=hues, names=walls, widths=[2.0] * len(walls)), static=True)
+    columns = min(max(len(walls), 1), WALLS_IN_ROW)
+    places = [
+        np.array([(row % columns + 0.5) * 600.0 / columns, 12.0 + 24.0 * (row // columns)])
+        for row in range(len(walls))
+    ]  # fmt: skip
+    log_texts(stream, entities.WALL_KEY, list(zip(places, walls, hues, strict=True)))
     if scene.walls.force is not None:
         pale = [(*hue[:3], 150) for hue in hues]
-        names = [f"{name}, recorded" for name in walls]
         for path in (entities.WALL_NORMAL_RECORDED, entities.WALL_TANGENTIAL_RECORDED):
-            stream.log(path, rr.SeriesLines(colors=pale, names=names, widths=[5.0] * len(walls)), static=True)
+            stream.log(path, rr.SeriesLines(colors=pale, names=walls, widths=[5.0] * len(walls)), static=True)
 
 
 def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> None:

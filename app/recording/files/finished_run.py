@@ -55,7 +55,7 @@ class RecordingOptions:
     sweeps: SweepChoice | str = SweepChoice.LOG
     max_size: int | None = None  # [bytes]
     tolerance: float | None = None  # stopping level of the residual, drawn in the residual plots
-    active: Tab = Tab.EXPERIMENT  # the tab in front
+    active: Tab = Tab.SUMMARY  # the tab in front
     part_frames: int = PART_FRAMES  # frames in one file
 
 

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import rerun as rr
 
+from ...drawing.force_range import ForceRange
 from ...experiment.units import Scale
 from ...process.browser import open_page
 from ...results.results import Results
@@ -28,7 +29,7 @@ from ...solver.frame_forces import FrameForces
 from ...solver.statistics.frame_statistics import FrameStatistics
 from ..look import entities
 from ..look.canvas import Canvas
-from ..look.force_style import ForceRange, ForceStyle
+from ..look.force_style import ForceStyle
 from ..look.scene import Scene, tracks_in_cell
 from ..packing_layers.forces.network import SweepChoice
 from ..tabs.blueprint import RecordingLayout, make_blueprint

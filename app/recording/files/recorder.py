@@ -26,6 +26,7 @@ from ..look.clock import AccumulatedStrain, Clock
 from ..look.level_of_detail import drawn_contacts, kept_sweeps
 from ..look.printable_text import printable
 from ..look.scene import Scene
+from ..packing_layers.captions import log_caption, log_card
 from ..packing_layers.contact_changes import log_changes
 from ..packing_layers.contact_counts import log_contact_count_styles, log_contact_counts
 from ..packing_layers.film import FilmWriter
@@ -130,6 +131,8 @@ class Recorder:
             log_tolerance_style(stream)
         if scene.radius_tuning is not None:
             log_radius_curve(stream, scene.radius_tuning)
+        if self._film is not None:
+            self._film.log_keys(stream)
         if self._truth is not None:
             self._truth.log_axes(stream)
 
@@ -143,6 +146,8 @@ class Recorder:
         drawn, kept = drawn_contacts(forces), kept_sweeps(self._kept, scene.grains.count)
         if photograph is not None:
             log_photograph(clock, scene.canvas, photograph)
+        log_caption(clock, scene, forces)
+        log_card(clock, scene, forces, statistics)
         log_grains_and_walls(clock, scene, forces)
         self.network_rows += log_network(clock, scene, drawn, self._previous, self._sweeps, kept)
         log_force_uncertainty(clock, scene, drawn)
@@ -185,10 +190,10 @@ class Recorder:
             log_residual_styles(self._stream)
             self._has_residual_styles = True
         history = forces.history
-        log_residuals(clock, history)
+        log_residuals(clock, forces)
         if self._plot is not None:
             marked = chosen_sweeps(history, SweepChoice.LOG, self._kept)
-            self._plot.log(clock, history, forces.cold_residual, history.recorded[marked])
+            self._plot.log(clock, forces, history.recorded[marked])
 
     def _running(self) -> Scene:
         if self._scene is None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ...drawing.force_range import ForceRange
 from ...results.results import Results
-from ..look.force_style import ForceRange
 from ..tabs.axis_ranges import CurveExtremes
 
 

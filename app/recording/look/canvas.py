@@ -67,7 +67,12 @@ class Canvas:
     @property
     def legend_height(self) -> float:
         """Height [px] of the strip below the grains, for legends."""
-        return 0.15 * max(self.height, 0.6 * self.width)
+        return 0.2 * max(self.height, 0.6 * self.width)
+
+    @property
+    def header_height(self) -> float:
+        """Height [px] of the strip above the grains, for scale bar and caption."""
+        return 0.13 * max(self.height, 0.6 * self.width)
 
     @property
     def quantum(self) -> float:

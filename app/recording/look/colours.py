@@ -1,27 +1,11 @@
-"""Colours: perceptually uniform ramps built in OKLab, and the fixed colours of the views.
-
-A ramp is a path through OKLab divided into steps of equal length, so that equal differences of force look equally
-different. OKLab: B. Ottosson, "A perceptual color space for image processing" (2020).
-"""
+"""Colours of the views: fixed ones, and ramps of quantities other than the force."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.bodies.grains import Array
-
-# Cone responses (cubed) from OKLab, and linear sRGB from cone responses: Ottosson (2020).
-_CONES_FROM_LAB = np.array(
-    [[1.0, 0.3963377774, 0.2158037573], [1.0, -0.1055613458, -0.0638541728], [1.0, -0.0894841775, -1.2914855480]]
-)
-_RGB_FROM_CONES = np.array(
-    [
-        [4.0767416621, -3.3077115913, 0.2309699292],
-        [-1.2684380046, 2.6097574011, -0.3413193965],
-        [-0.0041960863, -0.7034186147, 1.7076147010],
-    ]
-)
+from ...drawing.ramps import make_ramp
 
 Rgba = tuple[int, int, int, int]
 
@@ -44,8 +28,6 @@ FORBIDDEN: Rgba = (255, 214, 80, 255)  # by a reviewer
 # Curves: CIE76 differences of 25 and more under deuteranopia and protanopia, of the first and the last two in grey.
 SERIES: tuple[Rgba, ...] = ((255, 202, 87, 255), (90, 133, 250, 255), (174, 252, 163, 255), (215, 131, 209, 255))
 
-# Lightness, chroma, hue [°] along the path: deep red, vermilion, orange, yellow, cream.
-_FORCE_PATH = ((0.46, 0.150, 20.0), (0.60, 0.195, 34.0), (0.74, 0.165, 60.0), (0.87, 0.155, 92.0), (0.97, 0.06, 106.0))
 # Signed quantities: lightness is monotonic, so that less and more differ without hue.
 # Overlap cream, touching orange, open blue.
 _GAP_PATH = ((0.97, 0.04, 106.0), (0.87, 0.12, 85.0), (0.72, 0.14, 55.0), (0.56, 0.09, 330.0), (0.42, 0.12, 265.0))
@@ -59,34 +41,6 @@ _PROBABILITY_PATH = ((0.93, 0.13, 103.0), (0.81, 0.12, 70.0), (0.67, 0.05, 10.0)
 _DIFFERENCE_PATH = (
     (0.41, 0.235, 264.0), (0.52, 0.12, 260.0), (0.62, 0.0, 0.0), (0.75, 0.08, 60.0), (0.905, 0.10, 88.0),
 )  # fmt: skip
-RAMP_LEVELS = 64
-
-
-def lab_from_lch(path: tuple[tuple[float, float, float], ...]) -> Array:
-    """Convert lightness, chroma and hue [°] (k, 3) to OKLab (k, 3)."""
-    lightness, chroma, hue = np.array(path).T
-    return np.stack([lightness, chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue))], axis=1)
-
-
-def linear_srgb(lab: Array) -> Array:
-    """Convert OKLab (k, 3) to linear sRGB (k, 3), not clipped: outside 0 … 1 a screen cannot show it."""
-    return (lab @ _CONES_FROM_LAB.T) ** 3 @ _RGB_FROM_CONES.T
-
-
-def even_path(corners: Array, count: int) -> Array:
-    """Return points (count, 3) at equal distances along the polyline through OKLab corners (k, 3)."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    at = np.linspace(0.0, length[-1], count)
-    return np.stack([np.interp(at, length, corners[:, axis]) for axis in range(3)], axis=1)
-
-
-def make_ramp(path: tuple[tuple[float, float, float], ...], count: int = RAMP_LEVELS) -> NDArray[np.uint8]:
-    """Return a ramp (count, 4) of opaque sRGB colours along a path through OKLab."""
-    linear = np.clip(linear_srgb(even_path(lab_from_lch(path), count)), 0.0, 1.0)
-    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    ramp = np.full((count, 4), 255, np.uint8)
-    ramp[:, :3] = np.round(255.0 * srgb)
-    return ramp
 
 
 def packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:
@@ -100,7 +54,6 @@ def packed_one(colour: Rgba) -> np.uint32:
     return packed(np.array([colour], np.uint8))[0]
 
 
-FORCE_RAMP = make_ramp(_FORCE_PATH)
 GAP_RAMP = make_ramp(_GAP_PATH)
 UNCERTAINTY_RAMP = make_ramp(_UNCERTAINTY_PATH)
 PROBABILITY_RAMP = make_ramp(_PROBABILITY_PATH)

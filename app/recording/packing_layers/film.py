@@ -11,13 +11,16 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from ...drawing.frame_caption import caption_of_strain, caption_of_trust
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.frame_forces import FrameForces
 from ..look import entities
+from ..look.axes import log_texts
 from ..look.canvas import Canvas
 from ..look.clock import Clock
 from ..look.colours import FAINT, INK, LOADED_WALL, Rgba, packed, packed_one
+from ..look.ramp_legend import PIECES
 from ..look.scene import Scene
 from .forces.network import SweepChoice, visible_sweeps
 
@@ -25,7 +28,9 @@ COLUMNS, ROWS = 3, 3  # of frames
 SWEEP_COLUMNS = 2  # of sweeps, in ROWS rows
 PICTURES = COLUMNS * ROWS  # greatest number of frames
 SWEEP_PICTURES = SWEEP_COLUMNS * ROWS  # greatest number of sweeps, including the reported field
-STEP_DOWN = 1.14  # distance of rows over the height of a picture, with space for a name
+STEP_DOWN = 1.45  # distance of rows over the height of a picture, with space for a name
+LINE_HEIGHT = 0.1  # of the height of a picture: from line to line above it
+KEY_HEIGHT = 0.22  # of the height of a picture: the strip below all of them, for the legend
 STRONG = 1.0  # times the mean f_n of the run: the least force drawn in pictures of frames
 STRONG_SWEEPS = 1.5  # times the mean f_n of the run: the least force drawn in pictures of sweeps
 
@@ -37,9 +42,18 @@ def film_frames(frame_count: int) -> NDArray[np.int64]:
 
 def film_bounds(canvas: Canvas, columns: int) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the bounds of a film with this number of columns, in x and y [px]."""
-    above = 0.5 * (STEP_DOWN - 1.0) * canvas.height
+    above = (STEP_DOWN - 1.0) * canvas.height
     top = canvas.top - above
-    return (canvas.left, canvas.left + columns * canvas.width), (top, top + ROWS * STEP_DOWN * canvas.height)
+    return (canvas.left, canvas.left + columns * canvas.width), (
+        top,
+        top + (ROWS * STEP_DOWN + KEY_HEIGHT) * canvas.height,
+    )
+
+
+def film_caption(forces: FrameForces, time: float) -> list[str]:
+    """Return the lines above a picture: frame and time, strain, status and trust."""
+    when = f"frame {forces.frame} · {time:.4g} s" if np.isfinite(time) else f"frame {forces.frame}"
+    return [when, caption_of_strain(forces) or "strain unknown", caption_of_trust(forces)]
 
 
 class FilmWriter:
@@ -48,6 +62,22 @@ class FilmWriter:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._frames = film_frames(scene.tracks.frame_count)
+
+    def log_keys(self, stream: rr.RecordingStream) -> None:
+        """Log the legend of forces below both films, static."""
+        canvas, style = self._scene.canvas, self._scene.style
+        for path, columns in ((entities.FILM_KEY, COLUMNS), (entities.FILM_SWEEPS_KEY, SWEEP_COLUMNS)):
+            wide = columns * canvas.width
+            x = canvas.left + np.linspace(0.25, 0.75, PIECES + 1) * wide
+            y = np.full(PIECES, canvas.top + ((ROWS - 1) * STEP_DOWN + 1.0 + 0.3 * KEY_HEIGHT) * canvas.height)
+            lines = np.stack([np.stack([x[:-1], y], axis=1), np.stack([x[1:], y], axis=1)], axis=1)
+            fn = np.linspace(0.0, style.range.top, PIECES + 1)[1:]
+            stream.log(
+                path, rr.LineStrips2D(lines.astype(np.float32), radii=style.radii(fn), colors=style.colours(fn)),
+                static=True,
+            )  # fmt: skip
+            texts = (("0", x[0]), (f"≥ {style.range.top:.3g} N", x[-1]))
+            log_texts(stream, f"{path}/ticks", [(np.array([at, y[0]]), text, INK) for text, at in texts])
 
     def log(self, clock: Clock, forces: FrameForces) -> None:
         """Log one frame: its picture, static, if it has one; the nearest picture; the film of its sweeps."""
@@ -58,7 +88,7 @@ class FilmWriter:
             clock.stream.log(
                 f"{entities.FILM_FRAMES}/{frame}",
                 self._lines(forces, forces.fn[None], at, STRONG),
-                self._names(at, [f"frame {frame}"]),
+                self._names(np.repeat(at, 3, axis=0), film_caption(forces, clock.time)),
                 static=True,
             )
         clock.start()
@@ -124,9 +154,12 @@ class FilmWriter:
     def _names(self, at: Array, names: list[str]) -> rr.Points2D:
         """Return the names of pictures, placed above them."""
         canvas = self._scene.canvas
-        middle = np.array([0.5 * (canvas.left + canvas.right), canvas.top - 0.05 * canvas.height])
+        middle = np.array([0.5 * (canvas.left + canvas.right), canvas.top - 0.12 * canvas.height])
+        above = np.zeros((len(names), 2))
+        if len(names) > 1 and (at == at[0]).all():  # the lines of one picture, the last one lowest
+            above[:, 1] = LINE_HEIGHT * canvas.height * np.arange(1 - len(names), 1)
         return rr.Points2D(
-            (middle + at).astype(np.float32),
+            (middle + at + above).astype(np.float32),
             radii=np.float32(0.01),
             colors=packed(np.array([INK] * len(names), np.uint8)),
             labels=names,

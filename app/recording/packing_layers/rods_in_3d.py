@@ -6,13 +6,15 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from ...drawing.frame_caption import caption_of_time, caption_of_trust
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces
 from ...tracks import TrackStatus
 from ..look import entities
 from ..look.clock import Clock
-from ..look.colours import BOUNDARY, INFERRED, LOST, SUSPECT, packed_one
+from ..look.colours import BOUNDARY, INFERRED, INK, LOST, SUSPECT, packed_one
 from ..look.level_of_detail import is_outlined
+from ..look.printable_text import printable
 from ..look.scene import Scene
 
 ALUMINIUM = (34, 39, 48, 255)  # dark, so that forces in front of the rods are visible, also in grey
@@ -47,6 +49,21 @@ def log_rods(clock: Clock, scene: Scene, forces: FrameForces) -> None:
         else rr.Points3D(centre[present].astype(np.float32), radii=size, colors=shade[present].astype(np.uint32)),
     )
     _log_chains(clock, scene, forces)
+    _log_caption(clock, scene, forces)
+
+
+def _log_caption(clock: Clock, scene: Scene, forces: FrameForces) -> None:
+    """Log the caption above the rods, with their length as the scale and the range of the forces."""
+    top, style = scene.outline(clock.frame), scene.style.range
+    place = [float(np.nanmean(top[:, 0])), float(np.nanmax(top[:, 1]) + 3.0 * scene.tracks.radius.max()), 0.0]
+    key = f"rods of {1e3 * scene.rod_length:g} mm; forces from {style.mean:.3g} N (red) to {style.top:.3g} N (cream)"
+    text = f"{caption_of_time(forces, clock.time)}\n{caption_of_trust(forces)}\n{key}"
+    clock.stream.log(
+        entities.ROD_CAPTION,
+        rr.Points3D(
+            [place], radii=np.float32(1e-6), colors=packed_one(INK), labels=[printable(text)], show_labels=True
+        ),
+    )
 
 
 def _log_chains(clock: Clock, scene: Scene, forces: FrameForces) -> None:

@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import rerun as rr
 
+from ...drawing.uncertainty import SURE
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.statistics.agreement import Agreement
@@ -173,12 +174,11 @@ def _accuracy(frames: list[FrameSummary]) -> str:
 def _frames(frames: list[FrameSummary]) -> str:
     rows = [
         f"| {f.frame} | {f.status.name.lower()} | {_number(f.trust)} | {_number(f.similarity)} | {f.sweeps} "
-        f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} "
-        f"| {_cell(f.reason)} |"
+        f"| {f.natural_map:.1e} | {f.unbalance:.1e} | {f.contacts} | {np.degrees(f.friction_angle):.1f} | {f.lost} |"
         for f in frames
     ]
-    head = "| frame | status | T | similarity | sweeps | natural map | unbalance | contacts | φ [°] | lost | why |"
-    return "\n".join(["## Frames", "", head, "|" + "---|" * 11, *rows]) if rows else ""
+    head = "| frame | status | T | similarity | sweeps | natural map | unbalance | contacts | φ [°] | lost |"
+    return "\n".join(["## Frames", "", head, "|" + "---|" * 10, *rows]) if rows else ""
 
 
 def _legend(scene: Scene, clipped: int, total: int) -> str:
@@ -189,7 +189,11 @@ def _legend(scene: Scene, clipped: int, total: int) -> str:
         f"colour increase linearly with f_n, the same in every frame: grey and thin below {force.weak:.3g} N (half the "
         f"mean), then deep red, orange, yellow, up to cream at {force.top:.3g} N. "
         f"{clipped} of {total} forces are above and drawn as {force.top:.3g} N.\n"
-        "- **Dim edges** of lines: as wide as a force that is two standard deviations larger; sweeps have none.\n"
+        f"- **Gaps** in a line: the fraction of it that is missing is σ(f_n) / f_n, from {SURE:g} on; a row of dots "
+        "is a force about which little is known. Sweeps have no gaps, as their uncertainty is not known.\n"
+        "- **Caption** above the packing: frame, time, shear or change of area since frame 0, status, trust.\n"
+        "- **Inferred − true**: width by the magnitude of the difference, yellow where the inferred force is greater, "
+        "blue where it is less.\n"
         "- **Cyan dots**: contacts at the Coulomb limit (sliding).\n"
         "- **Strokes at the rim** show rotation: they pointed up in frame 0. Amber outline: suspect pose. "
         "Blue outline: a rod that no photograph shows, inferred from its neighbours. "

@@ -7,17 +7,19 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 from rerun.blueprint.visualizers import Visualizer  # pyright: ignore[reportPrivateImportUsage]
 
+from ...results.schema import unit_of
 from ..look import entities
 from ..look.canvas import Canvas
 from ..look.colours import BACKGROUND
 from .axis_ranges import Extremes, range_with_legend
 
+WALL_KEY_BOUNDS = ((-60.0, 660.0), (0.0, 60.0))
 PLOT_HEIGHT = 300.0  # [px] height of a curve view by default
 _TOP = (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop)
 
 
 def packing_view(name: str, canvas: Canvas, contents: list[str], contacts: Visualizer | None = None) -> rrb.View:
-    """Return a view of the packing with a scale bar and space for a legend below.
+    """Return a view of the packing with scale bar and caption above it and space for a legend below.
 
     Parameters
     ----------
@@ -32,11 +34,12 @@ def packing_view(name: str, canvas: Canvas, contents: list[str], contacts: Visua
     """
     return rrb.Spatial2DView(
         origin="/",
-        contents=[*contents, f"{entities.SCALE_BAR}/**"],
+        contents=[*contents, f"{entities.SCALE_BAR}/**", entities.CAPTION],
         name=name,
         background=BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(
-            x_range=[canvas.left, canvas.right], y_range=[canvas.top, canvas.bottom + canvas.legend_height]
+            x_range=[canvas.left, canvas.right],
+            y_range=[canvas.top - canvas.header_height, canvas.bottom + canvas.legend_height],
         ),
         overrides={entities.FORCES: contacts} if contacts else None,
     )
@@ -82,17 +85,29 @@ def solid_view(name: str, origin: str, eye: tuple[float, float, float], target: 
 
 
 def lanes_view() -> rrb.View:
-    """Return a view of the status and tracking of frames as lanes."""
+    """Return a view of the status and tracking of frames as lanes, whose signs its title explains."""
     return rrb.StateTimelineView(
-        origin="/frames", contents=[entities.STATUS_LANE, entities.TRACKING_LANE], name="Status of the frames",
+        origin="/frames",
+        contents=[entities.STATUS_LANE, entities.TRACKING_LANE],
+        name="0 reset   ≠ rearranging   ≈ settling   = settled   ? suspect   × failed",
         time_view=whole_axis(),
-    )  # fmt: skip
+    )
 
 
-def flags_view() -> rrb.View:
-    """Return a view of the warnings as a list."""
-    columns = rrb.TextLogColumns(timeline_columns=[entities.FRAME], text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin=entities.FLAGS, name="Flags", columns=columns)
+def wall_force_views(extremes: Extremes, walls: int, *, recorded: bool) -> list[rrb.View | rrb.Container]:
+    """Return plots of the forces on the walls, and the key to their colours; nothing where there are no walls."""
+    if not walls:
+        return []
+    unit = unit_of("statistics/wall_force")
+    normal, tangential = [entities.WALL_NORMAL_FORCE], [entities.WALL_TANGENTIAL_FORCE]
+    if recorded:
+        normal, tangential = [*normal, entities.WALL_NORMAL_RECORDED], [*tangential, entities.WALL_TANGENTIAL_RECORDED]
+    plots = [
+        curve_view(f"Walls, {name} [{unit}]", paths, extremes, entries=0)
+        for name, paths in (("normal", normal), ("tangential", tangential))
+    ]
+    key = drawn_view("Walls; wide and pale: recorded" if recorded else "Walls", entities.WALL_KEY, *WALL_KEY_BOUNDS)
+    return [rrb.Horizontal(*plots), key]
 
 
 def curve_view(
@@ -121,7 +136,7 @@ def curve_view(
     height : float
         Height of the plot in a window of usual size [px].
     entries : int, optional
-        Entries of the legend; None: one per path and one for all bands, none for a single curve.
+        Entries of the legend; None: one per path, whose band has its name, none for a single curve.
     corner : Corner2D
         Corner of the legend.
     axis : TimeAxis, optional
@@ -129,8 +144,8 @@ def curve_view(
     """
     bands = [path + entities.BAND for path in contents if path in entities.BANDED]
     if entries is None:
-        entries = len(contents) + bool(bands) if len(contents) + bool(bands) > 1 else 0
-    contents = [*contents, *bands]
+        entries = len(contents) if len(contents) > 1 else 0
+    contents = [*bands, *contents]
     if y_range is None:
         y_range = range_with_legend(extremes or {}, contents, entries=entries, height=height, top=corner in _TOP)
     return rrb.TimeSeriesView(

@@ -17,7 +17,9 @@ from types import TracebackType
 
 from rerun.experimental import ViewerClient
 
+from ..look.entities import ROOT_CONTAINER
 from ..parts import parts_of
+from .plain_window import TOP_BAR, contents_of, erase_buttons, path_of, without_panels
 from .viewer import free_port, viewer_binary, viewer_environment
 
 START_SECONDS = 60.0
@@ -44,7 +46,9 @@ class HeadlessViewer:
     recording : Path or str
         The recording.
     width, height : int
-        Size of the window [px].
+        Size of the pictures of the window [px].
+    plain : bool
+        Show one tab alone, without the viewer's menus, rows of tabs, time panel and buttons.
 
     Raises
     ------
@@ -54,11 +58,12 @@ class HeadlessViewer:
         If the viewer cannot be started.
     """
 
-    def __init__(self, recording: Path | str, *, width: int = 1600, height: int = 1000) -> None:
+    def __init__(self, recording: Path | str, *, width: int = 1600, height: int = 1000, plain: bool = False) -> None:
         self.recording = Path(recording)
         if not self.recording.is_file():
             raise FileNotFoundError(f"there is no recording {recording}")
-        self._size = f"{width}x{height}"
+        self._plain = plain
+        self._size = f"{width}x{height + (TOP_BAR if plain else 0)}"
         self._process: subprocess.Popen[bytes] | None = None
         self._client: ViewerClient | None = None
         self._tab: str | None = None
@@ -92,7 +97,7 @@ class HeadlessViewer:
     @property
     def tabs(self) -> list[str]:
         """Names of the tabs, in their order."""
-        return [self._name(each) for each in self._root()[1]["contents"]]
+        return [self._name(each) for each in contents_of(self._root()[1])]
 
     @property
     def views(self) -> list[str]:
@@ -117,7 +122,7 @@ class HeadlessViewer:
     def show_tab(self, name: str) -> None:
         """Bring a tab to the front; raise NoPictureError if there is none of that name."""
         path, root = self._root()
-        for each in root["contents"]:
+        for each in contents_of(root):
             if self._name(each) == name:
                 blueprint = self._running().get_blueprint().blueprint
                 blueprint[path]["ContainerBlueprint"]["active_tab"] = each
@@ -167,10 +172,15 @@ class HeadlessViewer:
                 picture = b""  # a view that has just come to the front has no layout yet
             digest = hashlib.sha256(picture).digest()
             if picture and digest == previous:
-                return picture
+                return self._without_buttons(picture) if self._plain and view is None else picture
             previous = digest
             time.sleep(PICTURE_INTERVAL)
         raise NoPictureError(f"{self.recording}: the picture still changed after {ANSWER_SECONDS:g} s")
+
+    def _without_buttons(self, picture: bytes) -> bytes:
+        blueprint = self._running().get_blueprint().blueprint
+        tab = next(each for each in contents_of(self._root()[1]) if self._name(each) == self._tab)
+        return erase_buttons(picture, blueprint, path_of(tab))
 
     def _start(self) -> None:
         if not vulkan_drivers():
@@ -209,6 +219,9 @@ class HeadlessViewer:
             self._running().open(str(file))
             self._wait_until_loaded()
         self._running().set_time(play_state="paused")  # a blueprint may start it playing
+        if self._plain:
+            self._running().set_blueprint(without_panels(self._running().get_blueprint().blueprint), "recording")
+            self.show_tab(self._name(self._root()[1].get("active_tab") or contents_of(self._root()[1])[0]))
 
     def _wait_until_loaded(self) -> None:
         client, end = self._running(), time.monotonic() + ANSWER_SECONDS
@@ -231,12 +244,12 @@ class HeadlessViewer:
         """Return path and content of the container of the tabs."""
         for path, parts in self._running().get_blueprint().blueprint.items():
             container = parts.get("ContainerBlueprint", {})
-            if container.get("container_kind") == "Tabs":
+            if container.get("container_kind") == "Tabs" and container.get("display_name") == ROOT_CONTAINER:
                 return path, container
         raise NoPictureError(f"{self.recording} has no tabs")
 
     def _name(self, item: str) -> str:
-        return _display_name(self._running().get_blueprint().blueprint[_path(item)])
+        return _display_name(self._running().get_blueprint().blueprint[path_of(item)])
 
     def _bring_to_front(self, name: str) -> str:
         """Return the view of this name in the front tab, or else in the first tab that has one, and show that tab."""
@@ -255,20 +268,15 @@ class HeadlessViewer:
 
     def _views_of_tab(self, tab: str) -> set[str]:
         blueprint = self._running().get_blueprint().blueprint
-        pending = [each for each in self._root()[1]["contents"] if self._name(each) == tab]
+        pending = [each for each in contents_of(self._root()[1]) if self._name(each) == tab]
         views: set[str] = set()
         while pending:
             item = pending.pop()
-            if _path(item).startswith("/view/"):
-                views.add(_path(item).removeprefix("/view/"))
+            if path_of(item).startswith("/view/"):
+                views.add(path_of(item).removeprefix("/view/"))
             else:
-                pending += blueprint[_path(item)]["ContainerBlueprint"]["contents"]
+                pending += contents_of(blueprint[path_of(item)]["ContainerBlueprint"])
         return views
-
-
-def _path(item: str) -> str:
-    """Return the blueprint path of a container's item, which is stored with or without a leading slash."""
-    return "/" + item.lstrip("/")
 
 
 def _display_name(parts: dict) -> str:

@@ -13,6 +13,7 @@ from ..parts import read_chunks
 from .film_file import encode_film
 from .headless import HeadlessViewer, NoPictureError
 
+DEFAULT_TAB = "Forces"
 PictureProgress = Callable[[int, int], None]  # pictures done, pictures in all
 
 
@@ -21,7 +22,7 @@ class PictureSettings:
     """Timeline, tab, view and size of the pictures."""
 
     timeline: str = "frame"
-    tab: str | None = None  # None: the one in front
+    tab: str | None = None  # None: the forces, or the one in front of a recording without that tab
     view: str | None = None  # of that tab; None: all views
     size: tuple[int, int] = (1600, 1000)  # [px]
 
@@ -133,9 +134,10 @@ def _pictures(
     shown: PictureSettings,
     progress: PictureProgress | None,
 ) -> Iterator[tuple[int, bytes]]:
-    with HeadlessViewer(recording, width=shown.size[0], height=shown.size[1]) as viewer:
-        if shown.tab is not None:
-            viewer.show_tab(shown.tab)
+    with HeadlessViewer(recording, width=shown.size[0], height=shown.size[1], plain=True) as viewer:
+        tab = DEFAULT_TAB if shown.tab is None and DEFAULT_TAB in viewer.tabs else shown.tab
+        if tab is not None:
+            viewer.show_tab(tab)
         for done, value in enumerate(times, 1):
             viewer.set_time(shown.timeline, value)
             yield value, viewer.picture(shown.view)

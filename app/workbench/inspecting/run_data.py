@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...drawing.force_range import ForceRange
 from ...experiment.units import Scale
-from ...recording.look.force_style import ForceRange
 from ...results.checkpoint import Checkpoint, flatten
 from ...results.hdf5.lazy_sequences import CachedSequence, LazySequence
 from ...results.hdf5.store import load_results, load_tracks, read_origin

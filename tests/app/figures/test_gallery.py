@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from rodsight.figures.figure_style import COLOURS, WIDTHS
-from rodsight.figures.force_network import THINNEST_CORE, top_force
-from rodsight.figures.gallery import FigureName, default_frame, draw_figure, write_figures
+from rodsight.figures.force_network import branch_lines
+from rodsight.figures.gallery import NEED_TRUTH, FigureName, default_frame, draw_figure, write_figures
 from rodsight.notebook.run import Run
 from rodsight.solver.frame_forces import FrameStatus
 
 from tests.app.recording.fake_results import make_results, make_truth
+from tests.app.recording.look.colour_vision import VISIONS, cie76
+
+VISIBLE = 20.0  # CIE76 difference from the paper
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +39,7 @@ def test_every_figure_has_the_width_of_a_column_and_units(results):
 def test_the_network_shows_every_contact_that_bears_force_and_its_length(results):
     axes, bar = draw_figure(results, "forces", 3).axes
     assert bar.get_ylabel().endswith("[N]")
-    lines, _cores = (each for each in axes.collections if isinstance(each, LineCollection))
+    lines = next(each for each in axes.collections if isinstance(each, LineCollection))
     fn = results.frames[3].fn
     assert len(lines.get_segments()) == np.count_nonzero(fn > 0)
     width = np.asarray(lines.get_linewidths())
@@ -62,7 +65,7 @@ def test_the_default_frame_is_the_last_settled_one(results):
 def test_files_are_written_for_all_figures_with_data(results, tmp_path):
     files = write_figures(results, tmp_path / "figures", ("pdf", "svg"))
     assert {each.name for each in files} == {
-        f"{name}.{kind}" for name in get_args(FigureName) if name != "truth" for kind in ("pdf", "svg")
+        f"{name}.{kind}" for name in get_args(FigureName) if name not in NEED_TRUTH for kind in ("pdf", "svg")
     }
     assert (tmp_path / "figures" / "forces.pdf").read_bytes().startswith(b"%PDF")
     text = (tmp_path / "figures" / "density.svg").read_text()
@@ -86,22 +89,40 @@ def test_the_network_states_time_shear_status_trust_and_the_force_of_a_line(resu
     assert any(text.endswith("mm") for text in shown)
 
 
-def test_uncertain_forces_are_hollow_and_certain_ones_are_solid(results):
+@pytest.mark.parametrize("vision", VISIONS)
+def test_the_surest_and_the_least_sure_third_differ_at_a_glance(results, vision):
+    """In the drawn picture itself, along its lines, in grey and every kind of colour vision."""
     forces = results.frames[3]
-    strong = top_force(results)
-    fn = np.where(forces.fn > 0, strong, 0.0)
-    sd = np.linspace(0.05, 1.0, len(fn)) * strong
-    frames = [replace(each, fn=fn, fn_sd=sd) if each is forces else each for each in results.frames]
-    axes = draw_figure(replace(results, frames=frames), "forces", 3, width="double").axes[0]
-    lines, cores = (each for each in axes.collections if isinstance(each, LineCollection))
-    width = float(np.asarray(lines.get_linewidths())[0])
-    of_core = dict(zip(map(_key, cores.get_segments()), np.asarray(cores.get_linewidths()), strict=True))
-    relative = [of_core.get(_key(line), 0.0) / width for line in lines.get_segments()]
-    expected = np.clip(sd[fn > 0] / strong, 0.0, 0.8)
-    assert np.sort(relative) == pytest.approx(np.sort(expected), abs=THINNEST_CORE / width)
-    third = len(relative) // 3
-    assert np.sort(relative)[-third:].min() - np.sort(relative)[:third].max() > 0.2  # distinct at a glance
+    bearing = forces.fn > 0
+    sd = np.zeros_like(forces.fn)
+    relative = np.random.default_rng(5).permutation(np.geomspace(0.08, 1.2, int(bearing.sum())))  # as on the sample
+    sd[bearing] = relative * forces.fn[bearing]
+    frames = [replace(each, fn_sd=sd) if each is forces else each for each in results.frames]
+    figure = draw_figure(replace(results, frames=frames), "forces", 3, width="double")
+    figure.canvas.draw()
+    picture = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+    axes = figure.axes[0]
+    lines = branch_lines(results, 3, forces.contacts)[bearing]
+    fraction = np.linspace(0.1, 0.9, 81)[:, None]
+    ink = []
+    for start, end in lines:
+        x, y = np.rint(axes.transData.transform(start + fraction * (end - start))).astype(int).T
+        seen = picture[len(picture) - 1 - y, x]
+        ink.append(np.mean([cie76(tuple(each), (255, 255, 255), vision) > VISIBLE for each in seen.tolist()]))
+    order = np.argsort(relative)
+    third = len(order) // 3
+    surest, least = np.array(ink)[order[:third]], np.array(ink)[order[-third:]]
+    separated = np.mean(surest[:, None] > least[None, :])
+    assert separated > 0.95
+    assert np.median(surest) - np.median(least) > 0.35  # at a glance
 
 
-def _key(segment):
-    return tuple(np.round(segment, 9).ravel().tolist())
+def test_the_difference_of_two_fields_is_a_map(results):
+    truth = make_truth(results, np.random.default_rng(0))
+    axes = draw_figure(results, "difference", 2, truth=truth).axes[0]
+    drawn = [each for each in axes.collections if isinstance(each, LineCollection)]
+    assert len({tuple(colour) for colour in drawn[0].get_colors()}) == 2  # more and less
+    assert "r(f" in axes.get_title(loc="left")
+    same = draw_figure(results, "difference", 2, against=results).axes[0]
+    widths = [each.get_linewidths() for each in same.collections if isinstance(each, LineCollection)]
+    assert np.ptp(widths[0]) == 0.0  # no difference

@@ -11,10 +11,10 @@ from rodsight.recording.comparison_layer import (
     R_FN,
     SECOND,
     describe,
-    difference_colours,
     record_comparison,
 )
 from rodsight.recording.look import entities
+from rodsight.recording.packing_layers.forces.difference import difference_colours
 from rodsight.results.comparison import DifferentPackingError, compare_runs, compare_with_truth
 from rodsight.results.results import TruthContacts
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from rodsight.drawing.force_range import ForceRange
+from rodsight.drawing.ramps import FORCE_RAMP
 from rodsight.process.frame_range import FrameRange
-from rodsight.recording.look.colours import FORCE_RAMP
-from rodsight.recording.look.force_style import THICKEST, THINNEST, ForceRange
+from rodsight.recording.look.force_style import THICKEST, THINNEST
 from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
 from rodsight.solver.statistics.local_motion import measure_local_motion

@@ -1,4 +1,4 @@
-"""Writes a dim edge along the contacts, as wide as a force larger by two standard deviations."""
+"""Writes the gaps in the lines of uncertain forces: the less is known of a force, the more of its line is missing."""
 
 from __future__ import annotations
 
@@ -6,39 +6,73 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from ....drawing.uncertainty import Gaps, line_gaps, relative_uncertainty
+from ....solver.bodies.grains import Array
 from ....solver.frame_forces import FrameForces
 from ...look import entities
 from ...look.clock import Clock
-from ...look.colours import packed
+from ...look.colours import BACKGROUND, packed_one
 from ...look.scene import Scene
+from ...look.values import nullable
 
-STANDARD_DEVIATIONS = 2.0  # as for the bands of curves
-DIM = 0.42  # of the brightness of the line of the force
+MARGIN = 1.1  # width of a gap over that of its line
+SHORTEST = 1e-3  # of the radius of a grain: half a stroke that would have no length
 
 
 def log_force_uncertainty(clock: Clock, scene: Scene, forces: FrameForces) -> None:
-    """Log the edges of the reported forces of one frame; sweeps have none, as their standard deviation is unknown."""
-    style = scene.style
-    fn, sd = np.nan_to_num(forces.fn), np.nan_to_num(forces.fn_sd)
-    radius = style.radii(fn + STANDARD_DEVIATIONS * sd)
-    visible = (fn > style.range.weak) & (radius > style.radii(fn))  # without edges of grey lines and edges of no width
+    """Log the gaps of the reported forces of one frame; sweeps have none, as their standard deviation is unknown."""
+    none = np.zeros(forces.contacts.count, np.bool_)
     if clock.last > clock.first:
         clock.start()
-        _log_edges(clock, scene, forces, radius, np.zeros_like(visible))
+        _log_gaps(clock, scene, forces, none)
     clock.end()
-    _log_edges(clock, scene, forces, radius, visible)
+    _log_gaps(clock, scene, forces, np.nan_to_num(forces.fn) > 0.0)
 
 
-def _log_edges(
-    clock: Clock, scene: Scene, forces: FrameForces, radius: NDArray[np.float32], visible: NDArray[np.bool_]
-) -> None:
-    colours = scene.style.colours(np.nan_to_num(forces.fn[visible]))
-    shades = np.stack([(colours >> shift) & 0xFF for shift in (24, 16, 8, 0)], axis=-1).astype(np.float64)
-    dim = np.rint(shades * [DIM, DIM, DIM, 1.0]).astype(np.uint8)
+def gap_strokes(gaps: Gaps, line_radius: NDArray[np.floating], mean_radius: float) -> tuple[Array, Array]:
+    """Return strokes that hide gaps of lines: along a line where a gap is longer than the line is wide, else across.
+
+    Parameters
+    ----------
+    gaps : Gaps
+        Gaps (g,) [px].
+    line_radius : array (g,)
+        Half width of their lines [px].
+    mean_radius : float
+        Mean radius of the grains [px].
+
+    Returns
+    -------
+    strokes : array (g, 2, 2)
+        Their ends [px]; the viewer rounds them.
+    radii : array (g,)
+        Half of their width [px].
+    """
+    wide = MARGIN * np.asarray(line_radius, np.float64)
+    long = gaps.length > 2.0 * wide
+    radii = np.where(long, wide, 0.5 * gaps.length)
+    half = np.maximum(np.where(long, 0.5 * gaps.length, wide) - radii, SHORTEST * mean_radius)
+    across = np.stack([-gaps.direction[:, 1], gaps.direction[:, 0]], axis=1)
+    arm = np.where(long[:, None], gaps.direction, across) * half[:, None]
+    return np.stack([gaps.middle - arm, gaps.middle + arm], axis=1), radii
+
+
+def _log_gaps(clock: Clock, scene: Scene, forces: FrameForces, visible: NDArray[np.bool_]) -> None:
+    rows = np.flatnonzero(visible)
+    fn, contacts = forces.fn[rows], forces.contacts.select(visible)
+    lines = np.asarray(scene.branches(clock.frame, contacts), np.float64)
+    grain = scene.canvas.grain_radius
+    gaps = line_gaps(lines, relative_uncertainty(fn, forces.fn_sd[rows]), grain)
+    strokes, radii = gap_strokes(gaps, scene.style.radii(fn)[gaps.row], grain)
+    quantum = scene.style.quantum
     clock.stream.log(
         entities.FORCE_UNCERTAINTY,
         rr.LineStrips2D(
-            scene.branches(clock.frame, forces.contacts.select(visible)), radii=radius[visible], colors=packed(dim),
-            draw_order=19.0,
+            strokes.astype(np.float32), radii=(np.ceil(radii / quantum) * quantum).astype(np.float32),
+            colors=packed_one(BACKGROUND), draw_order=21.0,
+        ),
+        rr.AnyValues(
+            fn=nullable(fn[gaps.row].astype(np.float32)),
+            fn_sd=nullable(forces.fn_sd[rows][gaps.row].astype(np.float32)),
         ),
     )  # fmt: skip

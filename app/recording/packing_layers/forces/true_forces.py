@@ -7,7 +7,7 @@ import rerun as rr
 
 from ....results.results import TruthContacts
 from ....solver.contacts.contacts import ContactSource, measure_contacts
-from ....solver.contacts.pairs import align
+from ....solver.contacts.pairs import align, are_present
 from ....solver.frame_forces import FrameForces
 from ....solver.statistics.agreement import Agreement, compare_forces
 from ...look import entities
@@ -16,6 +16,7 @@ from ...look.clock import Clock
 from ...look.colours import INK, SERIES, packed_one
 from ...look.scene import Scene
 from ...look.values import log_scalar, nullable
+from .difference import log_difference, log_difference_legend
 from .network import body_values
 
 
@@ -30,6 +31,7 @@ class TruthWriter:
 
     def log_axes(self, stream: rr.RecordingStream) -> None:
         """Log axes of the scatter plot and the styles of the curves."""
+        log_difference_legend(stream, self._scene, "inferred", "true")
         top = self._axes.x_range[1]
         step = round_step(top / 2.5)
         ticks = [(step * k, f"{step * k:g}") for k in range(int(top / step) + 1)]
@@ -86,7 +88,14 @@ class TruthWriter:
             np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed]),
         )
         true = np.column_stack([truth.fn[rows], truth.ft[rows]])
-        _, (true_fn, _), (inferred_fn, _) = (each.T for each in align(key, true, inferred_key, inferred))
+        union, (true_fn, true_ft), (inferred_fn, inferred_ft) = (
+            each.T for each in align(key, true, inferred_key, inferred)
+        )
+        both = np.stack([inferred_fn, true_fn]), np.stack([inferred_ft, true_ft])
+        present = are_present(union, scene.tracks.present[clock.frame], scene.grains.count + scene.walls.count)
+        log_difference(
+            clock, scene, entities.TRUTH_DIFFERENCE, union[present], both[0][:, present], both[1][:, present]
+        )
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,

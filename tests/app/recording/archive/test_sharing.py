@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.cli.main import main
+from rodsight.drawing.force_range import ForceRange
 from rodsight.experiment.units import Scale
 from rodsight.recording.archive.cards import make_card
 from rodsight.recording.archive.readback import read_forces
@@ -14,7 +15,7 @@ from rodsight.recording.archive.share import share_recording
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.tabs.layout_property import read_layout
 from rodsight.recording.viewing.single_page import write_single_page
 from rodsight.recording.viewing.viewer import viewer_binary

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rerun as rr
+from rodsight.drawing.force_range import ForceRange
 from rodsight.recording.curve_layers.convergence import SMALLEST, power_of_ten
 from rodsight.recording.curve_layers.force_density import BINS as DENSITY_BINS
 from rodsight.recording.curve_layers.force_density import EDGES, density_points, merge_bins
@@ -14,7 +15,7 @@ from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
 from rodsight.recording.look.clock import Clock
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.look.printable_text import printable
 from rodsight.recording.look.scene import Scene
 from rodsight.recording.packing_layers.contact_changes import gap_colours
@@ -195,4 +196,4 @@ def test_every_curve_of_the_statistics_has_its_band_and_every_plot_that_shows_it
         band = latest(path, curve.path + entities.BAND, entities.FRAME, 1)["Scalars:scalars"]
         assert band == pytest.approx([value - 0.5 * curve.unit, value + 0.5 * curve.unit], nan_ok=True), curve
     view = curve_view("both", [entities.TAIL_EXPONENT, entities.TRUST])
-    assert view.contents == [entities.TAIL_EXPONENT, entities.TRUST, entities.TAIL_EXPONENT + entities.BAND]
+    assert view.contents == [entities.TAIL_EXPONENT + entities.BAND, entities.TAIL_EXPONENT, entities.TRUST]

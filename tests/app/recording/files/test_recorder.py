@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
+from rodsight.drawing.force_range import ForceRange
 from rodsight.experiment.units import Scale
 from rodsight.recording.archive.readback import read_forces
 from rodsight.recording.files.finished_run import RecordingOptions, _check_complete, write_recording
 from rodsight.recording.files.recorder import Recorder
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.look.scene import Scene
 from rodsight.recording.packing_layers.forces.network import SweepChoice
 from rodsight.recording.tabs.blueprint import Tab

@@ -3,11 +3,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from rodsight.drawing.force_range import ForceRange
 from rodsight.recording.curve_layers.settling import ALL_TRACKED, SOME_CUT, SOME_INFERRED, SOME_LOST, tracking_state
 from rodsight.recording.files.finished_run import RecordingOptions, write_recording
 from rodsight.recording.look import entities
 from rodsight.recording.look.canvas import Canvas
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.look.written_schema import SCHEMA, Condition
 from rodsight.recording.packing_layers.grains_and_walls import grain_colours
 from rodsight.tracks import TrackStatus
@@ -93,17 +95,38 @@ def test_every_sweep_has_its_residuals_for_any_choice_of_kept_forces(tmp_path):
     results = make_results(3, sweeps=50, recorded=np.array([0, 10, 49]))
     path = write_recording(results, tmp_path / "run.rrd", options=RecordingOptions(sweeps="none")).path
     logged = [row for row in rows(path, entities.SWEEP_NATURAL_MAP) if "Scalars:scalars" in row]
-    found = [row for row in logged if "sweep" in row]
-    assert [row["sweep"] for row in found] == [
-        *range(50),
-        *range(51, 101),
-        *range(102, 152),
-    ]  # none for the reported field
+    found = [row for row in logged if "sweep" in row and "frame" not in row]
+    assert [row["sweep"] for row in found] == [*range(50), *range(51, 101), *range(102, 152)]
     expected_values = np.concatenate([np.log10(frame.history.natural_map) for frame in results.frames])
     assert np.array_equal([row["Scalars:scalars"][0] for row in found], expected_values)
-    of_frames = [row for row in logged if "sweep" not in row]  # on the timeline of frames: the last sweep of each
-    assert [row["frame"] for row in of_frames] == [0, 1, 2]
-    assert np.array_equal([row["Scalars:scalars"][0] for row in of_frames], expected_values[49::50])
+    reported = [row for row in logged if "frame" in row]  # on all timelines: the reported field, after the sweeps
+    assert [(row["frame"], row["sweep"]) for row in reported] == [(0, 50), (1, 101), (2, 152)]
+    values = [row["Scalars:scalars"][0] for row in reported]
+    assert values == pytest.approx([np.log10(frame.natural_map) for frame in results.frames])
+
+
+def test_the_curves_of_a_frame_end_with_the_unbalance_of_the_reported_field(tmp_path):
+    results = make_results(2, sweeps=20)
+    frames = [replace(each, unbalance=1e-3 * (1 + each.frame)) for each in results.frames]
+    path = write_recording(replace(results, frames=frames), tmp_path / "run.rrd").path
+    for frame in frames:
+        curve = latest(path, entities.SWEEP_UNBALANCE, entities.FRAME, frame.frame)["Scalars:scalars"]
+        assert curve == pytest.approx([np.log10(frame.unbalance)])
+        mark = latest(path, entities.RESIDUAL_REPORTED, entities.FRAME, frame.frame)
+        assert mark["Points2D:labels"] == ["reported"]
+
+
+def test_the_caption_states_when_how_strained_and_how_far_to_trust_and_sweeps_are_not_reported(tmp_path):
+    results = make_results(2, sweeps=20)
+    frames = [replace(each, shear=0.02 * each.frame, trust=0.8) for each in results.frames]
+    path = write_recording(replace(results, frames=frames), tmp_path / "run.rrd").path
+    (text,) = latest(path, entities.CAPTION, entities.FRAME, 1)["Points2D:labels"]
+    assert text.startswith(f"frame 1 · {results.tracks.time[1]:.4g} s · shear 1.15°")
+    assert text.endswith(f"{frames[1].status.name.lower()} · trust 0.80")
+    (forming,) = latest(path, entities.CAPTION, entities.SWEEP, 25)["Points2D:labels"]
+    assert "not yet the reported field" in forming
+    card = latest(path, entities.FRAME_CARD, entities.FRAME, 1)["TextDocument:text"][0]
+    assert "trust **0.80**" in card
 
 
 def test_a_lost_grain_is_crossed_out_flagged_and_keeps_its_row(recording, results):

@@ -2,23 +2,27 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.experiment.jpeg_photographs import LARGEST, encode_jpeg
-from rodsight.experiment.units import Scale
-from rodsight.recording.look.canvas import NOMINAL_RADIUS, Canvas
-from rodsight.recording.look.colours import (
-    _DIFFERENCE_PATH,
+from rodsight.drawing.force_range import ForceRange
+from rodsight.drawing.ramps import (
     _FORCE_PATH,
-    _GAP_PATH,
-    _PROBABILITY_PATH,
-    _UNCERTAINTY_PATH,
+    _FORCE_PATH_ON_WHITE,
     FORCE_RAMP,
     RAMP_LEVELS,
     even_path,
     lab_from_lch,
     linear_srgb,
+)
+from rodsight.experiment.jpeg_photographs import LARGEST, encode_jpeg
+from rodsight.experiment.units import Scale
+from rodsight.recording.look.canvas import NOMINAL_RADIUS, Canvas
+from rodsight.recording.look.colours import (
+    _DIFFERENCE_PATH,
+    _GAP_PATH,
+    _PROBABILITY_PATH,
+    _UNCERTAINTY_PATH,
     packed,
 )
-from rodsight.recording.look.force_style import ForceRange, ForceStyle
+from rodsight.recording.look.force_style import ForceStyle
 from rodsight.recording.packing_layers.forces.network import SweepChoice, chosen_sweeps, visible_sweeps
 
 from tests.app.recording.fake_results import RADIUS, make_results
@@ -27,7 +31,9 @@ GAMUT = 0.01  # of linear sRGB: invisible change by clipping
 EVEN = 1e-6  # relative: rounding
 
 
-@pytest.mark.parametrize("path", [_FORCE_PATH, _GAP_PATH, _UNCERTAINTY_PATH, _PROBABILITY_PATH, _DIFFERENCE_PATH])
+@pytest.mark.parametrize(
+    "path", [_FORCE_PATH, _FORCE_PATH_ON_WHITE, _GAP_PATH, _UNCERTAINTY_PATH, _PROBABILITY_PATH, _DIFFERENCE_PATH]
+)
 def test_a_ramp_is_perceptually_uniform_and_within_srgb(path):
     lab = even_path(lab_from_lch(path), RAMP_LEVELS)
     steps = np.linalg.norm(np.diff(lab, axis=0), axis=1)
@@ -41,6 +47,7 @@ def test_a_ramp_is_perceptually_uniform_and_within_srgb(path):
 def test_greater_forces_are_always_lighter():
     light = even_path(lab_from_lch(_FORCE_PATH), RAMP_LEVELS)[:, 0]
     assert np.all(np.diff(light) > 0.0)
+    assert np.all(np.diff(even_path(lab_from_lch(_FORCE_PATH_ON_WHITE), RAMP_LEVELS)[:, 0]) < 0.0)  # darker on white
 
 
 def test_oklab_white_and_black_are_srgb_white_and_black():

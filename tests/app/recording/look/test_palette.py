@@ -4,13 +4,14 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from rodsight.drawing.force_range import ForceRange
+from rodsight.drawing.ramps import FORCE_RAMP, FORCE_RAMP_ON_WHITE
 from rodsight.figures.figure_style import COLOURS
 from rodsight.recording.curve_layers.settling import STATUS_COLOURS, TRACKING_COLOURS
 from rodsight.recording.look.colours import (
     ADDED,
     DIFFERENCE_RAMP,
     FORBIDDEN,
-    FORCE_RAMP,
     GAP_RAMP,
     LOST,
     NEW_CONTACT,
@@ -18,7 +19,6 @@ from rodsight.recording.look.colours import (
     SERIES,
     UNCERTAINTY_RAMP,
 )
-from rodsight.recording.look.force_style import ForceRange
 from rodsight.recording.packing_layers.rods_in_3d import ALUMINIUM
 from rodsight.solver.frame_forces import FrameStatus
 
@@ -36,8 +36,8 @@ GROUPS = {
 
 
 RAMPS = {
-    "force": FORCE_RAMP, "gap": GAP_RAMP, "uncertainty": UNCERTAINTY_RAMP, "probability": PROBABILITY_RAMP,
-    "difference": DIFFERENCE_RAMP,
+    "force": FORCE_RAMP, "force on white": FORCE_RAMP_ON_WHITE, "gap": GAP_RAMP, "uncertainty": UNCERTAINTY_RAMP,
+    "probability": PROBABILITY_RAMP, "difference": DIFFERENCE_RAMP,
 }  # fmt: skip
 
 

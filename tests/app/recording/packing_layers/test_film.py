@@ -1,10 +1,10 @@
 from __future__ import annotations
 
 import numpy as np
+from rodsight.drawing.force_range import ForceRange
 from rodsight.recording.archive.share import share_recording
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.look import entities
-from rodsight.recording.look.force_style import ForceRange
 from rodsight.recording.packing_layers.film import (
     PICTURES,
     STRONG,
@@ -37,7 +37,10 @@ def test_a_picture_shows_the_strong_forces_of_its_frame_beside_earlier_pictures(
         picture = rows(recording.path, f"{entities.FILM_FRAMES}/{frame}")[-1]
         lines = np.array(picture["LineStrips2D:strips"])
         assert len(lines) - OUTLINE == np.sum(results.frames[frame].fn > strong)
-        assert picture["Points2D:labels"] == [f"frame {frame}"]
+        when, strain, trust = picture["Points2D:labels"]
+        assert when == f"frame {frame} · {results.tracks.time[frame]:.4g} s"
+        assert strain
+        assert trust.startswith(results.frames[frame].status.name.lower())
         assert lines[..., 0].min() > left
         assert lines[..., 0].max() < right
         assert lines[..., 1].min() > top
@@ -48,7 +51,7 @@ def test_a_picture_shows_the_strong_forces_of_its_frame_beside_earlier_pictures(
     across, down = (np.diff(np.array(middles), axis=0)).T
     assert np.all(across[:2] > 0.3 * (right - left) * 0.9)  # three in a row
     assert np.allclose(down[:2], 0.0, atol=1.0)
-    assert down[2] > 0.9 * (bottom - top) / 3  # the fourth is below the first
+    assert down[2] > 0.8 * (bottom - top) / 3  # the fourth is below the first
 
 
 def test_the_film_of_sweeps_ends_with_the_reported_forces(recording, results):
