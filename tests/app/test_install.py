@@ -73,7 +73,7 @@ def test_the_wheel_holds_the_package_its_data_and_no_tests(wheel):
     assert [each.name for each in wheel.iterdir() if not each.name.endswith(".dist-info")] == ["rodsight"]
     for name in (
         "py.typed", "workbench/page/steps/review.js", "recording/viewing/pages/single_page.html",
-        "docs/troubleshooting.md", "docs/pictures/experiment.png", "docs/notebooks/is_it_to_be_trusted.ipynb",
+        "docs/troubleshooting.md", "docs/pictures/forces.jpg", "docs/notebooks/is_it_to_be_trusted.ipynb",
         "manual/page.html", "manual/cures.toml", "campaigns/report.html",
     ):  # fmt: skip
         assert (wheel / "rodsight" / name).is_file(), name

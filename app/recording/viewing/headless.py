@@ -25,6 +25,7 @@ from .viewer import free_port, viewer_binary, viewer_environment
 START_SECONDS = 60.0
 ANSWER_SECONDS = 60.0
 NOTICE_SECONDS = 9.0  # for which the viewer shows its start notices over a corner of the window
+REMARK = "; "  # begins the remark in the title of a view, without which the view is found, too
 PICTURE_INTERVAL = 0.25  # [s] between two pictures that must be equal: the viewer fetches data on demand
 
 
@@ -253,7 +254,8 @@ class HeadlessViewer:
 
     def _bring_to_front(self, name: str) -> str:
         """Return the view of this name in the front tab, or else in the first tab that has one, and show that tab."""
-        named = {str(view.view_id) for view in self._running().get_state().views if view.name == name}
+        views = self._running().get_state().views
+        named = {str(view.view_id) for view in views if name in (view.name, (view.name or "").partition(REMARK)[0])}
         if not named:
             shown = ", ".join(sorted(repr(each) for each in set(self.views)))
             raise NoPictureError(f"{self.recording} has no view {name!r}; there are {shown}")

@@ -6,6 +6,7 @@ import pytest
 from rodsight.cli.main import main
 from rodsight.recording.viewing.headless import HeadlessViewer, NoPictureError, vulkan_drivers
 from rodsight.recording.viewing.pictures import PictureSettings, timeline_values, write_film
+from rodsight.recording.viewing.plain_window import BUTTONS, ICON, TITLE
 
 from tests.browser import read_picture, warm_fraction
 
@@ -31,6 +32,26 @@ def test_pictures_of_tabs_and_views_at_any_time(recording):
         assert viewer.warnings() == []
         with pytest.raises(NoPictureError, match="no view 'Nothing'"):
             viewer.picture("Nothing")
+
+
+@needs_vulkan
+@pytest.mark.screen
+def test_a_plain_picture_of_a_tab_has_no_menus_and_no_buttons(recording):
+    size = (900, 600)
+    with HeadlessViewer(recording.path, width=size[0], height=size[1], plain=True) as viewer:
+        viewer.show_tab("Forces")
+        viewer.set_time("frame", 1)
+        picture = read_picture(viewer.picture()).astype(int)
+        assert picture.shape[:2] == size[::-1]
+        saturated = np.ptp(picture, axis=2) > 60
+        assert saturated.mean() > 0.005  # the forces are drawn
+        assert not saturated[:TITLE].any()  # orange warnings of the viewer stand in its uppermost row
+        left = int(size[0] * 1.25 / 2.25)
+        for end in (left, size[0]):
+            assert np.ptp(picture[2 : TITLE - 2, end - BUTTONS + 2 : end - 4]) < 12  # buttons in titles are erased
+        assert np.ptp(picture[:TITLE, ICON:200]) > 100  # the title itself is there
+        viewer.show_tab("Rods in space")  # of a nested row of tabs
+        assert warm_fraction(read_picture(viewer.picture())) > 0.005
 
 
 @needs_vulkan
