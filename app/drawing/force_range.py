@@ -33,7 +33,8 @@ class ForceRange:
 
     def fraction_of_ramp(self, fn: NDArray[np.floating]) -> Array:
         """Return places of forces [N] on the ramp of colours, 0 at the weak level and 1 at the top."""
-        return np.clip((np.nan_to_num(fn) - self.weak) / (self.top - self.weak), 0.0, 1.0)
+        place = (np.nan_to_num(fn) - self.weak) / (self.top - self.weak)
+        return np.asarray(np.clip(place, 0.0, 1.0), np.float64)
 
     @classmethod
     def of(cls, frames: Sequence[FrameForces]) -> ForceRange:

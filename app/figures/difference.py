@@ -47,7 +47,8 @@ def draw_difference(comparison: Comparison, frame: int, width: Width) -> Figure:
     contacts = measure_pairs(base.grains, base.tracks.position[frame], at_rest, key)
     drawn = np.flatnonzero(np.isfinite(contacts.point).all(axis=1))
     difference = (ours - theirs)[drawn]
-    drawn, difference = (each[np.argsort(np.abs(difference))] for each in (drawn, difference))
+    order = np.argsort(np.abs(difference))
+    drawn, difference = drawn[order], difference[order]
     top = DIFFERENCE_FRACTION * ForceRange.of(base.frames).top
     axes.add_collection(LineCollection(
         list(branch_lines(base, frame, contacts)[drawn]),

@@ -88,14 +88,11 @@ class TruthWriter:
             np.nan_to_num(np.column_stack([forces.fn, forces.ft])[listed]),
         )
         true = np.column_stack([truth.fn[rows], truth.ft[rows]])
-        union, (true_fn, true_ft), (inferred_fn, inferred_ft) = (
-            each.T for each in align(key, true, inferred_key, inferred)
-        )
-        both = np.stack([inferred_fn, true_fn]), np.stack([inferred_ft, true_ft])
+        union, on_truth, on_inferred = align(key, true, inferred_key, inferred)
         present = are_present(union, scene.tracks.present[clock.frame], scene.grains.count + scene.walls.count)
-        log_difference(
-            clock, scene, entities.TRUTH_DIFFERENCE, union[present], both[0][:, present], both[1][:, present]
-        )
+        both = np.stack([on_inferred, on_truth])[:, present]
+        log_difference(clock, scene, entities.TRUTH_DIFFERENCE, union[present], both[..., 0], both[..., 1])
+        true_fn, inferred_fn = on_truth[:, 0], on_inferred[:, 0]
         reach = self._axes.x_range[1]
         clock.stream.log(
             entities.TRUTH_SCATTER,
