@@ -21,6 +21,7 @@ from .config.dotted_keys import leaves
 from .config.experiment_file import ExperimentFile, load_config
 from .photographs import Channel, ImageSelection, Photographs
 from .reading.input_files import InputFiles
+from .reading.photograph_order import NUMBER, ORDER_COLUMNS, GivenOrder, arrange_order
 from .reading.tables import Table, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
@@ -65,9 +66,25 @@ class Experiment:
         section = self.config.photographs
         assert section is not None
         self.inputs.refuse_outside(Path(os.path.normpath(self.folder / section.files)))  # before folders are listed
-        files = self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
-        selection = ImageSelection(channel or section.channel, section.region, section.mask)
-        return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, selection=selection)
+        selection = ImageSelection(channel or section.channel, section.region, section.mask, section.rotation)
+        order = self.given_order()
+        return Photographs(
+            self.matching() if order is None else order.files, inputs=self.inputs, max_pixels=section.max_pixels,
+            selection=selection, ordered=order is not None,
+        )  # fmt: skip
+
+    def given_order(self) -> GivenOrder | None:
+        """Return the photographs and their places in time that a table lists; None where there is no such table."""
+        section = self.config.photographs
+        if section is None or section.order is None:
+            return None
+        return arrange_order(self.table(section.order, ORDER_COLUMNS, (NUMBER,)), self.matching(), self.folder)
+
+    def matching(self) -> Sequence[Path]:
+        """Return all photographs that the pattern matches, in natural order."""
+        section = self.config.photographs
+        assert section is not None
+        return self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
 
     def table(self, name: str, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
         """Read a table of the experiment's folder. Raises InputError with file, row and value."""
@@ -82,7 +99,8 @@ class Experiment:
         config = self.config
         names = [config.truth, config.truth_tracks]
         if config.photographs:
-            names += [config.photographs.times, config.photographs.grains, config.photographs.corrections]
+            section = config.photographs
+            names += [section.times, section.order, section.grains, section.corrections]
         if config.tracks:
             names += [config.tracks.positions, config.tracks.grains, config.tracks.times]
         if config.walls:
@@ -160,7 +178,9 @@ def read_times(experiment: Experiment, frame_count: int) -> Array:
     """Return the time of every frame (f,) [s], ascending."""
     config = experiment.config
     if config.photographs is not None and config.photographs.interval is not None:
-        return np.arange(frame_count, dtype=np.float64) * config.photographs.interval
+        order = experiment.given_order()
+        number = np.arange(frame_count) if order is None else order.number[:frame_count] - order.number[0]
+        return number.astype(np.float64) * config.photographs.interval
     name = config.photographs.times if config.photographs is not None else config.tracks and config.tracks.times
     assert name is not None
     return arrange_times(experiment.table(name, TIME_COLUMNS), frame_count)

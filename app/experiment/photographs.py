@@ -5,13 +5,11 @@ from __future__ import annotations
 import errno
 import io
 import os
-import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from threading import Lock
 from typing import Generic, Literal, Protocol, TypeVar
@@ -23,12 +21,14 @@ from ..process.errors import InputError
 from .image_header import claimed_size
 from .png_chunks import is_whole_png
 from .reading.input_files import InputFiles
+from .reading.photograph_order import in_order
 
 Image = NDArray[np.float32]
 
 # ITU-R BT.601 luma of blue, green, red: the order of OpenCV's channels.
 LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
 Channel = Literal["grey", "red", "green", "blue"]
+Rotation = Literal[0, 90, 180, 270]
 CHANNELS: dict[Channel, NDArray[np.float32]] = {
     "grey": LUMA,
     "red": np.array([0.0, 0.0, 1.0], dtype=np.float32),
@@ -37,7 +37,6 @@ CHANNELS: dict[Channel, NDArray[np.float32]] = {
 }
 
 FULL_SCALE = 255.0
-WRAPPED = 4  # numbers of a camera's counter, at most, that may be missing where it wraps
 MAX_PIXELS = 200_000_000  # more than any laboratory camera has; .8 GB as float32
 
 # Suffixes of cameras' raw files, which the optional package rawpy reads.
@@ -48,11 +47,12 @@ RAW_SUFFIXES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class ImageSelection:
-    """The channel, the region and the mask of a photograph: the part of it that is used."""
+    """The channel, the rotation, the region and the mask of a photograph: the part of it that is used."""
 
     channel: Channel = "grey"
     region: tuple[int, int, int, int] | None = None  # [px] first column and row, last column and row; None: all
     mask: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons [px] that are not used
+    rotation: Rotation = 0  # [degrees] clockwise, before everything else
 
     def cut(self, image: Image) -> Image:
         """Return the image with all other pixels set to the median grey of those that are used: they show no edge."""
@@ -82,9 +82,10 @@ class Photographs(Sequence[Image]):
     """Photographs in natural order (img2 before img10); item k is read from its file on access.
 
     Every image is float32 (H, W), grey, on a scale where the full scale of the file's depth is 255:
-    16-bit files keep all their levels as fractions. Pixels are those stored in the file: an
-    orientation tag is not applied. Raises InputError for no files, an unreadable one, or one of
-    another size than the first.
+    16-bit files keep all their levels as fractions. Pixels are those stored in the file, rotated
+    as the selection states: an orientation tag is not applied, because a camera that looks down
+    does not know its own. Raises InputError for no files, an unreadable one, or one of another
+    size than the first.
     """
 
     def __init__(
@@ -95,8 +96,10 @@ class Photographs(Sequence[Image]):
         inputs: InputFiles | None = None,
         max_pixels: int = MAX_PIXELS,
         selection: ImageSelection = WHOLE_IMAGE,
+        ordered: bool = False,
     ) -> None:
-        self.files: tuple[Path, ...] = in_order(Path(file) for file in files)
+        """Check that there are files; ordered: they are taken as they are listed, not by their names."""
+        self.files: tuple[Path, ...] = tuple(map(Path, files)) if ordered else in_order(map(Path, files))
         if not self.files:
             raise InputError(source, "", "there are no photographs")
         self._shape: tuple[int, int] | None = None
@@ -126,9 +129,7 @@ class Photographs(Sequence[Image]):
     def shape(self) -> tuple[int, int]:
         """Rows and columns of every photograph [px]."""
         if self._shape is None:
-            self._shape = _shape_of(
-                read_photograph(self.files[0], self._inputs, self._max_pixels, self._selection.channel)
-            )
+            self._shape = _shape_of(self._read(0))
             self.check_region(self._shape)
         return self._shape
 
@@ -147,22 +148,29 @@ class Photographs(Sequence[Image]):
         for frame, file in enumerate(self.files):
             content = _content_of(file, self._inputs, self._max_pixels)
             stated = claimed_size(content) if is_whole_png(content) else None
-            if stated is None or stated != self.shape[::-1]:
-                self._check_size(frame, _grey_of(file, content, self._selection.channel))
+            shape = self.shape if self._selection.rotation in (90, 270) else self.shape[::-1]
+            if stated is None or stated != shape:
+                self._check_size(frame, _grey_of(file, content, self._selection))
 
     def __len__(self) -> int:
         return len(self.files)
 
     def __getitem__(self, frame: int) -> Image:  # pyright: ignore[reportIncompatibleMethodOverride]
-        image = read_photograph(self.files[frame], self._inputs, self._max_pixels, self._selection.channel)
-        return self._selection.cut(self._check_size(frame, image))
+        return self._selection.cut(self._check_size(frame, self._read(frame)))
+
+    def _read(self, frame: int) -> Image:
+        file = self.files[frame]
+        return _grey_of(file, _content_of(file, self._inputs, self._max_pixels), self._selection)
 
     def in_channels(self, frame: int) -> dict[str, Image]:
         """Return one photograph in each of CHANNELS, decoded once."""
         file = self.files[frame]
         pixels = _pixels_of(file, _content_of(file, self._inputs, self._max_pixels))
         names = CHANNELS if pixels.ndim == 3 and pixels.shape[2] > 2 else {"grey": LUMA}
-        images = {name: self._check_size(frame, _to_grey(file, pixels, weight)) for name, weight in names.items()}
+        images = {
+            name: self._check_size(frame, rotated(_to_grey(file, pixels, weight), self._selection.rotation))
+            for name, weight in names.items()
+        }
         return {name: self._selection.cut(images.get(name, images["grey"])) for name in CHANNELS}
 
     def _check_size(self, frame: int, image: Image) -> Image:
@@ -222,30 +230,6 @@ class PrefetchedPhotographs(Generic[P]):
         self._reader.shutdown(wait=True, cancel_futures=True)
 
 
-def natural_key(file: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
-    """Return a sort key that compares numbers in names by value: img2 before img10."""
-    parts = re.split(r"(\d+)", file.as_posix())
-    return tuple((0, int(part)) if part.isdecimal() else (1, part.lower()) for part in parts), file.as_posix()
-
-
-def in_order(files: Iterable[Path]) -> tuple[Path, ...]:
-    """Return photographs in the natural order of their names; a camera's counter that wraps goes on.
-
-    A counter of so many digits wraps where photographs with its last and its first numbers are there, and none with
-    numbers between: DSC_9998, DSC_9999, DSC_0001.
-    """
-    ordered = sorted(files, key=natural_key)
-    names = [re.fullmatch(r"(.*?)(\d{4,})", file.stem) for file in ordered]
-    if len(ordered) < 2 or len({(name[1], len(name[2])) if name else None for name in names}) != 1 or names[0] is None:
-        return tuple(ordered)
-    counts, period = [int(name[2]) for name in names if name], 10 ** len(names[0][2])
-    steps = [after - before for before, after in pairwise(counts)]
-    widest = max(range(len(steps)), key=steps.__getitem__)
-    usual = sorted(steps)[(len(steps) - 1) // 2] if len(steps) > 1 else WRAPPED
-    wraps = counts[0] + period - counts[-1] <= max(2 * usual, WRAPPED) and steps[widest] > period // 2
-    return tuple(ordered[widest + 1 :] + ordered[: widest + 1] if wraps else ordered)
-
-
 def read_photograph(
     file: Path, inputs: InputFiles | None = None, max_pixels: int = MAX_PIXELS, channel: Channel = "grey"
 ) -> Image:
@@ -269,11 +253,16 @@ def read_photograph(
     InputError
         The file is not a photograph, or a raw file without the package that reads it.
     """
-    return _grey_of(file, _content_of(file, inputs, max_pixels), channel)
+    return _grey_of(file, _content_of(file, inputs, max_pixels), ImageSelection(channel))
 
 
-def _grey_of(file: Path, content: bytes, channel: Channel) -> Image:
-    return _to_grey(file, _pixels_of(file, content), CHANNELS[channel])
+def rotated(image: Image, rotation: Rotation) -> Image:
+    """Return a photograph rotated clockwise by so many degrees."""
+    return np.ascontiguousarray(np.rot90(image, -rotation // 90)) if rotation else image
+
+
+def _grey_of(file: Path, content: bytes, selection: ImageSelection) -> Image:
+    return rotated(_to_grey(file, _pixels_of(file, content), CHANNELS[selection.channel]), selection.rotation)
 
 
 def _pixels_of(file: Path, content: bytes) -> NDArray:

@@ -7,14 +7,14 @@ while, since the missing one may be late.
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from ..experiment.photographs import in_order, read_photograph
+from ..experiment.photographs import read_photograph
+from ..experiment.reading.photograph_order import in_order, last_number
 from ..process.errors import InputError
 
 STEADY_TIME = 0.5  # [s] without a change of the file
@@ -64,7 +64,7 @@ class Arrivals:
 
     def _without_gap(self, files: list[Path]) -> list[Path]:
         """Leave out files after a missing number, until the maximum delay is over."""
-        number = [_last_number(file) for file in files]
+        number = [last_number(file) for file in files]
         step = [b - a for a, b in pairwise(number) if a is not None and b is not None]
         if len(step) < 2 or min(step) <= 0:
             return files
@@ -75,8 +75,3 @@ class Arrivals:
         if self._gap_since is None:
             self._gap_since = self.clock()
         return files if self.clock() - self._gap_since > self.max_delay else files[:gap]
-
-
-def _last_number(file: Path) -> int | None:
-    found = re.findall(r"\d+", file.stem)
-    return int(found[-1]) if found else None

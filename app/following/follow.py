@@ -80,6 +80,11 @@ def follow(
         raise InputError(
             run.experiment.file, "key photographs.interval", "is missing: it gives the times of future photographs"
         )
+    if section.order is not None:
+        raise InputError(
+            run.experiment.file, f"key photographs.order = {section.order!r}",
+            "lists the photographs, but --follow uses all that arrive: remove the key",
+        )  # fmt: skip
     arrivals, state = Arrivals(run.experiment.folder, section.files), _Followed()
     report("Waiting for photographs.")
     since = time.monotonic()

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
-from ...experiment.photographs import natural_key
+from ...experiment.reading.photograph_order import natural_key
 from ...experiment.reading.tables import Table
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array

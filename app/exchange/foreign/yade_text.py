@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...experiment.photographs import natural_key
+from ...experiment.reading.photograph_order import natural_key
 from ...experiment.reading.tables import Table
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array

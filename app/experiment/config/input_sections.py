@@ -113,6 +113,17 @@ class PhotographsSection(Section):
         "reflections.",
         unit="px", default=(),
     )  # fmt: skip
+    order: str | None = key(
+        "Table file[,number]: the photographs to use, in this order, of those that files matches, and their places in "
+        "time in intervals; absent: all, in the natural order of their names.",
+        default=None,
+    )
+    rotation: Literal[0, 90, 180, 270] = key(
+        "Angle by which the photographs are rotated clockwise before they are used. A camera's note of its orientation "
+        "is not used: cameras that look down do not know it.",
+        unit="degrees",
+        default=0,
+    )
     follow: Literal["texture", "outline"] = key(
         "Feature of the rods that is tracked. texture: the paint on them, with their rotation; outline: their rims, "
         "for plain discs or for discs that change inside, such as photoelastic ones; their rotation stays unknown.",

@@ -154,7 +154,8 @@ app.hint = (text) => { at("hint").textContent = text ?? ""; };
 app.photograph = (frame) => {
   const { project } = app;
   if (!project.files.length) return "";
-  return `/photograph?${new URLSearchParams({ at: project.at, frame, channel: project.photographs.channel ?? "grey" })}`;
+  const { channel = "grey", rotation = 0 } = project.photographs; // a photograph that is kept belongs to its file, as it is used
+  return `/photograph?${new URLSearchParams({ at: project.at, frame, channel, rotation, file: project.series.names[frame] ?? "" })}`;
 };
 
 function markOf(step) {
@@ -220,7 +221,7 @@ app.timeline = () => {
       slider, h("div", { class: "row tools" }, h("span", { class: "soft", id: "frame-file" }), sheetButton(app, null, null)));
   }
   at("frame-name").textContent = `photograph ${app.frame} of ${count - 1}`;
-  at("frame-file").textContent = `${project.files[app.frame]}${interval ? ` · ${digits(interval * app.frame, 4)} s` : ""}`;
+  at("frame-file").textContent = `${project.files[app.frame]}${interval ? ` · ${digits(interval * ((project.series.number[app.frame] ?? app.frame) - (project.series.number[0] ?? 0)), 4)} s` : ""}`;
 };
 
 app.show = (frame) => {

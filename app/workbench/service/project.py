@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...experiment.experiment import GrainGuess
-from ...experiment.photographs import Channel, Image, ImageSelection, read_photograph
+from ...experiment.photographs import Channel, Image, ImageSelection, Rotation, read_photograph, rotated
 from ...experiment.reading.input_files import InputFiles
 from ...experiment.units import Scale
 from ...out_of_date import recording_out_of_date
@@ -38,6 +38,7 @@ from ..setup.draft import Draft, stamp_of
 from ..setup.edits import TABLES
 from ..setup.experiment_folders import run_folder, valid_name
 from ..setup.journal import PLACE, Journal
+from ..setup.photograph_series import describe_series
 from ..setup.validation import ValidationResult, outside_walls, validate
 
 NOT_OWN = "of_another_experiment"  # below the run's folder of another experiment: nothing is there
@@ -45,6 +46,7 @@ KEPT = 6  # photographs in memory: the one shown, two to either side, the first
 KEPT_PICTURES, SMALL_PICTURE = 32, 2_000_000  # of them as they were sent; [bytes]
 WHOLE = (slice(None), slice(None))
 QUALITY = 90  # of JPEG
+PhotographKey = tuple[Path, int, Channel, Rotation]  # of a file as it is now
 BEYOND = 58  # grey level of a crop beyond the edge of the photograph
 
 
@@ -69,7 +71,7 @@ class Project:
         self.draft = Draft(folder, Journal(folder / PLACE), root=root)
         self.lock = threading.RLock()
         self.editing = threading.RLock()  # held from what an edit reads to what it writes
-        self._photographs: OrderedDict[tuple[Path, int, Channel], Image] = OrderedDict()
+        self._photographs: OrderedDict[PhotographKey, Image] = OrderedDict()
         self._pictures: OrderedDict[tuple[object, ...], bytes] = OrderedDict()
         self._stamp: Any = None
         self._validation: ValidationResult | None = None
@@ -118,7 +120,7 @@ class Project:
             if key in self._photographs:
                 self._photographs.move_to_end(key)
                 return self._photographs[key]
-        image = read_photograph(key[0], channel=key[2])
+        image = rotated(read_photograph(key[0], channel=key[2]), key[3])
         with self.lock:
             self._photographs[key] = image
             while len(self._photographs) > KEPT:
@@ -131,14 +133,15 @@ class Project:
         section = None if experiment is None else experiment.config.photographs
         return image if section is None else ImageSelection(region=section.region, mask=section.mask).cut(image)
 
-    def _photograph_key(self, frame: int) -> tuple[Path, int, Channel]:
+    def _photograph_key(self, frame: int) -> PhotographKey:
         """A name of a photograph that changes with its file and the channel. Raises InputError."""
         found = self.validation()
         if not 0 <= frame < len(found.files):
             raise InputError(self.draft.file, f"photograph {frame}", f"is not there: {len(found.files)} are")
         file, section = found.files[frame], found.data.get("photographs", {})
         InputFiles(self.root).refuse_outside(file)  # also where it was exchanged for a link since
-        return file, hash(stamp_of(file)), section.get("channel", "grey")
+        rotation = section.get("rotation", 0)
+        return file, hash(stamp_of(file)), section.get("channel", "grey"), rotation if rotation in (90, 180, 270) else 0
 
     def picture(self, frame: int, widest: int, part: tuple[slice, slice] = WHOLE) -> bytes:
         """Encode one photograph as JPEG, no wider or higher than so many pixels; small ones sent last are kept.
@@ -345,7 +348,8 @@ class Project:
             "steps": [{"name": s.name, "mark": s.mark.value, "messages": s.messages} for s in found.steps.values()],
             "other_messages": found.other_messages, "tracked": found.tracked, "width": width, "height": height,
             "bounds": bounds,
-            "files": [file.name for file in found.files], "frames": self.frame_count(), "photographs": section,
+            "files": [file.name for file in found.files], "series": describe_series(found),
+            "frames": self.frame_count(), "photographs": section,
             "pixel": None if found.scale is None else found.scale.mean_size,
             "walls": _walls(found), "rods": _rods(found),
             "outside": outside_walls(found), "material": found.data.get("material", {}),
@@ -362,7 +366,8 @@ class Project:
             return None
         folder = (self.folder / pattern).parent
         try:
-            return folder.stat().st_mtime_ns
+            known = () if self._validation is None else self._validation.all_files  # each may be replaced in place
+            return folder.stat().st_mtime_ns, hash(tuple(map(stamp_of, known)))
         except (OSError, ValueError):
             return None
 

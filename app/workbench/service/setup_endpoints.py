@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, StringConstraints
 from ...experiment.experiment import GrainGuess
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import STRAIGHT
-from ..setup import circles, edits
+from ..setup import circles, edits, photograph_series
 from ..setup.validation import ValidationResult, outside_walls
 from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint, without_nul
 from .project import Project
@@ -25,6 +25,7 @@ Written = Annotated[str, StringConstraints(max_length=LARGEST_WRITTEN), AfterVal
 WITH_TABLE = frozenset(("set_table",))  # endpoints whose requests hold a table
 LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
 Polygon = Annotated[list[Point], Field(min_length=3, max_length=500)]
+Files = Annotated[list[Text], Field(min_length=1, max_length=100_000)]
 Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
 
 
@@ -48,6 +49,38 @@ def set_photographs(
     if mask is not None:
         keys["photographs.mask"] = [[_rounded(point) for point in polygon] for polygon in mask] or None
     opened.draft.set_keys("photographs" if mask is None else "mask", keys)
+    return opened.describe()
+
+
+@editing_endpoint
+def set_order(workbench: Workbench, at: Text, files: Files, change: Text = "order") -> dict[str, Any]:
+    """Use the named photographs in this order, and leave the others out."""
+    opened = workbench.project(at)
+    photograph_series.set_order(opened.draft, opened.validation(), files, change)
+    return opened.describe()
+
+
+@editing_endpoint
+def number_by_names(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Take the places in time of the photographs from the numbers in their names."""
+    opened = workbench.project(at)
+    photograph_series.number_by_names(opened.draft, opened.validation())
+    return opened.describe()
+
+
+@editing_endpoint
+def use_camera_times(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Order the photographs by the camera's clock, and take their times from it."""
+    opened = workbench.project(at)
+    photograph_series.use_camera_times(opened.draft, opened.validation())
+    return opened.describe()
+
+
+@editing_endpoint
+def rotate(workbench: Workbench, at: Text, rotation: Literal[0, 90, 180, 270]) -> dict[str, Any]:
+    """Rotate the photographs clockwise by so many degrees in all, with everything that is drawn on them."""
+    opened = workbench.project(at)
+    photograph_series.rotate(opened.draft, opened.validation(), rotation)
     return opened.describe()
 
 

@@ -48,6 +48,10 @@ class Draft:
         except RecursionError:
             raise InputError(self.file, "", "is nested too deeply") from None
 
+    def content(self, name: str) -> bytes | None:
+        """Read a file of the experiment; None where there is none. Raises InputError outside of the root."""
+        return self._read(name)
+
     def write(self, name: str, files: Mapping[str, bytes | None]) -> None:
         """Write whole files, None: remove; one step of undo with a name."""
         with self.lock:

@@ -112,7 +112,7 @@ def _set_and_move_walls(draft: Draft, name: str, keys: dict[str, Any]) -> None:
             names = [wall for wall, bar in zip(walls.name, bars, strict=True) if bar]
             ends = scale.to_pixels(walls.endpoints[0])[bars]
             if names:
-                draft.write("walls", {walls_file(before): _walls_table(names, ends, after)})
+                draft.write("walls", {walls_file(before): walls_table(names, ends, after)})
             if circles:
                 draft.write("circles", {before.data["walls"]["arcs"]: arcs_table(circles, after)})
 
@@ -181,7 +181,7 @@ def set_walls(draft: Draft, found: ValidationResult, walls: Sequence[tuple[str, 
         rest = {key: value for key, value in {**kept, **plates}.items() if key != "file"} if "arcs" in kept else None
         draft.set_keys(change, {"walls": rest}, {walls_file(found): None})
         return
-    table = _walls_table(names, np.array([line for _, line in walls]), found.scale)
+    table = walls_table(names, np.array([line for _, line in walls]), found.scale)
     draft.set_keys(change, {"walls": {**kept, "file": walls_file(found), **plates}}, {walls_file(found): table})
 
 
@@ -206,7 +206,7 @@ def rename_wall(draft: Draft, found: ValidationResult, wall: str, name: str) -> 
         draft.set_keys(f"wall {name}", {"walls": section}, {section["arcs"]: table})
         return
     names = [name if each == wall else each for each, bar in zip(walls.name, bars, strict=True) if bar]
-    table = _walls_table(names, scale.to_pixels(walls.endpoints[0])[bars], scale)
+    table = walls_table(names, scale.to_pixels(walls.endpoints[0])[bars], scale)
     draft.set_keys(f"wall {name}", {"walls": section}, {walls_file(found): table})
 
 
@@ -367,7 +367,7 @@ def _within_walls(detection: Detection, found: ValidationResult) -> Detection:
     return Detection(*(each[inside] for each in columns))
 
 
-def _walls_table(names: Sequence[str], ends: Array, scale: Scale) -> bytes:
-    """The table of walls of frame 0, by their ends (w, 2, 2) [px]."""
+def walls_table(names: Sequence[str], ends: Array, scale: Scale) -> bytes:
+    """Return the table of walls of frame 0, by their ends (w, 2, 2) [px]."""
     metres = np.round(scale.to_world(ends), 9).reshape(-1, 4).tolist()
     return as_table(WALL_COLUMNS, ([0, name, *each] for name, each in zip(names, metres, strict=True)))

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...experiment.experiment import CONFIG_NAME
-from ...experiment.photographs import RAW_SUFFIXES, in_order, natural_key
+from ...experiment.photographs import RAW_SUFFIXES
+from ...experiment.reading.photograph_order import in_order, natural_key
 from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
 from .toml_edit import set_values

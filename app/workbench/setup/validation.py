@@ -16,7 +16,6 @@ import numpy as np
 
 from ...experiment.config.experiment_file import ExperimentFile, find_config_errors
 from ...experiment.experiment import Experiment, GrainGuess, read_grain_guess, read_times, read_tracks
-from ...experiment.image_header import claimed_size
 from ...experiment.photographs import Channel, read_photograph
 from ...experiment.plausibility import (
     check_inside,
@@ -28,6 +27,7 @@ from ...experiment.plausibility import (
     rods_cut_by_walls,
 )
 from ...experiment.reading.input_files import InputFiles
+from ...experiment.reading.photograph_order import MissingNumbers, missing_numbers
 from ...experiment.scaling import make_scale
 from ...experiment.units import Scale
 from ...experiment.walls import read_walls
@@ -35,8 +35,8 @@ from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import wall_distance
 from ...tracks import Tracks, TrackStatus, WallTracks
 from .draft import Draft
+from .photograph_checks import LISTED, compare_with_camera, name_missing, unusable
 
-HEADER = 1 << 18  # bytes of a photograph that contain its size
 STEPS = ("photographs", "scale", "walls", "rods", "material")
 OF_KEYS = {  # the step of a key: the longest prefix counts
     "photographs": "photographs", "photographs.pixel_size": "scale", "photographs.distance": "scale",
@@ -47,6 +47,7 @@ OF_KEYS = {  # the step of a key: the longest prefix counts
 MOSTLY = 0.8  # fraction of the rods beyond a wall above which the walls are wrong, not the rods
 UNLIKE = 1.5  # ratio of the rods' radii and the known ones above which the scale is in question
 FEW = 0.8  # of the rods that would fill the area of those found: fewer are reported
+FEW_PHOTOGRAPHS = 4
 SUBSTITUTE = 1e-4  # [m] of a pixel, and [s] between photographs, where they are missing
 
 
@@ -90,6 +91,17 @@ class ValidationResult:
     scale: Scale | None = None
     walls: WallTracks | None = None  # of frame 0
     rods: GrainGuess | None = None  # [px] on the first photograph
+    unusable: dict[int, str] = field(default_factory=dict)  # photographs that cannot be read, with the reason
+    missing: list[MissingNumbers] = field(default_factory=list)  # between their names
+    all_files: tuple[Path, ...] = ()  # photographs that match, in natural order
+    number: tuple[int, ...] = ()  # place in time of every photograph, in intervals
+
+    @property
+    def left_out(self) -> tuple[Path, ...]:
+        """The photographs that match, but are not used."""
+        used = set(self.files)
+        return tuple(file for file in self.all_files if file not in used)
+
     experiment: Experiment | None = None  # with substitutes for a missing scale and missing times
     other_messages: list[str] = field(default_factory=list)  # those that concern no step
 
@@ -193,14 +205,16 @@ def _validate_photographs(found: ValidationResult, experiment: Experiment) -> bo
         section = experiment.config.photographs
         assert section is not None
         stat = found.files[0].stat()
-        found.shape = _shape_of(found.files[0], stat.st_mtime_ns, stat.st_size, section.max_pixels, section.channel)
+        stored = _shape_of(found.files[0], stat.st_mtime_ns, stat.st_size, section.max_pixels, section.channel)
+        rows, columns = stored if section.rotation in (0, 180) else stored[::-1]
+        found.shape = rows, columns
         experiment.photographs().check_region(found.shape)
-        for k, file in enumerate(found.files):
-            with file.open("rb") as stream:
-                size = claimed_size(stream.read(HEADER))
-            if size is not None and size != (found.shape[1], found.shape[0]):
-                mistake = f"is {size[0]} x {size[1]} pixels, the first photograph {found.shape[1]} x {found.shape[0]}"
-                raise InputError(file, f"photograph {k}", mistake)
+        found.unusable = unusable(found.files, stored)
+        for k, fault in list(found.unusable.items())[:LISTED]:
+            step.add_error(f"Photograph {k}, {found.files[k].name}, {fault}: leave it out, or replace the file.")
+        if len(found.unusable) > LISTED:
+            step.add_error(f"{len(found.unusable) - LISTED} more photographs cannot be used.")
+        _validate_order(found, experiment)
         if "interval" not in found.data.get("photographs", {}) and section.times is None:
             return True
         read_times(experiment, len(found.files))
@@ -212,7 +226,27 @@ def _validate_photographs(found: ValidationResult, experiment: Experiment) -> bo
         return False
     if len(found.files) < 2:
         step.add_warning("There is one photograph: forces follow from the motion of the rods between photographs.")
+    elif len(found.files) < FEW_PHOTOGRAPHS:
+        step.add_warning(
+            f"There are {len(found.files)} photographs: friction is mobilised over several, and with so few "
+            "the forces stay suspect."
+        )
     return True
+
+
+def _validate_order(found: ValidationResult, experiment: Experiment) -> None:
+    """Compare the order of the photographs with the numbers in their names and with the camera's notes."""
+    section, step = experiment.config.photographs, found.steps["photographs"]
+    assert section is not None
+    order = experiment.given_order()
+    found.all_files = tuple(experiment.matching())
+    found.number = tuple(range(len(found.files)) if order is None else order.number.tolist())
+    found.missing = missing_numbers(found.files) if order is None else []
+    interval = section.interval if "interval" in found.data.get("photographs", {}) else None
+    uneven = order is not None and bool((np.diff(order.number) != 1).any())
+    notes = compare_with_camera(found.files, section.rotation, None if uneven else interval)
+    for sentence in (*name_missing(found.missing if section.times is None else ()), *notes):
+        step.add_warning(sentence)
 
 
 @lru_cache(maxsize=16)

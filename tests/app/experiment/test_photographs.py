@@ -14,10 +14,10 @@ from rodsight.experiment.photographs import (
     ImageSelection,
     Photographs,
     PrefetchedPhotographs,
-    in_order,
     read_photograph,
 )
 from rodsight.experiment.reading.input_files import InputFiles
+from rodsight.experiment.reading.photograph_order import in_order
 from rodsight.process.errors import InputError, RunError
 
 ROUNDING = 1e-3  # [grey] float32 arithmetic on values up to 255

@@ -1,6 +1,7 @@
 // Step 1: the photographs, their order, their times, and the region that is used.
 
 import { request, chart, colour, digits, fact, h, numberField, parse, sign, notify } from "/page/dom.js";
+import { leaveOut, orderSection, shift } from "/page/parts/order.js";
 import { tableField } from "/page/parts/tables.js";
 
 const SOON = 400; // [ms]
@@ -9,9 +10,11 @@ let soon = 0, cutting = null, masking = null, measured = null; // quality: { at,
 export const photographs = {
   name: "photographs", title: "Photographs", frames: true,
   hint: () => (cutting ? "Drag over the region to use" : masking ? `Click the corners of the part to be ignored (${masking.length}); Enter closes it, Esc ends` : ""),
-  keyHelp: [["M", "mask a part: click its corners, Enter closes it"]],
+  keyHelp: [["M", "mask a part: click its corners, Enter closes it"], ["Alt+← Alt+→", "this photograph earlier, later in the order"], ["Del", "leave this photograph out"]],
   key(app, event) {
     if (event.key === "m") { maskBegins(app); return true; }
+    if (event.key === "Delete") { leaveOut(app); return true; }
+    if (event.altKey && (event.key === "ArrowLeft" || event.key === "ArrowRight")) { shift(app, event.key === "ArrowLeft" ? -1 : 1); return true; }
     if (!masking) return false;
     if (event.key === "Escape") { masking = null; app.tool(null); app.paint(); return true; }
     if (event.key === "Enter") { maskCloses(app); return true; }
@@ -23,7 +26,6 @@ export const photographs = {
   panel(app) {
     const { project } = app, section = project.photographs;
     return [
-      h("p", {}, "They are in the natural order of their names: 2 comes before 10."),
       fact("photographs", String(project.files.length)),
       fact("size", project.width ? `${project.width} × ${project.height} px` : "–"),
       h("div", { class: "field" }, h("label", { htmlFor: "field-name" }, "name"), h("input", { id: "field-name", value: project.name, onchange: (event) => app.change("set_photographs", { name: event.target.value }) })),
@@ -38,10 +40,10 @@ export const photographs = {
         section.region ? h("button", { onclick: () => app.change("set_photographs", { region: "all" }) }, "Use all of it") : null,
         h("button", { class: masking ? "on" : "", id: "mask", title: "M", onclick: () => maskBegins(app) }, "Mask a part"),
         section.mask?.length ? h("button", { id: "unmask", onclick: () => app.change("set_photographs", { mask: section.mask.slice(0, -1) }) }, `Remove the last of ${section.mask.length} masks`) : null),
+      h("div", { class: "field" }, h("label", { htmlFor: "field-rotation" }, "rotated by"), h("select", { id: "field-rotation", title: "Clockwise, with everything that is drawn on them", onchange: (event) => app.change("rotate", { rotation: Number(event.target.value) }) },
+        [0, 90, 180, 270].map((angle) => h("option", { value: angle, selected: angle === (section.rotation ?? 0) }, `${angle}°`)))),
       project.files.length ? [h("h2", {}, "Quality"), quality(app)] : null,
-      h("h2", {}, "Order"),
-      h("div", { class: "list" }, project.files.slice(0, 400).map((name, k) => h("button", { class: k === app.frame ? "here" : "", onclick: () => app.show(k) },
-        h("span", { class: "soft" }, String(k)), h("span", { style: { flex: "1" } }, name), h("span", { class: "soft" }, section.interval ? `${digits(k * section.interval, 4)} s` : "")))),
+      orderSection(app),
       h("div", { class: "row" }, h("button", { id: "duplicate", disabled: project.at === ".", title: "A new experiment beside this one with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment")),
     ];
   },
