@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from . import pipeline
+from .compilation.ahead import SOLVER_KERNELS
 from .inference.diagnosis.trial import TRIAL_PHOTOGRAPHS
 from .prediction import Prediction, describe_photographs, predict_accuracy
 from .results.finding import Finding
@@ -63,6 +64,11 @@ def check_input(run: Run, *, predict: bool = True) -> InputReport:
     InputError
         The input is invalid.
     """
+    with run.compiling():
+        return _check_input(run, predict)
+
+
+def _check_input(run: Run, predict: bool) -> InputReport:
     tracks, walls = pipeline.check(run)
     photographed = run.experiment.config.photographs is not None
     count = len(run.experiment.photographs()) if tracks is None else tracks.frame_count
@@ -71,6 +77,7 @@ def check_input(run: Run, *, predict: bool = True) -> InputReport:
         first, first_walls = pipeline.check_first_photographs(run, TRIAL_PHOTOGRAPHS if predict else 1)
     sentences: list[str] = []
     if predict:
+        run.kernels.wait(SOLVER_KERNELS)
         found = predict_accuracy(run.experiment.config, first, first_walls, run.progress)
         sentences = found.describe() + (describe_photographs(run.experiment) if tracks is None else [])
     unused = tuple(

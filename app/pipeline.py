@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from .compilation.ahead import SOLVER_KERNELS, TRACKING_KERNELS
 from .experiment.boundary import apply_boundary
 from .experiment.config.experiment_file import ExperimentFile, as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
@@ -99,6 +100,7 @@ def check_first_photographs(run: Run, count: int) -> tuple[Tracks, WallTracks | 
     """
     from .tracking.stage import track_first  # given tracks do not need it
 
+    run.kernels.wait(TRACKING_KERNELS)
     tracks, walls = track_first(run.experiment, count, run.progress, run.notes.append)
     if walls is not None:
         run.notes.extend(check_packing(run.experiment, tracks, walls))
@@ -133,6 +135,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
         kept.append(stage)
         return checkpoint
 
+    run.kernels.wait(TRACKING_KERNELS)
     tracks, walls, tables = track_photographs(
         experiment, stop, keep, run.progress, notify=run.notes.append
     )  # fmt: skip
@@ -264,6 +267,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     since = time.perf_counter()
     inputs = _inputs(run, log, tracks, walls)
     store = CheckpointStore(lambda: run.checkpoint("solving", origin.fingerprint))
+    run.kernels.wait(SOLVER_KERNELS)
     try:
         results = infer_sequence(inputs, _RunObserver(run, log), store)
     except UndeterminedError as error:

@@ -10,13 +10,14 @@ import shutil
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
 from . import __version__
+from .compilation.ahead import SOLVER_KERNELS, TRACKING_KERNELS, KernelsAhead
 from .experiment.config.experiment_file import as_toml
 from .experiment.experiment import Experiment, Stamp, checksums, stamp_of_input
 from .experiment.reading.input_files import regular
@@ -90,6 +91,13 @@ class Run:
     notes: list[str] = field(default_factory=list)  # sentences for the user
     keep_old: bool = False  # results of other code are used as they are
     stamps: dict[str, Stamp] = field(default_factory=dict)  # of input files by name, before they were read
+    kernels: KernelsAhead = field(default_factory=KernelsAhead)
+
+    def compiling(self) -> AbstractContextManager[None]:
+        """Compile kernels inside the block, where they are missing, for stages that wait for them."""
+        photographs = self.experiment.config.photographs is not None
+        stages = (TRACKING_KERNELS, SOLVER_KERNELS) if photographs else (SOLVER_KERNELS,)
+        return self.kernels.compiling(stages, self.progress)
 
     def file(self, name: str) -> Path:
         """Return the path of a file in the run's folder."""
@@ -266,7 +274,8 @@ def hold_run(run: Run) -> Iterator[Run]:
             name = part.name.removesuffix(PART)
             if part.parent != run.folder or name in OWN or LATER.fullmatch(name):
                 part.unlink(missing_ok=True)
-        yield run
+        with run.compiling():
+            yield run
 
 
 def refuse_foreign_folder(folder: Path, experiment: Experiment) -> None:

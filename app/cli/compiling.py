@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-COMPILATION_NOTE = "Kernels are compiled once for this machine: the first commands take some minutes longer."
+COMPILATION_NOTE = "Kernels are compiled once for this machine: the first run takes about a minute longer."
 
 
 @contextmanager

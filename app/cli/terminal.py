@@ -19,6 +19,7 @@ from rich.progress import (
 )
 from rich.progress import Progress as Bars
 
+from ..compilation.ahead import STAGE as COMPILATION
 from ..process.progress import Progress, no_progress
 from .compiling import COMPILATION_NOTE, count_compilations
 
@@ -40,17 +41,19 @@ def progress_bars() -> Iterator[Progress]:
     )
     tasks: dict[str, TaskID] = {}
 
-    def show(stage: str, done: int, total: int) -> None:
+    def show(stage: str, done: int, total: int | None) -> None:
         if stage not in tasks:
+            if stage == COMPILATION:
+                bars.console.print(COMPILATION_NOTE)
             tasks[stage] = bars.add_task(stage, total=total)
         bars.update(tasks[stage], completed=done, total=total)
 
-    def compiling(count: int) -> None:
-        if count == 1:
-            bars.console.print(COMPILATION_NOTE)
-        show("compiling", count, count)
+    def compile_here(count: int) -> None:
+        """Show kernels that this process compiles itself, whose total is unknown, unless others are compiled ahead."""
+        if COMPILATION not in tasks or bars.tasks[tasks[COMPILATION]].total is None:
+            show(COMPILATION, count, None)
 
-    with bars, count_compilations(compiling):
+    with bars, count_compilations(compile_here):
         yield show
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..compilation.ahead import SOLVER_KERNELS, TRACKING_KERNELS
 from ..experiment.config.experiment_file import as_toml
 from ..experiment.experiment import Experiment, load_experiment
 from ..inference.corrected_sequence import CorrectedSequence
@@ -121,6 +122,7 @@ def _process_new(
     def checkpoint_of(stage: str) -> Checkpoint:
         return Checkpoint(run.folder / UNFINISHED / f"following-{stage}", fingerprint, run.notes)
 
+    run.kernels.wait(TRACKING_KERNELS)
     tracks, walls, tables = track_photographs(experiment, len(ready), checkpoint_of, run.progress, grains=state.grains)
     write_found_tables(run.folder, tables)
     save_tracks(
@@ -141,6 +143,7 @@ def _process_new(
     store = CheckpointStore(lambda: Checkpoint(run.folder / UNFINISHED / "solving", fingerprint, run.notes))
     observer = _FollowObserver(current, tracks, store, alarm)
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
+    run.kernels.wait(SOLVER_KERNELS)
     results = infer_sequence(inputs, observer, store, complete=False)
     return replace(results, name=experiment.name, configuration=as_toml(config))
 

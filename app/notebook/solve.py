@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from ..compilation.ahead import SOLVER_KERNELS, KernelsAhead
 from ..experiment.boundary import boundary_of, check_cell, find_boundary
 from ..experiment.config.experiment_file import as_toml, load_sections
 from ..experiment.config.input_sections import OUTER
@@ -112,8 +113,11 @@ def solve(
     wall_tracks = _arrange_walls(walls, arcs, load, tracked.frame_count, pressure or {})
     tracked, wall_tracks = _add_boundary(tracked, wall_tracks, boundary)
     inputs = Inputs(tracked, wall_tracks, material_of(sections), settings_of(sections))
+    shown, kernels = progress or shown_progress(), KernelsAhead()
     try:
-        results = infer_sequence(inputs, InferenceObserver(progress or shown_progress()))
+        with kernels.compiling((SOLVER_KERNELS,), shown):
+            kernels.wait(SOLVER_KERNELS)
+        results = infer_sequence(inputs, InferenceObserver(shown))
     except UndeterminedError as error:
         raise InputError("settings", f"key {error.key}", str(error)) from None
     return Run.in_memory(results, "solved", as_toml(sections), inputs)

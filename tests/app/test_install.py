@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
+from rodsight.process.processor import processor_level
+
+from tests.first_run import build_wheel, run_first, unpack_wheel
 
 pytestmark = pytest.mark.screen  # a wheel is built, and processes are started
 
@@ -17,13 +19,12 @@ TREE = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, unpacked."""
+    """The wheel with kernels for this processor, unpacked."""
     folder = tmp_path_factory.mktemp("wheel")
-    build = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(folder))
-    subprocess.run([*build, str(TREE)], check=True, capture_output=True)
-    (file,) = folder.glob("*.whl")
-    zipfile.ZipFile(file).extractall(folder / "site")
-    return folder / "site"
+    level = processor_level()
+    if level is None:
+        pytest.skip("wheels have kernels for x86-64-v3 and v4 only")
+    return unpack_wheel(build_wheel(folder, level), folder / "site")
 
 
 def run(code: str, folder: Path, *paths: Path) -> subprocess.CompletedProcess[str]:
@@ -78,3 +79,15 @@ def test_the_wheel_holds_the_package_its_data_and_no_tests(wheel):
     ):  # fmt: skip
         assert (wheel / "rodsight" / name).is_file(), name
     assert (wheel / "rodsight" / "solver" / "py.typed").is_file()
+
+
+def test_the_first_run_of_the_wheel_compiles_nothing(wheel, tmp_path):
+    assert run_first(wheel, tmp_path).compilations == 0
+
+
+def test_a_wheel_without_kernels_fits_every_system_and_one_with_kernels_its_own(wheel):
+    (facts,) = wheel.glob("*.dist-info/WHEEL")
+    tags = [line for line in facts.read_text().splitlines() if line.startswith("Tag: ")]
+    assert tags
+    assert all(tag.startswith(f"Tag: cp{sys.version_info.major}{sys.version_info.minor}-none-") for tag in tags)
+    assert not any(tag.endswith("-any") for tag in tags)

@@ -18,6 +18,7 @@ from datetime import date
 from pathlib import Path
 
 from tests.benchmarks import history
+from tests.benchmarks.first_minute import first_run_rows
 from tests.benchmarks.growth import TILES, growth, run_benchmark_job
 from tests.benchmarks.photograph_rows import detection_rows, tracking_rows
 from tests.benchmarks.solver_rows import load_rows, member_rows, sweep_rows
@@ -44,6 +45,10 @@ def start() -> Iterator[tuple[str, list[Row]]]:
         in_processor_time("loading all that solving tracks needs", _time_process("-c", ready), "≤ 1.5 s"),
     ]
     yield "Start", rows
+
+
+def first_minute() -> Iterator[tuple[str, list[Row]]]:
+    yield "The first minute: no folder of kernels", list(first_run_rows())
 
 
 def sample() -> Iterator[tuple[str, list[Row]]]:
@@ -74,13 +79,13 @@ def _time_process(*arguments: str, rounds: int = 3) -> list[Duration]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("--only", nargs="+", choices=["ratios", "start", "photographs", "growth", "sample"])
+    parser.add_argument("--only", nargs="+", choices=["ratios", "start", "first", "photographs", "growth", "sample"])
     parser.add_argument("--tiles", nargs="+", type=int, default=TILES)
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "rodsight-benchmark")
     parser.add_argument("--append", action="store_true")
     options = parser.parse_args()
     parts = {
-        "ratios": ratios, "start": start, "photographs": photographs,
+        "ratios": ratios, "start": start, "first": first_minute, "photographs": photographs,
         "growth": lambda: growth(options.folder, options.tiles, keep=options.append), "sample": sample,
     }  # fmt: skip
     print(f"{processor_name()}; {date.today().isoformat()}\n", flush=True)
