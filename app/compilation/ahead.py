@@ -172,7 +172,7 @@ def _begin_worker() -> subprocess.Popen[str]:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[bool]:
-    """Tell whether no other process compiles into a folder of kernels; if so, keep others out inside the block."""
+    """Yield whether no other process compiles into a folder of kernels; if so, keep others out inside the block."""
     alone = True
     with ExitStack() as stack:
         try:

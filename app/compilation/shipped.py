@@ -15,7 +15,6 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..process.errors import RunError
 from ..process.kernel_cache import (
     FEATURES_VARIABLE,
     NAME_VARIABLE,
@@ -44,10 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def pack(target: str) -> Path:
     """Compile the listed kernels for the chosen processor and write their archive.
 
-    Raises
-    ------
-    RunError
-        A kernel was not compiled: the list is old, or another process compiles.
+    Ends the process where a kernel was not compiled: the list is old, or another process compiles.
     """
     ahead, parts = KernelsAhead(), tuple({each.module.partition(".")[0] + "." for each in read_kernels()})
     with ahead.compiling(parts, all_uses=True):
@@ -55,7 +51,7 @@ def pack(target: str) -> Path:
             ahead.wait(part)
     folder = kernel_folder()
     if folder is None or not ahead.is_complete:
-        raise RunError(
+        sys.exit(
             "some kernels were not compiled: another process compiles, or the list is old "
             "(python -m tests.benchmarks.kernels writes it)"
         )
