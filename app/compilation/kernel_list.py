@@ -72,7 +72,8 @@ def encode(kind: Any) -> Any:
     if isinstance(kind, types.Array) and type(kind) is types.Array:
         return f"{kind.dtype} {kind.ndim} {kind.layout}{'' if kind.mutable else ' readonly'}"
     if isinstance(kind, types.BaseTuple):
-        parts = [encode(each) for each in kind]
+        members: Any = kind
+        parts = [encode(each) for each in members]
         owner = getattr(kind, "instance_class", None)
         return {_name_of(owner): parts} if owner is not None else parts
     if isinstance(kind, types.NumPyRandomGeneratorType):
