@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -33,7 +34,11 @@ def varied_parameters(rows: Sequence[Row], keys: Sequence[str]) -> dict[str, lis
 
 
 def draw_over_parameter(key: str, values: Sequence[float | None], rows: Sequence[Row]) -> str:
-    """Draw results over a varied parameter, a point for every run and a line through the means of equal values."""
+    """Draw results over a varied parameter, a point for every run and a line through the means of equal values.
+
+    The wide bar of a run covers the tenth to the ninetieth percentile of its frames, the thin line two standard
+    deviations of its forces.
+    """
     shown = [name for name in RESULTS if any(_number(row.get(name)) is not None for row in rows)]
     with paper_style():
         figure = new_figure("double", 0.3 * math.ceil(len(shown) / 2))
@@ -48,12 +53,24 @@ def draw_over_parameter(key: str, values: Sequence[float | None], rows: Sequence
                 grouped.setdefault(x, []).append(y)
             means = [(x, sum(ys) / len(ys)) for x, ys in sorted(grouped.items())]
             axes.plot(*zip(*means, strict=True), color=GRID, linewidth=1.0, zorder=1)
-            axes.plot(*zip(*points, strict=True), "o", color=COLOURS[0], zorder=2)
+            axes.plot(*zip(*points, strict=True), "o", color=COLOURS[0], zorder=4)
+            _draw_intervals(axes, name, values, rows)
             axes.set(xlabel=key, ylabel=RESULTS[name])
             axes.xaxis.set_tick_params(labelbottom=True)
         for axes in panels[len(shown) :]:
             axes.axis("off")
         return _svg(figure)
+
+
+def _draw_intervals(axes: Axes, name: str, values: Sequence[float | None], rows: Sequence[Row]) -> None:
+    for x, row in zip(values, rows, strict=True):
+        middle, low, high, sd = (_number(row.get(f"{name}{end}")) for end in ("", "_low", "_high", "_sd"))
+        if x is None or middle is None:
+            continue
+        if low is not None and high is not None:
+            axes.plot([x, x], [low, high], color=COLOURS[0], alpha=0.35, linewidth=4.0, solid_capstyle="butt", zorder=2)
+        if sd is not None:
+            axes.plot([x, x], [middle - 2.0 * sd, middle + 2.0 * sd], color=COLOURS[0], linewidth=0.8, zorder=3)
 
 
 def draw_over_frames(curves: Mapping[str, Curve], label: str) -> str:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+import math
+import tomllib
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
@@ -43,7 +46,8 @@ def collect(folder: Path, cases: Sequence[Case], outcomes: Sequence[Outcome]) ->
         The rows of the catalogue.
     """
     outcome_of = {each.name: each for each in outcomes}
-    rows = [_row(folder, case, outcome_of[case.name]) for case in cases]
+    varied = list(dict.fromkeys(each.partition("=")[0] for case in cases for each in case.settings))
+    rows = [_row(folder, case, outcome_of[case.name], varied) for case in cases]
     completed = [case for case in cases if not outcome_of[case.name].error]
     described = {}
     for table in get_args(TableName):
@@ -84,9 +88,9 @@ def _write(folder: Path, cases: Sequence[Case], table: TableName, file: Path) ->
     return schema
 
 
-def _row(folder: Path, case: Case, outcome: Outcome) -> Row:
-    """Return the catalogue's row of a run."""
-    row: Row = {"run": case.name, "experiment": case.experiment}
+def _row(folder: Path, case: Case, outcome: Outcome, varied: Sequence[str]) -> Row:
+    """Return the catalogue's row of a run; a varied key that it does not set has the value of its experiment."""
+    row: Row = {"run": case.name, "experiment": case.experiment, **dict.fromkeys(varied, "")}
     row |= {key: value for key, _, value in (each.partition("=") for each in case.settings)}
     row |= {
         "state": "failed" if outcome.error else "done",
@@ -96,24 +100,53 @@ def _row(folder: Path, case: Case, outcome: Outcome) -> Row:
     if outcome.error:
         return row
     summary = json.loads((folder / case.name / SUMMARY).read_text(encoding="utf-8"))
+    results = load_results(folder / case.name / RESULTS)
+    row |= {key: setting_of(results.configuration, key) for key in varied if row[key] == ""}
     count = summary["status_count"]
     row |= {
         "frames": summary["frame_count"],
         "grains": summary["grain_count"],
         "contacts": _mean(summary["contact_count"]),
         "friction_angle_degrees": _mean(summary["friction_angle_degrees"][1:]),
+        **_interval("friction_angle_degrees", summary["friction_angle_degrees"][1:]),
+        "friction_angle_degrees_sd": _rms(math.degrees(each.friction_angle_sd) for each in results.statistics),
         "coordination_number": _mean(summary["coordination_number"]),
+        **_interval("coordination_number", summary["coordination_number"]),
+        "coordination_number_sd": _rms(each.coordination_number_sd for each in results.statistics),
         "mean_fn": _mean(summary["mean_fn"]),
         "settled": count.get("settled", 0),
         "suspect": count.get("suspect", 0),
         "failed_frames": count.get("failed", 0),
         "trust": _mean(summary["trust"]),
+        **_interval("trust", summary["trust"]),
         "least_trust": min((each for each in summary["trust"] if each is not None), default=None),
         "friction_measured": (summary["friction"] or {}).get("measured"),
     }
     if "accuracy" in summary:
         row["r_fn"] = _mean(summary["accuracy"]["r_fn"])
+        row |= _interval("r_fn", summary["accuracy"]["r_fn"])
     return row
+
+
+def setting_of(configuration: str, key: str) -> Any:
+    """Return the value of a dotted key of a configuration in TOML; empty if it is not set."""
+    value: Any = tomllib.loads(configuration)
+    for part in key.split("."):
+        value = value.get(part, "") if isinstance(value, dict) else ""
+    return value
+
+
+def _interval(name: str, values: Sequence[float | None]) -> Row:
+    """Return the tenth and the ninetieth percentile of the frames, as columns."""
+    known = [each for each in values if each is not None]
+    low, high = np.quantile(known, [0.1, 0.9]).tolist() if known else (None, None)
+    return {f"{name}_low": low and round(low, 4), f"{name}_high": high and round(high, 4)}
+
+
+def _rms(deviations: Iterable[float]) -> float | None:
+    """Return the root mean square of standard deviations: those of frames are not independent of one another."""
+    known = [each for each in deviations if math.isfinite(each)]
+    return round(math.sqrt(sum(each**2 for each in known) / len(known)), 4) if known else None
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

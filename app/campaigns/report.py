@@ -15,6 +15,8 @@ from .collect import Row
 REPORT = "report.html"
 CURVES = {"friction_angle_degrees": "friction angle [°]", "trust": "trust"}
 HIDDEN = ("experiment",)
+HIDDEN_ENDINGS = ("_low", "_high", "_sd")  # intervals, which the charts show and catalogue.csv holds
+INTERVALS = "wide bars: 10 to 90 % of its frames; thin lines: two standard deviations of the inferred forces"
 
 
 def write_report(folder: Path, rows: Sequence[Row]) -> Path:
@@ -23,12 +25,21 @@ def write_report(folder: Path, rows: Sequence[Row]) -> Path:
 
     source = files(__name__.rpartition(".")[0]).joinpath("report.html").read_text(encoding="utf-8")
     template = jinja2.Environment(autoescape=True, trim_blocks=True).from_string(source)
-    columns = [name for name in dict.fromkeys(key for row in rows for key in row) if name not in HIDDEN]
+    columns = [
+        name
+        for name in dict.fromkeys(key for row in rows for key in row)
+        if name not in HIDDEN
+        and not name.endswith(HIDDEN_ENDINGS)
+        and any(row.get(name) not in ("", None) for row in rows)
+    ]
     done = [str(row["run"]) for row in rows if row["state"] == "done"]
     finished = [row for row in rows if row["state"] == "done"]
     settings = [name for name in columns if "." in name]  # keys of experiment.toml
     charts = [
-        {"svg": draw_over_parameter(key, values, finished), "caption": f"Means over the frames of each run, over {key}"}
+        {
+            "svg": draw_over_parameter(key, values, finished),
+            "caption": f"Every run over {key}: mean of its frames; {INTERVALS}",
+        }
         for key, values in varied_parameters(finished, settings).items()
     ]
     charts += [
@@ -41,7 +52,7 @@ def write_report(folder: Path, rows: Sequence[Row]) -> Path:
     page = template.render(
         title=f"Campaign {folder.name}",
         rows=rows,
-        heads=columns,
+        columns=columns,
         charts=charts,
         failed=failed,
         folder=folder.as_posix(),

@@ -1,7 +1,7 @@
-"""Description of a folder of tables: a dictionary of columns, and a Frictionless data package for repositories.
+"""Description of a folder of tables for repositories: a dictionary of columns, a data package and an RO-Crate.
 
-Format: Data Package and Table Schema, version 1 (specs.frictionlessdata.io). Tables carry unit and meaning of their
-columns as metadata.
+Formats: Data Package and Table Schema, version 1 (specs.frictionlessdata.io); RO-Crate 1.1
+(w3id.org/ro/crate/1.1). Tables carry unit and meaning of their columns as metadata.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ import pyarrow as pa
 from .. import __version__
 from ..process.atomic import write_atomically
 
-DICTIONARY, PACKAGE = "columns.csv", "datapackage.json"
+DICTIONARY, PACKAGE, CRATE = "columns.csv", "datapackage.json", "ro-crate-metadata.json"
+CRATE_FORMAT = "https://w3id.org/ro/crate/1.1"
 SOURCE = "Richefeu, Combe, Maurin: An Attempt in Assessing Contact Forces From a Kinematic Field, Powders & Grains 2013"
 
 
 def write_description(folder: Path, tables: Mapping[str, pa.Table], *, name: str, configuration: str) -> list[Path]:
-    """Write columns.csv and datapackage.json beside tables.
+    """Write columns.csv, datapackage.json and ro-crate-metadata.json beside tables.
 
     Parameters
     ----------
@@ -42,12 +43,13 @@ def write_description(folder: Path, tables: Mapping[str, pa.Table], *, name: str
     Returns
     -------
     list of Path
-        The two files.
+        The three files.
     """
     package = _package(folder, tables, name, configuration)
     write_atomically(folder / DICTIONARY, _dictionary(tables).encode())
-    write_atomically(folder / PACKAGE, (json.dumps(package, indent=1, ensure_ascii=False) + "\n").encode())
-    return [folder / DICTIONARY, folder / PACKAGE]
+    for file, content in ((PACKAGE, package), (CRATE, _crate(package))):
+        write_atomically(folder / file, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
+    return [folder / DICTIONARY, folder / PACKAGE, folder / CRATE]
 
 
 def _dictionary(tables: Mapping[str, pa.Table]) -> str:
@@ -71,6 +73,42 @@ def _package(folder: Path, tables: Mapping[str, pa.Table], name: str, configurat
         "sources": [{"title": SOURCE}],
         "rodsight": {"version": __version__, "configuration": configuration},
         "resources": [_resource(folder / file, table) for file, table in tables.items()],
+    }
+
+
+def _crate(package: dict[str, Any]) -> dict[str, Any]:
+    """Return the RO-Crate of a data package: the folder as a data set, its files, and the program that made them.
+
+    Authors and licence of the data are for those who publish it to add; the profile demands a licence of a published
+    crate, which therefore states that none is given yet.
+    """
+    tables = [
+        {"@id": each["path"], "@type": "File", "name": each["path"], "encodingFormat": each["mediatype"],
+         "contentSize": str(each["bytes"]), "sha256": each["hash"].removeprefix("sha256:")}
+        for each in package["resources"]
+    ]  # fmt: skip
+    descriptions = [
+        {"@id": DICTIONARY, "@type": "File", "name": "meaning and unit of all columns", "encodingFormat": "text/csv"},
+        {"@id": PACKAGE, "@type": "File", "name": "Frictionless data package", "encodingFormat": "application/json"},
+    ]
+    program = {"@id": "#rodsight", "@type": "SoftwareApplication", "name": "Rodsight", "version": __version__}
+    dataset = {
+        "@id": "./", "@type": "Dataset", "name": package["title"], "description": package["description"],
+        "datePublished": package["created"], "license": "not stated: to be chosen by those who publish the data",
+        "citation": SOURCE, "hasPart": [{"@id": each["@id"]} for each in [*tables, *descriptions]],
+        "mentions": {"@id": "#computation"},
+    }  # fmt: skip
+    computation = {
+        "@id": "#computation", "@type": "CreateAction", "name": "inference of contact forces from photographs",
+        "endTime": package["created"], "instrument": {"@id": "#rodsight"},
+        "result": [{"@id": each["@id"]} for each in tables],
+    }  # fmt: skip
+    about = {
+        "@id": CRATE, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": CRATE_FORMAT},
+    }  # fmt: skip
+    return {
+        "@context": f"{CRATE_FORMAT}/context",
+        "@graph": [about, dataset, *tables, *descriptions, program, computation],
     }
 
 

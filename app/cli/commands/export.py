@@ -185,6 +185,8 @@ def _window(text: str) -> tuple[int, int]:
 def _share(
     recording: Path, frames: tuple[int, int | None], scale: float, page: bool, out: Path | None, console: Console
 ) -> int:
+    from tempfile import TemporaryDirectory
+
     from ...recording.archive.cards import make_card
     from ...recording.archive.share import share_recording
     from ...recording.viewing.single_page import write_single_page
@@ -192,22 +194,25 @@ def _share(
 
     first, stop = frames
     name = recording.parent.name if recording.name == RECORDING else recording.stem
-    target = out if out is not None and not page else recording.with_name(f"{name or 'run'}-share.rrd")
-    if target.resolve() == recording.resolve():
-        raise InputError(target, "", "is the recording itself: choose another --out")
-    try:
-        report = share_recording(recording, target, first=first, stop=stop, scale=scale)
-    except ValueError as error:
-        raise InputError(recording, "", str(error)) from None
-    sizes = f"{target}: {_size(report.size)} of {_size(report.former_size)}, {report.frames} frames."
-    print_line(console, f"{sizes} To view it: rodsight view {target}")
-    if page:
-        file = out if out is not None else target.with_suffix(".html")
-        size = write_single_page([target], file, title=name or "Rodsight", cards=[make_card(target)])
-        print_line(
-            console,
-            f"{file}: {_size(size)}, viewer included; any browser opens it, without network or server.",
-        )
+    suffix = ".html" if page else ".rrd"
+    file = out if out is not None else recording.with_name(f"{name or 'run'}-share{suffix}")
+    if file.resolve() == recording.resolve():
+        raise InputError(file, "", "is the recording itself: choose another --out")
+    with TemporaryDirectory(prefix="rodsight-") as place:
+        part = Path(place) / "part.rrd" if page else file
+        try:
+            report = share_recording(recording, part, first=first, stop=stop, scale=scale)
+        except ValueError as error:
+            raise InputError(recording, "", str(error)) from None
+        extent = f"{_size(report.size)} of {_size(report.former_size)}, {report.frames} frames"
+        if not page:
+            print_line(console, f"{file}: {extent}. To view it: rodsight view {file}")
+            return 0
+        size = write_single_page([part], file, title=name or "Rodsight", cards=[make_card(part)])
+    print_line(
+        console,
+        f"{file}: {_size(size)} with the viewer, the recording {extent}; any browser opens it, without network.",
+    )
     return 0
 
 

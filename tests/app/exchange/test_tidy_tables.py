@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import hashlib
+import json
+
 import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
@@ -68,8 +71,23 @@ def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
         with pytest.raises(SystemExit) as end:
             main(arguments)
         assert not end.value.code
-    names = {"contacts.csv", "grains.csv", "frames.csv", "walls.csv", "columns.csv", "datapackage.json"}
+    names = {
+        "contacts.csv",
+        "grains.csv",
+        "frames.csv",
+        "walls.csv",
+        "columns.csv",
+        "datapackage.json",
+        "ro-crate-metadata.json",
+    }
     assert {file.name for file in (out / "tables").iterdir()} == names
+    crate = json.loads((out / "tables" / "ro-crate-metadata.json").read_text())
+    entities = {each["@id"]: each for each in crate["@graph"]}
+    assert entities["ro-crate-metadata.json"]["about"] == {"@id": "./"}
+    assert {each["@id"] for each in entities["./"]["hasPart"]} == names - {"ro-crate-metadata.json"}
+    table = entities["contacts.csv"]
+    assert table["sha256"] == hashlib.sha256((out / "tables" / "contacts.csv").read_bytes()).hexdigest()
+    assert all(each["@id"] in entities for each in entities["./"]["hasPart"])
     assert (out / "vtk" / "contacts.pvd").is_file()
     with pytest.raises(SystemExit) as end:
         main(["export", "dic", str(out)])

@@ -1,0 +1,89 @@
+"""Write the addresses of the project into its files: `python -m rodsight.manual.project`, in the folder of the source.
+
+`project.toml` holds them; an empty one is left out. Written are `[project.urls]` of pyproject.toml, the lines
+`repository-code`, `url` and `doi` of CITATION.cff, and `repo_url` and `site_url` of the pages.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+import tomlkit
+
+from ..process.atomic import write_atomically
+from ..process.errors import InputError
+
+ADDRESSES = Path(__file__).parent / "project.toml"
+URLS = {"repository": "Repository", "issues": "Issues", "documentation": "Documentation"}
+CITATION = {"repository": "repository-code", "documentation": "url", "doi": "doi"}
+PAGES = {"repository": "repo_url", "documentation": "site_url"}
+FORMS = {
+    **dict.fromkeys(("repository", "issues", "documentation"), r"https://\S+\.\S+"),
+    "doi": r"10\.\d{4,9}/\S+",
+    **dict.fromkeys(("conduct", "security"), r"[^@\s]+@[^@\s]+\.[^@\s]+"),
+}
+
+
+def read_addresses(file: Path = ADDRESSES) -> dict[str, str]:
+    """Return the addresses that are filled in; raise InputError naming one that is unknown or not valid."""
+    found = tomllib.loads(file.read_text(encoding="utf-8"))
+    for name, text in found.items():
+        if name not in FORMS:
+            raise InputError(file, f"key {name}", f"is unknown: the keys are {', '.join(FORMS)}")
+        if not isinstance(text, str) or (text and not re.fullmatch(FORMS[name], text)):
+            raise InputError(file, f"key {name}", f"{text!r} is not of the form {FORMS[name]}")
+    return {name: text for name, text in found.items() if text}
+
+
+def write_addresses(source: Path, addresses: Mapping[str, str]) -> list[Path]:
+    """Write addresses into the files of a source folder, replacing earlier ones; return the files that changed."""
+    changes = {
+        source / "pyproject.toml": lambda text: _with_urls(text, addresses),
+        source / "CITATION.cff": lambda text: _with_lines(text, CITATION, addresses, '{}: "{}"'),
+        source / "app/manual/mkdocs.yml": lambda text: _with_lines(text, PAGES, addresses, "{}: {}"),
+    }
+    changed = []
+    for file, change in changes.items():
+        text = file.read_text(encoding="utf-8")
+        if (new := change(text)) != text:
+            write_atomically(file, new.encode())
+            changed.append(file)
+    return changed
+
+
+def _with_urls(text: str, addresses: Mapping[str, str]) -> str:
+    document = tomlkit.parse(text)
+    project = document["project"]
+    assert isinstance(project, tomlkit.items.Table)
+    urls = {label: addresses[name] for name, label in URLS.items() if name in addresses}
+    if urls:
+        project["urls"] = urls
+    elif "urls" in project:
+        del project["urls"]
+    return tomlkit.dumps(document)
+
+
+def _with_lines(text: str, keys: Mapping[str, str], addresses: Mapping[str, str], form: str) -> str:
+    """Return YAML with a line at its end for every address, and without earlier lines of these keys."""
+    kept = [line for line in text.splitlines() if line.partition(":")[0] not in keys.values()]
+    kept += [form.format(key, addresses[name]) for name, key in keys.items() if name in addresses]
+    return "\n".join(kept) + "\n"
+
+
+def main() -> int:
+    """Write the addresses into the source that this file belongs to; print the files that changed."""
+    source = Path(__file__).resolve().parents[2]
+    if not (source / "pyproject.toml").is_file():
+        print(f"{source}: is not the folder of the source", file=sys.stderr)
+        return 2
+    for file in write_addresses(source, read_addresses()):
+        print(file.relative_to(source))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

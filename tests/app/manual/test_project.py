@@ -1,0 +1,85 @@
+"""The home of the project: addresses that a maintainer fills in, the recipe of conda, and the workflow of the forge."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+from rodsight.manual.project import read_addresses, write_addresses
+from rodsight.process.errors import InputError
+
+ROOT = Path(__file__).parents[3]
+# Names that differ on conda-forge.
+CONDA = {"opencv-python-headless": "py-opencv", "matplotlib": "matplotlib-base", "rerun-sdk": "rerun-sdk"}
+FILLED = {
+    "repository": "https://forge.example/group/rodsight",
+    "documentation": "https://rodsight.example/docs",
+    "doi": "10.1234/archive.1",
+}
+
+
+@pytest.fixture
+def source(tmp_path):
+    for name in ("pyproject.toml", "CITATION.cff", "app/manual/mkdocs.yml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+def test_addresses_reach_the_package_the_citation_and_the_pages_and_leave_again(source):
+    before = {file: file.read_text() for file in source.rglob("*") if file.is_file()}
+    assert len(write_addresses(source, FILLED)) == 3
+    urls = tomllib.loads((source / "pyproject.toml").read_text())["project"]["urls"]
+    assert urls == {"Repository": FILLED["repository"], "Documentation": FILLED["documentation"]}
+    citation = yaml.safe_load((source / "CITATION.cff").read_text())
+    assert citation["repository-code"] == FILLED["repository"]
+    assert citation["doi"] == FILLED["doi"]
+    assert f"repo_url: {FILLED['repository']}" in (source / "app/manual/mkdocs.yml").read_text()
+    assert write_addresses(source, FILLED) == []  # nothing is written twice
+    write_addresses(source, {})
+    assert {file: file.read_text() for file in before} == before
+
+
+def test_the_addresses_of_the_tree_are_those_of_its_files(source):
+    assert write_addresses(source, read_addresses()) == [], "python -m rodsight.manual.project"
+
+
+@pytest.mark.parametrize("line", ['repository = "forge.example"', 'doi = "1234"', 'homepage = "https://a.b"'])
+def test_a_wrong_address_is_named(tmp_path, line):
+    (tmp_path / "project.toml").write_text(line + "\n")
+    with pytest.raises(InputError, match=line.split()[0]):
+        read_addresses(tmp_path / "project.toml")
+
+
+def test_the_recipe_of_conda_requires_what_the_package_requires():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = {re.split(r"[<>=;\[]", each)[0].strip() for each in project["dependencies"]}
+    recipe = yaml.safe_load((ROOT / ".ci/conda/recipe.yaml").read_text())
+    run = {str(each).split()[0] for each in recipe["requirements"]["run"]}
+    assert run - {"python"} == {CONDA.get(name, name) for name in wanted}
+    bounds = {str(each).split()[0]: str(each).partition(" ")[2] for each in recipe["requirements"]["run"]}
+    for each in project["dependencies"]:
+        name, bound = re.fullmatch(r"([A-Za-z0-9_.-]+)(.*)", each).groups()
+        assert bounds[CONDA.get(name, name)].replace(" ", "") == bound.replace(" ", ""), name
+
+
+def test_the_workflow_runs_the_gate_and_the_fast_tests_of_other_systems():
+    workflow = yaml.safe_load((ROOT / ".github/workflows/check.yml").read_text())
+    steps = {name: [each.get("run") for each in job["steps"]] for name, job in workflow["jobs"].items()}
+    assert ".ci/run" in steps["gate"]
+    systems = workflow["jobs"]["other-systems"]["strategy"]["matrix"]["os"]
+    assert {"macos-latest", "windows-latest"} <= set(systems)
+
+
+def test_the_paper_has_the_sections_that_the_journal_requires():
+    text = (ROOT / "app/docs/paper.md").read_text()
+    for heading in (
+        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+        "AI usage disclosure", "References",
+    ):  # fmt: skip
+        assert f"\n## {heading}\n" in text
+    assert 750 <= len(re.findall(r"\w+", text.partition("## Summary")[2])) <= 1750
