@@ -25,13 +25,8 @@ def write_report(folder: Path, rows: Sequence[Row]) -> Path:
 
     source = files(__name__.rpartition(".")[0]).joinpath("report.html").read_text(encoding="utf-8")
     template = jinja2.Environment(autoescape=True, trim_blocks=True).from_string(source)
-    columns = [
-        name
-        for name in dict.fromkeys(key for row in rows for key in row)
-        if name not in HIDDEN
-        and not name.endswith(HIDDEN_ENDINGS)
-        and any(row.get(name) not in ("", None) for row in rows)
-    ]
+    known = dict.fromkeys(name for row in rows for name, value in row.items() if value not in ("", None))
+    columns = [name for name in known if name not in HIDDEN and not name.endswith(HIDDEN_ENDINGS)]
     done = [str(row["run"]) for row in rows if row["state"] == "done"]
     finished = [row for row in rows if row["state"] == "done"]
     settings = [name for name in columns if "." in name]  # keys of experiment.toml
