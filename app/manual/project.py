@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import tomlkit
+from tomlkit.items import Table
 
 from ..process.atomic import write_atomically
 from ..process.errors import InputError
@@ -58,7 +59,7 @@ def write_addresses(source: Path, addresses: Mapping[str, str]) -> list[Path]:
 def _with_urls(text: str, addresses: Mapping[str, str]) -> str:
     document = tomlkit.parse(text)
     project = document["project"]
-    assert isinstance(project, tomlkit.items.Table)
+    assert isinstance(project, Table)
     urls = {label: addresses[name] for name, label in URLS.items() if name in addresses}
     if urls:
         project["urls"] = urls
