@@ -1,7 +1,8 @@
 """Write the addresses of the project into its files: `python -m rodsight.manual.project`, in the folder of the source.
 
 `project.toml` holds them; an empty one is left out. Written are `[project.urls]` of pyproject.toml, the lines
-`repository-code`, `url` and `doi` of CITATION.cff, and `repo_url` and `site_url` of the pages.
+`repository-code`, `url` and `doi` of CITATION.cff, and `repo_url` and `site_url` of the pages. The requirements of
+pyproject.toml are copied into the recipe of conda.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ ADDRESSES = Path(__file__).parent / "project.toml"
 URLS = {"repository": "Repository", "issues": "Issues", "documentation": "Documentation"}
 CITATION = {"repository": "repository-code", "documentation": "url", "doi": "doi"}
 PAGES = {"repository": "repo_url", "documentation": "site_url"}
+RECIPE = ".ci/conda/recipe.yaml"
+CONDA_NAMES = {"opencv-python-headless": "py-opencv", "matplotlib": "matplotlib-base"}  # that differ on conda-forge
 FORMS = {
     **dict.fromkeys(("repository", "issues", "documentation"), r"https://\S+\.\S+"),
     "doi": r"10\.\d{4,9}/\S+",
@@ -56,6 +59,22 @@ def write_addresses(source: Path, addresses: Mapping[str, str]) -> list[Path]:
     return changed
 
 
+def write_requirements(source: Path) -> list[Path]:
+    """Copy the requirements of pyproject.toml into the recipe of conda; return the recipe if it changed."""
+    file = source / RECIPE
+    text = file.read_text(encoding="utf-8")
+    required = tomllib.loads((source / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    lines = ["    - python >=3.11"]
+    for each in required:
+        name, bound = re.fullmatch(r"([A-Za-z0-9_.-]+)(.*)", each).groups()  # type: ignore[union-attr]
+        lines.append(f"    - {CONDA_NAMES.get(name, name)} {bound}".rstrip())
+    new = re.sub(r"(?<=\n  run:\n)(    - .*\n)+", "\n".join(lines) + "\n", text)
+    if new == text:
+        return []
+    write_atomically(file, new.encode())
+    return [file]
+
+
 def _with_urls(text: str, addresses: Mapping[str, str]) -> str:
     document = tomlkit.parse(text)
     project = document["project"]
@@ -81,7 +100,7 @@ def main() -> int:
     if not (source / "pyproject.toml").is_file():
         print(f"{source}: is not the folder of the source", file=sys.stderr)
         return 2
-    for file in write_addresses(source, read_addresses()):
+    for file in [*write_addresses(source, read_addresses()), *write_requirements(source)]:
         print(file.relative_to(source))
     return 0
 
