@@ -13,9 +13,6 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-import tomlkit
-from tomlkit.items import Table
-
 from ..process.atomic import write_atomically
 from ..process.errors import InputError
 
@@ -76,15 +73,11 @@ def write_requirements(source: Path) -> list[Path]:
 
 
 def _with_urls(text: str, addresses: Mapping[str, str]) -> str:
-    document = tomlkit.parse(text)
-    project = document["project"]
-    assert isinstance(project, Table)
-    urls = {label: addresses[name] for name, label in URLS.items() if name in addresses}
-    if urls:
-        project["urls"] = urls
-    elif "urls" in project:
-        del project["urls"]
-    return tomlkit.dumps(document)
+    """Return pyproject.toml with the table [project.urls] before the scripts, and without an earlier one."""
+    text = re.sub(r"^\[project\.urls\]\n(?:.+\n)*\n", "", text, flags=re.MULTILINE)
+    lines = [f'{label} = "{addresses[name]}"\n' for name, label in URLS.items() if name in addresses]
+    table = "".join(["[project.urls]\n", *lines, "\n"]) if lines else ""
+    return text.replace("[project.scripts]\n", f"{table}[project.scripts]\n", 1)
 
 
 def _with_lines(text: str, keys: Mapping[str, str], addresses: Mapping[str, str], form: str) -> str:
