@@ -18,7 +18,8 @@ from .process.progress import Progress
 if TYPE_CHECKING:
     from .experiment.units import Scale
     from .figures.figure_style import Width
-    from .figures.gallery import FileKind
+    from .figures.gallery import FigureSet, FileKind
+    from .figures.paper_set import Picture
     from .results.results import Results, TruthContacts
 
 ExportKind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
@@ -185,19 +186,80 @@ def _figure_as_png(results: Results, figure: str, frame: int, truth: TruthContac
 
 
 def write_run_figures(
-    file: Path, out: Path | None, formats: tuple[FileKind, ...], frame: int | None, width: Width
+    file: Path,
+    out: Path | None,
+    formats: tuple[FileKind, ...],
+    frame: int | None,
+    width: Width | None = None,
+    figures: FigureSet = "results",
 ) -> list[Path]:
-    """Write the figures of a run, also against the truth if there is one; return the files. Raises InputError."""
-    from .figures.gallery import write_figures
+    """Write the figures of a run, also against the truth if there is one; return the files.
+
+    Parameters
+    ----------
+    file : Path
+        results.h5.
+    out : Path, optional
+        Folder; default: figures beside the results, or figures/paper.
+    formats : tuple of str
+        Kinds of files.
+    frame : int, optional
+        The frame to draw.
+    width : str, optional
+        Columns; default: single, of the paper's set double.
+    figures : {'results', 'paper'}
+        Which set.
+
+    Raises
+    ------
+    InputError
+        There is no such frame, or a figure cannot be drawn.
+    """
+    from .figures.gallery import write_figures, write_paper_set
     from .results.hdf5.store import load_results
     from .run_truth import truth_of
 
-    folder = file.parent / "figures" if out is None else out
     results, truth = load_results(file), truth_of(file)
     try:
-        return write_figures(results, folder, formats, frame=frame, width=width, truth=truth)
+        if figures == "paper":
+            folder = file.parent / "figures" / "paper" if out is None else out
+            return write_paper_set(
+                results, folder, formats, frame=frame, width=width or "double", truth=truth,
+                pictures=_end_pictures(file, results),
+            )  # fmt: skip
+        folder = file.parent / "figures" if out is None else out
+        return write_figures(results, folder, formats, frame=frame, width=width or "single", truth=truth)
     except (IndexError, ValueError) as error:
-        raise InputError("--frame", str(frame), str(error)) from None
+        raise InputError("export figures", "" if frame is None else f"--frame {frame}", str(error)) from None
+
+
+def _end_pictures(file: Path, results: Results) -> list[Picture]:
+    """Return the photographs of the first and the last frame; none where the run has none or they are missing."""
+    import numpy as np
+
+    from .experiment.experiment import load_experiment
+    from .experiment.scaling import make_scale
+    from .figures.paper_set import Picture
+    from .results.hdf5.store import origin_of
+    from .run_folder import find_experiment
+
+    try:
+        origin = origin_of(file)
+        experiment = load_experiment(find_experiment(file, origin))
+        section = experiment.config.photographs
+        if section is None:
+            return []
+        photographs = experiment.photographs()
+        scale = make_scale(section, photographs.shape[0], results.calibration)
+        pictures = []
+        for frame in (0, results.tracks.frame_count - 1):
+            grey = photographs[origin.frames.start + frame * origin.frames.step]
+            rows, columns = grey.shape
+            (left, top), (right, bottom) = scale.to_world(np.array([[-0.5, -0.5], [columns - 0.5, rows - 0.5]]))
+            pictures.append(Picture(frame, grey, (float(left), float(right), float(bottom), float(top))))
+        return pictures
+    except InputError:
+        return []
 
 
 def _scale_of(results: Results, pixel_size: float | None) -> Scale:

@@ -10,7 +10,7 @@ from ..results.results import Results
 from ..solver.bodies.cell import Cell
 from ..solver.bodies.grains import Array
 from ..solver.frame_forces import FrameStatus
-from ..solver.statistics.local_motion import measure_local_motion
+from ..solver.kinematics.local_motion import measure_local_motion
 from ..solver.statistics.stress import grain_stresses
 
 # Units and meanings of the columns.

@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from ..inference.zero_start import solve_from_zero
 from ..process.atomic import write_atomically
 from ..results.comparison import compare_runs, compare_with_truth
 from ..results.results import Results, TruthContacts
@@ -18,16 +20,21 @@ from .directions import draw_rose, draw_stress
 from .distributions import draw_density
 from .figure_style import Width, paper_style
 from .force_network import draw_forces
+from .kinematics import draw_kinematics
+from .paper_set import Picture, draw_apparatus, draw_recorded, draw_strip, draw_zero_starts
 from .time_curves import draw_time
 from .truth_comparison import draw_truth
 
-FigureName = Literal["forces", "density", "rose", "stress", "time", "truth", "difference"]
+FigureName = Literal["forces", "density", "rose", "stress", "time", "kinematics", "truth", "difference"]
 FileKind = Literal["pdf", "svg", "png"]
+FigureSet = Literal["results", "paper"]
+ZERO_STARTS = 12  # frames swept from zero forces, of which two are drawn
 
 NEED_TRUTH = ("truth", "difference")
 
 _DRAW: dict[str, Callable[[Results, int, Width], Figure]] = {
     "forces": draw_forces, "density": draw_density, "rose": draw_rose, "stress": draw_stress, "time": draw_time,
+    "kinematics": draw_kinematics,
 }  # fmt: skip
 
 
@@ -137,13 +144,76 @@ def write_figures(
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name in get_args(FigureName):
-        if name in NEED_TRUTH and truth is None:
+        if (name in NEED_TRUTH and truth is None) or (name == "kinematics" and results.kinematics is None):
             continue
-        figure = draw_figure(results, name, frame, width=width, truth=truth)
-        for kind in kinds:
-            files.append(folder / f"{name}.{kind}")
-            stream = io.BytesIO()  # a file that cannot be written to confuses matplotlib
-            with paper_style():  # holds the fonts of PDF and SVG
-                figure.savefig(stream, format=kind)
-            write_atomically(files[-1], stream.getvalue())
+        files += _write(draw_figure(results, name, frame, width=width, truth=truth), folder / name, kinds)
+    return files
+
+
+def write_paper_set(
+    results: Results,
+    folder: Path,
+    kinds: Sequence[FileKind],
+    *,
+    frame: int | None = None,
+    width: Width = "double",
+    truth: TruthContacts | None = None,
+    pictures: Sequence[Picture] = (),
+) -> list[Path]:
+    """Write the figures of the paper that introduced the method, from a run.
+
+    Parameters
+    ----------
+    results : Results
+        The results of the run.
+    folder : Path
+        Folder of the figures; it is created.
+    kinds : sequence of str
+        Kinds of files: "pdf", "svg", "png".
+    frame : int, optional
+        The frame with which the strip of networks ends; None: `default_frame`.
+    width : str
+        "single" or "double" column.
+    truth : TruthContacts, optional
+        True forces, as recorded ones.
+    pictures : sequence of Picture
+        Photographs of the first and the last frame.
+
+    Returns
+    -------
+    list of Path
+        apparatus, zero_forces, networks, recorded.
+
+    Raises
+    ------
+    IndexError, ValueError
+        There is no such frame, or fewer than two frames have forces.
+    """
+    shown = default_frame(results) if frame is None else frame
+    if not 0 <= shown < len(results.frames):
+        raise IndexError(f"there is no frame {shown}: frames go from 0 to {len(results.frames) - 1}")
+    candidates = np.unique(np.linspace(1, len(results.frames) - 1, ZERO_STARTS).round().astype(int))
+    found = [each for each in solve_from_zero(results, candidates.tolist()) if np.isfinite(each.agreement)]
+    if len(found) < 2:
+        raise ValueError("fewer than two frames have forces: the paper's figures compare frames")
+    found.sort(key=lambda each: each.agreement)
+    folder.mkdir(parents=True, exist_ok=True)
+    with paper_style():
+        figures = {
+            "apparatus": draw_apparatus(results, pictures, width),
+            "zero_forces": draw_zero_starts(results, found[0], found[-1], width),
+            "networks": draw_strip(results, shown, width),
+            "recorded": draw_recorded(results, truth, shown, width),
+        }
+    return [file for name, figure in figures.items() for file in _write(figure, folder / name, kinds)]
+
+
+def _write(figure: Figure, stem: Path, kinds: Sequence[FileKind]) -> list[Path]:
+    """Write a figure as files of these kinds."""
+    files = [stem.with_suffix(f".{kind}") for kind in kinds]
+    for file, kind in zip(files, kinds, strict=True):
+        stream = io.BytesIO()  # a file that cannot be written to confuses matplotlib
+        with paper_style():  # holds the fonts of PDF and SVG
+            figure.savefig(stream, format=kind)
+        write_atomically(file, stream.getvalue())
     return files

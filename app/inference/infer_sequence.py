@@ -17,6 +17,7 @@ from ..solver.assessment.penalties import penalise_friction
 from ..solver.assessment.statistic_intervals import widen_for_friction
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
+from ..solver.kinematics.sequence_kinematics import SequenceKinematics, measure_kinematics
 from ..solver.sequence.frames import solve_first_frame
 from ..solver.statistics.frame_statistics import FrameStatistics
 from .corrected_sequence import CorrectedSequence
@@ -79,7 +80,15 @@ def infer_sequence(
     count, measured = len(frames), sequence.friction_measured
     assessed = LazySequence(count, lambda k: penalise_friction(frames[k], check, measured=measured))
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
-    return replace(unsolved, frames=assessed, statistics=widened, friction_check=check)
+    kinematics = _measure_kinematics(sequence)
+    return replace(unsolved, frames=assessed, statistics=widened, friction_check=check, kinematics=kinematics)
+
+
+def _measure_kinematics(sequence: CorrectedSequence) -> SequenceKinematics | None:
+    """Measure the motion of the corrected tracks; grains that are not present are not seen."""
+    tracks = sequence.tracks
+    position = np.where(tracks.present[..., None], tracks.position, np.nan)
+    return measure_kinematics(position, tracks.rotation, tracks.radius, tracks.sigma, sequence.walls.cell)
 
 
 def _with_first_frame(

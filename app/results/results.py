@@ -16,6 +16,7 @@ from ..solver.contacts.pairs import Keys, make_keys
 from ..solver.contacts.radius_tuning import RadiusTuning
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces
+from ..solver.kinematics.sequence_kinematics import SequenceKinematics
 from ..solver.statistics.frame_statistics import FrameStatistics
 from ..tracks import Tracks, WallTracks
 from .finding import Finding
@@ -64,6 +65,7 @@ class Results:
     radius_tuning: RadiusTuning | None = None  # None: not requested
     boundary: Boundary | None = None  # None: used as given
     base_friction: float = 0.0  # coefficient of the base that was used; 0: none
+    kinematics: SequenceKinematics | None = None  # None: fewer than two frames, or not all are there
     diagnosis: tuple[Finding, ...] = ()  # causes of wrong forces that the evidence supports
     ensemble_size: int = 0  # resampled sequences behind the standard deviations of the forces; 0: free formula
 

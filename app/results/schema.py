@@ -19,6 +19,9 @@ from ..solver.calibration.calibrate import Calibration
 from ..solver.contacts.radius_tuning import RadiusTuning
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import ERROR_PARTS, FrameForces
+from ..solver.kinematics.mean_field import FLUCTUATION_EDGES
+from ..solver.kinematics.sequence_kinematics import SequenceKinematics
+from ..solver.kinematics.spatial_correlation import DISTANCE_EDGES
 from ..solver.nlgs.start_residuals import COLD_SWEEPS
 from ..solver.quantity import DeclaredField, Quantity, quantities
 from ..solver.sequence.ensemble import MEMBERS
@@ -45,6 +48,7 @@ PARTS: dict[str, type] = {
     "boundary": Boundary,
     "friction_check": FrictionCheck,
     "radius_tuning": RadiusTuning,
+    "kinematics": SequenceKinematics,
 }
 PER_FRAME = ("frames", "statistics")  # parts with one object per frame
 GROUP_OF_PART = {"contacts": "contacts", "history": "sweeps"}  # nested parts of a frame: attribute and group
@@ -101,6 +105,13 @@ DIMENSIONS = {
     "error_part": Dimension("sources of the error of the forces", ERROR_PARTS),
     "force_bin": Dimension("bins of f / ⟨f⟩, labelled by their middles", _middles(FORCE_EDGES)),
     "mobilisation_bin": Dimension("bins of |f_t| / (μ f_n), labelled by their middles", _middles(MOBILISATION_EDGES)),
+    "strain_window": Dimension("windows of 1, 2, 4 … photographs"),
+    "fluctuation_bin": Dimension(
+        "bins of fluctuations over their rms, labelled by middles", _middles(FLUCTUATION_EDGES)
+    ),
+    "distance_bin": Dimension(
+        "bins of distances in mean diameters, labelled by their middles", _middles(DISTANCE_EDGES)
+    ),
     "radius_change": Dimension("tested changes of radius"),
     "friction_trial": Dimension("tested coefficients of friction"),
     "cold_sweep": Dimension("sweeps from zero forces", COLD_SWEEPS.astype(np.float64)),

@@ -166,7 +166,9 @@ def _prepare(
         snapshots, settings, remark = _with_measured_precision(packing, snapshots, settings)
     positions = None
     if settings.uses_positions and len(snapshots) > 1:
-        positions = PositionEstimates(packing, snapshots, settings.posterior, settings.workers, posteriors)
+        positions = PositionEstimates(
+            packing, snapshots, settings.posterior, settings.workers, posteriors, span=settings.used_span
+        )
     sequence = SequenceProblem(
         packing, snapshots, settings, packing.inferred, positions, known, _find_reversals(snapshots, settings)
     )

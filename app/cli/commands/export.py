@@ -22,7 +22,7 @@ KINDS_OF_OPTION: dict[str, tuple[Kind, ...]] = {
     ),
     "--rate": ("video",),
     "--pixel-size": ("dic",),
-    **dict.fromkeys(("--frame", "--formats", "--width"), ("figures",)),
+    **dict.fromkeys(("--frame", "--formats", "--width", "--set"), ("figures",)),
 }
 
 
@@ -42,7 +42,7 @@ def export(
     tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show; default Forces")] = None,
     view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
     figure: Annotated[
-        Literal["forces", "density", "rose", "stress", "time", "truth", "difference"] | None,
+        Literal["forces", "density", "rose", "stress", "time", "kinematics", "truth", "difference"] | None,
         tyro.conf.arg(help="pictures, video: this figure of every frame, instead of the viewer"),
     ] = None,
     size: Annotated[
@@ -57,7 +57,16 @@ def export(
         tuple[Literal["pdf", "svg", "png"], ...], tyro.conf.arg(help="figures: kinds of files; default pdf svg")
     ] = (),
     width: Annotated[
-        Literal["single", "double"] | None, tyro.conf.arg(help="figures: columns of a page; default single")
+        Literal["single", "double"] | None,
+        tyro.conf.arg(help="figures: columns of a page; default single, of the set paper double"),
+    ] = None,
+    figure_set: Annotated[
+        Literal["results", "paper"] | None,
+        tyro.conf.arg(
+            name="set",
+            help="figures: of the results, or those of the paper: apparatus, frames from zero forces, consecutive "
+            "networks, P(f) and stress against recorded ones; default results",
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> int:
@@ -67,12 +76,14 @@ def export(
     opens vtk/packing.pvd, OVITO ovito/frame_0000.vtm; they find the other files. An option that does not apply to the
     chosen kind is refused.
 
+    The figures of the paper: rodsight export figures runs/shear --set paper
+
     Example: rodsight export video runs/shear --figure forces
     """
     given = {
         "--kind": kind, "--frames": frames, "--timeline": timeline, "--step": step, "--tab": tab, "--view": view,
         "--size": size, "--rate": rate, "--pixel-size": pixel_size, "--frame": frame, "--formats": formats or None,
-        "--width": width, "--figure": figure,
+        "--width": width, "--figure": figure, "--set": figure_set,
     }  # fmt: skip
     from ...exported_files import Drawing, draw_figure_frames, draw_pictures, write_data, write_run_figures
     from ...results.hdf5.store import load_results
@@ -101,7 +112,7 @@ def export(
             message = f"{files[0].parent}/: {len(files)} pictures, {files[0].name} … {files[-1].name}."
     elif what == "figures":
         file = results_file(source)
-        files = write_run_figures(file, out, formats or ("pdf", "svg"), frame, width or "single")
+        files = write_run_figures(file, out, formats or ("pdf", "svg"), frame, width, figure_set or "results")
         message = f"{files[0].parent}/: {', '.join(each.name for each in files)}."
     else:
         target = folder / what if out is None else out

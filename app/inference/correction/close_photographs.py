@@ -9,8 +9,8 @@ from ...solver.detection.displacement import displacement_scale
 from ...tracks import Tracks
 
 HIDDEN = 0.5  # displacement over the noise of a sliding: below it most of what is read is noise
-VISIBLE = 1.0  # the same over the span that is chosen
-MAX_SPAN = 8  # r(f_n) is flat from two to four photographs at VISIBLE; wider spans miss events
+VISIBLE = 1.5  # the same over the span that is chosen
+MAX_SPAN = 8  # r(f_n) is flat around VISIBLE, from three to five photographs; wider spans miss events
 SAMPLES = 5  # intervals from which a displacement is read
 LEAST_INTERVALS = 4  # of the chosen length in the sequence
 
@@ -28,9 +28,9 @@ def choose_span(tracks: Tracks) -> tuple[int, str]:
     Notes
     -----
     s(m), the median rms non-affine displacement of a grain over m photographs, against the noise 2.8 σ of a sliding:
-    chosen is the least m with s(m) ≥ 2.8 σ where s(1) < 1.4 σ. Errors of one photograph enter the sliding over any
-    interval once, but sliding grows with its length. Smoothing the positions instead would make the errors of
-    neighbouring photographs alike.
+    where s(1) < 0.5 · 2.8 σ, chosen is the least m with s(m) ≥ 1.5 · 2.8 σ, else the widest if s(m) ≥ 2.8 σ. Errors of
+    one photograph enter the sliding over any interval once, but sliding grows with its length. Smoothing the positions
+    instead would make the errors of neighbouring photographs alike.
     """
     present, frames = tracks.present, tracks.frame_count
     if frames < 2 * LEAST_INTERVALS or not present.any():
@@ -39,8 +39,10 @@ def choose_span(tracks: Tracks) -> tuple[int, str]:
     first = _displacement(tracks, 1)
     if not first < HIDDEN * noise:
         return 1, ""
-    for span in range(2, min(MAX_SPAN, (frames - 1) // LEAST_INTERVALS) + 1):
-        if _displacement(tracks, span) >= VISIBLE * noise:
+    widest = min(MAX_SPAN, (frames - 1) // LEAST_INTERVALS)
+    for span in range(2, widest + 1):
+        moved = _displacement(tracks, span)
+        if moved >= VISIBLE * noise or (span == widest and moved >= noise):
             return span, (
                 "photographs follow one another so closely that noise hides the sliding between them "
                 f"({1e6 * first:.0f} µm where noise is {1e6 * noise:.0f} µm): it is read over {span} photographs"

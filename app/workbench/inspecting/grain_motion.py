@@ -11,7 +11,7 @@ from ...reviewing.rounding import rounded
 from ...solver.bodies.cell import Cell
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameStatus
-from ...solver.statistics.local_motion import measure_local_motion
+from ...solver.kinematics.local_motion import measure_local_motion
 from ...solver.statistics.stress import grain_stresses
 from .run_data import RunData
 

@@ -12,6 +12,7 @@ from rodsight.figures.force_network import branch_lines
 from rodsight.figures.gallery import NEED_TRUTH, FigureName, default_frame, draw_figure, write_figures
 from rodsight.notebook.run import Run
 from rodsight.solver.frame_forces import FrameStatus
+from rodsight.solver.kinematics.sequence_kinematics import measure_kinematics
 
 from tests.app.recording.fake_results import make_results, make_truth
 from tests.app.recording.look.colour_vision import VISIONS, cie76
@@ -21,7 +22,10 @@ VISIBLE = 20.0  # CIE76 difference from the paper
 
 @pytest.fixture(scope="module")
 def results():
-    return make_results(4, 8, 7, sweeps=2)
+    made = make_results(4, 8, 7, sweeps=2)
+    tracks = made.tracks
+    found = measure_kinematics(tracks.position, tracks.rotation, tracks.radius, tracks.sigma)
+    return replace(made, kinematics=found)
 
 
 def test_every_figure_has_the_width_of_a_column_and_units(results):
@@ -54,6 +58,8 @@ def test_a_figure_that_cannot_be_drawn_raises(results):
         draw_figure(results, "network")
     with pytest.raises(IndexError, match="from 0 to 3"):
         draw_figure(results, "forces", 4)
+    with pytest.raises(ValueError, match="no kinematics"):
+        draw_figure(replace(results, kinematics=None), "kinematics")
 
 
 def test_the_default_frame_is_the_last_settled_one(results):
@@ -67,6 +73,8 @@ def test_files_are_written_for_all_figures_with_data(results, tmp_path):
     assert {each.name for each in files} == {
         f"{name}.{kind}" for name in get_args(FigureName) if name not in NEED_TRUTH for kind in ("pdf", "svg")
     }
+    earlier = write_figures(replace(results, kinematics=None), tmp_path / "earlier", ("png",))
+    assert "kinematics.png" not in {each.name for each in earlier}
     assert (tmp_path / "figures" / "forces.pdf").read_bytes().startswith(b"%PDF")
     text = (tmp_path / "figures" / "density.svg").read_text()
     assert "<text" in text  # texts are not converted to outlines

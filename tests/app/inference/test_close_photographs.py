@@ -27,7 +27,7 @@ def tracks_moving(step: float, noise: float = NOISE) -> Tracks:
     )
 
 
-@pytest.mark.parametrize(("step", "span"), [(7.5e-6, 4), (9.5e-6, 3), (3.4e-6, 8)])
+@pytest.mark.parametrize(("step", "span"), [(7.5e-6, 6), (9.5e-6, 5), (5e-6, 8), (3.8e-6, 8)])
 def test_sliding_is_read_over_a_span_where_noise_hides_it(step: float, span: int) -> None:
     found, sentence = choose_span(tracks_moving(step))
     assert found == span

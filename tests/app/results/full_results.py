@@ -16,6 +16,9 @@ from rodsight.solver.calibration.gap_statistics import GapStatistics
 from rodsight.solver.calibration.priors import CalibrationPriors
 from rodsight.solver.convex.friction_check import FrictionCheck
 from rodsight.solver.frame_forces import ERROR_PARTS, FrameForces
+from rodsight.solver.kinematics.mean_field import FLUCTUATION_BINS
+from rodsight.solver.kinematics.sequence_kinematics import SequenceKinematics
+from rodsight.solver.kinematics.spatial_correlation import DISTANCE_BINS
 from rodsight.solver.nlgs.start_residuals import COLD_SWEEPS
 from rodsight.solver.sequence.ensemble import MEMBERS
 
@@ -68,8 +71,18 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         ),
         radius_tuning=tuning,
         boundary=_boundary(f, w, np.random.default_rng(seed + 1)),
+        kinematics=_kinematics(f, n, np.random.default_rng(seed + 2)),
         ensemble_size=2,
     )
+
+
+def _kinematics(f: int, n: int, rng: np.random.Generator) -> SequenceKinematics:
+    windows = 2
+    return SequenceKinematics(
+        2, rng.random((f, 2, 2)), rng.random((f, n, 2)), *rng.random((5, f, n)), rng.random((f, n)) < 0.5,
+        *rng.random((3, f)), 2 ** np.arange(windows), *rng.random((4, windows)),
+        rng.random((windows, FLUCTUATION_BINS)), rng.random((windows, DISTANCE_BINS)), rng.random(windows),
+    )  # fmt: skip
 
 
 def _boundary(f: int, w: int, rng: np.random.Generator) -> Boundary:

@@ -74,7 +74,13 @@ def test_any_results_read_back_unchanged(tmp_path, seed, frame_count, columns, r
     rng = np.random.default_rng(seed)
     results = thinned(make_full_results(frame_count, seed, columns=columns, rows=rows, sweeps=sweeps), rng)
     if rng.random() < 0.5:
-        plain = {"calibration": None, "friction_check": None, "radius_tuning": None, "ensemble_size": 0}
+        plain = {
+            "calibration": None,
+            "friction_check": None,
+            "radius_tuning": None,
+            "kinematics": None,
+            "ensemble_size": 0,
+        }
         frames = [replace(frame, member_force=None) for frame in results.frames]
         walls = replace(results.walls, force=None, sigma=None)
         results = replace(results, frames=frames, walls=walls, **plain)

@@ -12,7 +12,7 @@ from rodsight.process.frame_range import FrameRange
 from rodsight.recording.look.force_style import THICKEST, THINNEST
 from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
-from rodsight.solver.statistics.local_motion import measure_local_motion
+from rodsight.solver.kinematics.local_motion import measure_local_motion
 from rodsight.verdicts.decisions import BodyNames, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
 from rodsight.workbench.inspecting.run_data import run_stamp

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 import pytest
+from rodsight.solver.contacts.verdicts import Verdicts
 from rodsight.solver.mixture.position_estimates import PositionEstimates
 from rodsight.solver.posterior.posterior_settings import PosteriorSettings
 
@@ -33,3 +34,18 @@ def test_given_posteriors_are_used_as_they_are(soft) -> None:
     given = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS).at(0)
     assert given is not None
     assert PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS, given={0: given}).at(0) is given
+
+
+def test_close_photographs_share_the_posterior_of_the_first_of_every_span(soft) -> None:
+    every = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS)
+    shared = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS, span=3)
+    fifth, third = shared.at(5), every.at(3)
+    assert fifth is not None
+    assert third is not None
+    assert np.array_equal(fifth.fn, third.fn)  # also where frames 3 and 4 were not requested
+    assert shared.at(4) is fifth
+    judged = shared.at(4, Verdicts(reset=True))
+    own = every.at(4)
+    assert judged is not None
+    assert own is not None
+    assert np.array_equal(judged.fn, own.fn)  # a frame with verdicts has a posterior of its own

@@ -11,7 +11,6 @@ from scipy.spatial import KDTree
 
 from ..bodies.cell import Cell
 from ..bodies.grains import Array
-from ..bodies.strain import logarithmic_strain
 
 REACH = 1.0  # mean diameters between the surfaces of neighbours: the first shell and what fills its gaps
 MIN_NEIGHBOURS = 3  # two determine the gradient exactly and leave no residual
@@ -24,6 +23,7 @@ class LocalMotion:
 
     strain: Float[Array, "n 2 2"]  # [–] logarithmic, extension positive
     d2min: Float[Array, " n"]  # [m²] mean squared departure of the neighbours from the local gradient
+    rotation: Float[Array, " n"]  # [rad] rigid rotation of the neighbourhood, counter-clockwise
 
 
 def measure_local_motion(
@@ -53,13 +53,14 @@ def measure_local_motion(
     With the distances d_j of the neighbours j before and d_j′ after, F minimises Σ |d_j′ − F d_j|², and
     D²min = (1/m) Σ |d_j′ − F d_j|² over the m neighbours (M. L. Falk & J. S. Langer, Phys. Rev. E 57, 7192, 1998, eqs.
     2.11–2.14, there without 1/m). Neighbours are the grains whose surfaces are less than one mean diameter apart
-    before. The strain is ½ ln(F Fᵀ).
+    before. The strain is ½ ln(F Fᵀ), NaN where det F ≤ 0; the rotation is that of the polar decomposition,
+    atan2(F_yx − F_xy, F_xx + F_yy).
     """
     count = len(radius)
-    strain, d2min = np.full((count, 2, 2), np.nan), np.full(count, np.nan)
+    d2min = np.full(count, np.nan)
     present = np.asarray(np.isfinite(np.hstack([before, after])).all(axis=1))
     if not present.any():
-        return LocalMotion(strain, d2min)
+        return LocalMotion(np.full((count, 2, 2), np.nan), d2min, d2min)
     i, old, new = _neighbours(before, after, radius, present, cells)
     moments, mixed = np.zeros((count, 2, 2)), np.zeros((count, 2, 2))
     np.add.at(moments, i, old[:, :, None] * old[:, None, :])
@@ -71,9 +72,17 @@ def measure_local_motion(
     left = np.sum((new - np.einsum("cab,cb->ca", gradient[i], old)) ** 2, axis=1)
     total = np.bincount(i, weights=np.where(known[i], left, 0.0), minlength=count)
     d2min[known] = total[known] / neighbours[known]
-    for k in np.flatnonzero(known):
-        strain[k] = logarithmic_strain(gradient[k] - np.eye(2))
-    return LocalMotion(strain, d2min)
+    rotation = np.arctan2(gradient[:, 1, 0] - gradient[:, 0, 1], gradient[:, 0, 0] + gradient[:, 1, 1])
+    return LocalMotion(_logarithmic_strains(gradient), d2min, rotation)
+
+
+def _logarithmic_strains(deformation: Float[Array, "n 2 2"]) -> Float[Array, "n 2 2"]:
+    """Return ½ ln(F Fᵀ) of deformation gradients F; NaN where det F is not positive."""
+    strain = np.full(deformation.shape, np.nan)
+    sound = np.linalg.det(np.nan_to_num(deformation)) > 0.0
+    stretch, axes = np.linalg.eigh(deformation[sound] @ deformation[sound].transpose(0, 2, 1))
+    strain[sound] = np.einsum("nak,nk,nbk->nab", axes, 0.5 * np.log(stretch), axes)
+    return strain
 
 
 def _spanning(moments: Float[Array, "n 2 2"]) -> Bool[np.ndarray, " n"]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from rodsight.solver.bodies.cell import Cell
-from rodsight.solver.statistics.local_motion import measure_local_motion
+from rodsight.solver.kinematics.local_motion import measure_local_motion
 
 R = 0.005
 SIDE = 8
