@@ -8,16 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ..results.results import Results
 from ..solver.bodies.grains import Array
-from ..solver.bodies.wall_shapes import outlines
 from ..solver.kinematics.mean_field import FLUCTUATION_EDGES
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics
 from ..solver.kinematics.spatial_correlation import DISTANCE_EDGES
-from .figure_style import BLUE, COLOURS, DASHES, INK, OUTLINE, VERMILION, Width, add_scale_bar, add_title, new_figure
-from .force_network import bar_length, bounds_of
+from .figure_style import BLUE, COLOURS, DASHES, INK, OUTLINE, VERMILION, Width, add_title, new_figure
+from .force_network import bounds_of, draw_packing
 
 TOP_QUANTILE = 0.99  # of a quantity over the grains: above it the colour is constant
 LONGEST_ARROW = 2.0  # mean radii, of the rms fluctuation
@@ -64,7 +62,8 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
 def _draw_map(
     axes: Axes, results: Results, frame: int, value: Array, colours: str, label: str, *, signed: bool
 ) -> None:
-    here = _draw_frame(axes, results, frame)
+    draw_packing(axes, results, frame)
+    here = results.tracks.present[frame]
     known = value[here & np.isfinite(value)]
     top = float(np.quantile(np.abs(known), TOP_QUANTILE)) if len(known) else 1.0
     place, size = results.tracks.position[frame, here], 2.0 * results.tracks.radius[here]
@@ -82,26 +81,10 @@ def _draw_map(
     bar.ax.locator_params(nbins=3)
 
 
-def _draw_frame(axes: Axes, results: Results, frame: int) -> NDArray[np.bool_]:
-    """Draw walls and scale bar; return which grains are present (n,)."""
-    low, high = bounds_of(results)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    axes.axis("off")
-    for line in outlines(results.walls.endpoints[frame], results.walls.side):
-        axes.plot(*line.T, color=INK, linewidth=0.7, zorder=2)
-    add_scale_bar(axes, bar_length(float(high[0] - low[0])))
-    return results.tracks.present[frame]
-
-
 def _draw_fluctuations(axes: Axes, results: Results, frame: int, found: SequenceKinematics) -> None:
     """Draw fluctuations as arrows, their rms LONGEST_ARROW mean radii long."""
-    here = _draw_frame(axes, results, frame)
+    draw_packing(axes, results, frame)
     vector, place = found.fluctuation[frame], results.tracks.position[frame]
-    size = 2.0 * results.tracks.radius[here]
-    axes.add_collection(EllipseCollection(
-        size, size, np.zeros(len(size)), units="xy", offsets=place[here], offset_transform=axes.transData,
-        facecolor="none", edgecolor=OUTLINE, linewidth=0.25, zorder=1,
-    ))  # fmt: skip
     known = np.isfinite(vector).all(axis=1)
     rms = float(np.sqrt(np.mean(np.sum(vector[known] ** 2, axis=1)))) if known.any() else 0.0
     if rms > 0.0:

@@ -11,6 +11,8 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..drawing.force_range import ForceRange
+from ..drawing.frame_caption import caption_of_trust
 from ..inference.zero_start import ZeroStart
 from ..results.results import Results, TruthContacts
 from ..solver.bodies.grains import Array
@@ -18,7 +20,7 @@ from ..solver.bodies.wall_shapes import outlines
 from ..solver.frame_forces import FrameStatus
 from ..solver.statistics.force_statistics import FORCE_EDGES, force_density
 from .figure_style import BLUE, INK, OUTLINE, VERMILION, Width, add_scale_bar, add_title, new_figure
-from .force_network import bar_length, bounds_of, describe_frame, draw_network, top_force
+from .force_network import bar_length, bounds_of, draw_network
 from .recorded_stress import recorded_stress
 
 STRIP = 5  # consecutive networks
@@ -65,9 +67,9 @@ def draw_apparatus(results: Results, pictures: Sequence[Picture], width: Width) 
 def draw_zero_starts(results: Results, worst: ZeroStart, best: ZeroStart, width: Width) -> Figure:
     """Draw two frames swept from zero forces: the one that departs most from the reported forces, and the nearest."""
     figure, panels = _row(results, 2, width)
-    top = top_force(results)
+    force_range = ForceRange.of(results.frames)
     for axes, letter, found in zip(panels, "ab", (worst, best), strict=True):
-        draw_network(axes, results, found.frame, found.contacts, found.fn, top)
+        draw_network(axes, results, found.frame, found.contacts, found.fn, force_range)
         add_title(axes, f"({letter}) frame {found.frame} from zero forces\nr with the reported: {found.agreement:.2f}")
     return figure
 
@@ -77,11 +79,11 @@ def draw_strip(results: Results, frame: int, width: Width) -> Figure:
     last = range(max(frame - STRIP + 1, 0), frame + 1)
     frames = [k for k in last if results.frames[k].status is not FrameStatus.FAILED]
     figure, panels = _row(results, len(frames), width)
-    top = top_force(results)
+    force_range = ForceRange.of(results.frames)
     for axes, k in zip(panels, frames, strict=True):
         forces = results.frames[k]
-        draw_network(axes, results, k, forces.contacts, forces.fn, top)
-        add_title(axes, f"frame {k}\n{describe_frame(results, k).splitlines()[1].split(':')[0]}")
+        draw_network(axes, results, k, forces.contacts, forces.fn, force_range)
+        add_title(axes, f"frame {k}\n{caption_of_trust(forces)}")
     return figure
 
 
