@@ -64,7 +64,13 @@ def test_memory_is_independent_of_the_number_of_frames(tmp_path, monkeypatch):
             fn = np.random.default_rng(k).random(forces.history.fn.shape).astype(np.float32)
             return replace(forces, frame=k, history=replace(forces.history, fn=fn))
 
-        plain = {"boundary": None, "calibration": None, "friction_check": None, "radius_tuning": None}
+        plain = {
+            "boundary": None,
+            "calibration": None,
+            "friction_check": None,
+            "radius_tuning": None,
+            "kinematics": None,
+        }
         tracks = few.tracks.frames(0, 3)
         over = np.arange(count) % 3
         tracks = replace(

@@ -41,6 +41,7 @@ def full():
         walls=walls,
         boundary=None,
         radius_tuning=None,
+        kinematics=None,
         friction_check=None,
         calibration=None,
     )
