@@ -35,6 +35,7 @@ class CorrectedSequence:
     failed: Mapping[int, str]  # unusable frames with the reason; their snapshots are interpolated
     wall_friction: WallFriction | None = None  # measured at walls; None: given, or as between rods
     friction_measured: bool = False  # whether the friction between rods was measured
+    base_gravity: float = 9.81  # [m/s²] onto the base
     noise_remark: str = ""  # where the measured noise contradicts the stated one
 
     def with_tracks(self, tracks: Tracks) -> CorrectedSequence:

@@ -23,8 +23,6 @@ from ..solver.statistics.frame_statistics import FrameStatistics
 from .corrected_sequence import CorrectedSequence
 from .correction.correct_sequence import correct_sequence
 from .correction.friction import check_sequence_friction
-from .diagnosis.base_friction import measure_base_friction
-from .diagnosis.trial import trial_score
 from .first_frame import estimate_first_frame
 from .frame_store import FrameStore, MemoryStore
 from .inputs import Inputs
@@ -66,13 +64,13 @@ def infer_sequence(
     """
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
-    if inputs.material.base_friction_measured:
-        inputs = measure_base_friction(inputs, trial_score)
     sequence = correct_sequence(inputs)
     observer.corrected(sequence)
     solve_frames(sequence, store, observer)
     frames, statistics = store.sequences(len(sequence.snapshots))
-    unsolved = replace(sequence.unsolved_results(), base_friction=inputs.material.base_friction)
+    unsolved = replace(
+        sequence.unsolved_results(), base_friction=sequence.packing.material.base_drag / sequence.base_gravity
+    )
     if not complete or all(each.status is FrameStatus.FAILED for each in frames):
         return replace(unsolved, frames=frames, statistics=statistics)
     frames, statistics = _with_first_frame(sequence, frames, statistics, observer)

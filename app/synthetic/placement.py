@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..solver.bodies.grains import Array
 from ..solver.bodies.wall_shapes import STRAIGHT, circle_parameters
 from ..solver.dem.dem_truth import DemTruth
 
@@ -22,6 +23,21 @@ def cut_sides(truth: DemTruth) -> DemTruth:
     endpoints[:, right, 1] = endpoints[:, right, 0] + side
     endpoints[:, left, 0] = endpoints[:, left, 1] + side
     return replace(truth, endpoints=endpoints)
+
+
+def tilt_box(truth: DemTruth, angle: Array) -> DemTruth:
+    """Turn box and grains of every photograph counter-clockwise by an angle (f,) [rad], about the origin.
+
+    Forces are stated along the normals of contacts, which turn with them.
+    """
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turn = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
+    return replace(
+        truth,
+        endpoints=np.einsum("fab,fweb->fwea", turn, truth.endpoints),
+        position=np.einsum("fab,fnb->fna", turn, truth.position),
+        rotation=truth.rotation + angle[:, None],
+    )
 
 
 def place_in_picture(truth: DemTruth, margin: float) -> DemTruth:

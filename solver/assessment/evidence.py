@@ -39,3 +39,4 @@ class Evidence:
     overlap_agreement: float = math.nan  # of the motion estimate with the motion-free balance of overlaps
     agreement_age: int = 0  # frames since these three were computed
     force_change: float = math.nan  # 1 − correlation of f_n with the previous frame, over the contacts of either
+    power_gap: float = math.nan  # of the convex members: 0 if all friction acts at its limit against the sliding

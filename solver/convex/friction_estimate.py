@@ -21,7 +21,11 @@ from ..nlgs.force_memory import ForceMemory
 from ..parallel import parallel_map
 from .program import Balance, ConvexSettings, solve_convex_member
 
-FACTORS = (0.5, 0.6, 0.7, 0.8, 0.88, 0.94, 1.0, 1.06, 1.14, 1.25, 1.45, 1.7, 2.0)  # of the assumed coefficient
+# Of the assumed coefficient; only those about the minimum are tried.
+FACTORS = (
+    0.12, 0.17, 0.24, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.94, 1.0, 1.06, 1.14, 1.25, 1.45, 1.7, 2.0, 2.4, 2.9, 3.5,
+    4.2, 5.0,
+)  # fmt: skip
 SIDE = 2  # trials on either side of the minimum
 
 

@@ -139,7 +139,7 @@ class Simulation(ABC):
         fn = np.concatenate([self._pairs.fn, self._wall_pairs.fn])
         if not np.any(fn > 0.0):
             return float("inf")
-        gravity = self.grains.mass[:, None] * np.array(self.settings.gravity)
+        gravity = self.grains.mass[:, None] * np.array([self._law.gravity_x, self._law.gravity_y])
         resultant = np.linalg.norm(self._bodies.force[:, :2] + gravity, axis=1)
         return float(resultant.mean() / fn[fn > 0.0].mean())
 
@@ -166,6 +166,12 @@ class Simulation(ABC):
             done += advance(
                 self._bodies, self._pairs, self._wall_pairs, self._law, self._boundary, drive[done:], self._skin
             )
+
+    def tilt(self, angle: float) -> None:
+        """Turn gravity clockwise by an angle [rad] from the settings' direction, as in a box that tilts."""
+        x, y = self.settings.gravity
+        cosine, sine = float(np.cos(angle)), float(np.sin(angle))
+        self._law = self._law._replace(gravity_x=cosine * x + sine * y, gravity_y=cosine * y - sine * x)
 
     def rest(self, unbalance: float | None = None) -> int:
         """Hold the boundary until grains and plates are in equilibrium, or the pause limit; return the steps done.

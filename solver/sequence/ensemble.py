@@ -21,6 +21,7 @@ from ..bodies.grains import Array
 from ..contacts.contacts import Contacts
 from ..contacts.pairs import are_among
 from ..convex.ensemble_members import NormalisedSlip, RefinedMotion, Slip, advance_convex_member, read_slip, steady_slip
+from ..convex.friction_estimate import relative_power_gap
 from ..convex.program import Balance, ConvexForces, assemble_balance, project_onto_equilibrium
 from ..detection.contact_networks import PairProbability, ProbabilityNetwork
 from ..detection.displacement import member_intervals
@@ -95,6 +96,7 @@ class EnsembleForces:
     forbidden_probability: Array  # (m,) P(touch) of those, as detected
     missing: MissingContacts  # pairs among those of `step` that were not detected but shown by the balance
     seen_slip: NormalisedSlip  # around the frame where that is known, else before it or after
+    power_gap: float  # mean of the convex members against the sliding that each reads; NaN where nothing slides
 
     @property
     def member_force(self) -> Array:
@@ -159,7 +161,7 @@ def solve_ensemble(
         np.array(members.weight), np.array(members.place),
         EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing),
         chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
-        touching.forbidden_probability, missing.only(touching.contacts.key), members.seen_slip,
+        touching.forbidden_probability, missing.only(touching.contacts.key), members.seen_slip, members.power_gap,
     )  # fmt: skip
 
 
@@ -186,7 +188,7 @@ def _solve_members(
         slips = list(_slips(problem, touching.contacts))
         convex = parallel_map(_member_tasks(problem, state, touching, balance, slips), workers)
     chains = _compare_chains(touching.contacts, steps, state)
-    return touching, chains, balance, _gather_members(slips, convex, chains)
+    return touching, chains, balance, _gather_members(slips, convex, chains, balance.friction)
 
 
 def _describe_missing(contacts: Contacts, fn: Array, missing: MissingContacts) -> list[str]:
@@ -219,6 +221,7 @@ class _Members:
     memories: list[ForceMemory | None]  # of the five convex members; None: no interval to read
     remarks: list[str]
     seen_slip: NormalisedSlip
+    power_gap: float  # mean of the convex members
 
     @property
     def convex(self) -> list[Array]:
@@ -296,13 +299,17 @@ def _member_tasks(
 
 
 def _gather_members(
-    slips: Sequence[Slip | None], convex: Sequence[tuple[ConvexForces, ForceMemory]], chains: _Chains
+    slips: Sequence[Slip | None],
+    convex: Sequence[tuple[ConvexForces, ForceMemory]],
+    chains: _Chains,
+    friction: Array,
 ) -> _Members:
-    """Collect all members that converged; convex: results of those with an interval to read."""
+    """Collect all members that converged; convex: results of those with an interval to read; friction (c,)."""
     fields = [chains.soft.solution.force, chains.stiff.solution.force]
     weight, place = [1.0, 1.0], [0, 1]
     memories: list[ForceMemory | None] = []
     remarks: list[str] = []
+    gaps: list[float] = []
     found = iter(convex)
     for number, slip in enumerate(slips, start=CHAINS):
         if slip is None:
@@ -313,10 +320,13 @@ def _gather_members(
             fields.append(np.column_stack([forces.fn, forces.ft]))
             weight.append(slip.weight)
             place.append(number)
+            gaps.append(relative_power_gap(slip.value, friction, forces.fn, forces.ft))
         else:
             remarks.append(f"a convex member was left out ({forces.termination})")
         memories.append(updated)
-    return _Members(np.stack(fields), weight, place, memories, remarks, _seen_slip(slips))
+    known = [each for each in gaps if np.isfinite(each)]
+    gap = float(np.mean(known)) if known else np.nan
+    return _Members(np.stack(fields), weight, place, memories, remarks, _seen_slip(slips), gap)
 
 
 def _average(problem: FrameProblem, balance: Balance, members: _Members) -> tuple[Array, Array, list[str]]:

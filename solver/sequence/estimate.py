@@ -61,6 +61,7 @@ class Estimate:
     seen_slip: NormalisedSlip | None = None  # None: no members
     disagreement: float = np.nan  # D
     start_difference: float = np.nan  # H
+    power_gap: float = np.nan  # of the convex members
     motion: ForceEstimate | None = None  # the motion estimate, where it was mixed
     mixture: Mixture | None = None  # with the position-only estimate; None: not computed
     overlap: float = np.nan  # [m] per mean force, by the position-only estimate
@@ -278,6 +279,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
             packing, snapshot, problem.motion, estimate.contacts, estimate.fn, step.walls, soft=problem.settings.soft
         ),
         force_change=_force_change(estimate, state),
+        power_gap=estimate.power_gap,
     )
 
 
@@ -347,5 +349,5 @@ def _estimate_by_ensemble(problem: FrameProblem, state: SequenceState, positions
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
         found.remark, found.fn_sd, found.ft_sd, found.member_force if problem.settings.keep_members else None,
         found.cone_fraction(friction), found.seen_slip, found.disagreement, found.start_difference,
-        missing=found.missing,
+        missing=found.missing, power_gap=found.power_gap,
     )  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...process.errors import UndeterminedError
 from ...solver.bodies.interpolation import interpolate_ignored_frames
+from ...solver.bodies.packing import Packing
 from ...solver.contacts.radius_tuning import RadiusTuning
 from ...solver.sequence.failure import find_unseen
 from ...tracks import Tracks, WallTracks
@@ -17,7 +18,7 @@ from ..snapshots import make_snapshots
 from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii
 from .close_photographs import choose_span
-from .friction import measure_friction, measure_friction_of_walls, tuned_radii
+from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii
 from .outliers import replace_outliers
 from .radii import calibrate_with_radii, use_size_classes
 from .short_gaps import interpolate_short_gaps
@@ -94,19 +95,27 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks = replace(tracks, radius=tracks.radius + tuning.found)
         packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
     snapshots, of_walls = make_snapshots(tracks, walls), None
-    if material.friction_measured and not nothing_seen:
+    if (material.friction_measured or material.base_friction_measured) and not nothing_seen:
         seen = interpolate_ignored_frames(snapshots, failed)
         probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
-        material = measure_friction(material, packing, seen, probability, settings.sequence.workers)
-        packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
-        of_walls = measure_friction_of_walls(material, packing, seen, probability, settings.sequence.workers)
+
+        def pack() -> Packing:
+            return material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+
+        given_at_walls = material.wall_friction is not None
+        workers = settings.sequence.workers
+        material = measure_resisting(material, packing, seen, probability, workers)
+        if material.friction_measured:
+            material = measure_friction(material, pack(), seen, probability, workers)
+            if not given_at_walls:
+                of_walls = refine_wall_friction(material, pack(), seen, probability, workers)
         if of_walls is not None:
             material = replace(material, wall_friction=of_walls.measured)
-            packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+        packing = pack()
     corrected = CorrectedSequence(
         packing, tracks, walls, snapshots if nothing_seen else interpolate_ignored_frames(snapshots, failed),
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
-        inputs.material.friction_measured, "; ".join(each for each in remarks if each),
+        inputs.material.friction_measured, inputs.material.base_gravity, "; ".join(each for each in remarks if each),
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
 

@@ -12,7 +12,19 @@ from ...solver.bodies.motion import Snapshot
 from ...solver.bodies.packing import Packing
 from ...solver.bodies.rods import RodMaterial
 from ...solver.contacts.radius_tuning import RadiusTuning, tune_radii
-from ...solver.convex.friction_check import FRAMES, FrictionCheck, WallFriction, check_friction, measure_wall_friction
+from ...solver.convex.friction_check import (
+    BIAS,
+    COVERAGE_FACTOR,
+    FRAMES,
+    MIN_WALL_CONTACTS,
+    WALL_BIAS_SD,
+    FrictionCheck,
+    WallFriction,
+    check_friction,
+    measure_wall_friction,
+)
+from ...solver.convex.resistance import Resistance, base_drag_of, find_in_sequence, model_of, resisted_frames
+from ...solver.convex.sliding_model import Parameter, fit_model
 from ...solver.detection.touch_probability import ContactProbabilitySettings
 from ...solver.frame_forces import FrameForces, FrameStatus
 from ...solver.nlgs.chain import ChainSettings, force_scale
@@ -20,6 +32,7 @@ from ...tracks import Tracks, WallTracks
 from ..corrected_sequence import CorrectedSequence
 from ..snapshots import make_snapshots
 
+DOUBTFUL_GAP = 0.1  # power gap at the best friction above which something else may resist the sliding
 GUESSES = 5  # of the friction, each by the previous one
 SAME_FRICTION = 0.02  # relative change below which the iteration has converged
 POSSIBLE = (0.02, 2.0)  # range of the friction
@@ -56,10 +69,22 @@ def check_sequence_friction(sequence: CorrectedSequence, frames: Sequence[FrameF
     unit = force_scale(packing, ChainSettings())
     probability = sequence.settings.for_radii(packing.grains.radius).ensemble.probability
     check = check_friction(packing, snapshots, first, first + count - 1, unit, probability, sequence.settings.workers)
+    if check is not None and (not check.agrees or float(np.nanmin(check.gap, initial=0.0)) > DOUBTFUL_GAP):
+        check = _beside_others(check, find_in_sequence(packing, snapshots, first, unit, probability))
     walls = sequence.wall_friction
     if check is None or walls is None:
         return check
     return replace(check, wall_measured=walls.measured, wall_low=walls.low, wall_high=walls.high)
+
+
+def _beside_others(check: FrictionCheck, found: Resistance | None) -> FrictionCheck:
+    """The check with the friction between rods beside that of walls or base or an attraction, where these win."""
+    if found is None or found.cause in ("", "friction", "photographs_reversed"):
+        return check
+    ratio = found.found.friction / BIAS / check.measured
+    return replace(
+        check, measured=ratio * check.measured, low=ratio * check.low, high=ratio * check.high, enclosed=True
+    )
 
 
 def measure_friction(
@@ -108,6 +133,70 @@ def measure_friction_of_walls(
     first = max(1, (len(snapshots) - count) // 2)
     unit = force_scale(packing, ChainSettings())
     return measure_wall_friction(packing, snapshots, first, first + count - 1, unit, settings, workers)
+
+
+def refine_wall_friction(
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> WallFriction | None:
+    """Measure the friction at walls anew, with its interval over the frames; else that of other packings.
+
+    None where `measure_resisting` has not found it.
+    """
+    if (measured := material.wall_friction) is None:
+        return None
+    free = replace(material, wall_friction=None)
+    found = measure_friction_of_walls(free, packing, snapshots, settings, workers)
+    half_width = COVERAGE_FACTOR * WALL_BIAS_SD * measured
+    return found or WallFriction(measured, max(measured - half_width, 0.0), measured + half_width)
+
+
+def measure_resisting(
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> RodMaterial:
+    """Measure together what resists sliding and is not given: friction of rods, of walls, and of the base.
+
+    Raises
+    ------
+    FrictionError, BaseFrictionError
+        The motion does not determine it.
+    """
+    count = min(FRAMES, len(snapshots) - 2)
+    error = BaseFrictionError if material.base_friction_measured else FrictionError
+    if count < 1:
+        raise error("three photographs are needed to measure it")
+    first, unit = max(1, (len(snapshots) - count) // 2), force_scale(packing, ChainSettings())
+    frames = resisted_frames(packing, snapshots, range(first, first + count), unit, settings, workers)
+    free: list[Parameter] = ["base_drag"] if material.base_friction_measured else []
+    walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
+    if material.friction_measured:
+        own = material.wall_friction is not None or walls < MIN_WALL_CONTACTS
+        free += ["friction"] if own else ["wall_friction", "friction"]
+    given = model_of(packing, unit)
+    found = fit_model(frames, given, free)
+    if not np.isfinite(found.gap):
+        raise error("nothing slides in these photographs, so they do not determine it: give a number")
+    if material.base_friction_measured:
+        if not packing.scale_is_known:
+            raise BaseFrictionError("needs a wall with a known load")
+        drag = base_drag_of(packing, found.model, unit)
+        material = replace(material, base_friction=drag / material.base_gravity, base_friction_measured=False)
+    if "wall_friction" in free and found.enclosed:
+        material = replace(material, wall_friction=max(found.model.wall_friction, POSSIBLE[0]))
+    return material
+
+
+class BaseFrictionError(UndeterminedError):
+    """The motion does not determine the friction of the base."""
+
+    key = "material.base_friction"
 
 
 class FrictionError(UndeterminedError):

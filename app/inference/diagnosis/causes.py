@@ -35,11 +35,32 @@ CAUSES: dict[str, Cause] = {
         'set material.friction to the value found, or to "measured"',
     ),
     "wall_friction": Cause(
-        "tangential forces at the walls are limited wrongly", "set material.wall_friction to the value found"
+        "tangential forces at the walls are limited wrongly",
+        'set material.wall_friction to the value found, or leave it out and set material.friction to "measured"',
     ),
     "base_friction": Cause(
         "the base carries part of the load, and the forces are too small",
         'set material.base_friction to "measured", or to the coefficient found',
+    ),
+    "adhesion": Cause(
+        "contacts also pull, and this model lets them only push",
+        "take the forces for patterns, not for values: this model has no attraction",
+    ),
+    "inertia": Cause(
+        "part of the forces accelerates rods, and their balance lacks it",
+        "load more slowly, or photograph at rest",
+    ),
+    "outlier_tracks": Cause(
+        "a rod that jumps for one photograph seems to slide; its pose is interpolated there",
+        "look at these rods in these photographs",
+    ),
+    "missing_poses": Cause(
+        "contacts of rods that photographs lack are interpolated, or missing",
+        "find these rods in the photographs",
+    ),
+    "wall_misplaced": Cause(
+        "rods stand beyond a wall, which then carries too much force, or none",
+        "correct the ends of the wall",
     ),
     "walls_shifted": Cause(
         "rods seem to penetrate walls or to leave them", "give the walls at the times of the photographs"
@@ -51,6 +72,7 @@ CAUSES: dict[str, Cause] = {
         "rods that touch seem apart in one direction and overlap in the other",
         "calibrate the camera: x and y have different scales",
     ),
+    "all_radii": Cause("contacts are lost or invented", "measure the radii anew, or the pixel size"),
     "class_radii": Cause("contacts of one size of rods are lost or invented", "measure the radii of every size anew"),
     "not_explained": Cause(
         "the forces contradict the motion, the positions or one another",

@@ -1,6 +1,7 @@
 """Differential diagnosis: the input is compared with its rivals by what their forces leave unexplained.
 
-Each rival is solved for a few photographs as a run would. The one whose evidence leads to expect clearly better forces
+Tests without forces come first, then the comparison of what resists the sliding, then rivals of the geometry, each
+solved for a few photographs as a run would. The one whose evidence leads to expect clearly better forces
 than the given input, and than all other causes, is named. Nothing is named that does not win.
 """
 
@@ -11,21 +12,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...process.errors import UndeterminedError
 from ...process.progress import Progress, no_progress
 from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.bodies.grains import Array
-from ..correction.correct_sequence import complete_walls
+from ..correction.correct_sequence import complete_walls, correct_sequence
 from ..inputs import Inputs
 from .causes import finding
-from .direct_tests import examine_order, examine_rotations, examine_walls
+from .direct_tests import (
+    examine_inertia,
+    examine_order,
+    examine_poses,
+    examine_rotations,
+    examine_wall_places,
+    examine_wall_times,
+    examine_walls,
+)
+from .resistance import examine_resistance
 from .rivals import rivals_of
-from .trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial, trial_score
+from .trial import TRIAL_PHOTOGRAPHS, Trial, select_window, solve_trial, trial_score
 
 # Rise of arctanh r that a rival must reach over the given input, and over all other causes. On correct input, and where
 # the model lacks physics that no rival has, the highest rise was 0.13 (seed 40, six scenarios).
 CLEAR, AHEAD = 0.2, 0.1
 DOUBTFUL = 0.93  # expected r of some photographs of a solved test below which rivals are compared
+DOUBTFUL_GAP = 0.1  # least power gap of the friction check above which what resists the sliding is examined
 UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause wins
 LEAST_GRAINS = (
     100  # of a packing whose rivals are compared: the evidence of fewer varies by chance as much as by causes
@@ -38,6 +50,7 @@ def diagnose(
     progress: Progress = no_progress,
     *,
     first: int = 0,
+    sliding: bool = True,
 ) -> list[Finding]:
     """Find causes for what contradicts the forces.
 
@@ -51,6 +64,8 @@ def diagnose(
         Called after every rival.
     first : int
         First of the photographs on which rivals are compared.
+    sliding : bool
+        Whether to examine what resists the sliding.
 
     Returns
     -------
@@ -61,9 +76,26 @@ def diagnose(
     if len(failed) == inputs.tracks.frame_count:
         return []
     found = [*examine_rotations(inputs.tracks, walls), *examine_order(inputs.tracks)]
-    found += examine_walls(inputs.tracks, walls)
-    if found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS:
-        return found
+    found += (
+        examine_walls(inputs.tracks, walls)
+        or examine_wall_times(inputs.tracks, walls)
+        or examine_wall_places(inputs.tracks, walls)
+    )
+    found += examine_inertia(inputs.tracks, walls, inputs.material)
+    poses = examine_poses(inputs.tracks)
+    if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
+        found = _examine_sliding(inputs, first)
+    if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
+        found = _compare_rivals(inputs, trial, progress, first)
+    if poses:  # they explain it
+        found = [each for each in found if each.cause != "not_explained"]
+    if found:  # wrong radii look like jumps
+        poses = [each for each in poses if each.cause != "outlier_tracks"]
+    return [*found, *poses]
+
+
+def _compare_rivals(inputs: Inputs, trial: Trial, progress: Progress, first: int) -> list[Finding]:
+    """Solve the rivals of the geometry, and name the one that clearly wins."""
     rivals = list(rivals_of(inputs))
     rise: dict[str, tuple[float, str]] = {}
     for done, rival in enumerate(rivals):
@@ -94,13 +126,24 @@ def diagnose_solved(inputs: Inputs, results: Results, progress: Progress = no_pr
     list of Finding
         Rivals are compared only where some photographs have an expected r below DOUBTFUL.
     """
+    check = results.friction_check
+    slides = check is None or not check.agrees or not float(np.nanmin(check.gap, initial=np.inf)) < DOUBTFUL_GAP
     expected = np.array([frame.expected_correlation for frame in results.frames])
     window = min(TRIAL_PHOTOGRAPHS, len(expected))
     mean = np.array([_mean(expected[k : k + window]) for k in range(len(expected) - window + 1)])
     if np.isfinite(mean).any() and np.nanmin(mean) < DOUBTFUL:
         first = int(np.nanargmin(mean))
         return diagnose(inputs, solve_trial(inputs, first=first), progress, first=first)
-    return diagnose(inputs, None)
+    return diagnose(inputs, None, sliding=slides)
+
+
+def _examine_sliding(inputs: Inputs, first: int) -> list[Finding]:
+    """What resists the sliding in the photographs from `first` on."""
+    window, _ = select_window(inputs, first=first)
+    try:
+        return examine_resistance(correct_sequence(window))
+    except (UndeterminedError, ValueError, FloatingPointError):  # these photographs do not show it
+        return []
 
 
 def _mean(values: Array) -> float:

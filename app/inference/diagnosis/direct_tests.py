@@ -1,26 +1,36 @@
-"""Tests of the input that need no forces: rotations, the order of the photographs, walls that do not move."""
+"""Tests of the input that need no forces: rotations, order and speed of the photographs, poses, walls."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...results.finding import Finding
-from ...solver.bodies.grains import Array
+from ...solver.bodies.grains import Array, Grains
+from ...solver.bodies.rods import RodMaterial
+from ...solver.bodies.strain import displacement_gradient, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson
 from ...tracks import Tracks, WallTracks
+from ..correction.outliers import find_outliers
 from .causes import finding
 
 AGREES = 0.25  # rank correlation of stated and inferred rotations beyond which they are the same, or opposite …
 SIGMAS = 5.0  # … and standard deviations of that of unrelated ones
 DEGREES = 10.0  # ratio of stated to inferred rotations: degrees are 57 times radians
 SHORTER = 0.75  # path through the photographs in another order over the given one, below which that order is right
+UNEVEN = 0.4  # standard deviation of the steps over their mean from which on another order is looked for …
+SORTED = 0.4  # … which must make the path shorter by so much
 REPEATED = 0.1  # displacement of a step over the median step below which a photograph is repeated …
 STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
+SHIFTED = 0.5  # distance of shifted walls from the rods over that of the given ones, below which they are right
+BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
+MISSING = 0.03  # fraction of the poses that may be missing
+INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
+SEVERAL = 6  # rods that stand beyond a wall at least: with fewer, their radii may be wrong
 NEAREST = 3  # rods at a wall: the distance of the third nearest is judged
 
 
@@ -76,6 +86,9 @@ def examine_order(tracks: Tracks) -> list[Finding]:
     if swapped:
         pairs = ", ".join(f"{k} and {k + 1}" for k in swapped[:4]) + ("…" if len(swapped) > 4 else "")
         found.append(finding("photographs_swapped", f"the motion is shorter with photographs {pairs} swapped"))
+    elif shorter := _shortened_by_sorting(tracks, step):
+        words = f"in another order the motion is {100.0 * shorter:.0f} % shorter, and its steps are more even"
+        found.append(finding("photographs_swapped", words))
     repeated = (
         np.flatnonzero(step < max(REPEATED * usual, STILL * noise)) if usual > MOVES * noise else np.empty(0, np.int64)
     )
@@ -106,6 +119,92 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     return found
 
 
+def examine_poses(tracks: Tracks) -> list[Finding]:
+    """Look for rods that jump for one photograph, and for rods that photographs lack."""
+    found, outlier = [], find_outliers(tracks)
+    if outlier.any():
+        frames = np.flatnonzero(outlier.any(axis=1)).tolist()
+        words = ", ".join(map(str, frames[:4])) + ("…" if len(frames) > 4 else "")
+        count = int(outlier.sum())
+        subject = "1 pose jumps" if count == 1 else f"{count} poses jump"
+        found.append(finding("outlier_tracks", f"{subject} against its neighbours and back, in photographs {words}"))
+    missing = 1.0 - float(tracks.present.mean())
+    if MISSING < missing < 1.0:
+        found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing"))
+    return found
+
+
+def examine_inertia(tracks: Tracks, walls: WallTracks, material: RodMaterial) -> list[Finding]:
+    """Look for motion so fast that rods are out of balance.
+
+    Notes
+    -----
+    The inertial number is I = γ̇ √(m̄/(p L)), with the rate of shear γ̇ by the times of the photographs, the mean mass m̄,
+    the pressure p of the loaded walls and the length L of the rods. Simulated packings are out of balance by about
+    7 I of the mean force.
+    """
+    pressure = walls.usual_pressure(material.length)
+    if not np.isfinite(pressure).any() or tracks.frame_count < 2:
+        return []
+    mass = float(Grains.of_rods(tracks.radius, density=material.density, length=material.length).mass.mean())
+    scale = np.sqrt(mass / (float(np.nanmean(pressure)) * material.length))
+    rates = [_shear_rate(tracks, k) for k in range(1, tracks.frame_count)]
+    known = [each for each in rates if np.isfinite(each)]
+    number = float(np.median(known)) * scale if known else 0.0
+    if number < INERTIAL:
+        return []
+    words = f"the inertial number is {number:.2g}, so that rods are out of balance by some {100 * OUT * number:.0f} %"
+    return [finding("inertia", f"{words} of the mean force")]
+
+
+def examine_wall_places(tracks: Tracks, walls: WallTracks) -> list[Finding]:
+    """Look for straight walls that several rods stand beyond in every photograph."""
+    allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), BEYOND * float(tracks.radius.mean()))
+    found = []
+    for w in np.flatnonzero(walls.sides == STRAIGHT).tolist():
+        gap = np.array([_near_gap(tracks, walls, k, w, nearest=SEVERAL) for k in range(tracks.frame_count)])
+        gap = gap[np.isfinite(gap)]
+        if len(gap) and float(np.median(gap)) < -allowed:
+            words = f"rods stand {1e3 * -float(np.median(gap)):.2g} mm beyond wall '{walls.name[w]}'"
+            found.append(finding("wall_misplaced", words))
+    return found
+
+
+def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
+    """Look for straight walls that fit the rods of the photograph before or after better than those of their own."""
+    straight, frames = np.flatnonzero(walls.sides == STRAIGHT).tolist(), tracks.frame_count
+    if not straight or frames < 4:
+        return []
+    allowed = max(DRIFT_SIGMAS * float(np.nanmedian(tracks.position_sigma)), DRIFT * float(tracks.radius.mean()))
+
+    def misfit(shift: int) -> float:
+        """Greatest median distance of the walls from the rods of photographs k − shift [m]."""
+        numbers = range(1, frames - 1)
+        gaps = np.abs([[_near_gap(tracks, walls, k, w, k + shift) for k in numbers] for w in straight])
+        return float(np.max(np.median(gaps, axis=1))) if np.isfinite(gaps).all() else np.nan
+
+    own = misfit(0)
+    for shift, words in ((1, "late"), (-1, "early")):
+        other = misfit(shift)
+        if own > allowed and other < SHIFTED * own:
+            evidence = (
+                f"the walls are one photograph {words}: rods are {1e3 * own:.2g} mm off, else {1e3 * other:.2g} mm"
+            )
+            return [finding("walls_shifted", evidence)]
+    return []
+
+
+def _shear_rate(tracks: Tracks, k: int) -> float:
+    """Rate of shear [1/s] of the step to photograph k; NaN with too few rods."""
+    both, time = tracks.present[k - 1] & tracks.present[k], float(tracks.time[k] - tracks.time[k - 1])
+    if int(both.sum()) < 4 or not time > 0.0:
+        return np.nan
+    gradient = displacement_gradient(
+        tracks.position[k - 1], np.where(both[:, None], tracks.position[k] - tracks.position[k - 1], np.nan), both
+    )
+    return shear_strain(0.5 * (gradient + gradient.T)) / time
+
+
 def _distance(tracks: Tracks, k: int, other: int) -> float:
     """Rms displacement of the rods from one photograph to another [m]; NaN where they have no rod in common."""
     both = tracks.present[k] & tracks.present[other]
@@ -119,13 +218,37 @@ def _shorter_if_swapped(tracks: Tracks, step: Array, k: int) -> bool:
     return swapped < SHORTER * given
 
 
-def _near_gap(tracks: Tracks, walls: WallTracks, k: int, w: int) -> float:
-    """Gap [m] between a wall and the NEAREST-th rod."""
+def _shortened_by_sorting(tracks: Tracks, step: Array) -> float:
+    """Fraction by which the path through the photographs is shorter if each is followed by the nearest; 0: it is not.
+
+    A loading that returns visits places again, but in even steps.
+    """
+    known = step[np.isfinite(step)]
+    if len(known) < len(step) or not known.mean() > 0.0 or known.std() < UNEVEN * known.mean():
+        return 0.0
+    f = tracks.frame_count
+    apart = np.array([[_distance(tracks, k, other) if k != other else np.inf for other in range(f)] for k in range(f)])
+    if not np.isfinite(apart[~np.eye(f, dtype=np.bool_)]).all():
+        return 0.0
+    start = int(np.unravel_index(int(np.argmax(np.where(np.isfinite(apart), apart, -1.0))), apart.shape)[0])
+    path, here, left = 0.0, start, set(range(f)) - {start}
+    while left:
+        nearest = min(left, key=lambda k: apart[here, k])
+        path, here = path + float(apart[here, nearest]), nearest
+        left.remove(nearest)
+    shorter = 1.0 - path / float(known.sum())
+    return shorter if shorter > SORTED else 0.0
+
+
+def _near_gap(
+    tracks: Tracks, walls: WallTracks, k: int, w: int, at: int | None = None, *, nearest: int = NEAREST
+) -> float:
+    """Gap [m] between a wall and one of the nearest rods; at: photograph of the wall, k by default."""
     here = tracks.present[k]
-    if here.sum() < NEAREST:
+    if here.sum() < nearest:
         return np.nan
-    (a, b) = walls.endpoints[k, w]
+    (a, b) = walls.endpoints[k if at is None else at, w]
     along = (b - a) / np.linalg.norm(b - a)
     normal = np.array([-along[1], along[0]])
     gap = (tracks.position[k, here] - a) @ normal - tracks.radius[here]
-    return float(np.sort(gap)[NEAREST - 1])
+    return float(np.sort(gap)[nearest - 1])

@@ -78,18 +78,22 @@ def solve_trial(
     Trial or None
         None: fewer than two photographs, no walls, or no forces.
     """
-    stride, _ = choose_span(inputs.tracks)
-    part = (first, min(first + stride * (photographs - 1) + 1, inputs.tracks.frame_count), stride)
-    tracks, walls = inputs.tracks.frames(*part), inputs.walls.frames(*part)
-    if tracks.frame_count < 2:
+    given, stride = select_window(inputs, photographs, first)
+    if given.tracks.frame_count < 2:
         return None
     store = MemoryStore()
-    settings = inputs.settings.without_sweeps()
-    given = replace(inputs, tracks=tracks, walls=walls, settings=settings)
     solve_frames(correct_sequence(given), store, InferenceObserver() if observer is None else observer)
     judged = store.frames[min(SETTLED, len(store.frames) - 1) :]
     evidence = tuple(each.state.evidence for each in judged if each.state.evidence.assessed)
     return Trial(evidence, stride) if evidence else None
+
+
+def select_window(inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, first: int = 0) -> tuple[Inputs, int]:
+    """Select the photographs of a trial solution; also return the step between them."""
+    stride, _ = choose_span(inputs.tracks)
+    part = (first, min(first + stride * (photographs - 1) + 1, inputs.tracks.frame_count), stride)
+    tracks, walls = inputs.tracks.frames(*part), inputs.walls.frames(*part)
+    return replace(inputs, tracks=tracks, walls=walls, settings=inputs.settings.without_sweeps()), stride
 
 
 def trial_score(inputs: Inputs, first: int = 0) -> float:

@@ -24,21 +24,25 @@ from ...synthetic.scenarios.scenario_table import SCENARIOS
 from .scenario_score import ScenarioScore, StudyPlan, read_scenario
 from .score_table import describe_seeds, score_scenarios
 
-# The causes that a diagnosis may name; of every other scenario none, or "not_explained" where the model lacks physics.
-TRUE_CAUSE: dict[ScenarioName, str] = {
-    "time_reversed": "photographs_reversed", "swapped_frames": "photographs_swapped",
-    "duplicate_frame": "photograph_repeated", "theta_sign": "rotation_sign", "theta_zero": "rotation_zero",
-    "theta_degrees": "rotation_in_degrees", "mu_01": "friction", "mu_05": "friction", "mu_low": "friction",
-    "mu_high": "friction", "base_friction": "base_friction", "walls_late": "walls_shifted", "top_fixed": "wall_at_rest",
-    "aspect_03": "stretched_picture", "aspect_1": "stretched_picture", "class_2": "class_radii",
-    "smooth_walls": "wall_friction", "wrong_class": "not_explained",
+# The causes that a diagnosis should name. Of all other scenarios it should name none, except "not_explained" where the
+# model lacks physics; bars that overhang and unknown rotations are no errors.
+TRUE_CAUSE: dict[ScenarioName, tuple[str, ...]] = {
+    "time_reversed": ("photographs_reversed",), "swapped_frames": ("photographs_swapped",),
+    "shuffled": ("photographs_swapped",), "duplicate_frame": ("photograph_repeated",),
+    "theta_sign": ("rotation_sign",), "theta_zero": ("rotation_zero",), "theta_degrees": ("rotation_in_degrees",),
+    "mu_01": ("friction",), "mu_05": ("friction",), "mu_low": ("friction",), "mu_high": ("friction",),
+    "walls_late": ("walls_shifted",), "top_fixed": ("wall_at_rest", "wall_misplaced"),
+    "wall_inside": ("wall_misplaced",), "aspect_03": ("stretched_picture",), "aspect_1": ("stretched_picture",),
+    "class_2": ("class_radii",), "wrong_class": ("not_explained", "class_radii"),
+    "outliers": ("outlier_tracks",), "one_jump": ("outlier_tracks",), "missing_poses": ("missing_poses",),
+    "base_friction": ("base_friction",), "smooth_walls": ("wall_friction",), "rough_walls": ("wall_friction",),
+    "smooth_walls_spread": ("wall_friction",), "cohesion": ("adhesion",), "strong_cohesion": ("adhesion",),
+    "inertia": ("inertia",), "strong_inertia": ("inertia",), "nearly_jammed": ("base_friction",),
 }  # fmt: skip
-COMPARED_SCENARIOS: tuple[ScenarioName, ...] = (
-    "shear", "sheared", "biaxial", "isotropic", "unseen", "centres", "radii_03", "radii_1", "step_05", "step_1",
-    "ten_frames", "outer", "soft", "loose", "cyclic", "noise_40", "circle", "stiff", "cohesion",
-    "friction_spread", "inertia", "rolling", "sizes_10", *TRUE_CAUSE, "overhang", "outliers",
-    "missing_poses",
-)  # fmt: skip
+# Of several scenarios with the same input error but for its size, one.
+COMPARED_SCENARIOS: tuple[ScenarioName, ...] = tuple(
+    name for name in SCENARIOS if name not in ("corners", "short_walls", "camera", "radius_offset", "ten_frames")
+)
 HEADINGS = (
     "scenario", "seed", "noise/motion", "step °", "gaps %", "expected", "from", "to", "r from 3", "", "diagnosis",
 )  # fmt: skip
@@ -74,9 +78,11 @@ class PredictionOutcome:
     @property
     def rightly(self) -> bool | None:
         """Whether the true cause was named; None: none was named, or only that something is not explained."""
-        if self.named in ("", NOT_EXPLAINED):
+        if self.prediction is None or not self.named:
             return None
-        return self.named == TRUE_CAUSE.get(self.score.scenario)
+        true = set(TRUE_CAUSE.get(self.score.scenario, ()))
+        causes = {each.cause for each in self.prediction.diagnosis}
+        return None if causes == {NOT_EXPLAINED} and NOT_EXPLAINED not in true else causes <= true
 
 
 def study_predictions(

@@ -126,10 +126,10 @@ def _file(plan: StudyPlan, scenario: ScenarioName, seed: int) -> Path:
 
 @cache
 def _code_fingerprint() -> str:
-    """Return a fingerprint of all source files that a score may depend on."""
+    """Return a fingerprint of all source files and fitted constants that a score may depend on."""
     digest = hashlib.sha256()
     for root in (Path(solver.__file__).parent, Path(__file__).parents[2]):
-        for file in sorted(root.rglob("*.py")):
+        for file in sorted([*root.rglob("*.py"), *root.rglob("*.toml")]):
             if file.relative_to(root).parts[0] not in ("cli", "recording", "review", "tracking"):
                 digest.update(file.read_bytes())
     return digest.hexdigest()

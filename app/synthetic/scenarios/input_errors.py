@@ -18,6 +18,8 @@ OUTLIERS, OUTLIER_SIZE = 0.02, (3e-4, 2e-3)  # of all poses; [m]
 MISSING = 0.1  # of all poses
 WRONG_CLASS = 0.1  # of the rods
 CLASS_ERROR = 0.02  # of one class of radii
+INSIDE = 2e-3  # [m], by which a side is stated inside the packing
+JUMP = 1e-3  # [m] of one rod in one photograph
 OVERHANG = 0.05  # [m] of the bars beyond the packing at either end
 CORRELATED_NOISE, CORRELATION = 1e-5, 0.9  # [m] of a position component; from photograph to photograph
 
@@ -25,6 +27,11 @@ CORRELATED_NOISE, CORRELATION = 1e-5, 0.9  # [m] of a position component; from p
 def reverse_time(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """List the photographs in reverse order."""
     return _reorder(observed, np.arange(len(observed.position))[::-1])
+
+
+def shuffle_frames(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """List the photographs in random order."""
+    return _reorder(observed, rng.permutation(len(observed.position)))
 
 
 def swap_frames(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
@@ -67,6 +74,13 @@ def fix_top(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
     """State the plate at rest."""
     endpoints, top = observed.endpoints.copy(), observed.wall_names.index("top")
     endpoints[:, top] = endpoints[0, top]
+    return replace(observed, endpoints=endpoints)
+
+
+def shift_side_inwards(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the right side inside the packing, so that rods stand beyond it."""
+    endpoints, right = observed.endpoints.copy(), observed.wall_names.index("right")
+    endpoints[:, right, :, 0] -= INSIDE
     return replace(observed, endpoints=endpoints)
 
 
@@ -113,6 +127,14 @@ def add_outliers(observed: ObservedData, rng: np.random.Generator) -> ObservedDa
     size, angle = rng.uniform(*OUTLIER_SIZE, (frames, n)), rng.uniform(0.0, 2.0 * np.pi, (frames, n))
     shift = np.where(wrong, size, 0.0)[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return replace(observed, position=observed.position + shift)
+
+
+def displace_one_pose(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """Displace one rod in one photograph in the middle."""
+    position, frame, rod = observed.position.copy(), len(observed.position) // 2, len(observed.id) // 2
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    position[frame, rod] += JUMP * np.array([np.cos(angle), np.sin(angle)])
+    return replace(observed, position=position)
 
 
 def lose_poses(observed: ObservedData, rng: np.random.Generator) -> ObservedData:

@@ -14,7 +14,7 @@ from ...solver.dem.dem_truth import DemFrame, DemSettings, DemTruth
 from ...solver.dem.ring_cell import CIRCLE_NAMES, CIRCLE_SIDES, RingCell
 from ...solver.dem.shear_cell import ShearCell, shear_photographs
 from ..dense_packing import choose_radii, prepare_packing
-from ..placement import cut_sides, place_in_picture
+from ..placement import cut_sides, place_in_picture, tilt_box
 from ..ring_packing import prepare_ring
 from .periodic_packing import prepare_periodic
 
@@ -79,6 +79,8 @@ def simulate_loading(loading: LoadingPath, grains: int, seed: int, progress: Pro
     truth = DemTruth.of_frames(cell.grains.radius, frames, loading.settings)
     if loading.open_top:
         truth = truth.without_wall("top")
+    if loading.motion is tilt_heap:
+        truth = tilt_box(truth, np.deg2rad(loading.step * np.arange(loading.frames)))
     return place_in_picture(
         cut_sides(truth) if loading.motion in (shear, shear_under_loads, shear_cyclically) else truth, MARGIN
     )
@@ -148,6 +150,22 @@ def push_core(cell: RingCell, loading: LoadingPath) -> Iterator[DemFrame]:
         if k:
             cell.move_core((distance, 0.0), CORE_ROTATION)
         cell.press()
+        yield cell.photograph(cell.rest())
+
+
+def turn_core(cell: RingCell, loading: LoadingPath) -> Iterator[DemFrame]:
+    """Turn the core in its place, the ring under its pressure: an annular shear cell; step: rotation [rad]."""
+    for k in range(loading.frames):
+        if k:
+            cell.move_core((0.0, 0.0), loading.step)
+        cell.press()
+        yield cell.photograph(cell.rest())
+
+
+def tilt_heap(cell: ShearCell, loading: LoadingPath) -> Iterator[DemFrame]:
+    """Tilt a box with a free surface, counter-clockwise; step [°]. The photographs are those of the box at rest."""
+    for k in range(loading.frames):
+        cell.tilt(float(np.deg2rad(loading.step * k)))
         yield cell.photograph(cell.rest())
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.bodies.grains import Array
+from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.wall_shapes import STRAIGHT, Sides, all_sides
 from ...solver.dem.dem_truth import DemTruth
+from ...solver.dem.simulation import RAMP
 from .. import experiment_files
 from ..experiment_files import StatedInputs
 
@@ -37,6 +38,7 @@ class ObservedData:
     load: Array = field(default_factory=lambda: np.empty((0, 0)))  # (f, loads) [N] on them
     shown: NDArray[np.int64] | None = None  # (f,) photographs of the truth in their stated order; None: as they are
     lost: NDArray[np.bool_] | None = None  # (f, n) poses without a row in the table; None: none
+    interval: float = INTERVAL  # [s] between photographs
 
 
 def observe_truth(
@@ -68,8 +70,18 @@ def observe_truth(
     return ObservedData(
         np.arange(len(truth.radius)), truth.radius, position, rotation, truth.endpoints, truth.wall_names,
         max(noise, FINEST_PRECISION), StatedInputs.of(truth.settings, plates=plates), truth.cell, side=truth.side,
-        measured=measured, load=_normal_forces(truth, measured),
+        measured=measured, load=_normal_forces(truth, measured), interval=_interval_of(truth),
     )  # fmt: skip
+
+
+def _interval_of(truth: DemTruth) -> float:
+    """True time between photographs of a packing that is photographed while it moves [s]; at rest INTERVAL."""
+    if not truth.settings.moving:
+        return INTERVAL
+    given = truth.settings
+    mass = Grains.of_rods(truth.radius, density=given.density, length=given.length).mass.mean()
+    rate = (1.0 - RAMP) * given.inertial_number / float(np.sqrt(mass / (given.pressure * given.length)))
+    return float(np.abs(np.diff(truth.shear)).mean()) / rate
 
 
 def _normal_forces(truth: DemTruth, walls: tuple[str, ...]) -> Array:
@@ -87,7 +99,7 @@ def write_observed(folder: Path, observed: ObservedData, truth: DemTruth, remark
     files = experiment_files
     files.write_tracks(folder / "tracks.csv", observed.id, observed.position, observed.rotation, observed.lost)
     files.write_grains(folder / "grains.csv", observed.id, observed.radius)
-    files.write_times(folder / "times.csv", INTERVAL * np.arange(len(observed.position), dtype=np.float64))
+    files.write_times(folder / "times.csv", observed.interval * np.arange(len(observed.position), dtype=np.float64))
     truth = truth.frames(0, len(observed.position)) if observed.shown is None else truth.take(observed.shown)
     tables = ""
     if observed.wall_names:

@@ -33,6 +33,7 @@ from .input_errors import (
     confuse_classes,
     correlate_noise,
     delay_walls,
+    displace_one_pose,
     drop_rotation,
     duplicate_frame,
     extend_bars,
@@ -41,6 +42,8 @@ from .input_errors import (
     misstate_class,
     reverse_time,
     scale_rotation,
+    shift_side_inwards,
+    shuffle_frames,
     state_walls_rough,
     stretch_picture,
     swap_frames,
@@ -55,6 +58,8 @@ from .loading_paths import (
     shear_cyclically,
     shear_purely,
     shear_under_loads,
+    tilt_heap,
+    turn_core,
 )
 from .preset_names import Group, ScenarioName
 
@@ -97,8 +102,16 @@ def _choose_ten(count: int, rng: np.random.Generator) -> Array:
     return 1.0 / rng.uniform(1.0 / 0.03, 1.0 / 0.003, count)
 
 
-def _missing(meaning: str, loading: LoadingPath, departure: Departure = keep_unchanged) -> Scenario:
-    return Scenario(meaning, loading, departure, group="missing physics")
+def _choose_by_power_law(count: int, rng: np.random.Generator) -> Array:
+    """Draw radii (n,) [m] between 4 and 24 mm, their number falling with the power 2.5 of the radius."""
+    low, high = 0.004**-1.5, 0.024**-1.5
+    return rng.uniform(high, low, count) ** (-1.0 / 1.5)
+
+
+def _missing(
+    meaning: str, loading: LoadingPath, departure: Departure = keep_unchanged, noise: float = 1e-5
+) -> Scenario:
+    return Scenario(meaning, loading, departure, noise, group="missing physics")
 
 
 def _wrong(meaning: str, departure: Departure) -> Scenario:
@@ -179,6 +192,19 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         "shear to and fro by four steps of .05°",
         LoadingPath(shear_cyclically, 0.05, initial_shear=2.0, plates=("top",)),
     ),
+    "tiny_cycles": Scenario(
+        "shear to and fro by four steps of .01°",
+        LoadingPath(shear_cyclically, 0.01, initial_shear=2.0, plates=("top",)),
+    ),
+    "annulus": Scenario(
+        "a core turns by .02 rad a photograph in a ring under pressure",
+        LoadingPath(turn_core, 0.02, plates=("ring",), ring=True),
+    ),
+    "tilted_bed": Scenario(
+        "a box with a free surface tilts by 1° a photograph; no plate",
+        LoadingPath(tilt_heap, 1.0, settings=HEAP, open_top=True),
+    ),
+    "power_law": Scenario("sheared; radii 1:6, most of them small", replace(MOVED, sizes=_choose_by_power_law)),
     "noise_40": Scenario("sheared; 40 µm noise", MOVED, noise=4e-5),
     "correlated_noise": Scenario("sheared; further errors of 10 µm that change slowly", MOVED, correlate_noise),
     "stiff": _missing("sheared; contacts ten times as stiff, photographed at rest", _sheared(normal_stiffness=2e8)),
@@ -186,6 +212,12 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
         "the same, photographed while it moves",
         _sheared(normal_stiffness=2e8, moving=True, unbalance_limit=10.0, damping_ratio=0.4),
     ),
+    "stiff_loose": _missing(
+        "contacts ten times as stiff, photographed at rest; packed with friction",
+        replace(_sheared(normal_stiffness=2e8), loose=True),
+    ),
+    "stiffest": _missing("sheared; contacts fifty times as stiff, at rest", _sheared(normal_stiffness=1e9)),
+    "stiff_noise_40": _missing("stiff; 40 µm noise", _sheared(normal_stiffness=2e8), noise=4e-5),
     "base_friction": _missing(
         "sheared on a base with friction of 10 % of the mean force", _sheared(base_friction=150.0)
     ),
@@ -193,6 +225,16 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "strong_cohesion": _missing("sheared; contacts attract by 40 % of the mean force", _sheared(adhesion=20.0)),
     "friction_spread": _missing("sheared; friction varies by 40 % between contacts", _sheared(friction_spread=0.4)),
     "smooth_walls": _missing("sheared; smooth walls stated as rough", _sheared(wall_friction=0.0), state_walls_rough),
+    "smooth_walls_spread": _missing(
+        "the same, and friction varies by 40 % between contacts", _sheared(wall_friction=0.0, friction_spread=0.4),
+        state_walls_rough,
+    ),
+    "rough_walls": _missing(
+        "sheared; walls of friction .5 stated like the rods", _sheared(wall_friction=0.5), state_walls_rough
+    ),
+    "strong_inertia": _missing(
+        "sheared three times as fast as that", _sheared(inertial_number=6e-2, moving=True, unbalance_limit=10.0)
+    ),
     "inertia": _missing(
         "sheared fast: forces out of balance by some 10 %, photographed while it moves",
         _sheared(inertial_number=2e-2, moving=True, unbalance_limit=10.0),
@@ -200,6 +242,7 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "rolling": _missing("sheared; rolling resistance of .1", _sheared(rolling_friction=0.1)),
     "sizes_10": _missing("sheared; radii 1:10", replace(MOVED, sizes=_choose_ten)),
     "time_reversed": _wrong("photographs in reverse order", reverse_time),
+    "shuffled": _wrong("photographs in random order", shuffle_frames),
     "swapped_frames": _wrong("every third pair of photographs swapped", swap_frames),
     "duplicate_frame": _wrong("one photograph twice", duplicate_frame),
     "theta_sign": _wrong("rotations with the wrong sign", scale_rotation(-1.0)),
@@ -210,11 +253,13 @@ SCENARIOS: dict[ScenarioName, Scenario] = {
     "mu_05": _wrong("friction stated as .5 instead of .25", misstate_friction(0.5)),
     "walls_late": _wrong("walls one photograph late", delay_walls),
     "top_fixed": _wrong("the plate stated at rest", fix_top),
+    "wall_inside": _wrong("the right side stated 2 mm inside the packing", shift_side_inwards),
     "aspect_03": _wrong("x stretched by .3 %", stretch_picture(0.003)),
     "aspect_1": _wrong("x stretched by 1 %", stretch_picture(0.01)),
     "class_2": _wrong("one class of radii 2 % too large", misstate_class),
     "wrong_class": _wrong("a tenth of the rods stated of another size", confuse_classes),
     "overhang": _wrong("the plate's wall overhangs by 5 cm at either end", extend_bars),
     "outliers": _wrong("2 % of the poses displaced by .3 to 2 mm", add_outliers),
+    "one_jump": _wrong("one rod displaced by 1 mm in one photograph", displace_one_pose),
     "missing_poses": _wrong("10 % of the poses missing", lose_poses),
 }  # fmt: skip

@@ -51,8 +51,9 @@ def test_sequences_solved_again_use_the_measured_friction_at_walls() -> None:
 @pytest.mark.slow
 def test_a_low_friction_of_circular_walls_is_measured(tmp_path, monkeypatch) -> None:
     scenario = SCENARIOS["circle"]
-    course = replace(scenario.course, settings=replace(scenario.course.settings, wall_friction=0.12), frames=10)
-    monkeypatch.setitem(SCENARIOS, "circle", replace(scenario, course=course))
+    settings = replace(scenario.loading.settings, wall_friction=0.12)
+    loading = replace(scenario.loading, settings=settings, frames=10)
+    monkeypatch.setitem(SCENARIOS, "circle", replace(scenario, loading=loading))
     folder = scenario_folder.make_scenario(tmp_path / "circle", "circle", 1, grains=200).folder
     text = (folder / "experiment.toml").read_text()
     (folder / "experiment.toml").write_text(

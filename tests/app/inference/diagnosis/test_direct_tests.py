@@ -4,7 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.diagnosis.direct_tests import examine_order, examine_rotations, examine_walls
+from rodsight.inference.diagnosis.direct_tests import (
+    examine_inertia,
+    examine_order,
+    examine_poses,
+    examine_rotations,
+    examine_wall_places,
+    examine_wall_times,
+    examine_walls,
+)
+from rodsight.solver.bodies.rods import RodMaterial
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 FRAMES, SIDE, PITCH, NOISE = 8, 10, 0.016, 1e-5
@@ -97,3 +106,62 @@ def test_a_wall_that_rods_penetrate_while_it_rests_is_named():
     assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
     endpoints[:, 1, :, 1] -= np.linspace(0.0, 2e-3, FRAMES)[:, None]  # it moves, but not with the rods
     assert examine_walls(moved, replace(walls, endpoints=endpoints)) == []
+
+
+def test_photographs_in_random_order_are_named():
+    tracks = rolling_tracks()
+    order = np.array([3, 0, 6, 2, 7, 1, 5, 4])
+    (found,) = examine_order(replace(tracks, position=tracks.position[order]))
+    assert found.cause == "photographs_swapped"
+
+
+def test_jumps_and_missing_poses_are_named():
+    tracks = rolling_tracks()
+    assert examine_poses(tracks) == []
+    position = tracks.position.copy()
+    position[4, 44] += [1e-3, 0.0]
+    (jump,) = examine_poses(replace(tracks, position=position))
+    assert jump.cause == "outlier_tracks"
+    assert "1 pose jumps" in jump.evidence
+    assert "photographs 4" in jump.evidence
+    lost = np.random.default_rng(7).random((FRAMES, N)) < 0.1
+    status = np.where(lost, np.uint8(TrackStatus.LOST), tracks.status)
+    (missing,) = examine_poses(
+        replace(tracks, position=np.where(lost[..., None], np.nan, tracks.position), status=status)
+    )
+    assert missing.cause == "missing_poses"
+
+
+def test_fast_shear_is_named():
+    tracks, walls = rolling_tracks(), box()
+    assert examine_inertia(tracks, walls, RodMaterial()) == []
+    sheared = tracks.position.copy()
+    sheared[..., 0] += STEP * np.arange(FRAMES)[:, None] * sheared[..., 1]
+    fast = replace(tracks, position=sheared, time=1e-3 * np.arange(FRAMES))
+    (found,) = examine_inertia(fast, walls, RodMaterial())
+    assert found.cause == "inertia"
+    assert examine_inertia(replace(fast, time=30.0 * np.arange(FRAMES)), walls, RodMaterial()) == []
+
+
+def test_rods_beyond_a_wall_are_named():
+    tracks, walls = rolling_tracks(), box()
+    assert examine_wall_places(tracks, walls) == []
+    inside = walls.endpoints.copy()
+    inside[:, 1, :, 1] -= 2e-3
+    (found,) = examine_wall_places(tracks, replace(walls, endpoints=inside))
+    assert found.cause == "wall_misplaced"
+    assert "2 mm beyond wall 'top'" in found.evidence
+
+
+def test_walls_that_lag_behind_are_named():
+    tracks, walls = rolling_tracks(), box()
+    rise = 1e-3 * np.arange(FRAMES)
+    moved = tracks.position + np.stack([np.zeros((FRAMES, N)), rise[:, None] * np.ones(N)], axis=-1)
+    endpoints = walls.endpoints.copy()
+    endpoints[..., 1] += rise[:, None, None]
+    moved, right = replace(tracks, position=moved), replace(walls, endpoints=endpoints)
+    assert examine_wall_times(moved, right) == []
+    late = endpoints[np.maximum(np.arange(FRAMES) - 1, 0)]
+    (found,) = examine_wall_times(moved, replace(right, endpoints=late))
+    assert found.cause == "walls_shifted"
+    assert "late" in found.evidence

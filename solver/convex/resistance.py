@@ -1,0 +1,186 @@
+"""What resists sliding in a sequence: the given friction, or a rival that leaves a clearly lesser power gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ..bodies.grains import Array
+from ..bodies.motion import Snapshot
+from ..bodies.packing import Packing
+from ..detection.touch_probability import ContactProbabilitySettings, probable_contacts, window_of
+from ..parallel import parallel_map
+from .ensemble_members import measured_slip
+from .program import assemble_balance
+from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_models, power_gap
+
+CLEAR = 0.62  # gap of a rival over that of the given model, and of another friction alone, below which it wins
+LEAST_GAP = 0.03  # fall of the gap below which nothing is decided
+MOST_GAP = 0.25  # gap above which not even the best rival explains the sliding
+REVERSED = 0.5  # gap of the reversed motion over that of the given one, below which it wins
+AHEAD = 0.85  # gap of the winner over that of the second
+FRAMES = 4  # consecutive photographs on which models are compared
+FEWEST = 2  # of these
+LEAST_WALLS = 12  # contacts with walls from which on their friction is a rival
+# Parameters of each rival; the friction of grains shifts with the others.
+RIVALS: dict[str, tuple[Parameter, ...]] = {
+    "friction": ("all_friction",),
+    "wall_friction": ("wall_friction", "friction"),
+    "base_friction": ("base_drag", "all_friction"),
+    "adhesion": ("attraction", "all_friction"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Resistance:
+    """The model that explains the sliding."""
+
+    cause: str  # a name of RIVALS, or "photographs_reversed"; empty: none is clearly better than the given model
+    given: SlidingModel
+    given_gap: float
+    found: SlidingModel
+    found_gap: float
+
+
+def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, workers: int | None = 1) -> Resistance | None:
+    """Compare what may resist the sliding.
+
+    Parameters
+    ----------
+    frames : sequence of ResistedFrame
+    given : SlidingModel
+        Of the input.
+    workers : int, optional
+        Threads.
+
+    Returns
+    -------
+    Resistance or None
+        None where nothing slides. A rival is named if its parameters are determined, its gap is below .62 times that of
+        the given model and of another friction alone, .85 times that of every other rival, and below .25.
+    """
+    before = power_gap(frames, given)
+    if not np.isfinite(before):
+        return None
+    nothing = Resistance("", given, before, given, before)
+    turned = power_gap([each.reversed() for each in frames], given)
+    if turned < min(REVERSED * before, MOST_GAP):
+        return Resistance("photographs_reversed", given, before, given, turned)
+    walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
+    names = [name for name in RIVALS if name != "wall_friction" or walls >= LEAST_WALLS]
+    fitted = dict(zip(names, compare_models(frames, given, [RIVALS[each] for each in names], workers), strict=True))
+    sound = {name: each for name, each in fitted.items() if each.enclosed}
+    friction = sound["friction"].gap if "friction" in sound else before
+    best = min((name for name in sound if name != "friction"), key=lambda name: sound[name].gap, default="")
+    if best and _wins(sound[best].gap, min(before, friction)):
+        others = [each.gap for name, each in sound.items() if name not in (best, "friction")]
+        if all(sound[best].gap < AHEAD * other for other in others):
+            return Resistance(best, given, before, sound[best].model, sound[best].gap)
+        return nothing  # it is one of two, and friction alone is worse than either
+    if "friction" in sound and _wins(friction, before):
+        return Resistance("friction", given, before, sound["friction"].model, friction)
+    return nothing
+
+
+def find_in_sequence(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    first: int,
+    force_unit: float,
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> Resistance | None:
+    """Compare what may resist the sliding in up to FRAMES frames from `first` on, which have neighbours on both sides.
+
+    Returns
+    -------
+    Resistance or None
+        None with fewer than two such frames, without friction, or where nothing slides.
+    """
+    numbers = range(first, min(first + FRAMES, len(snapshots) - 1))
+    if len(numbers) < FEWEST or packing.material.friction <= 0.0 or packing.material.wall_friction <= 0.0:
+        return None
+    frames = resisted_frames(packing, snapshots, numbers, force_unit, settings, workers)
+    return find_resistance(frames, model_of(packing, force_unit), workers)
+
+
+def _wins(gap: float, other: float) -> bool:
+    return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)
+
+
+def resisted_frames(
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    numbers: Sequence[int],
+    force_unit: float,
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> list[ResistedFrame]:
+    """Prepare frames, each with the sliding over (k − 1, k + 1).
+
+    Parameters
+    ----------
+    packing : Packing
+    snapshots : sequence of Snapshot
+    numbers : sequence of int
+        Consecutive frames with neighbours on both sides.
+    force_unit : float
+        Typical contact force [N].
+    settings : ContactProbabilitySettings
+    workers : int, optional
+        Threads.
+    """
+    return parallel_map(
+        [partial(_resisted_frame, packing, snapshots, k, force_unit, settings) for k in numbers], workers
+    )
+
+
+def model_of(packing: Packing, force_unit: float) -> SlidingModel:
+    """The model that a packing states."""
+    material = packing.material
+    drag = material.base_drag * float(packing.grains.mass.mean()) / force_unit
+    return SlidingModel(material.friction, material.wall_friction, drag)
+
+
+def base_drag_of(packing: Packing, model: SlidingModel, force_unit: float) -> float:
+    """Drag of the base [m/s²] under a model: coefficient of friction times gravity."""
+    return model.base_drag * force_unit / float(packing.grains.mass.mean())
+
+
+def _resisted_frame(
+    packing: Packing, snapshots: Sequence[Snapshot], k: int, force_unit: float, settings: ContactProbabilitySettings
+) -> ResistedFrame:
+    snapshot, window = snapshots[k], window_of(k, len(snapshots))
+    contacts, probability = probable_contacts(
+        packing.grains, [snapshots[f] for f in window], k - window.start, settings
+    )
+    walls = packing.walls_of(snapshot)
+    free = replace(packing, grains=replace(packing.grains, drag=None))
+    balance = assemble_balance(
+        contacts, free.grains, walls, present=snapshot.present,
+        friction=packing.material.friction_at(contacts.with_wall), force_unit=force_unit,
+        gravity=packing.material.gravity,
+        # The power gap does not depend on the scale of the forces, so any total is valid.
+        wall_normal_total=None if packing.scale_is_known else force_unit * max(int(contacts.gauge.sum()), 1),
+    )  # fmt: skip
+    slip = measured_slip(contacts, packing.grains, walls, (snapshots[k - 1], snapshots[k + 1]))
+    present = snapshot.present & packing.grains.free
+    return ResistedFrame(
+        balance, contacts, slip, probability, _unit_drag(packing, snapshots, k, len(balance.load)), int(present.sum())
+    )
+
+
+def _unit_drag(packing: Packing, snapshots: Sequence[Snapshot], k: int, rows: int) -> Array:
+    """Load b (m,) of a base that drags a mean grain by the force unit, against its motion over (k − 1, k + 1)."""
+    before, now, after = snapshots[k - 1 : k + 2]
+    present = now.present & packing.grains.free
+    moved = np.nan_to_num(after.position - before.position)
+    size = np.sqrt((moved**2).sum(axis=1) + 4.0 * now.sigma**2)
+    share = packing.grains.mass / packing.grains.mass.mean()
+    against = (share / np.where(size > 0.0, size, 1.0))[:, None] * moved
+    drag, n = np.zeros(rows), int(present.sum())
+    drag[:n], drag[n : 2 * n] = against[present, 0], against[present, 1]
+    return drag
