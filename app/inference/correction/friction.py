@@ -178,7 +178,7 @@ def measure_resisting(
     walls = float(np.mean([each.contacts.with_wall.sum() for each in frames]))
     if material.friction_measured:
         own = material.wall_friction is not None or walls < MIN_WALL_CONTACTS
-        free += ["friction"] if own else ["wall_friction", "friction"]
+        free.extend(("friction",) if own else ("wall_friction", "friction"))
     given = model_of(packing, unit)
     found = fit_model(frames, given, free)
     if not np.isfinite(found.gap):
