@@ -25,6 +25,8 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "disagreement_of_members": lambda e: e.disagreement,
     "gap_error": lambda e: e.information.gap_error / e.information.diameter,
     "force_change": lambda e: e.force_change,
+    # friction that opposes the measured sliding less than it could: another friction, walls, a base, wrong rotations
+    "power_gap": lambda e: e.power_gap,
 }
 ONE_SIDED = 1.645  # standard deviations of a normal distribution that 5 % are beyond, on one side
 LEAST = 1e-4  # of a measure: its logarithm is taken

@@ -17,10 +17,10 @@ from .ensemble_members import measured_slip
 from .program import assemble_balance
 from .sliding_model import Parameter, ResistedFrame, SlidingModel, compare_models, power_gap
 
-CLEAR = 0.62  # gap of a rival over that of the given model, and of another friction alone, below which it wins
+CLEAR = 0.62  # gap of a rival over that of the given model, and of another friction alone, below which it is named
 LEAST_GAP = 0.03  # fall of the gap below which nothing is decided
 MOST_GAP = 0.25  # gap above which not even the best rival explains the sliding
-REVERSED = 0.5  # gap of the reversed motion over that of the given one, below which it wins
+REVERSED = 0.5  # gap of the reversed motion over that of the given one, below which it is named
 AHEAD = 0.85  # gap of the winner over that of the second
 FRAMES = 4  # consecutive photographs on which models are compared
 FEWEST = 2  # of these
@@ -75,12 +75,12 @@ def find_resistance(frames: Sequence[ResistedFrame], given: SlidingModel, worker
     sound = {name: each for name, each in fitted.items() if each.enclosed}
     friction = sound["friction"].gap if "friction" in sound else before
     best = min((name for name in sound if name != "friction"), key=lambda name: sound[name].gap, default="")
-    if best and _wins(sound[best].gap, min(before, friction)):
+    if best and _is_clearly_less(sound[best].gap, min(before, friction)):
         others = [each.gap for name, each in sound.items() if name not in (best, "friction")]
         if all(sound[best].gap < AHEAD * other for other in others):
             return Resistance(best, given, before, sound[best].model, sound[best].gap)
         return nothing  # it is one of two, and friction alone is worse than either
-    if "friction" in sound and _wins(friction, before):
+    if "friction" in sound and _is_clearly_less(friction, before):
         return Resistance("friction", given, before, sound["friction"].model, friction)
     return nothing
 
@@ -107,7 +107,7 @@ def find_in_sequence(
     return find_resistance(frames, model_of(packing, force_unit), workers)
 
 
-def _wins(gap: float, other: float) -> bool:
+def _is_clearly_less(gap: float, other: float) -> bool:
     return gap < min(CLEAR * other, other - LEAST_GAP, MOST_GAP)
 
 

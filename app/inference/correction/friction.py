@@ -78,7 +78,7 @@ def check_sequence_friction(sequence: CorrectedSequence, frames: Sequence[FrameF
 
 
 def _beside_others(check: FrictionCheck, found: Resistance | None) -> FrictionCheck:
-    """The check with the friction between rods beside that of walls or base or an attraction, where these win."""
+    """The check with the friction between rods beside that of walls or base or an attraction, where these are named."""
     if found is None or found.cause in ("", "friction", "photographs_reversed"):
         return check
     ratio = found.found.friction / BIAS / check.measured

@@ -26,7 +26,8 @@ GROUPS: tuple[Group, ...] = ("correct", "missing physics", "wrong input")
 # Kinds that no fit reads: of each group some, and of each mechanism at most one.
 LEFT_OUT = frozenset({
     "step_1", "circle", "corners", "radii_03", "strong_cohesion", "rolling", "stiff_moving", "theta_sign", "aspect_03",
-    "walls_late", "swapped_frames", "outliers", "missing_poses",
+    "walls_late", "swapped_frames", "shuffled", "outliers", "one_jump", "missing_poses", "tilted_bed", "stiff_loose",
+    "rough_walls",
 })  # fmt: skip
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
 COVERED = 0.03  # fraction of frames of any group that may have T too high
@@ -35,12 +36,13 @@ SMOOTH = 0.15  # of the range of a measure, over which its isotonic regression i
 START = 2.6  # arctanh r below which the margin grows
 SLOPES = np.linspace(0.0, 0.6, 7)
 BEST_R, WORST_R = 0.995, -0.2  # limits of r whose arctanh is fitted
-MOTION_ONLY = ("correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change")
+MOTION_ONLY = ("correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change", "power_gap")
 # Least and greatest value of each measure: beyond them no more is known.
 RANGES = {
-    "disagreement_of_estimates": (0.02, 1.0), "disagreement_with_either": (0.03, 1.0), "correction": (0.02, 2.0),
+    "disagreement_of_estimates": (0.02, 1.0), "disagreement_with_either": (0.03, 1.0),
+    "correction": (0.02, 2.0),
     "previous_residual": (0.004, 0.2),
-    "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6),
+    "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6), "power_gap": (0.01, 1.5),
 }  # fmt: skip
 
 
