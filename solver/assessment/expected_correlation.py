@@ -27,8 +27,11 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "force_change": lambda e: e.force_change,
     # friction that opposes the measured sliding less than it could: another friction, walls, a base, wrong rotations
     "power_gap": lambda e: e.power_gap,
+    # what the positions show in two ways: the posterior, and the balance of overlaps
+    "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
 }
 ONE_SIDED = 1.645  # standard deviations of a normal distribution that 5 % are beyond, on one side
+MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
 LEAST = 1e-4  # of a measure: its logarithm is taken
 
 
@@ -77,6 +80,11 @@ def expected_interval(evidence: Evidence) -> tuple[float, float, float]:
     return expected, low, high
 
 
+def rests_on_overlaps(evidence: Evidence) -> bool:
+    """Whether the field follows from the overlaps of soft grains: what the motion contradicts then says little."""
+    return evidence.information.soft and evidence.position_weight > MOSTLY_OVERLAPS
+
+
 def losses(evidence: Evidence) -> dict[str, float]:
     """By how much the bound would rise if one measure were at its best, for each known measure."""
     table, score = _table(evidence), correlation_score(evidence)
@@ -106,8 +114,11 @@ def _term(table: dict[str, Any], measure: float) -> float:
 
 
 def _table(evidence: Evidence) -> dict[str, Any]:
-    """The table for the evidence at hand: with the position-only estimate or without."""
-    return FITTED["expected_correlation"]["motion" if math.isnan(evidence.agreement) else "both"]
+    """The table for the evidence at hand: of overlaps of soft grains, of both estimates, or of the motion alone."""
+    tables = FITTED["expected_correlation"]
+    if rests_on_overlaps(evidence) and not math.isnan(evidence.position_agreement) and "overlaps" in tables:
+        return tables["overlaps"]
+    return tables["motion" if math.isnan(evidence.agreement) else "both"]
 
 
 def _terms(table: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

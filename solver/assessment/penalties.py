@@ -119,6 +119,8 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         f"noise of {1e6 * found.noise:.3g} µm against {1e6 * found.motion:.3g} µm that neighbours move in a step",
         "gap_error": f"gaps of strong contacts deviate by {1e6 * found.gap_error:.3g} µm beyond noise: radii or "
         "centres are wrong, or grains soft; measure radii, or let calibration find them",
+        "disagreement_of_positions": "forces from the positions and from the balance of overlaps agree by "
+        f"{evidence.position_agreement:.2f} only: radii, centres or the camera are wrong, or noise hides the overlaps",
         "power_gap": f"{100.0 * evidence.power_gap:.0f} % of the power of friction at its limit is missing from the "
         "measured sliding: the friction of rods, walls or base, rotations, or the order of the photographs",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",

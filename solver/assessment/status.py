@@ -59,7 +59,7 @@ def decide_status(evidence: Evidence) -> StatusDecision:
         )
     if evidence.holes:
         places = "1 hole" if evidence.holes == 1 else f"{evidence.holes} holes"
-        why += f"; {places} would fit a rod: grains may be unseen, and the trust is reduced for it"
+        why += f"; {places} would fit a rod: grains may be unseen"
     return StatusDecision(status, why)
 
 

@@ -298,17 +298,19 @@ def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> 
 
     console = table_console(WIDTH)
     scenarios: tuple[ScenarioName, ...] = request.scenarios or get_args(ScenarioName)
+    fits: dict[str, tuple[trust_study.AdditiveFit, trust_study.Margin]] = {}
     with progress_of(request.quiet) as progress:
         if fit:
             read: list[ScenarioName] = [name for name in scenarios if name not in trust_study.LEFT_OUT]
             known = TrustSample.of(score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress))
-            for title, names in (("both", tuple(trust_study.MEASURES)), ("motion", trust_study.MOTION_ONLY)):
-                found, margin, _ = trust_study.fit_expected(known, names)
+            for title, names in trust_study.FITS.items():
+                found, margin, _ = trust_study.fit_expected(trust_study.rows_of(known, title), names)
+                fits[title] = found, margin
                 console.print(
                     trust_study.describe_fit(title, found, margin), highlight=False, markup=False, soft_wrap=True
                 )
         scores = score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
-    sample = TrustSample.of(scores)
+    sample = trust_study.refit(TrustSample.of(scores), fits)
     new = np.isin(sample.kind, list(trust_study.LEFT_OUT))
     trust_study.print_trust(console, "Kinds that the fit has read", sample.select(~new))
     trust_study.print_trust(console, "Kinds left out of the fit", sample.select(new))

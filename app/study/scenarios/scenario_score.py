@@ -27,7 +27,7 @@ from ...process.progress import Progress, no_progress
 from ...results.results import Results
 from ...results.truth import names_of_given, read_truth, true_ids
 from ...solver.assessment.evidence import Evidence
-from ...solver.assessment.expected_correlation import MEASURES
+from ...solver.assessment.expected_correlation import MEASURES, rests_on_overlaps
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, match_values
 from ...solver.frame_forces import FrameForces, FrameStatus
@@ -57,6 +57,7 @@ class ScenarioScore:
     expected: tuple[float | None, ...] = ()  # (f,) expected correlation
     measures: tuple[tuple[float | None, ...], ...] = ()  # (f, m) of the evidence, see `expected_correlation.MEASURES`
     status: tuple[str, ...] = ()  # (f,)
+    overlaps: tuple[bool, ...] = ()  # (f,) whether the forces follow from the overlaps of soft grains
     coverage: tuple[float | None, float | None] = (None, None)  # of f_n by one and by two standard deviations
     r_ours: float | None = None  # on all candidate pairs, mean from SETTLED on, as the next three
     r_static: float | None = None
@@ -115,6 +116,7 @@ def score_scenario(
         true = true_forces(experiment, solution.sequence)
     return replace(
         _compare(scenario, seed, solution.sequence, frames, true, cpu),
+        overlaps=tuple(rests_on_overlaps(each) for each in solution.evidence),
         measures=tuple(tuple(_plain(measure(each)) for measure in MEASURES.values()) for each in solution.evidence),
     )
 

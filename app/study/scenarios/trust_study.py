@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,14 +36,23 @@ SMOOTH = 0.15  # of the range of a measure, over which its isotonic regression i
 START = 2.6  # arctanh r below which the margin grows
 SLOPES = np.linspace(0.0, 0.6, 7)
 BEST_R, WORST_R = 0.995, -0.2  # limits of r whose arctanh is fitted
-MOTION_ONLY = ("correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change", "power_gap")
+# The fits, each with the measures that it weighs.
+FITS: dict[str, tuple[str, ...]] = {
+    "both": tuple(name for name in MEASURES if name != "disagreement_of_positions"),
+    "motion": (
+        "correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change", "power_gap",
+    ),
+    "overlaps": (
+        "disagreement_of_positions", "disagreement_of_estimates", "previous_residual", "gap_error", "force_change",
+    ),
+}  # fmt: skip
 # Least and greatest value of each measure: beyond them no more is known.
 RANGES = {
     "disagreement_of_estimates": (0.02, 1.0), "disagreement_with_either": (0.03, 1.0),
     "correction": (0.02, 2.0),
     "previous_residual": (0.004, 0.2),
     "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6),
-    "power_gap": (0.01, 1.5),
+    "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.02, 1.0),
 }  # fmt: skip
 
 
@@ -55,6 +64,7 @@ class TrustSample:
     seed: NDArray[np.int64]  # (f,)
     group: NDArray[np.str_]  # (f,)
     suspect: NDArray[np.bool_]  # (f,)
+    overlaps: NDArray[np.bool_]  # (f,) whether the forces follow from the overlaps of soft grains
     r: Array  # (f,)
     trust: Array  # (f,)
     expected: Array  # (f,)
@@ -75,6 +85,7 @@ class TrustSample:
             np.array([score.seed for score, _ in rows]),
             np.array([SCENARIOS[score.scenario].group for score, _ in rows]),
             np.array([score.status[k] == "suspect" for score, k in rows]),
+            np.array([score.overlaps[k] for score, k in rows]),
             np.array([score.r[k] for score, k in rows], float),
             np.array([score.trust[k] for score, k in rows], float),
             np.array([score.expected[k] for score, k in rows], float),
@@ -88,7 +99,7 @@ class TrustSample:
         """The chosen frames (f,)."""
         return TrustSample(
             self.kind[chosen], self.seed[chosen], self.group[chosen], self.suspect[chosen],
-            self.r[chosen], self.trust[chosen], self.expected[chosen],
+            self.overlaps[chosen], self.r[chosen], self.trust[chosen], self.expected[chosen],
             {name: each[chosen] for name, each in self.measures.items()},
         )  # fmt: skip
 
@@ -125,7 +136,7 @@ class Margin:
         return np.maximum(np.tanh(score - self.margin - self.slope * np.maximum(START - score, 0.0)), 0.0)
 
 
-def fit_expected(sample: TrustSample, names: Sequence[str] = tuple(MEASURES)) -> tuple[AdditiveFit, Margin, Array]:
+def fit_expected(sample: TrustSample, names: Sequence[str]) -> tuple[AdditiveFit, Margin, Array]:
     """Fit the expected correlation, and the margin of its bound on seeds left out in turn.
 
     Returns
@@ -142,6 +153,23 @@ def fit_expected(sample: TrustSample, names: Sequence[str] = tuple(MEASURES)) ->
         away = sample.seed == seed
         left_out[away] = _fit(sample.select(~away), names).score(sample.select(away))
     return _fit(sample, names), _fit_margin(sample, left_out), left_out
+
+
+def refit(sample: TrustSample, fits: dict[str, tuple[AdditiveFit, Margin]]) -> TrustSample:
+    """The sample with expected correlation and trust by new fits, without the penalties outside of them."""
+    expected, trust = sample.expected.copy(), sample.trust.copy()
+    for name, (fit, margin) in fits.items():
+        here = sample.overlaps if name == "overlaps" else ~sample.overlaps
+        if name == "motion" or not here.any():
+            continue
+        score = fit.score(sample.select(here))
+        expected[here], trust[here] = np.maximum(np.tanh(score), 0.0), margin.bound(score)
+    return replace(sample, expected=expected, trust=trust)
+
+
+def rows_of(sample: TrustSample, fit: str) -> TrustSample:
+    """The frames that a fit of this name is for."""
+    return sample.select(sample.overlaps if fit == "overlaps" else ~sample.overlaps)
 
 
 def describe_fit(title: str, fit: AdditiveFit, margin: Margin) -> str:

@@ -8,12 +8,13 @@ PhotographedPreset = Literal["small", "paper", "1g2e"]
 MeasuredPreset = Literal["photoelastic"]  # no experiment, but the output of another program
 Group = Literal["correct", "missing physics", "wrong input"]
 ScenarioName = Literal[
-    "shear", "sheared", "biaxial", "isotropic", "gravity", "soft", "softer", "soft_radii_03", "soft_unseen",
+    "shear", "sheared", "biaxial", "isotropic", "gravity", "soft", "softer", "soft_radii_03", "soft_radii_1",
+    "soft_noise", "softer_noise", "soft_stretched", "softer_stretched", "soft_unseen",
     "nearly_jammed",
     "corners", "short_walls", "unseen", "camera", "centres", "radii_03", "radii_1", "radius_offset",
     "mu_low", "mu_high", "step_05", "step_1", "ten_frames", "periodic", "outer", "circle", "loads",
     "loose", "cyclic", "noise_40", "correlated_noise", "annulus", "tilted_bed", "tiny_cycles", "power_law",
-    "stiff", "stiff_moving", "stiff_loose", "stiffest", "stiff_noise_40",
+    "stiff", "stiff_moving", "stiff_loose", "stiff_noise_40",
     "base_friction", "cohesion", "strong_cohesion", "friction_spread",
     "smooth_walls", "smooth_walls_spread", "rough_walls", "inertia", "strong_inertia", "rolling", "sizes_10",
     "time_reversed", "shuffled", "swapped_frames", "duplicate_frame",
