@@ -27,7 +27,7 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "force_change": lambda e: e.force_change,
     # friction that opposes the measured sliding less than it could: another friction, walls, a base, wrong rotations
     "power_gap": lambda e: e.power_gap,
-    # what the positions show in two ways: the posterior, and the balance of overlaps
+    # two readings of the positions: the posterior, and the balance of overlaps
     "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
 }
 ONE_SIDED = 1.645  # standard deviations of a normal distribution that 5 % are beyond, on one side
@@ -81,7 +81,7 @@ def expected_interval(evidence: Evidence) -> tuple[float, float, float]:
 
 
 def rests_on_overlaps(evidence: Evidence) -> bool:
-    """Whether the field follows from the overlaps of soft grains: what the motion contradicts then says little."""
+    """Whether the field follows from the overlaps of soft grains: a contradiction with the motion then means little."""
     return evidence.information.soft and evidence.position_weight > MOSTLY_OVERLAPS
 
 

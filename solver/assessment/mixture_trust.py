@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from ..bodies.grains import Array
 from .evidence import Evidence
 from .fitted import FITTED
 
@@ -21,6 +22,7 @@ MAX_TRUST_MEASURED = 0.96  # the gaps show the overlaps; r .98 to .996 on simula
 MAX_TRUST_STATED = 0.65  # softness is specified and no gap shows it; r .66 to .74 on photoelastic discs
 RELIABILITY_DISAGREEMENT: tuple[float, float] = tuple(FITTED["motion_reliability"]["disagreement"])
 RELIABILITY_CORRECTION: tuple[float, float] = tuple(FITTED["motion_reliability"]["correction"])
+WEIGHT_TERMS = ("constant", "correction", "unclear", "sliding")  # coefficients of the weight in fitted.toml
 LEAST_WEIGHT: float = FITTED["position_weight"]["least"]  # weights below it are not used
 # Of 1 − R of a sound frame, the fraction that its motion estimate errs by on average (sixteen scenarios, seed 0). A
 # reliability of LOW or less is taken as the expectation itself.
@@ -137,28 +139,39 @@ def expected_of_motion(reliability: float, *, scale_known: bool) -> float:
     return 1.0 - (1.0 - reliability) * (1.0 - sure * (1.0 - MEAN_ERROR_FRACTION))
 
 
-def evident_position_weight(correction: float, position_agreement: float) -> float:
+def evident_position_weight(evidence: Evidence) -> float:
     """Weight of the position-only estimate beside a motion estimate of hard grains under a known load.
 
     Parameters
     ----------
-    correction : float
-        ε, by which forces must correct the measured motion: what the model lacks, or wrong input.
-    position_agreement : float
-        Correlation of the position-only estimate with the motion-free balance of overlaps: what positions show.
+    evidence : Evidence
+        Of the motion estimate: the correction ε, by which forces must correct the measured motion; the power gap p,
+        by which friction opposes the sliding less than it could; and the correlation c of the position-only estimate
+        with the motion-free balance of overlaps: what positions show.
 
     Returns
     -------
     float
-        w = 1/(1 + exp(−(a + b ln ε + c ln(1 − agreement)))), in (0, 1), with a, b, c from fitted.toml.
+        w = 1/(1 + exp(−(a_0 + a_1 ln ε + a_2 ln(1 − c) + a_3 ln p))), in (0, 1), with a from fitted.toml.
     """
     table = FITTED["position_weight"]
-    known = table["default_correction"] if math.isnan(correction) else correction
-    epsilon = float(np.clip(known, *table["correction_range"]))
-    other = 1.0 - (0.5 if math.isnan(position_agreement) else position_agreement)
-    unclear = float(np.clip(other, *table["unclear_range"]))
-    score = table["constant"] + table["correction"] * math.log(epsilon) + table["unclear"] * math.log(unclear)
+    score = float(position_weight_terms(evidence) @ np.array([table[name] for name in WEIGHT_TERMS]))
     return 1.0 / (1.0 + math.exp(-score))
+
+
+def position_weight_terms(evidence: Evidence) -> Array:
+    """The terms (t,) that WEIGHT_TERMS names, of `evident_position_weight`."""
+    table = FITTED["position_weight"]
+
+    def logarithm(value: float, default: float, limits: list[float]) -> float:
+        return math.log(float(np.clip(default if math.isnan(value) else value, *limits)))
+
+    return np.array([
+        1.0,
+        logarithm(evidence.correction, table["default_correction"], table["correction_range"]),
+        logarithm(1.0 - evidence.position_agreement, table["default_unclear"], table["unclear_range"]),
+        logarithm(evidence.power_gap, table["default_sliding"], table["sliding_range"]),
+    ])  # fmt: skip
 
 
 def fused_trust(first: float, second: float, agreement: float, weight: float) -> float:

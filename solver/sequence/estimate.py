@@ -119,14 +119,14 @@ def _combine(
     before = state.evidence
     if not np.isnan(before.agreement) and before.agreement_age + 1 < STEADY_FRAMES:
         carried = _with_agreements_of(evidence, before)
-        weight = evident_position_weight(carried.correction, carried.position_agreement)
+        weight = evident_position_weight(carried)
         if weight < LEAST_WEIGHT and expect_correlation(carried) > STEADY and before.position_weight == 0.0:
             return alone, carried
     posterior = positions.at(problem.k, problem.verdicts)
     if posterior is None or not posterior.fn.any():
         return alone, evidence
     evidence = _with_agreements(problem, evidence, alone, posterior)
-    weight = evident_position_weight(evidence.correction, evidence.position_agreement)
+    weight = evident_position_weight(evidence)
     if weight < LEAST_WEIGHT:
         return alone, evidence
     mixed = _mix(problem, alone, posterior, motion_reliability(evidence), position_weight=weight)

@@ -44,6 +44,7 @@ def study(
             "uncertainty",
             "worlds",
             "trust",
+            "mixture",
             "numbers",
             "intervals",
             "report",
@@ -54,11 +55,11 @@ def study(
         tyro.conf.Positional,
         tyro.conf.arg(
             help="the paper's claims; r against noise; fit of trust and status; coverage of error bars; simulated "
-            "scenarios of laboratory data; trust against r by kind of input, and its fit; every statistic against the "
-            "truth; coverage of the intervals of forces by groups of contacts, and a fit of their constants; all of "
-            "that as one page, with what is outside its limits; the accuracy that `check` predicts from the first "
-            "photographs beside the result; a run against measured forces; the change of forces by small changes of "
-            "input"
+            "scenarios of laboratory data; trust against r by kind of input, and its fit; fit of the weights of "
+            "the two estimates; every statistic against the truth; coverage of the intervals of forces by "
+            "groups of contacts, and a fit of their constants; all of that as one page, with what is outside "
+            "its limits; the accuracy that `check` predicts from the first photographs beside the result; a run "
+            "against measured forces; the change of forces by small changes of input"
         ),
     ],
     folder: Annotated[
@@ -152,6 +153,8 @@ def study(
         return _study_worlds(request, jobs=jobs, as_json=as_json)
     if subject == "trust":
         return _study_trust(request, jobs=jobs, fit=fit)
+    if subject == "mixture":
+        return _study_mixture(request)
     if subject == "numbers":
         return _study_numbers(request, fit=fit)
     if subject == "intervals":
@@ -314,6 +317,15 @@ def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> 
     new = np.isin(sample.kind, list(trust_study.LEFT_OUT))
     trust_study.print_trust(console, "Kinds that the fit has read", sample.select(~new))
     trust_study.print_trust(console, "Kinds left out of the fit", sample.select(new))
+    return 0
+
+
+def _study_mixture(request: _StudyRequest) -> int:
+    from ...study.scenarios.mixture_fit import print_mixture, sample_mixtures
+
+    with progress_of(request.quiet) as progress:
+        sample = sample_mixtures(request.plan, request.scenarios or get_args(ScenarioName), request.seeds, progress)
+    print_mixture(table_console(), sample)
     return 0
 
 

@@ -16,9 +16,11 @@ from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameStatus
 from ...solver.statistics.agreement import compare_forces
 from ...synthetic.scenarios.preset_names import ScenarioName
+from ...synthetic.scenarios.scenario_table import SCENARIOS
 from ..scenarios.contact_errors import ContactErrors, measure_errors
 from ..scenarios.interval_coverage import FIRST, GROUPS, covered, describe_violations
-from ..scenarios.scenario_score import StudyPlan
+from ..scenarios.predictions import TRUE_CAUSE, PredictionOutcome, confusion, predict_all
+from ..scenarios.scenario_score import ScenarioScore, StudyPlan
 from ..scenarios.solved_scenario import SolvedScenario, solve_scenarios
 from ..scenarios.statistic_errors import (
     StatisticErrors,
@@ -55,6 +57,7 @@ class CalibrationStudy:
     errors: ContactErrors
     numbers: list[StatisticErrors]
     frames: TrustedFrames
+    outcomes: tuple[PredictionOutcome, ...] = ()  # predictions and diagnoses of `check`
 
     @property
     def data_hash(self) -> str:
@@ -70,6 +73,14 @@ class CalibrationStudy:
     def too_trusting(self) -> float:
         """Fraction of the frames whose correlation is below their trust."""
         return float(np.mean(self.frames.r < self.frames.trust)) if len(self.frames.r) else float("nan")
+
+    @property
+    def too_trusting_by_scenario(self) -> dict[str, float]:
+        """The same fraction for every scenario."""
+        below = self.frames.r < self.frames.trust
+        return {
+            str(name): float(below[self.frames.scenario == name].mean()) for name in np.unique(self.frames.scenario)
+        }
 
     @property
     def coverage(self) -> dict[str, tuple[float, ...]]:
@@ -90,6 +101,9 @@ class CalibrationStudy:
             "data": self.data_hash, "contacts": len(self.errors.group), "coverage": self.coverage,
             "coverage_by_world": self.coverage_by_scenario,
             "frames": len(self.frames.r), "too_trusting": self.too_trusting,
+            "too_trusting_by_world": self.too_trusting_by_scenario,
+            "predicted": [[each.score.scenario, each.expected[0], each.score.r_late] for each in self.outcomes],
+            "diagnosis": confusion(self.outcomes),
             "bias": {
                 name: relative_bias([each for each in self.numbers if each.name == name])
                 for name in dict.fromkeys(each.name for each in self.numbers)
@@ -102,13 +116,17 @@ def study_calibration(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
 ) -> CalibrationStudy:
     """Solve scenarios and compare all stated quantities with the truth."""
-    errors, numbers, frames = [], [], []
+    errors, numbers, frames, reached = [], [], [], []
     for solved in solve_scenarios(plan, scenarios, seeds, progress):
         errors.append(measure_errors(solved))
         numbers += measure_statistic_errors(solved)
         frames.append(_frames_of(solved))
+        reached.append((solved.scenario, solved.seed, frames[-1][2]))
+    outcomes = predict_all(plan, [_score_of(each) for each in reached], progress)
     joined = TrustedFrames(*(np.concatenate(column) for column in zip(*frames, strict=True)))
-    return CalibrationStudy(tuple(scenarios), tuple(seeds), plan.grains, ContactErrors.joined(errors), numbers, joined)
+    return CalibrationStudy(
+        tuple(scenarios), tuple(seeds), plan.grains, ContactErrors.joined(errors), numbers, joined, tuple(outcomes)
+    )
 
 
 def violations(study: CalibrationStudy) -> list[str]:
@@ -147,6 +165,20 @@ def sliding_rows(study: CalibrationStudy) -> list[list[str]]:
 def statistic_error_rows(study: CalibrationStudy) -> list[list[str]]:
     """Return a row of cells for every statistic, under HEADINGS of `statistic_errors`."""
     return statistic_rows(study.numbers)
+
+
+def confusion_rows(study: CalibrationStudy) -> list[list[str]]:
+    """Return a row of cells for every scenario: its group, what should be named, what was named in how many tests."""
+    return [
+        [name, SCENARIOS[name].group, " or ".join(TRUE_CAUSE.get(name, ("nothing",))), named]
+        for name, named in confusion(study.outcomes).items()
+    ]
+
+
+def _score_of(reached: tuple[ScenarioName, int, Array]) -> ScenarioScore:
+    """The score of a solved scenario as far as a prediction is compared with it."""
+    scenario, seed, r = reached
+    return ScenarioScore(scenario, seed, "", r=tuple(float(each) for each in r))
 
 
 def _frames_of(solved: SolvedScenario) -> tuple[NDArray[Any], Array, Array, NDArray[Any]]:

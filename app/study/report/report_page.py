@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 from scipy.special import erf
 
 from ...figures.figure_style import COLOURS, DASHES, INK, VERMILION, add_title, new_figure, paper_style
+from ...synthetic.scenarios.scenario_table import SCENARIOS
 from ..scenarios.interval_coverage import COMPONENTS, GROUPS
 from ..scenarios.statistic_errors import HEADINGS, SCENARIO_HEADINGS
-from .calibration_report import CalibrationStudy, coverage_rows, sliding_rows, statistic_error_rows
+from .calibration_report import CalibrationStudy, confusion_rows, coverage_rows, sliding_rows, statistic_error_rows
 
+PANELS = 5  # in a row
 MAX_RATIO = 3.0  # [standard deviation]
 MARKS = "osv^D<>Ph*Xd"
 
@@ -45,7 +47,14 @@ normal law. Above it intervals are too wide, below it too narrow.</p>
 <h2>Trust</h2>
 <p>Trust is a lower bound of the correlation with the true normal forces: at most 5 % of the frames may lie below the
 line. {{ "%.1f"|format(100 * facts.too_trusting) }} % do.</p>
-<img src="{{ trust }}" alt="Correlation with the truth over trust, frame by frame">
+<img src="{{ trust }}" alt="Correlation with the truth over trust, frame by frame, for every scenario">
+{% if confused %}<h2>Prediction and diagnosis</h2>
+<p>What <code>rodsight check</code> expects from the first photographs, with its interval, over what the whole test
+reached.</p>
+<img src="{{ predicted }}" alt="Predicted over reached correlation, with intervals">
+<table><thead><tr><th>scenario</th><th>group</th><th>cause</th><th>named (tests)</th></tr></thead><tbody>
+{% for row in confused %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
+{% endif %}
 <h2>Statistics</h2>
 <table><thead><tr>{% for each in headings %}<th>{{ each }}</th>{% endfor %}</tr></thead><tbody>
 {% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
@@ -63,8 +72,10 @@ def report_page(study: CalibrationStudy) -> str:
     """Return the page as HTML."""
     with paper_style():
         coverage, trust = _encoded(draw_coverage(study)), _encoded(draw_trust(study))
+        predicted = _encoded(draw_predictions(study)) if study.outcomes else ""
     return _PAGE.render(
-        facts=study.facts(), coverage=coverage, covered=coverage_rows(study), trust=trust, headings=HEADINGS,
+        facts=study.facts(), coverage=coverage, covered=coverage_rows(study), trust=trust,
+        predicted=predicted, confused=confusion_rows(study) if study.outcomes else [], headings=HEADINGS,
         rows=statistic_error_rows(study), scenario_headings=SCENARIO_HEADINGS, sliding=sliding_rows(study),
     )  # fmt: skip
 
@@ -91,20 +102,48 @@ def draw_coverage(study: CalibrationStudy) -> Figure:
 
 
 def draw_trust(study: CalibrationStudy) -> Figure:
-    """Draw the correlation with the truth over trust, with one marker per scenario."""
+    """Draw the correlation with the truth over trust in a panel for every scenario, each with the line r = T."""
+    frames, names = study.frames, study.scenarios
+    columns = min(len(names), PANELS)
+    rows = -(-len(names) // columns)
+    figure = new_figure("double", min(0.28 * rows + 0.05, 2.5))
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    low = float(min(frames.trust.min(), frames.r.min(), 0.9))
+    for number, axes in enumerate(panels.flat):
+        axes.plot([low, 1.0], [low, 1.0], color=VERMILION, linewidth=1.0)
+        if number >= len(names):
+            axes.set_axis_off()
+            axes.lines[0].set_visible(False)
+            continue
+        here = frames.scenario == names[number]
+        sound, suspect = here & ~frames.suspect, here & frames.suspect
+        axes.plot(frames.trust[sound], frames.r[sound], "o", color=COLOURS[0], mfc="none", markersize=3.0)
+        axes.plot(frames.trust[suspect], frames.r[suspect], "x", color=COLOURS[1], markersize=3.0)
+        below = 100.0 * study.too_trusting_by_scenario.get(names[number], 0.0)
+        axes.set_title(f"{names[number]}, below: {below:.0f} %", fontsize=7)
+    figure.supxlabel("trust T (crosses: suspect frames)", fontsize=8)
+    figure.supylabel("correlation r with the true f$_n$", fontsize=8)
+    return figure
+
+
+def draw_predictions(study: CalibrationStudy) -> Figure:
+    """Draw the expected correlation of `check` with its interval over the correlation that was reached."""
     figure = new_figure("double", 0.55)
     axes: Axes = figure.add_subplot()
-    frames = study.frames
-    for number, scenario in enumerate(study.scenarios):
-        here = frames.scenario == scenario
-        axes.plot(
-            frames.trust[here], frames.r[here], MARKS[number % len(MARKS)], color=COLOURS[number % len(COLOURS)],
-            mfc="none", label=scenario,
+    known = [each for each in study.outcomes if each.score.r_late is not None and np.isfinite(each.expected[0])]
+    for number, group in enumerate(("correct", "missing physics", "wrong input")):
+        some = [each for each in known if SCENARIOS[each.score.scenario].group == group]
+        if not some:
+            continue
+        r = np.array([each.score.r_late for each in some], float)
+        expected, low, high = np.array([each.expected for each in some]).T
+        axes.errorbar(
+            r, expected, yerr=[expected - low, high - expected], fmt=MARKS[number], color=COLOURS[number],
+            mfc="none", linewidth=0.8, label=group,
         )  # fmt: skip
-    low = float(min(frames.trust.min(), frames.r.min(), 0.9))
-    axes.plot([low, 1.0], [low, 1.0], color=VERMILION, linewidth=1.2, label="r = T: at most 5 % below")
-    axes.set(xlabel="trust T", ylabel="correlation r with the true f$_n$")
-    axes.legend(loc="lower right", ncols=2)
+    axes.axline((0.9, 0.9), slope=1.0, color=VERMILION, linewidth=1.2)
+    axes.set(xlabel="correlation that was reached", ylabel="predicted by check", ylim=(None, 1.0))
+    axes.legend(loc="lower right")
     return figure
 
 

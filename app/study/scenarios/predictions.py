@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,8 +90,26 @@ def study_predictions(
     plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
 ) -> list[PredictionOutcome]:
     """Score every scenario of every seed, and predict its accuracy from its first photographs."""
-    scores = score_scenarios(plan, scenarios, seeds, progress=progress)
-    return [PredictionOutcome(score, _predict(plan, score.scenario, score.seed)) for score in scores]
+    return predict_all(plan, score_scenarios(plan, scenarios, seeds, progress=progress), progress)
+
+
+def predict_all(
+    plan: StudyPlan, scores: Sequence[ScenarioScore], progress: Progress = no_progress
+) -> list[PredictionOutcome]:
+    """Predict the accuracy of solved scenarios from their first photographs, and name what is wrong with them."""
+    found = []
+    for done, score in enumerate(scores):
+        progress("predictions", done, len(scores))
+        found.append(PredictionOutcome(score, _predict(plan, score.scenario, score.seed)))
+    return found
+
+
+def confusion(outcomes: Sequence[PredictionOutcome]) -> dict[ScenarioName, str]:
+    """What was named for every scenario, with the number of seeds: ``{"mu_01": "friction 2"}``."""
+    found: dict[ScenarioName, Counter[str]] = {}
+    for each in outcomes:
+        found.setdefault(each.score.scenario, Counter())[each.named or "nothing"] += 1
+    return {name: ", ".join(f"{cause} {n}" for cause, n in count.items()) for name, count in found.items()}
 
 
 def print_predictions(console: Console, outcomes: Sequence[PredictionOutcome]) -> None:

@@ -12,6 +12,8 @@ from rodsight.study.scenarios.contact_errors import ContactErrors
 from rodsight.study.scenarios.scenario_score import StudyPlan
 from rodsight.study.scenarios.statistic_errors import StatisticErrors, compared_names
 
+from .test_predictions import SOUND, outcome, predicted
+
 COUNT = 6000
 
 
@@ -63,6 +65,15 @@ def test_the_page_names_version_seeds_and_the_hash_of_its_data(study):
     narrow = report_page(replace(study, errors=replace(study.errors, sd=0.8 * study.errors.sd)))
     assert ("f_n 68 −" in page, "f_n 68 −" in narrow) == (False, True)
     assert "http" not in page.replace("http://www.w3.org", "")  # self-contained
+
+
+def test_the_page_compares_predictions_and_names_what_was_diagnosed(study):
+    outcomes = (outcome(predicted(SOUND), 0.97), outcome(predicted(None), 0.9))
+    page = report_page(replace(study, outcomes=outcomes))
+    assert "Prediction and diagnosis" in page
+    assert "<tr><td>shear</td><td>correct</td><td>nothing</td><td>nothing 2</td></tr>" in page
+    assert "Prediction and diagnosis" not in report_page(study)
+    assert replace(study, outcomes=outcomes).facts()["predicted"][0][2] == 0.97
 
 
 @pytest.mark.slow

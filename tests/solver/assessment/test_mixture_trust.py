@@ -87,8 +87,14 @@ def test_the_reliability_of_motion_has_its_fitted_values():
 
 
 def test_positions_weigh_more_where_forces_correct_the_motion_and_overlaps_are_clear():
-    weight = evident_position_weight(0.1, 0.9)
-    assert weight == pytest.approx(1.0 / (1.0 + math.exp(0.899 - 1.145 * math.log(0.1) + 1.3 * math.log(0.1))))
-    assert evident_position_weight(0.4, 0.9) > weight > evident_position_weight(0.1, 0.6)
-    assert evident_position_weight(9.0, 0.9) == evident_position_weight(2.0, 0.9)  # the range of the fit
-    assert evident_position_weight(math.nan, math.nan) == evident_position_weight(0.1, 0.5)
+
+    def weight(correction, agreement, gap):
+        given = replace(SOUND, correction=correction, position_agreement=agreement, power_gap=gap)
+        return evident_position_weight(given)
+
+    middle = weight(0.1, 0.9, 0.2)
+    assert 0.0 < middle < 1.0
+    assert weight(0.4, 0.9, 0.2) > middle > weight(0.1, 0.6, 0.2)
+    assert weight(0.1, 0.9, 0.5) > middle > weight(0.1, 0.9, 0.05)
+    assert weight(9.0, 0.9, 9.0) == weight(2.0, 0.9, 1.5)  # the range of the fit
+    assert weight(math.nan, math.nan, math.nan) == weight(0.1, 0.5, 0.1)

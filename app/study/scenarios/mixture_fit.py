@@ -1,0 +1,157 @@
+"""Fit of the weight of the position-only estimate beside the motion estimate, on simulated packings.
+
+Both estimates of a frame are mixed with all weights, and each mixture is compared with the truth. The weight that is
+fitted is that of least loss against the best one; what a mixture loses against its better part counts more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from scipy.optimize import minimize
+from scipy.special import expit
+
+from ...experiment.experiment import load_experiment
+from ...process.errors import InputError
+from ...process.progress import Progress, no_progress
+from ...solver.assessment.evidence import Evidence
+from ...solver.assessment.mixture_trust import WEIGHT_TERMS, position_weight_terms
+from ...solver.baselines.motion_free import overlap_balance
+from ...solver.bodies.grains import Array
+from ...solver.contacts.pairs import Keys, align
+from ...solver.dem.dem_truth import UnbalancedError
+from ...solver.mixture.position_estimates import PositionEstimates
+from ...solver.statistics.agreement import pearson
+from ...synthetic.scenarios.preset_names import ScenarioName
+from ...synthetic.scenarios.scenario_folder import make_scenario
+from .scenario_score import ScenarioSolution, StudyPlan, solve_scenario, true_forces
+
+FIRST, STRIDE = 3, 3  # of the frames that are read
+WEIGHTS = np.linspace(0.0, 1.0, 11)  # of the position-only estimate
+TOLERATED, PRICE = 0.003, 3.0  # loss against the better part; its price beyond, over that of a loss against the best
+RIDGE, STARTS, STEPS = 1e-4, 3, 1500
+FOLDS = 5
+EXCESS = 0.005  # loss against the better part that is counted
+
+
+@dataclass(frozen=True, slots=True)
+class MixtureSample:
+    """Frames of hard grains under a known load; f frames."""
+
+    kind: NDArray[np.str_]  # (f,)
+    terms: Array  # (f, t) of the logarithm of w/(1 − w)
+    r: Array  # (f, 11) correlation of the mixture of every weight with the truth
+
+    def select(self, chosen: NDArray[np.bool_]) -> MixtureSample:
+        """The chosen frames (f,)."""
+        return MixtureSample(self.kind[chosen], self.terms[chosen], self.r[chosen])
+
+    def reached(self, weight: Array) -> Array:
+        """Correlation (f,) of the mixtures of these weights (f,)."""
+        return np.array([np.interp(w, WEIGHTS, r) for w, r in zip(weight, self.r, strict=True)])
+
+    @property
+    def better(self) -> Array:
+        """Correlation (f,) of the better part."""
+        return np.maximum(self.r[:, 0], self.r[:, -1])
+
+
+def sample_mixtures(
+    plan: StudyPlan, scenarios: Sequence[ScenarioName], seeds: Sequence[int], progress: Progress = no_progress
+) -> MixtureSample:
+    """Solve scenarios by their motion alone, and mix every third frame with its position-only estimate."""
+    motion = replace(plan, settings=(*plan.settings, "solver.positions=never"))
+    found: list[tuple[str, Array, Array]] = []
+    cases = [(name, seed) for name in scenarios for seed in seeds]
+    for done, (name, seed) in enumerate(cases):
+        progress("mixtures", done, len(cases))
+        with TemporaryDirectory() as folder:
+            try:
+                made = make_scenario(
+                    Path(folder), name, seed, grains=plan.grains, cache=plan.folder / "kept", progress=progress
+                )
+                experiment = load_experiment(made.folder, motion.settings)
+                solution = solve_scenario(experiment, progress)
+            except (InputError, UnbalancedError):
+                continue
+            found += [(name, *each) for each in _mix_frames(solution, true_forces(experiment, solution.sequence))]
+    kinds, terms, r = zip(*found, strict=True)
+    return MixtureSample(np.array(kinds), np.array(terms), np.array(r))
+
+
+def fit_weight(sample: MixtureSample) -> Array:
+    """Coefficients (t,) of the terms; every kind counts the same."""
+    _, index, count = np.unique(sample.kind, return_inverse=True, return_counts=True)
+    weight, best, better = 1.0 / count[index], sample.r.max(axis=1), sample.better
+
+    def loss(coefficients: Array) -> float:
+        r = sample.reached(expit(sample.terms @ coefficients))
+        lost = best - r + PRICE * np.maximum(better - r - TOLERATED, 0.0)
+        return float(np.average(lost, weights=weight)) + RIDGE * float(coefficients @ coefficients)
+
+    starts = np.random.default_rng(0).normal(0.0, 0.3, (STARTS, sample.terms.shape[1]))
+    options = {"maxiter": STEPS, "maxfev": STEPS, "fatol": 1e-7}
+    trials = [minimize(loss, start, method="Nelder-Mead", options=options) for start in starts]
+    return np.asarray(min(trials, key=lambda trial: trial.fun).x)
+
+
+def print_mixture(console: Console, sample: MixtureSample) -> None:
+    """Print the fitted coefficients, and what mixtures reach whose kinds were left out of the fit in turn."""
+    coefficients = fit_weight(sample)
+    values = ", ".join(f"{name} = {x:.3f}" for name, x in zip(WEIGHT_TERMS, coefficients, strict=True))
+    console.print(f"[position_weight] {values}", markup=False, highlight=False, soft_wrap=True)
+    weight, kinds = np.zeros(len(sample.r)), np.unique(sample.kind)
+    for fold in range(FOLDS):
+        away = np.isin(sample.kind, kinds[fold::FOLDS])
+        if away.all() or not away.any():
+            continue
+        weight[away] = expit(sample.select(away).terms @ fit_weight(sample.select(~away)))
+    rows = {
+        "motion alone": sample.r[:, 0], "positions alone": sample.r[:, -1], "the better of both": sample.better,
+        "the best weight": sample.r.max(axis=1), "fitted": sample.reached(expit(sample.terms @ coefficients)),
+        "fitted, kinds left out in turn": sample.reached(weight),
+    }  # fmt: skip
+    for name, r in rows.items():
+        lost = sample.better - r
+        console.print(
+            f"{name}: mean r {np.mean([r[sample.kind == kind].mean() for kind in kinds]):.4f}, worse than the better "
+            f"part by more than {EXCESS} in {100.0 * np.mean(lost > EXCESS):.1f} % of {len(r)} frames, at most by "
+            f"{max(lost.max(), 0.0):.3f}", highlight=False, soft_wrap=True,
+        )  # fmt: skip
+
+
+def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array]]:
+    """Terms (t,) and correlations (11,) of the frames of hard grains under a known load."""
+    sequence, found = solution.sequence, []
+    if sequence.settings.soft or not sequence.packing.scale_is_known:
+        return []
+    estimates = PositionEstimates(sequence.packing, sequence.snapshots, sequence.settings.posterior, 1)
+    for k in range(FIRST, len(solution.unchecked), STRIDE):
+        frame, positions = solution.unchecked[k], estimates.at(k)
+        if positions is None or not positions.fn.any() or not frame.fn.any():
+            continue
+        noise = float(np.hypot(sequence.snapshots[k].sigma, sequence.settings.overlap or 0.0))
+        contacts, force = overlap_balance(sequence.packing, sequence.snapshots, k, noise)
+        motion = frame.contacts.key, frame.fn / frame.fn.sum()
+        geometry = positions.contacts.key, positions.fn / positions.fn.sum()
+        evidence = _with_agreement(solution.evidence[k], geometry, (contacts.key, force[:, 0]))
+        key, one, two = align(*motion, *geometry)
+        truth = true[k][0], true[k][1][:, 0]
+        r = [_correlate((key, (1.0 - w) * one + w * two), truth) for w in WEIGHTS]
+        found.append((position_weight_terms(evidence), np.array(r)))
+    return found
+
+
+def _with_agreement(evidence: Evidence, positions: tuple[Keys, Array], balance: tuple[Keys, Array]) -> Evidence:
+    return replace(evidence, position_agreement=_correlate(positions, balance))
+
+
+def _correlate(one: tuple[Keys, Array], two: tuple[Keys, Array]) -> float:
+    _, first, second = align(*one, *two)
+    return pearson(first, second)
