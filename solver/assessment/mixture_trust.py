@@ -164,7 +164,8 @@ def position_weight_terms(evidence: Evidence) -> Array:
     table = FITTED["position_weight"]
 
     def logarithm(value: float, default: float, limits: list[float]) -> float:
-        return math.log(float(np.clip(default if math.isnan(value) else value, *limits)))
+        low, high = limits
+        return math.log(min(max(default if math.isnan(value) else value, low), high))
 
     return np.array([
         1.0,

@@ -68,7 +68,7 @@ def sample_mixtures(
     """Solve scenarios by their motion alone, and mix every third frame with its position-only estimate."""
     motion = replace(plan, settings=(*plan.settings, "solver.positions=never"))
     found: list[tuple[str, Array, Array]] = []
-    cases = [(name, seed) for name in scenarios for seed in seeds]
+    cases: list[tuple[ScenarioName, int]] = [(name, seed) for name in scenarios for seed in seeds]
     for done, (name, seed) in enumerate(cases):
         progress("mixtures", done, len(cases))
         with TemporaryDirectory() as folder:
