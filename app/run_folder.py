@@ -24,6 +24,7 @@ from .experiment.reading.input_files import regular
 from .process.atomic import PART
 from .process.errors import InputError
 from .process.frame_range import ALL_FRAMES, FrameRange
+from .process.links import refuse_link
 from .process.lock import hold_folder
 from .process.progress import Progress, no_progress
 from .process.sources import hash_of_code
@@ -268,6 +269,8 @@ def hold_run(run: Run) -> Iterator[Run]:
     Raises RunError while another process works in the folder, and InputError where it belongs to another experiment.
     """
     refuse_foreign_folder(run.folder, run.experiment)
+    for name in (UNFINISHED, TRACKED):  # they are emptied
+        refuse_link(run.folder / name)
     with hold_folder(run.folder, run.notes.append):
         refuse_foreign_folder(run.folder, run.experiment)  # claimed meanwhile
         for part in (*run.folder.glob(f"*{PART}"), *(run.folder / UNFINISHED).rglob(f"*{PART}")):

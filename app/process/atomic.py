@@ -16,6 +16,7 @@ def replacing(file: Path) -> Iterator[Path]:
     """Give a temporary path to write to, which replaces `file` once the block ends without an error."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(file.name + PART)
+    part.unlink(missing_ok=True)  # of a process that was killed; or a link, through which it would be written elsewhere
     try:
         yield part
         os.replace(part, file)

@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from .errors import RunError
+from .links import refuse_link
 
 try:
     import fcntl
@@ -120,7 +121,8 @@ if hasattr(os, "register_at_fork"):
 def _take(lock: Path) -> tuple[int, Holder | None]:
     """Open a lock and write the current process into it; return the dead process that left the lock, if any."""
     while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+        refuse_link(lock)  # what it leads to would be emptied
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
         try:
             locked = _lock(handle)
             if fcntl is not None and os.fstat(handle).st_nlink == 0:  # its holder has just removed it

@@ -21,7 +21,7 @@ from http.cookies import CookieError, SimpleCookie
 from http.server import ThreadingHTTPServer
 from typing import Any
 
-from .connections import BACKLOG, Connections
+from .connections import BACKLOG, Connections, is_other_user
 
 CONTENT_POLICY = "; ".join(
     (
@@ -53,6 +53,9 @@ class QuietServer(ThreadingHTTPServer):
         super().__init__(*arguments, **more)
 
     def process_request(self, request: Any, client_address: Any) -> None:
+        if is_other_user(client_address, self.server_address[1]):  # before it takes the place of the owner's
+            self.shutdown_request(request)
+            return
         self.known.opened(client_address, lambda: _end(request))
         super().process_request(request, client_address)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import os
 import subprocess
 import tempfile
 import time
@@ -19,6 +20,7 @@ from rerun.experimental import ViewerClient
 
 from ..look.entities import ROOT_CONTAINER
 from ..parts import parts_of
+from .connections import users_of_listeners
 from .plain_window import TOP_BAR, contents_of, erase_buttons, path_of, without_panels
 from .viewer import free_port, viewer_binary, viewer_environment
 
@@ -210,9 +212,17 @@ class HeadlessViewer:
                 client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
                 client.get_state()
                 self._client = client
+            if self._client is not None:
+                self._refuse_other_user(port)
                 return
             time.sleep(0.1)
         raise NoPictureError(f"the viewer did not answer within {START_SECONDS:g} s")
+
+    def _refuse_other_user(self, port: int) -> None:
+        """Raise NoPictureError where the port is not the viewer's: another user took it and would draw the pictures."""
+        listening = users_of_listeners(port)
+        if self._process is None or self._process.poll() is not None or (listening and listening != {os.geteuid()}):
+            raise NoPictureError(f"port {port} was taken by another program before the viewer had it: try again")
 
     def _open(self) -> None:
         # One by one: the viewer does not answer while it loads a long part.

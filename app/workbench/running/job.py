@@ -96,18 +96,10 @@ class Job:
             if self.is_running:
                 return
             self._forget_last()
-            command = [
-                *PROGRAM,
-                "run",
-                str(self.experiment),
-                "--out",
-                str(self.results),
-                "--progress",
-                "lines",
-                *options,
-            ]
+            command = [*PROGRAM, *self._arguments, "--progress", "lines", *options]
             self.place.mkdir(exist_ok=True)
-            with (self.place / OUTPUT).open("wb") as output:
+            (self.place / OUTPUT).unlink(missing_ok=True)  # another name of it, if any, keeps its content
+            with (self.place / OUTPUT).open("xb") as output:
                 self.process = subprocess.Popen(
                     command, cwd=self.root, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                     start_new_session=True,
@@ -116,6 +108,10 @@ class Job:
             write_atomically(self.place / PROCESS, json.dumps(values).encode())
             self._set_state(JobState.RUNNING)
             threading.Thread(target=self._read_output, args=(self.process,), daemon=True).start()
+
+    @property
+    def _arguments(self) -> tuple[str, ...]:
+        return "run", str(self.experiment), "--out", str(self.results)
 
     @property
     def is_running(self) -> bool:
@@ -134,6 +130,8 @@ class Job:
             except (OSError, ValueError, TypeError, AttributeError, KeyError):
                 return
             if results != str(self.results) or not holder.is_near or not holder.is_alive:
+                return
+            if not _is_run(holder.process, self._arguments):  # the file may have come with the folder
                 return
             self._forget_last()
             self.found = holder
@@ -247,3 +245,16 @@ class Job:
     def _set_state(self, state: JobState) -> None:
         self.state = state
         self.version += 1
+
+
+def _is_run(process: int, arguments: tuple[str, ...]) -> bool:
+    """Whether a process is a run of this user with these arguments: only such a one may be ended from here."""
+    place = Path("/proc") / str(process)
+    if (place.parent / "self").exists():
+        try:
+            mine = not hasattr(os, "geteuid") or place.stat().st_uid == os.geteuid()
+            return mine and "\0".join(arguments).encode() in (place / "cmdline").read_bytes()
+        except OSError:  # it has ended
+            return False
+    listed = subprocess.run(["ps", "-o", "command=", "-p", str(process)], capture_output=True, text=True, check=False)
+    return " ".join(arguments) in listed.stdout

@@ -8,7 +8,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from ...recording.viewing.connections import DEADLINE, Connections
+from ...recording.viewing.connections import DEADLINE, Connections, is_other_user
 
 BODY_DEADLINE = 30.0  # [s] without data of a body
 
@@ -24,7 +24,9 @@ class HttpConnection(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        if self.client is not None:
+        if self.client is not None and self.server is not None and is_other_user(self.client, self.server[1]):
+            transport.abort()  # before it takes the place of the owner's
+        elif self.client is not None:
             self._known.opened(self.client, transport.abort)
             self.loop.call_later(DEADLINE, self._known.close_expired)
         self._watch()

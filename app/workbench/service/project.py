@@ -22,6 +22,7 @@ from ...experiment.units import Scale
 from ...out_of_date import recording_out_of_date
 from ...prediction import measure_photographs
 from ...process.errors import InputError
+from ...process.links import refuse_links
 from ...results.manifest import MANIFEST
 from ...reviewing.reviewed_run import ReviewedRun
 from ...reviewing.session import ReviewSession
@@ -90,6 +91,11 @@ class Project:
     def key(self) -> str:
         """The experiment in requests: its path from the root."""
         return self.folder.relative_to(self.root).as_posix()
+
+    def refuse_links(self) -> None:
+        """Raise InputError where files of the program's own, in the experiment or its run, are links to the outside."""
+        refuse_links(self.folder / PLACE, self.root)
+        refuse_links(self.run_folder, self.root if self._run is None else self._run)
 
     def validation(self) -> ValidationResult:
         """Validate the files; they are read again only where one has changed."""

@@ -58,7 +58,9 @@ class Workbench:
         with self._lock:
             if key not in self._projects:
                 self._projects[key] = Project(self.root, folder, self.run if folder == self.root else None)
-            return self._projects[key]
+            found = self._projects[key]
+        found.refuse_links()
+        return found
 
     def close(self) -> None:
         """Pause every run; the same command resumes it."""

@@ -1,0 +1,46 @@
+"""Links in folders of the program's own files: it makes none, and follows none that lead elsewhere."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import InputError
+
+
+def refuse_links(folder: Path, root: Path) -> None:
+    """Raise InputError where a folder of the program's own files holds a link, or is one, that leads outside of a root.
+
+    Hidden folders in it, and `contents`, are searched, too; files in them are replaced, not written to.
+    """
+    for place in (folder, *_links(folder)):
+        if place.is_symlink() and not _is_inside(place, root):
+            raise InputError(place, "", f"is a link that leads outside of {root}: remove it")
+
+
+def refuse_link(place: Path) -> None:
+    """Raise InputError for a link in the place of a file or folder of the program's own."""
+    if place.is_symlink():
+        raise InputError(place, "", "is a link, and belongs to the program: remove it")
+
+
+def _links(folder: Path) -> Iterator[Path]:
+    try:
+        with os.scandir(folder) as found:
+            entries = list(found)
+    except OSError:  # it is missing, or may not be read
+        return
+    for each in entries:
+        if each.is_symlink():
+            yield Path(each.path)
+        elif (each.name.startswith(".") or each.name == "contents") and each.is_dir(follow_symlinks=False):
+            with os.scandir(each.path) as inner:
+                yield from (Path(one.path) for one in inner if one.is_symlink())
+
+
+def _is_inside(place: Path, root: Path) -> bool:
+    try:
+        return place.resolve().is_relative_to(root.resolve())
+    except (OSError, RuntimeError):  # links in a circle
+        return False
