@@ -24,7 +24,7 @@ class HttpConnection(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        if self.client is not None and self.server is not None and is_other_user(self.client, self.server[1]):
+        if self.client is not None and self.server is not None and is_other_user(self.client, self.server[1] or 0):
             transport.abort()  # before it takes the place of the owner's
         elif self.client is not None:
             self._known.opened(self.client, transport.abort)
