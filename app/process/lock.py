@@ -121,7 +121,7 @@ if hasattr(os, "register_at_fork"):
 def _take(lock: Path) -> tuple[int, Holder | None]:
     """Open a lock and write the current process into it; return the dead process that left the lock, if any."""
     while True:
-        refuse_link(lock)  # what it leads to would be emptied
+        refuse_link(lock)  # the file at its end would be emptied
         handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
         try:
             locked = _lock(handle)

@@ -99,7 +99,7 @@ def users_of_listeners(port: int, tables: Path = TABLES) -> set[int]:
 
 
 def user_of_connection(client: Address, port: int, tables: Path = TABLES) -> int | None:
-    """Return the id of the user whose program opened a connection over 127.0.0.1; None where the system does not say.
+    """Return the id of the user whose program opened a connection over 127.0.0.1; None where it is unknown.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def user_of_connection(client: Address, port: int, tables: Path = TABLES) -> int
 
 
 def _diagnosed_user(address: bytes, client_port: int, port: int) -> int | None:
-    """Ask the kernel for one connection, which takes the same time however many there are. Raises OSError."""
+    """Look one connection up in the kernel, in the same time however many there are. Raises OSError."""
     connection = struct.pack("!HH16s16sI", client_port, port, address, SERVED, 0) + NO_COOKIE
     request = struct.pack("=BBBBI", socket.AF_INET, socket.IPPROTO_TCP, 0, 0, 0xFFFFFFFF) + connection
     header = struct.pack("=IHHII", 16 + len(request), SOCK_DIAG_BY_FAMILY, NLM_F_REQUEST, 0, 0)
