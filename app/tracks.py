@@ -81,6 +81,15 @@ class Tracks:
         ),
     ] = None  # no boundary grains
 
+    fringes: Annotated[
+        Array | None,
+        Quantity(
+            "squared brightness gradient integrated over the disc, G², over the squared light; NaN: not read",
+            dims="frame grain",
+            since=2,
+        ),
+    ] = None  # no photoelastic photographs
+
     def __post_init__(self) -> None:
         f, n = len(self.time), len(self.id)
         if self.position.shape != (f, n, 2):
@@ -88,7 +97,7 @@ class Tracks:
         for name in ("rotation", "sigma", "zncc", "status"):
             if getattr(self, name).shape != (f, n):
                 raise ValueError(f"{name} must be ({f}, {n}), not {getattr(self, name).shape}")
-        for name in ("second_zncc", "reference_frame"):
+        for name in ("second_zncc", "reference_frame", "fringes"):
             value = getattr(self, name)
             if value is not None and value.shape != (f, n):
                 raise ValueError(f"{name} must be ({f}, {n}), not {value.shape}")
@@ -174,7 +183,7 @@ class Tracks:
             None if self.second_zncc is None else self.second_zncc[part],
             None if self.reference_frame is None else self.reference_frame[part],
             None if self.failed_reason is None else self.failed_reason[part],
-            self.inferred, self.boundary,
+            self.inferred, self.boundary, None if self.fringes is None else self.fringes[part],
         )  # fmt: skip
 
 

@@ -86,6 +86,19 @@ class Experiment:
         assert section is not None
         return self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
 
+    def fringe_photographs(self) -> Photographs | None:
+        """Return the photographs in which fringes are read, one for every photograph; None: not given."""
+        section = self.config.photographs
+        if section is None or section.fringes is None:
+            return None
+        if section.fringes == "same":
+            return self.photographs(section.fringe_channel)
+        pattern = section.fringes
+        self.inputs.refuse_outside(Path(os.path.normpath(self.folder / pattern)))
+        files = self.inputs.listed(pattern, lambda: Photographs.matching(self.folder, pattern).files)
+        selection = ImageSelection(section.fringe_channel)
+        return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, selection=selection)
+
     def table(self, name: str, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
         """Read a table of the experiment's folder. Raises InputError with file, row and value."""
         return read_table(self.folder / name, columns, self.inputs, optional)
@@ -109,7 +122,12 @@ class Experiment:
         if config.boundary:
             names += [config.boundary.periodic, None if config.boundary.found else config.boundary.grains]
         files = [self.folder / name for name in names if name is not None]
-        return files + (list(self.photographs().files) if config.photographs else [])
+        if config.photographs:
+            files += self.photographs().files
+            if config.photographs.fringes not in (None, "same"):
+                fringes = self.fringe_photographs()
+                files += () if fringes is None else fringes.files
+        return files
 
 
 def load_experiment(path: Path, settings: Sequence[str] = (), *, root: Path | None = None) -> Experiment:

@@ -18,6 +18,7 @@ from ..solver.calibration.equations import rotate_offsets
 from ..solver.calibration.grain_errors import find_grain_errors
 from ..solver.contacts.verdicts import NO_VERDICTS
 from ..solver.frame_forces import FrameForces, FrameStatus
+from ..solver.mixture.fringe_evidence import calibrate_sequence_fringes
 from ..solver.mixture.position_estimates import frame_generator
 from ..solver.posterior.frame_posterior import FramePosterior, infer_frame
 from ..solver.posterior.sequence_evidence import SequenceEvidence
@@ -98,7 +99,8 @@ def _sample(
     sequence: CorrectedSequence, evidence: SequenceEvidence, gap_sd: np.ndarray | None
 ) -> FramePosterior | None:
     """Sample the posterior of the first frame; gap_sd (c,) [m]: remaining errors of its gaps."""
-    first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS))
+    evidence, fringes = calibrate_sequence_fringes(evidence, sequence.settings.workers)
+    first = evidence.of_frame(0, verdicts=sequence.verdicts.get(0, NO_VERDICTS), fringes=fringes)
     if first.contacts.count == 0:
         return None
     if gap_sd is not None:

@@ -105,7 +105,8 @@ def _with_first_frame(
             sequence.packing, sequence.snapshots, sequence.settings, posterior, reason,
             verdicts=sequence.verdicts, failed=sequence.failed,
         )  # fmt: skip
-        if sequence.settings.soft and not sequence.packing.scale_is_known:
+        fringed = sequence.tracks.fringes is not None  # they determine the scale of every frame by themselves
+        if sequence.settings.soft and not sequence.packing.scale_is_known and not fringed:
             forces = _on_scale_of(frames[0], forces)
         forces = _limit_by_second(with_remarks(sequence, forces), frames)
         summary = summarise_frame(sequence, forces)

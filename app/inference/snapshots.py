@@ -23,7 +23,7 @@ def make_snapshots(tracks: Tracks, walls: WallTracks) -> list[Snapshot]:
         Snapshot(
             float(tracks.time[k]), tracks.position[k], rotation[k], present[k], walls.endpoints[k],
             float(sigma[k]), walls.side, walls.load_at(k), None if walls.cell is None else walls.cell[k],
-            walls.plate,
+            walls.plate, None if tracks.fringes is None else tracks.fringes[k],
         )
         for k in range(tracks.frame_count)
     ]  # fmt: skip

@@ -34,6 +34,7 @@ from .detection.channels import count_discs, is_coloured
 from .detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from .detection.false_detections import describe_channels, describe_false_detections
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
+from .fringes import measure_fringes
 from .registration.manual_poses import ManualPoses
 from .report.page import TrackingReportData
 from .settings import TrackingSettings
@@ -136,7 +137,11 @@ def track_photographs(
     )  # fmt: skip
     failed = enumerate(tracks.failed_reason or ())
     reasons = tuple("; ".join(filter(None, (reason, missing_walls.get(k)))) for k, reason in failed)
-    return replace(tracks, failed_reason=reasons), walls, tables
+    tracks = replace(tracks, failed_reason=reasons)
+    polarised = experiment.fringe_photographs()
+    if polarised is not None:
+        tracks = replace(tracks, fringes=measure_fringes(polarised, tracks, scale, progress))
+    return tracks, walls, tables
 
 
 def track_first(

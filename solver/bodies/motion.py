@@ -31,6 +31,7 @@ class Snapshot:
     load: Float[Array, " w"] | None = None  # [N] measured loads of walls, NaN: not measured; None: none measured
     cell: Float[Array, "2 2"] | None = None  # [m] vectors of the periodic cell, in place of walls
     plate: Int32[np.ndarray, " w"] | None = None  # loaded wall that each is fixed to, as in Walls; None: none is fixed
+    fringes: Float[Array, " n"] | None = None  # squared brightness gradient of photoelastic discs, NaN: not read
 
     @property
     def walls(self) -> Walls:

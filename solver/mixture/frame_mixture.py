@@ -15,9 +15,11 @@ from ..bodies.grains import Array
 from ..contacts.contacts import Contacts
 from ..contacts.pairs import match_values
 from ..posterior.frame_posterior import FramePosterior
+from ..statistics.agreement import pearson
 from .field_mixing import ForceField, mix_fields
 
 HALF_WEIGHT_OVERLAP = 0.6  # overlap over the neighbours' displacement at which motion has half the weight
+FEWEST_DISCS, LEAST_CORRELATION = 20, 0.3  # discs whose pressures are compared; of fringes and true pressures
 MIN_OFFERED_PROBABILITY = 0.3  # P(bears) above which a pair is added to the network of the motion estimate
 
 
@@ -131,6 +133,37 @@ def motion_weight(overlap: float, moved: float) -> float:
     weight = 1/(1 + (overlap/(0.6 moved))²).
     """
     return 1.0 / (1.0 + (overlap / (HALF_WEIGHT_OVERLAP * moved)) ** 2) if moved > 0.0 else 0.0
+
+
+def limit_by_fringes(reliability: float, contacts: Contacts, fn: Array, positions: FramePosterior) -> float:
+    """Limit the reliability of the motion estimate to the agreement of its pressures with the fringes.
+
+    Parameters
+    ----------
+    reliability : float
+        Correlation with the truth that the motion estimate claims; NaN stays.
+    contacts : Contacts
+        Contacts (c) of the motion estimate.
+    fn : (c,)
+        Its normal forces [N].
+    positions : FramePosterior
+        With the fringes that it has used.
+
+    Notes
+    -----
+    Errors of both are independent: the correlation of pressures is the product of those with the truth.
+    """
+    if positions.fringes is None or np.isnan(reliability):
+        return reliability
+    measured = positions.fringes.pressure
+    pressure, between = np.zeros(len(measured)), ~contacts.with_wall
+    np.add.at(pressure, contacts.i, fn)
+    np.add.at(pressure, contacts.j[between], fn[between])
+    known = np.isfinite(measured)
+    if known.sum() < FEWEST_DISCS:
+        return reliability
+    agreement = pearson(pressure[known], measured[known]) / max(positions.fringes.correlation, LEAST_CORRELATION)
+    return min(reliability, float(np.clip(agreement, 0.0, 1.0)))
 
 
 def overlap_scale(positions: FramePosterior, total: float, unit: float) -> float:

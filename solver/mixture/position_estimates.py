@@ -13,8 +13,10 @@ from ..bodies.motion import Snapshot
 from ..bodies.packing import Packing
 from ..contacts.verdicts import NO_VERDICTS, Verdicts
 from ..posterior.frame_posterior import FramePosterior, infer_frame
+from ..posterior.fringe_calibration import FringeCalibration
 from ..posterior.posterior_settings import PosteriorSettings
 from ..posterior.sequence_evidence import SequenceEvidence, gather_position_evidence
+from .fringe_evidence import calibrate_sequence_fringes
 
 SEED = 0  # of the draws, with the number of the frame: the same bits for any order of requests
 
@@ -52,6 +54,7 @@ class PositionEstimates:
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._evidence: SequenceEvidence | None = None
         self._span = span
+        self._fringes: FringeCalibration | None = None
         self._known: dict[int, FramePosterior | None] = dict(given or {})
 
     def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
@@ -63,13 +66,19 @@ class PositionEstimates:
             self._known = {k: self._infer(k, verdicts)}
         return self._known[k]
 
+    @property
+    def fringes(self) -> FringeCalibration | None:
+        """Calibration of the fringes, once a frame has been estimated; None: no photoelastic photographs."""
+        return self._fringes
+
     def _infer(self, k: int, verdicts: Verdicts) -> FramePosterior | None:
         if self._evidence is None:
             try:
                 self._evidence = gather_position_evidence(self._packing, self._snapshots, self._settings)
             except ValueError:  # no two bodies are near
                 return None
-        evidence = self._evidence.of_frame(k, verdicts=verdicts)
+            self._evidence, self._fringes = calibrate_sequence_fringes(self._evidence, self._workers)
+        evidence = self._evidence.of_frame(k, verdicts=verdicts, fringes=self._fringes)
         if evidence.contacts.count == 0:
             return None
         return infer_frame(evidence, self._evidence.settings, frame_generator(k), self._workers)

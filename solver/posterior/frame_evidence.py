@@ -26,6 +26,10 @@ class FrameEvidence:
     # At the packing's edge, outside forces are not among the pairs, but are as large as forces between grains.
     edge: Bool[np.ndarray, " n"] | None = None  # None: no grain
     gap_sd: Float[Array, " c"] | None = None  # [m] standard deviation of an error of this gap alone; None: none
+    pressure: Float[Array, " n"] | None = None  # [N] measured sum of a grain's normal forces; NaN: not measured
+    pressure_sd: Float[Array, " n"] | None = None  # [N]
+    pressure_scale: float = np.nan  # of the measured pressures over one unit of all frames; NaN: forces have a scale
+    pressure_correlation: float = np.nan  # of the measured pressures with the true ones
 
     @property
     def diameter(self) -> float:

@@ -26,6 +26,15 @@ COVERAGE_FACTOR = 2.2
 
 
 @dataclass(frozen=True, slots=True)
+class FringeEvidence:
+    """Pressures of discs by their fringes, which a posterior has used."""
+
+    pressure: Float[Array, " n"]  # [N] sum of the normal forces on a disc, NaN: not measured
+    scale: float  # of these pressures over one unit of all frames; NaN: a load or weight determines the scale
+    correlation: float  # with the true pressures, by the scatter about the curve
+
+
+@dataclass(frozen=True, slots=True)
 class FramePosterior:
     """Means over the draws of all chains, with standard deviations.
 
@@ -47,6 +56,9 @@ class FramePosterior:
     offset_sd: float  # [m]
     trust: float  # correlation with the truth that the posterior itself expects
     agreement: float  # correlation of two chains; NaN with one
+    pressure: Float[Array, " n"]  # [N] sum of the normal forces on a grain
+    pressure_sd: Float[Array, " n"]  # [N] over the draws
+    fringes: FringeEvidence | None = None  # None: no photoelastic photographs
 
 
 def infer_frame(
@@ -111,7 +123,16 @@ def _summarise(evidence: FrameEvidence, chains: list[ChainMeans]) -> FramePoster
         offset_sd=diameter * float(np.sqrt(max(offset2 - offset**2, 0.0))),
         trust=float(np.sqrt(between_pairs / total)) if total > 0.0 else 0.0,
         agreement=_agreement(chains),
+        pressure=unit * error[:, 4],
+        pressure_sd=unit * np.sqrt(np.maximum(error[:, 5] - error[:, 4] ** 2, 0.0)),
+        fringes=_fringes(evidence),
     )
+
+
+def _fringes(evidence: FrameEvidence) -> FringeEvidence | None:
+    if evidence.pressure is None:
+        return None
+    return FringeEvidence(evidence.pressure, evidence.pressure_scale, evidence.pressure_correlation)
 
 
 def _agreement(chains: list[ChainMeans]) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ..bodies.grains import Array
 from ..bodies.motion import Snapshot
@@ -23,6 +23,7 @@ from ..contacts.verdicts import NO_VERDICTS, Verdicts
 from .candidate_gaps import OPEN_REACH, find_candidate_gaps, pair_covariates
 from .error_variances import ErrorVariances, estimate_error_variances
 from .frame_evidence import FrameEvidence, KnownForces
+from .fringe_calibration import FringeCalibration
 from .gap_series import GapNoise, GapSeries
 from .posterior_settings import PosteriorSettings
 from .touching_gaps import TouchingGaps
@@ -32,6 +33,8 @@ FORCE_SD = 0.8  # standard deviation of contact forces over their mean
 SHARED_ERROR_SDS = 1.0  # mean touching gap over its standard deviation above which all gaps must share an error
 VARIANCE_FRAMES = 8  # photographs used to separate errors of radii from errors of centres
 REVIEWED_PRIOR = 0.99  # prior probability of bearing of a pair that a reviewer saw touch
+IGNORED_OVERLAP_SDS = 2.0**0.5  # centre errors over the standard deviation of touching gaps, without overlaps
+NO_COMPLIANCE = 1e-6  # mean diameters per force unit: overlaps that show no forces
 GAP_LAW_FRACTION = 0.12  # b over the centres' standard deviation: below it the sampler mixes badly
 
 
@@ -55,7 +58,12 @@ class SequenceEvidence:
     settings: PosteriorSettings  # with the standard deviations and reach of the sequence
 
     def of_frame(
-        self, k: int, *, wall_normal_total: float | None = None, verdicts: Verdicts = NO_VERDICTS
+        self,
+        k: int,
+        *,
+        wall_normal_total: float | None = None,
+        verdicts: Verdicts = NO_VERDICTS,
+        fringes: FringeCalibration | None = None,
     ) -> FrameEvidence:
         """Assemble the evidence of frame k.
 
@@ -67,6 +75,8 @@ class SequenceEvidence:
             Known sum [N] of f_n over all walls, used where neither a load nor weight is known.
         verdicts : Verdicts
             Reviewed pairs: forbidden ones are left out, forced ones have the prior probability REVIEWED_PRIOR.
+        fringes : FringeCalibration, optional
+            Curve by which the fringes of discs show their pressures.
         """
         packing, snapshot = self.packing.at_frame(self.snapshots, k), self.snapshots[k]
         walls = packing.walls_of(snapshot)
@@ -77,6 +87,8 @@ class SequenceEvidence:
         contacts = measure_pairs(packing.grains, snapshot.position, walls, self.key[rows])
         contacts = replace(contacts, gap=self.gap[k, rows])
         n = packing.grains.count
+        known = _known_forces(packing, walls, contacts, wall_normal_total)
+        pressure, pressure_sd = self._pressures(k, fringes)
         return FrameEvidence(
             contacts=contacts,
             prior=np.where(reviewed[rows], REVIEWED_PRIOR, self.touching.touching_fraction[k]),
@@ -86,8 +98,33 @@ class SequenceEvidence:
             radius_sd=np.full(n, self.radius_sd),
             balanced=snapshot.present & packing.grains.free,
             edge=None if packing.grains.boundary is None else snapshot.present & packing.grains.boundary,
-            known=_known_forces(packing, walls, contacts, wall_normal_total),
+            known=known,
+            pressure=pressure,
+            pressure_sd=pressure_sd,
+            pressure_scale=np.nan if fringes is None or known.scale_known else fringes.scale.get(k, 1.0),
+            pressure_correlation=np.nan if fringes is None else fringes.correlation,
         )
+
+    def without_overlaps(self) -> SequenceEvidence:
+        """Return the evidence in which gaps show which pairs are near, and not how strongly they press.
+
+        The variance of touching gaps is then all error of the centres.
+        """
+        error = np.maximum(self.centre_sd, IGNORED_OVERLAP_SDS * self.touching.sd)
+        settings = replace(self.settings, compliance=0.0, compliance_sd=NO_COMPLIANCE)
+        return replace(self, centre_sd=error, settings=settings)
+
+    def complete_discs(self, k: int) -> Bool[np.ndarray, " n"]:
+        """Mark the discs of frame k (n,) whose fringes count: present, and with all their forces among the pairs."""
+        packing, snapshot = self.packing.at_frame(self.snapshots, k), self.snapshots[k]
+        complete = snapshot.present & packing.grains.free
+        return complete if packing.grains.boundary is None else complete & ~packing.grains.boundary
+
+    def _pressures(self, k: int, fringes: FringeCalibration | None) -> tuple[Array | None, Array | None]:
+        seen = self.snapshots[k].fringes
+        if fringes is None or seen is None:
+            return None, None
+        return fringes.pressure(k, np.where(self.complete_discs(k), seen, np.nan))
 
 
 def gather_position_evidence(

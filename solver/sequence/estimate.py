@@ -21,7 +21,14 @@ from ..contacts.pairs import Keys, align, are_among
 from ..convex.ensemble_members import NormalisedSlip
 from ..detection.contact_networks import ThresholdNetwork
 from ..mixture.equilibrium_projection import project_mixed_field
-from ..mixture.frame_mixture import ForceEstimate, Mixture, mix_on_contacts, motion_weight, overlap_scale
+from ..mixture.frame_mixture import (
+    ForceEstimate,
+    Mixture,
+    limit_by_fringes,
+    mix_on_contacts,
+    motion_weight,
+    overlap_scale,
+)
 from ..nlgs.chain import ChainStep, advance_chain
 from ..nlgs.force_memory import ForceMemory
 from ..posterior.frame_posterior import FramePosterior
@@ -101,8 +108,14 @@ def estimate_frame(problem: FrameProblem, state: SequenceState) -> tuple[Estimat
         if offered.fn.any():
             evidence = gather_evidence(problem, offered, state)
             evidence = _with_agreements(problem, evidence, offered, posterior)
-            mixed = _mix(problem, offered, posterior, motion_reliability(evidence))
-            if problem.follows_overlap:
+            reliability = limit_by_fringes(motion_reliability(evidence), offered.contacts, offered.fn, posterior)
+            mixed = _mix(problem, offered, posterior, reliability)
+            if posterior.fringes is not None and np.isfinite(posterior.fringes.scale):
+                total = float(mixed.fn.sum())
+                mixed = mixed.scaled(
+                    float(posterior.fn.sum()) / total / posterior.fringes.scale if total > 0.0 else 1.0
+                )
+            elif problem.follows_overlap:
                 factor = overlap_scale(posterior, float(mixed.fn.sum()), state.overlap_unit)
                 mixed = mixed.scaled(factor)
             return mixed, _evidence_of_mixture(problem, mixed, evidence, state)
@@ -188,6 +201,8 @@ def _always_uses_positions(problem: FrameProblem) -> bool:
     """Whether the position-only estimate is used whatever the motion shows."""
     settings = problem.settings
     if settings.positions == "always" or settings.soft or not problem.motion.ends_here:
+        return True
+    if problem.snapshot.fringes is not None:  # evidence on every contact, which only that estimate uses
         return True
     # Loading without sliding looks like agreement, and no load contradicts it.
     return not problem.packing.scale_is_known

@@ -85,6 +85,7 @@ def make_case(*, scale_known: bool, soft: bool) -> Case:
         rng.uniform(0.01, 0.03, m), rng.uniform(0.01, 0.02, RADII),
         np.concatenate([[0], np.cumsum([len(each) for each in members])]), np.concatenate(members).astype(np.int64),
         np.array([1.5, 2.5]) if scale_known else np.empty(0),
+        rng.uniform(1.0, 4.0, m), np.where(np.arange(m) % 3 == 1, 0.0, rng.uniform(0.5, 4.0, m)),
     )  # fmt: skip
     expected = float((1.0 / (1.0 + np.exp(-odds))).sum())
     model = ModelParameters(
@@ -121,10 +122,16 @@ def assert_same(case: Case, state: SamplerState, plain: PlainState) -> None:
     assert state.common[2:] == pytest.approx([(state.fn[z] - 1.0).sum(), z.sum()], abs=ROUNDING)
     sums = resultants(case.pairs, case.grains, state.fn, state.ft)
     np.testing.assert_allclose(state.body[:, FX : TORQUE + 1], sums, atol=ROUNDING)
+    np.testing.assert_allclose(state.normal_sum, normal_sums(case.pairs, state.fn, len(sums)), atol=ROUNDING)
     np.testing.assert_array_equal(state.body[:, LEVER], case.grains.lever)
     np.testing.assert_array_equal(state.body[:, BALANCE_WEIGHT], case.grains.balance_weight)
     for g in range(len(case.grains.group_load)):
         assert state.group_sum[g] == pytest.approx(state.fn[case.pairs.group == g].sum(), abs=ROUNDING)
+
+
+def normal_sums(pairs: SamplerPairs, fn: np.ndarray, count: int) -> np.ndarray:
+    """Sum of the normal forces on every grain (m,)."""
+    return np.array([fn[(pairs.i == k) | (pairs.j == k)].sum() for k in range(count)])
 
 
 def weighed(case: Case, state: SamplerState):
@@ -142,7 +149,7 @@ def weighed(case: Case, state: SamplerState):
 def sampled_state(case: Case, sweeps: int = 3) -> SamplerState:
     """A state some sweeps after the start, with errors of all kinds."""
     state, count = case.start, len(case.pairs.gap)
-    sums = np.zeros((count, 5)), np.zeros((len(state.body), 4)), np.zeros(4)
+    sums = np.zeros((count, 5)), np.zeros((len(state.body), 6)), np.zeros(4)
     schedule = np.tile(np.array(case.model), (sweeps, 1))
     run(
         np.random.default_rng(5), case.pairs, case.grains, schedule, state, make_workspace(case.pairs, case.grains), 1,
@@ -157,7 +164,7 @@ def test_forces_bearing_and_gaps_have_the_plain_conditional_distributions(case):
     for _ in range(SWEEPS):
         plain, followed = case.plain.draw_contacts(two, plain_of(case, state))
         workspace = weighed(case, state)
-        draw_contacts(one, case.pairs, case.grains.group_load, case.model, workspace, state)
+        draw_contacts(one, case.pairs, case.grains, case.model, workspace, state)
         assert_same(case, state, plain)
         residual = np.where(state.bearing, state.common[0] * state.fn, -state.open_gap)
         np.testing.assert_allclose(workspace.observation[:, 1], case.pairs.gap - state.common[1] + residual)
@@ -221,18 +228,19 @@ def test_sweeps_follow_the_schedule_and_only_the_last_are_summed(case):
     models, kept = [looser, looser, case.model, case.model, case.model], 2
     state, plain = case.start, plain_of(case, case.start)
     count, m = len(case.pairs.gap), len(case.grains.lever)
-    sums = np.zeros((count, 5)), np.zeros((m, 4)), np.zeros(4)
+    sums = np.zeros((count, 5)), np.zeros((m, 6)), np.zeros(4)
     workspace = make_workspace(case.pairs, case.grains)
     one, two = np.random.default_rng(4), np.random.default_rng(4)
     run(one, case.pairs, case.grains, np.array(models), state, workspace, kept, sums)
-    pair, error, common = np.zeros((count, 5)), np.zeros((m, 4)), np.zeros(4)
+    pair, error, common = np.zeros((count, 5)), np.zeros((m, 6)), np.zeros(4)
     for k, model in enumerate(models):
         plain = PlainSampler(case.pairs, case.grains, model).sweep(two, plain)
         if k >= len(models) - kept:
             z = plain.bearing.astype(float)
             pair += np.column_stack([z, plain.fn, plain.ft, plain.fn**2, plain.ft**2])
             radius = np.tile(plain.radius, FRAMES)
-            error += np.column_stack([plain.centre, radius, radius**2])
+            pressure = normal_sums(case.pairs, plain.fn, m)
+            error += np.column_stack([plain.centre, radius, radius**2, pressure, pressure**2])
             common += [plain.compliance, plain.compliance**2, plain.offset, plain.offset**2]
     assert_same(case, state, plain)
     for found, expected in zip(sums, (pair, error, common), strict=True):

@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 
 from ...process.errors import InputError, RunError
-from ...synthetic.scenarios.preset_names import MeasuredPreset, PhotographedPreset, ScenarioName
+from ...synthetic.scenarios.preset_names import FringedPreset, MeasuredPreset, PhotographedPreset, ScenarioName
 from ..arguments import Quiet
 from ..terminal import progress_of
 
@@ -23,11 +23,12 @@ def synth(
     out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT", help="folder to write")],
     /,
     preset: Annotated[
-        PhotographedPreset | MeasuredPreset | ScenarioName,
+        PhotographedPreset | MeasuredPreset | FringedPreset | ScenarioName,
         tyro.conf.arg(
             help="small, paper and 1g2e can be photographed; 1g2e: the apparatus of the method's authors, with corner "
             "discs, a measured load and .0267° of shear a photograph; photoelastic: discs and their forces as PeGS "
-            "writes them, for rodsight import pegs; the others are scenarios of tracks: --no-photographs"
+            "writes them, for rodsight import pegs; fringes: photographs of such discs with their fringes; the others "
+            "are scenarios of tracks: --no-photographs"
         ),
     ] = "small",
     seed: Annotated[int, tyro.conf.arg(help="of the packing, its paint and its noise")] = 0,
@@ -74,7 +75,8 @@ def synth(
             )  # fmt: skip
         else:
             refused = {
-                "--photographs": photographs and preset != "photoelastic", "--frames": frame_count,
+                "--photographs": photographs and preset not in ("photoelastic", "fringes"),
+                "--frames": None if preset == "fringes" else frame_count,
                 "--step-degrees": step_degrees, "--pixel-size": pixel_size, "--jpeg-quality": jpeg_quality,
                 "--png": png, "--reversal": reversal, "--radius-error": radius_error,
             }  # fmt: skip
@@ -83,7 +85,12 @@ def synth(
                     raise InputError("synth", f"{option} with preset {preset}", "applies to photographed presets only")
             if preset == "photoelastic":
                 return _photoelastic(out, seed, grains, progress, quiet=quiet)
-            made = make_scenario(out, preset, seed, grains=grains, noise=noise, progress=progress)
+            if preset == "fringes":
+                from ...synthetic.photoelastic.fringe_photographs import make_fringed
+
+                made = make_fringed(out, seed, grains=grains, frames=frame_count, progress=progress)
+            else:
+                made = make_scenario(out, preset, seed, grains=grains, noise=noise, progress=progress)
     if not quiet:
         content = f"{len(made.truth.radius)} rods, {made.truth.frame_count} frames"
         Console().print(f"{out}: {content}. Next: rodsight run {out}", highlight=False)
@@ -91,7 +98,7 @@ def synth(
 
 
 def _photoelastic(out: Path, seed: int, grains: int | None, progress: Progress, *, quiet: bool) -> int:
-    from ...synthetic.photoelastic import make_photoelastic
+    from ...synthetic.photoelastic.pegs_files import make_photoelastic
 
     made = make_photoelastic(out, seed, grains=grains, progress=progress)
     if not quiet:

@@ -129,6 +129,14 @@ class PhotographsSection(Section):
         "for plain discs or for discs that change inside, such as photoelastic ones; their rotation stays unknown.",
         default="texture",
     )
+    fringes: str | None = key(
+        "Pattern of the photographs of the same discs through a polariser, one for every photograph, or same: the "
+        "photographs themselves. The squared brightness gradient of every disc is evidence for its pressure.",
+        default=None,
+    )
+    fringe_channel: Literal["grey", "red", "green", "blue"] = key(
+        "Channel of colour photographs in which fringes are sharp: that of the narrowest light.", default="green"
+    )
     max_pixels: Annotated[int, whole(1, 10**10)] = key(
         "Largest number of pixels in the header of a photograph, because a file of a few bytes can state any number.",
         unit="px",

@@ -44,6 +44,7 @@ def add_unseen(tracks: Tracks, walls: WallTracks, sizes: Array | None, overlap: 
         "second_zncc": np.full((f, u), np.nan),
         "reference_frame": np.zeros((f, u), np.int32),
         "boundary": np.zeros(u, np.bool_),
+        "fringes": np.full((f, u), np.nan),
     }
     given = {each.name: getattr(tracks, each.name) for each in fields(tracks)}
     extended = {

@@ -89,6 +89,9 @@ SOFT = LoadingPath(shear, 0.25, plates=("top",), settings=DemSettings(normal_sti
 SOFTER = replace(SOFT, settings=DemSettings(normal_stiffness=3e5))
 HEAP = DemSettings(pressure=float("nan"), gravity=(0.0, -9.81), normal_stiffness=2e6)
 DISCS = DemSettings(normal_stiffness=4e5, friction=0.3, wall_friction=0.3, base_friction=10.0)
+# Stiff discs, whose overlaps are smaller than the errors of tracked rims, loaded without sliding.
+FRINGED = LoadingPath(load_isotropically, 0.0, settings=DemSettings(friction=0.3), sizes=choose_two_radii)
+
 
 MOVED = LoadingPath(shear, 0.25, initial_shear=2.0, plates=("top",))  # the first photograph is like the others
 

@@ -22,7 +22,7 @@ class ChainMeans:
     """Means over the kept sweeps of one chain, dimensionless."""
 
     pair: Array  # (c, 5) of z, z f, z t, (z f)², (z t)²
-    error: Array  # (m, 4) of ε, δ, δ²
+    error: Array  # (m, 6) of ε, δ, δ², Σ f, (Σ f)²
     common: Array  # (4,) of κ, κ², offset, offset²
 
 
@@ -35,7 +35,7 @@ def run_chain(
 ) -> ChainMeans:
     """Run one sweep for each row of the schedule (sweeps, 11), from a state without errors."""
     state = initial_state(pairs, grains, settings.compliance)
-    sums = (np.zeros((len(pairs.i), 5)), np.zeros((len(state.body), 4)), np.zeros(4))
+    sums = (np.zeros((len(pairs.i), 5)), np.zeros((len(state.body), 6)), np.zeros(4))
     run(rng, pairs, grains, schedule, state, make_workspace(pairs, grains), settings.kept, sums)
     return ChainMeans(*(each / settings.kept for each in sums))
 
@@ -72,7 +72,21 @@ def make_sampler_grains(evidence: FrameEvidence) -> SamplerGrains:
         start=np.concatenate([[0], np.cumsum(np.bincount(grain, minlength=n))]).astype(np.int64),
         row=np.concatenate([rows, rows[~wall]])[order].astype(np.int64),
         group_load=evidence.known.total / evidence.known.unit,
+        **_measured_pressures(evidence),
     )
+
+
+def _measured_pressures(evidence: FrameEvidence) -> dict[str, Array]:
+    """Measured sums of normal forces in force units, with their inverse variances (n,)."""
+    if evidence.pressure is None or evidence.pressure_sd is None:
+        none = np.zeros(len(evidence.radius))
+        return {"pressure": none, "pressure_weight": none}
+    known = np.isfinite(evidence.pressure) & (evidence.pressure_sd > 0.0)
+    sd = np.where(known, evidence.pressure_sd / evidence.known.unit, 1.0)
+    return {
+        "pressure": np.where(known, evidence.pressure / evidence.known.unit, 0.0),
+        "pressure_weight": np.where(known, sd**-2.0, 0.0),
+    }
 
 
 def _balance_weight(evidence: FrameEvidence) -> Array:

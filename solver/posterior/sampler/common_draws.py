@@ -59,9 +59,11 @@ def draw_scale(rng, pairs, grains, model, state):  # type: ignore[no-untyped-def
     Notes
     -----
     The products κ f stay as they are, so that minus the logarithm of the posterior depends on x in closed form, with
-    p_i the weight of grain i, F_i and M_i the sums of the contact forces and torques on it, L_g the load of a group:
+    q_i the weight of grain i, F_i, M_i and P_i the sums of the contact forces, torques and normal forces on it, p_i and
+    v_i the measured P_i and its inverse variance, L_g the load of a group:
 
-        ½ x² (Σ_i w_i (|F_i|² + M_i²) + Σ_g w (Σ f)² + Σ t²/τ²) + x (Σ_i w_i F_i·p_i − Σ_g w L_g Σ f + λ Σ f)
+        ½ x² (Σ_i w_i (|F_i|² + M_i²) + Σ_i v_i P_i² + Σ_g w (Σ f)² + Σ t²/τ²)
+        + x (Σ_i w_i F_i·q_i − Σ_i v_i p_i P_i − Σ_g w L_g Σ f + λ Σ f)
         + K/(2c) (x Σ f − Σ z)² + (κ/x − κ_0)²/(2 σ_κ²) − q ln x,
 
     where q is the number of force components that are drawn less one, for κ: the Jacobian of the move. ln x is drawn
@@ -69,6 +71,7 @@ def draw_scale(rng, pairs, grains, model, state):  # type: ignore[no-untyped-def
     """
     bearing, fn, ft, friction, common = state.bearing, state.fn, state.ft, pairs.friction, state.common
     body, load, group_sum, group_load = state.body, grains.load, state.group_sum, grains.group_load
+    normal_sum, pressure, pressure_weight = state.normal_sum, grains.pressure, grains.pressure_weight
     w = 1.0 / model.balance_sd**2
     square = cross = total = 0.0
     exponent = -1.0
@@ -81,6 +84,8 @@ def draw_scale(rng, pairs, grains, model, state):  # type: ignore[no-untyped-def
         fx, fy, wg = body[g, FX] - load[g, 0], body[g, FY] - load[g, 1], w * body[g, BALANCE_WEIGHT]
         square += wg * (fx * fx + fy * fy + body[g, TORQUE] ** 2)
         cross += wg * (fx * load[g, 0] + fy * load[g, 1])
+        square += pressure_weight[g] * normal_sum[g] ** 2
+        cross -= pressure_weight[g] * pressure[g] * normal_sum[g]
     for g in range(len(group_sum)):
         square += w * group_sum[g] ** 2
         cross -= w * group_sum[g] * group_load[g]
@@ -110,5 +115,6 @@ def draw_scale(rng, pairs, grains, model, state):  # type: ignore[no-untyped-def
         body[g, FX] = load[g, 0] + scale * (body[g, FX] - load[g, 0])
         body[g, FY] = load[g, 1] + scale * (body[g, FY] - load[g, 1])
         body[g, TORQUE] *= scale
+        normal_sum[g] *= scale
     for g in range(len(group_sum)):
         group_sum[g] *= scale

@@ -26,10 +26,11 @@ def weigh_contacts(pairs, grains, model, workspace):  # type: ignore[no-untyped-
         i, j, own = pairs.i[c], pairs.j[c], pairs.gap_sd[c]
         b = model.gap_law_sd if own == 0.0 else math.sqrt(model.gap_law_sd * model.gap_law_sd + own * own)
         wi, li = w * grains.balance_weight[i], grains.lever[i]
-        a, at = wi + model.mean_gauge / len(coefficients), tangential + wi * (1.0 + li * li)
+        a = wi + grains.pressure_weight[i] + model.mean_gauge / len(coefficients)
+        at = tangential + wi * (1.0 + li * li)
         if j >= 0:
             wj, lj = w * grains.balance_weight[j], grains.lever[j]
-            a += wj
+            a += wj + grains.pressure_weight[j]
             at += wj * (1.0 + lj * lj)
         if pairs.group[c] >= 0:
             a += w * (pairs.factor[c] * pairs.factor[c])
@@ -39,7 +40,7 @@ def weigh_contacts(pairs, grains, model, workspace):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def draw_contacts(rng, pairs, group_load, model, workspace, state):  # type: ignore[no-untyped-def]
+def draw_contacts(rng, pairs, grains, model, workspace, state):  # type: ignore[no-untyped-def]
     """Draw z, f, t and γ of contact after contact; leave the gap residuals at ε = δ = 0 in workspace.observation.
 
     Notes
@@ -47,11 +48,11 @@ def draw_contacts(rng, pairs, group_load, model, workspace, state):  # type: ign
     Given all else, and without Coulomb's bound, f and t of a bearing contact are independent Gaussians of logarithms
     −½ A f² + B f (f ≥ 0) and −½ A_t t² + B_t t, where F_k, M_k are the sums on grain k without this contact, l_k its
     radius over the mean radius, e = Σ z (f − 1) and N = Σ z the sums over the other contacts, c the number of pairs,
-    S the sum of the other forces of the group times their factors, L its load, a the factor of this one (terms with j
-    only between grains, with S and a only in a group):
+    S the sum of the other forces of the group times their factors, L its load, a the factor of this one, P_k the sum of
+    the other normal forces on grain k (terms with j only between grains, with S and a only in a group):
 
-        A   = w_i + w_j + w a² + K/c + κ²/b²
-        B   = n·(w_i F_i − w_j F_j) − κ h/b² − w a (S − L) − K (e − 1)/c − λ
+        A   = w_i + w_j + v_i + v_j + w a² + K/c + κ²/b²
+        B   = n·(w_i F_i − w_j F_j) − v_i (P_i − p_i) − v_j (P_j − p_j) − κ h/b² − w a (S − L) − K (e − 1)/c − λ
         A_t = w_i (1 + l_i²) + w_j (1 + l_j²) + 1/τ²
         B_t = t̂·(w_i F_i − w_j F_j) + w_i l_i M_i + w_j l_j M_j
 
@@ -68,7 +69,8 @@ def draw_contacts(rng, pairs, group_load, model, workspace, state):  # type: ign
     first, second, normal, gap = pairs.i, pairs.j, pairs.normal, pairs.gap
     prior, friction, group, factor = pairs.odds, pairs.friction, pairs.group, pairs.factor
     state_bearing, state_fn, state_ft, open_gap = state.bearing, state.fn, state.ft, state.open_gap
-    body, group_sum = state.body, state.group_sum
+    body, group_sum, group_load = state.body, state.group_sum, grains.group_load
+    normal_sum, pressure, pressure_weight = state.normal_sum, grains.pressure, grains.pressure_weight
     coefficients, observation = workspace.coefficients, workspace.observation
     kappa, offset, excess, count = state.common
     w, open_rate, tangential_sd = 1.0 / model.balance_sd**2, 1.0 / model.mean_open_gap, model.tangential_sd
@@ -86,8 +88,10 @@ def draw_contacts(rng, pairs, group_load, model, workspace, state):  # type: ign
         rx, ry, rm = body[i, FX] + fx, body[i, FY] + fy, body[i, TORQUE] + li * old_ft
         h = gap[c] - offset + nx * body[i, CX] + ny * body[i, CY] - body[i, DELTA]
         b, bt = wi * (rx * nx + ry * ny), wi * (ry * nx - rx * ny + li * rm)
+        b -= pressure_weight[i] * (normal_sum[i] - old_fn - pressure[i])
         lj = 0.0
         if j >= 0:
+            b -= pressure_weight[j] * (normal_sum[j] - old_fn - pressure[j])
             wj, lj = w * body[j, BALANCE_WEIGHT], body[j, LEVER]
             rx, ry, rm = body[j, FX] - fx, body[j, FY] - fy, body[j, TORQUE] + lj * old_ft
             h -= nx * body[j, CX] + ny * body[j, CY] + body[j, DELTA]
@@ -142,7 +146,9 @@ def draw_contacts(rng, pairs, group_load, model, workspace, state):  # type: ign
             body[i, FX] -= fx
             body[i, FY] -= fy
             body[i, TORQUE] -= li * dt
+            normal_sum[i] += dn
             if j >= 0:
+                normal_sum[j] += dn
                 body[j, FX] += fx
                 body[j, FY] += fy
                 body[j, TORQUE] -= lj * dt

@@ -14,6 +14,7 @@ is the corrected gap, and minus the logarithm of the posterior is the sum of
     balance   Σ_i w_i/2 (|ΣF_i|² + (ΣM_i)²) + Σ_groups w/2 (Σ f − L)²
     bearing   (h + κ f)²/(2 b²) + λ f + t²/(2 τ²) + ln(√(2π) τ) − ln P,   f ≥ 0, |t| ≤ μ f
     open      (h − γ)²/(2 b²) + γ/ℓ + ln ℓ − ln(1 − P),                   γ ≥ 0
+    pressure  Σ_i v_i/2 (Σ f − p_i)², p_i the measured sum of the normal forces on grain i, v_i its inverse variance
     errors    Σ |ε|²/(2 σ_c²) + Σ δ²/(2 σ_r²) + o²/(2 σ_o²) + (κ − κ_0)²/(2 σ_κ²),   κ ≥ 0
     gauge     K/(2c) (Σ z (f − 1))² + K_N/(2c) (Σ z − Σ P)²
 
@@ -35,7 +36,8 @@ def run(rng, pairs, grains, schedule, state, workspace, kept, sums):  # type: ig
     """Run one sweep for each row of the schedule (sweeps, 11) and add up the last `kept` states.
 
     A sweep draws (z, f, t, γ) of every pair in order, (δ, ε) of every grain in order, κ, o, and the scale of forces.
-    sums out: of z, z f, z t, (z f)², (z t)² (c, 5); of ε, δ and δ² (m, 4); of κ, κ², o, o² (4,).
+    sums out: of z, z f, z t, (z f)², (z t)² (c, 5); of ε, δ, δ², Σ f and (Σ f)² (m, 6); of κ, κ², o, o²
+    (4,).
     """
     discarded = len(schedule) - kept
     for k in range(len(schedule)):
@@ -44,7 +46,7 @@ def run(rng, pairs, grains, schedule, state, workspace, kept, sums):  # type: ig
         if k == 0 or (a != schedule[k - 1]).any():
             weigh_contacts(pairs, grains, model, workspace)
             factorize_errors(grains, model, workspace)
-        draw_contacts(rng, pairs, grains.group_load, model, workspace, state)
+        draw_contacts(rng, pairs, grains, model, workspace, state)
         draw_errors(rng, grains, workspace, state)
         draw_common(rng, pairs, model, workspace, state)
         draw_scale(rng, pairs, grains, model, state)
@@ -55,7 +57,7 @@ def run(rng, pairs, grains, schedule, state, workspace, kept, sums):  # type: ig
 @njit(cache=True, nogil=True)
 def _add(state, sums):  # type: ignore[no-untyped-def]
     by_pair, by_grain, shared = sums
-    bearing, fn, ft, body = state.bearing, state.fn, state.ft, state.body
+    bearing, fn, ft, body, normal_sum = state.bearing, state.fn, state.ft, state.body, state.normal_sum
     for c in range(len(bearing)):
         if bearing[c]:
             f, t = fn[c], ft[c]
@@ -68,6 +70,8 @@ def _add(state, sums):  # type: ignore[no-untyped-def]
         for q in range(3):
             by_grain[g, q] += body[g, CX + q]
         by_grain[g, 3] += body[g, CX + 2] ** 2
+        by_grain[g, 4] += normal_sum[g]
+        by_grain[g, 5] += normal_sum[g] ** 2
     for q in range(2):
         shared[2 * q] += state.common[q]
         shared[2 * q + 1] += state.common[q] ** 2

@@ -47,6 +47,8 @@ class SamplerGrains(NamedTuple):
     start: Rows  # (m + 1,) where each grain's rows in `row` begin
     row: Rows  # (2c,) of pairs, in the order of the grains
     group_load: Array  # (g,) known sums of normal forces
+    pressure: Array  # (m,) measured sum of a grain's normal forces
+    pressure_weight: Array  # (m,) inverse variance of that measurement; 0: not measured
 
 
 class ModelParameters(NamedTuple):
@@ -74,6 +76,7 @@ class SamplerState(NamedTuple):
     open_gap: Array  # (c,) γ
     body: Array  # (m, 8) records of the grains
     group_sum: Array  # (g,) Σ f of each group
+    normal_sum: Array  # (m,) Σ f on each grain
     common: Array  # (4,) κ, offset, Σ_bearing (f − 1), Σ z
 
 
@@ -102,9 +105,11 @@ def initial_state(pairs: SamplerPairs, grains: SamplerGrains, compliance: float)
     np.add.at(body[:, :2], pairs.j[between], force[between])
     grouped = pairs.group >= 0
     known = (pairs.factor * fn)[grouped]
+    normal_sum = np.bincount(pairs.i, fn, minlength=len(body))
+    normal_sum += np.bincount(pairs.j[between], fn[between], minlength=len(body))
     return SamplerState(
         bearing, fn, np.zeros(count), np.where(bearing, 0.0, np.maximum(pairs.gap, 0.0)), body,
-        np.bincount(pairs.group[grouped], known, minlength=len(grains.group_load)).astype(np.float64),
+        np.bincount(pairs.group[grouped], known, minlength=len(grains.group_load)).astype(np.float64), normal_sum,
         np.array([compliance, 0.0, 0.0, float(bearing.sum())]),
     )  # fmt: skip
 

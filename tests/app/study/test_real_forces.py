@@ -13,7 +13,7 @@ from rodsight.process.frame_range import FrameRange
 from rodsight.results.results import Results, TruthContacts
 from rodsight.study.real.real_forces import RealStudy, as_json, correlate_sides, study_real
 from rodsight.study.real.real_page import describe_limits, real_page, rows_of
-from rodsight.synthetic.photoelastic import make_photoelastic
+from rodsight.synthetic.photoelastic.pegs_files import make_photoelastic
 
 from tests.app.recording.fake_results import make_results
 from tests.app.study.test_baselines import own_forces

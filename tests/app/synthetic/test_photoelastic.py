@@ -12,7 +12,7 @@ from rodsight.exchange.foreign.observations import Convention, make_tracks
 from rodsight.exchange.foreign.pegs import read_pegs, true_contacts
 from rodsight.process.errors import InputError
 from rodsight.synthetic import photoelastic
-from rodsight.synthetic.photoelastic import RADIUS_DEFICIT, make_photoelastic
+from rodsight.synthetic.photoelastic.pegs_files import RADIUS_DEFICIT, make_photoelastic
 from rodsight.synthetic.scenarios.loading_paths import simulate_loading
 from rodsight.synthetic.scenarios.scenario_folder import load_or_simulate
 from rodsight.synthetic.scenarios.scenario_table import SCENARIOS

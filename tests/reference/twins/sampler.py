@@ -114,6 +114,10 @@ class PlainSampler:
             balance += 0.5 * weight / model.balance_sd**2 * (x**2 + y**2 + torque**2)
         for g, load in enumerate(grains.group_load):
             balance += 0.5 / model.balance_sd**2 * ((pairs.factor * state.fn)[pairs.group == g].sum() - load) ** 2
+        pressures = 0.0
+        for k in range(len(grains.pressure)):
+            on_grain = (pairs.i == k) | (pairs.j == k)
+            pressures += 0.5 * grains.pressure_weight[k] * (state.fn[on_grain].sum() - grains.pressure[k]) ** 2
         laws = 0.0
         for c in range(count):
             i, j, b, f, t = pairs.i[c], pairs.j[c], self.gap_sd(c), state.fn[c], state.ft[c]
@@ -138,7 +142,7 @@ class PlainSampler:
         z = np.asarray(state.bearing, bool)
         gauge = 0.5 * model.mean_gauge / count * (state.fn[z] - 1.0).sum() ** 2
         gauge += 0.5 * model.count_gauge / count * (z.sum() - model.expected_count) ** 2
-        return float(balance + laws + errors + gauge)
+        return float(balance + pressures + laws + errors + gauge)
 
     def draw_contact(self, rng: np.random.Generator, state: PlainState, c: int) -> tuple[PlainState, str]:
         """Draw (z, f, t, γ) of a pair; return which branch was followed, too."""

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..process.atomic import replacing_folder
-from ..process.errors import InputError
-from ..process.progress import Progress, no_progress
-from ..solver.bodies.grains import Array
-from ..solver.dem.dem_truth import DemTruth
-from .scenarios.scenario_folder import GRAINS, LEAST_GRAINS, load_or_simulate
-from .scenarios.scenario_table import SCENARIOS
+from ...process.atomic import replacing_folder
+from ...process.errors import InputError
+from ...process.progress import Progress, no_progress
+from ...solver.bodies.grains import Array
+from ...solver.dem.dem_truth import DemTruth
+from ..scenarios.scenario_folder import GRAINS, LEAST_GRAINS, load_or_simulate
+from ..scenarios.scenario_table import SCENARIOS
 
 DIAMETER = 50.0  # px, mean
 NOISE = 0.3  # px of a centre's coordinate, from photograph to photograph
