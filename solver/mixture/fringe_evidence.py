@@ -7,12 +7,13 @@ fringes look worse than they are. Whether overlaps are evidence as well is then 
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from ..bodies.grains import Array
 from ..posterior.frame_posterior import FramePosterior, infer_frame
 from ..posterior.fringe_calibration import FringeCalibration, FringeReading, calibrate_fringes, with_scale_of
 from ..posterior.sequence_evidence import SequenceEvidence
+from ..statistics.agreement import pearson
 
 FRAMES = 6  # estimated for the curve, evenly over the sequence
 PASSES = 4  # with the curve of the pass before; the first one rests on positions alone
@@ -93,7 +94,7 @@ def _rank_agreement(readings: dict[int, FringeReading]) -> float:
     for each in readings.values():
         seen = each.used & np.isfinite(each.fringes)
         if seen.sum() > 2 and np.ptp(each.fringes[seen]) > 0.0 and np.ptp(each.pressure[seen]) > 0.0:
-            found.append(float(spearmanr(each.fringes[seen], each.pressure[seen]).statistic))
+            found.append(pearson(rankdata(each.fringes[seen]), rankdata(each.pressure[seen])))
     return float(np.mean(found)) if found else 0.0
 
 

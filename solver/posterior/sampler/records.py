@@ -105,7 +105,7 @@ def initial_state(pairs: SamplerPairs, grains: SamplerGrains, compliance: float)
     np.add.at(body[:, :2], pairs.j[between], force[between])
     grouped = pairs.group >= 0
     known = (pairs.factor * fn)[grouped]
-    normal_sum = np.bincount(pairs.i, fn, minlength=len(body))
+    normal_sum = np.bincount(pairs.i, fn, minlength=len(body)).astype(np.float64)
     normal_sum += np.bincount(pairs.j[between], fn[between], minlength=len(body))
     return SamplerState(
         bearing, fn, np.zeros(count), np.where(bearing, 0.0, np.maximum(pairs.gap, 0.0)), body,
