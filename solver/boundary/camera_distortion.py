@@ -17,9 +17,13 @@ from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_tou
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
 FEWEST_PAIRS = 100  # in a frame
 SIGNIFICANT = 5.0  # standard errors
-EXPLAINED = 0.9  # greatest ratio of the robust scatter of touching gaps after a correction to that before
-ANISOTROPY, RADIAL = slice(0, 2), slice(2, 3)  # unknowns of the model
-MODELS = {"radial": (2,), "anisotropy": (0, 1), "both": (0, 1, 2)}
+EXPLAINED = 0.95  # greatest ratio of the robust scatter of touching gaps after a correction to that before
+ANISOTROPY, RADIAL, PERSPECTIVE, UNKNOWNS = slice(0, 2), slice(2, 4), slice(4, 6), 6  # unknowns of the model
+MODELS = ((2,), (0, 1), (2, 3), (0, 1, 2), (0, 1, 2, 3), (0, 1, 4, 5), (0, 1, 2, 3, 4, 5))
+MAX_OVERLAP = 2.5  # mean overlap over the scatter of touching gaps, above which readings of radii must be too large
+# Mean overlap of soft grains over the scatter of their touching gaps: forces have a standard deviation of .8 of their
+# mean.
+TYPICAL_OVERLAP = 1.25
 SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared
 UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of its mean over the parts of the picture
 
@@ -30,17 +34,19 @@ class CameraDistortion:
 
     Notes
     -----
-    x_true = x + L [a X + b (Y, X) + k |ξ|² ξ] with ξ = (x − x_0)/L = (X, Y) and a X standing for a (X, −Y).
+    x_true = x + L [a (X, −Y) + b (Y, X) + (k |ξ|² + m |ξ|⁴ + p X + q Y) ξ] with ξ = (x − x_0)/L = (X, Y).
     """
 
-    value: Array  # (3,) a, b, k
-    sd: Array  # (3,) standard error, as if errors were the same in all frames
+    value: Array  # (6,) a, b, k, m, p, q
+    sd: Array  # (6,) standard error, as if errors were the same in all frames
     middle: Array  # (2,) [m] x_0
     half_width: float  # [m] L
     scatter: float  # [m] robust standard deviation of the gaps of candidate pairs as they were measured
     explained: float  # [m] after the correction; the same without one
     applied: bool
     unexplained: float  # [m] range over the picture of the mean touching gap that remains; 0: within its error
+    radius_error: Array  # (q,) [m] true minus given radius of every class, if touching surfaces just meet
+    touching_scatter: float  # [m] robust standard deviation of the gaps of touching pairs after the correction
 
     def correct(self, position: Array) -> Array:
         """Return undistorted positions (…, 2) [m]."""
@@ -48,19 +54,39 @@ class CameraDistortion:
             return position
         return position + np.tensordot(self.value, _displacements(position, self.middle, self.half_width), 1)
 
+    def class_correction(self) -> Array | None:
+        """Return what to add to the radii of every class (q,) [m] of soft grains; None: overlaps may explain the gaps.
+
+        Notes
+        -----
+        The correction leaves every class a mean overlap of 1.25 s, s the scatter of touching gaps. Overlaps of forces
+        explain neither classes that differ by more than s nor overlaps above 2.5 s.
+        """
+        error, scatter = self.radius_error, self.touching_scatter
+        if len(error) < 2:
+            return None
+        if np.ptp(error) < scatter and -2.0 * float(error.mean()) < MAX_OVERLAP * scatter:
+            return None
+        return error + 0.5 * TYPICAL_OVERLAP * scatter
+
     def describe(self) -> list[str]:
         """Describe the correction and what remains in sentences for the user."""
         sentences = []
         if self.applied:
             parts = []
             if self.value[RADIAL].any():
-                parts.append(f"a radial distortion of {100 * float(self.value[2]):.2g} % at the picture's rim")
+                parts.append(
+                    f"a radial distortion of {100 * float(self.value[RADIAL].sum()):.2g} % at the picture's rim"
+                )
             if self.value[ANISOTROPY].any():
                 size = 100 * float(np.hypot(*self.value[ANISOTROPY]))
                 parts.append(f"a stretching of {size:.2g} % along one direction")
+            if self.value[PERSPECTIVE].any():
+                size = 100 * float(np.hypot(*self.value[PERSPECTIVE]))
+                parts.append(f"a perspective of {size:.2g} %")
             sentences.append(
-                f"{' and '.join(parts)} was removed, since gaps of near grains then scatter by "
-                f"{1e6 * self.explained:.0f} instead of {1e6 * self.scatter:.0f} µm"
+                f"{', '.join(parts)} {'was' if len(parts) == 1 else 'were'} removed, since gaps of near grains then "
+                f"scatter by {1e6 * self.explained:.0f} instead of {1e6 * self.scatter:.0f} µm"
             )
         if self.unexplained > 0.0:
             sentences.append(
@@ -75,7 +101,7 @@ class _Pairs:
     """Pairs that may touch, of all frames that are read."""
 
     gap: Array  # (m,) [m] as measured
-    design: Array  # (m, 3 + q) change of the gap by the unknowns of the camera and by an error of the radii by class
+    design: Array  # (m, 6 + q) change of the gap by the unknowns of the camera and by an error of the radii by class
     middle: Array  # (m, 2) of the pair over the half-width
     frames: int
 
@@ -102,9 +128,9 @@ def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[n
     Weighted least squares of g + n·(u(x_j) − u(x_i)) − δ_i − δ_j = 0 over pairs, with u the displacement of
     `CameraDistortion` and δ the error of a class's radius. Weights (1 + (g/s)²)⁻² for positive residuals g, with s
     shrinking from a fraction of a diameter to twice the robust standard deviation: pairs that do not touch stand apart.
-    The model with the fewest unknowns that reduces the robust scatter of all pairs to 0.9 of that of a simpler one is
-    applied, if its unknowns exceed five standard errors. Forces of soft grains depend on direction and place, too, but
-    do not change the scatter of their gaps so much.
+    A model with more unknowns is applied where it reduces the robust scatter of all pairs to 0.95 of that of a simpler
+    one, if one of its unknowns exceeds five standard errors. Forces of soft grains depend on direction and place, too,
+    but do not change the scatter of their gaps so much.
     """
     rows = np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))
     present = position[np.isfinite(position[..., 0])]
@@ -118,22 +144,25 @@ def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[n
     diameter = 2.0 * float(radius.mean())
     none = _fit(pairs, (), diameter)
     best, chosen = none, ()
-    for unknowns in sorted(MODELS.values(), key=len):
+    for unknowns in MODELS:
         found = _fit(pairs, unknowns, diameter)
         significant = np.abs(found.value[list(unknowns)]) > SIGNIFICANT * found.sd[list(unknowns)]
         if significant.any() and found.misfit < EXPLAINED * best.misfit:
             best, chosen = found, unknowns
-    value = np.where(np.isin(np.arange(3), chosen), best.value[:3], 0.0)
+    value = np.where(np.isin(np.arange(UNKNOWNS), chosen), best.value[:UNKNOWNS], 0.0)
     return CameraDistortion(
-        value, best.sd[:3], middle, half_width, none.misfit, best.misfit, bool(chosen), _place_dependence(pairs, best)
-    )
+        value, best.sd[:UNKNOWNS], middle, half_width, none.misfit, best.misfit, bool(chosen),
+        _place_dependence(pairs, best), best.value[UNKNOWNS:], best.scatter,
+    )  # fmt: skip
 
 
 def _displacements(position: Array, middle: Array, half_width: float) -> Array:
-    """Displacements (3, …, 2) [m] of points (…, 2) [m] by a unit of each unknown."""
+    """Displacements (6, …, 2) [m] of points (…, 2) [m] by a unit of each unknown."""
     x = (position - middle) / half_width
     square = np.sum(x**2, axis=-1, keepdims=True)
-    return half_width * np.stack([x * np.array([1.0, -1.0]), x[..., ::-1], square * x])
+    return half_width * np.stack(
+        [x * np.array([1.0, -1.0]), x[..., ::-1], square * x, square**2 * x, x[..., :1] * x, x[..., 1:] * x]
+    )
 
 
 def _pairs_with_design(
@@ -154,7 +183,7 @@ def _pairs_with_design(
 def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float) -> TouchingFit:
     """Fit some unknowns of the camera, and the errors of radii."""
     count = pairs.design.shape[1]
-    used = [*unknowns, *range(3, count)]
+    used = [*unknowns, *range(UNKNOWNS, count)]
     found = fit_touching_pairs(
         pairs.gap, pairs.design[:, used], np.arange(len(used)) >= len(unknowns), diameter, pairs.frames
     )

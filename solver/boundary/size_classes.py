@@ -17,6 +17,8 @@ from .touching_pairs import count_classes, find_near_pairs, fit_touching_pairs
 
 MIN_GAP, MAX_RANGE = 0.1, 0.12  # over the mean radius: between sizes, and of the readings of one size
 MAX_SIZES, MIN_GRAINS = 4, 10
+# Fraction of the grains, and distance over the mean radius: fewer grains so near a size are misread, not a size.
+RARE, NEAR_SIZE = 0.02, 0.14
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
 FEWEST_PAIRS = 50  # in a frame
 SIGNIFICANT = 5.0  # standard errors
@@ -49,19 +51,28 @@ def group_readings(radius: Float[Array, " n"]) -> Int[np.ndarray, " n"] | None:
     Notes
     -----
     Sorted readings are separated where neighbours differ by more than 0.1 of the mean. There are classes if no more
-    than four remain, each with a range of at most 0.12 of its mean.
+    than four remain, each with a range of at most 0.12 of its mean. Less than 2 % of the grains within 0.14 of the mean
+    radius of another size, as medians of changing readings, belong to that size.
     """
     if len(radius) < MIN_GRAINS:
         return None
     order = np.argsort(radius, kind="stable")
     boundaries = np.flatnonzero(np.diff(radius[order]) > MIN_GAP * radius.mean())
     groups = np.split(order, boundaries + 1)
+    common = [group for group in groups if len(group) >= RARE * len(radius)]
+    sizes = np.array([radius[group].mean() for group in common])
+    rare = [group for group in groups if len(group) < RARE * len(radius)]
+    apart = [group for group in rare if np.abs(sizes - radius[group].mean()).min() > NEAR_SIZE * radius.mean()]
+    groups = sorted([*common, *apart], key=lambda group: float(radius[group].mean()))
     wide = any(np.ptp(radius[group]) > MAX_RANGE * radius[group].mean() for group in groups)
     if len(groups) > MAX_SIZES or wide:
         return None
-    size_class = np.empty(len(radius), np.int64)
+    size_class = np.full(len(radius), -1)
     for number, group in enumerate(groups):
         size_class[group] = number
+    misread = size_class < 0
+    sizes = np.array([radius[group].mean() for group in groups])
+    size_class[misread] = np.abs(radius[misread, None] - sizes).argmin(axis=1)
     return size_class
 
 

@@ -38,10 +38,11 @@ def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
     return replace(tracks, sigma=factor * tracks.sigma), describe_contradiction(found, factor)
 
 
-def correct_camera(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
+def correct_camera(tracks: Tracks, walls: WallTracks, *, soft: bool = False) -> tuple[Tracks, str]:
     """Remove the camera's distortion from a packing without walls, where gaps of touching pairs show one.
 
-    Walls, where there are any, are measured with the same camera and show it better.
+    Walls, where there are any, are measured with the same camera and show it better. The radii of each size of soft
+    grains, which are not calibrated later, are corrected as well where no overlap explains their gaps.
 
     Returns
     -------
@@ -55,10 +56,17 @@ def correct_camera(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
     classes = group_readings(tracks.radius) if classes is None else classes
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     alike = np.zeros(tracks.grain_count, np.int64)
-    found = find_camera_distortion(position, tracks.radius, alike if classes is None else classes)
+    classes = alike if classes is None else classes
+    found = find_camera_distortion(position, tracks.radius, classes)
     if found is None:
         return tracks, ""
-    return replace(tracks, position=found.correct(tracks.position)), "; ".join(found.describe())
+    sentences, radius = found.describe(), tracks.radius
+    correction = found.class_correction() if soft else None
+    if correction is not None:
+        radius = radius + correction[classes]
+        changes = ", ".join(f"{1e6 * each:+.0f}" for each in correction)
+        sentences.append(f"radii of the sizes are corrected by {changes} µm, so that grains of all sizes touch alike")
+    return replace(tracks, position=found.correct(tracks.position), radius=radius), "; ".join(sentences)
 
 
 def _stated_noise(tracks: Tracks) -> float:

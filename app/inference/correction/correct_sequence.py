@@ -66,7 +66,8 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks, remarks[5] = use_size_classes(inputs.material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
-            tracks, remarks[2] = correct_camera(tracks, walls)
+            soft = inputs.material.stiffness not in (None, "rigid")
+            tracks, remarks[2] = correct_camera(tracks, walls, soft=soft)
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.unit
 OPPOSITE = np.array([[1.0, 0.0], [-1.0, 0.0]])
 
 
-def test_two_opposite_forces_stress_the_centre_as_the_textbook_says():
+def test_two_opposite_forces_stress_the_centre_by_the_known_formula():
     force, radius = 30.0, 0.01
     found = stress_difference(np.zeros(1), np.zeros(1), radius, OPPOSITE, -force * OPPOSITE)
     assert found[0] == pytest.approx(8.0 * force / (np.pi * 2.0 * radius))

@@ -41,7 +41,7 @@ def gap_range(position: np.ndarray) -> float:
     return float(np.percentile(length, 90) - np.percentile(length, 10))
 
 
-@pytest.mark.parametrize(("radial", "stretch"), [(0.05, 0.0), (-0.03, 0.0), (0.0, 0.02), (0.05, 0.02)])
+@pytest.mark.parametrize(("radial", "stretch"), [(0.05, 0.0), (-0.03, 0.0), (0.0, 0.02), (0.03, 0.01)])
 def test_a_distortion_is_found_and_removed(radial: float, stretch: float) -> None:
     position, size_class = lattice()
     radius = np.full(position.shape[1], R)
@@ -77,6 +77,18 @@ def test_a_dependence_on_place_that_no_camera_has_is_reported() -> None:
     assert found is not None
     assert found.unexplained > 5e-5
     assert "calibrate the camera" in found.describe()[-1]
+
+
+def test_readings_of_one_size_that_are_too_large_are_corrected() -> None:
+    position, size_class = lattice(3)
+    for error, corrected in ((0.0, False), (6e-5, True)):
+        radius = np.where(size_class == 1, R + error, R)  # overlaps of 120 µm at a noise of 28 µm
+        found = find_camera_distortion(position, radius, size_class)
+        assert found is not None
+        correction = found.class_correction()
+        assert (correction is not None) == corrected
+        if correction is not None:
+            assert correction[1] - correction[0] == pytest.approx(-error, abs=1e-5)
 
 
 def test_few_discs_show_nothing() -> None:

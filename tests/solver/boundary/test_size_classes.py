@@ -64,3 +64,10 @@ def test_exact_sizes_are_not_touched() -> None:
     true = two_sizes()
     assert find_size_classes(pack_rows(true), true) is None
     assert find_size_classes(pack_rows(true)[:, :5], true[:5]) is None  # and too few are no classes
+
+
+def test_few_readings_between_sizes_belong_to_the_nearest_size() -> None:
+    radius = np.concatenate([np.full(300, 4.4e-3), np.full(300, 5.5e-3), np.full(4, 4.9e-3), np.full(3, 8e-3)])
+    found = group_readings(radius)
+    assert found is not None
+    assert np.bincount(found).tolist() == [304, 300, 3]
