@@ -6,6 +6,7 @@ import { layers } from "/page/layers/settings.js";
 const SMALL = 1400, ENOUGH = 1.2; // [px] of the small picture; enlargement above which a sharper part is requested
 const AROUND = 0.25; // [of the window] of the photograph beside it, so that a small movement needs no new part
 const WIDEST = 3600; // [px] of a part: what a screen of four thousand pixels shows without the panels
+const PIXELS = 3; // screen pixels per pixel from which pixels are shown as squares
 const FINER = 1.5; // enlargement of a part above which a finer one is requested
 
 async function fetchPicture(url, priority = "auto") {
@@ -17,9 +18,10 @@ async function fetchPicture(url, priority = "auto") {
 const small = (url, priority) => fetchPicture(`${url}&size=${SMALL}`, priority);
 
 export class Picture {
-  /** changed: called when a sharper part has come. */
-  constructor(changed) {
-    this.changed = changed;
+  /** box: the element that shows it; changed: called when a sharper part has come. */
+  constructor(box, changed) {
+    this.box = box; this.changed = changed;
+    this.canvases = ["whole", "part"].map((name) => { const canvas = document.createElement("canvas"); canvas.className = name; box.append(canvas); return { canvas, shown: null }; });
     this.url = ""; this.image = null; this.part = null; this.requested = ""; this.foreseen = new Map();
   }
 
@@ -57,12 +59,32 @@ export class Picture {
     this.changed();
   }
 
-  /** Draw it into the coordinates of the photograph; fine: with the sharper part. */
-  draw(c, k, width, height, fine) {
+  /** The sharper part, where the screen shows more than the small picture has. */
+  finer(k, width) { return this.part && k * width > ENOUGH * this.image.width ? this.part : null; }
+
+  /** Show it in its element: the canvases are filled where their picture has changed, and moved. */
+  place(view, width, height, dense, dim) {
+    const { on, opacity } = layers.photograph, { image } = this, fine = image && this.finer(view.k * dense, width);
+    this.box.style.opacity = String(opacity * dim);
+    this.box.hidden = !on || !image;
+    if (!image) return;
+    for (const [place, source, left, top, wide] of [[this.canvases[0], image, 0, 0, width], [this.canvases[1], fine?.image, fine?.window[0], fine?.window[1], fine ? fine.window[2] - fine.window[0] : 0]]) {
+      place.canvas.hidden = !source;
+      if (!source) continue;
+      const name = look(source);
+      if (place.shown !== name) { fill(place.canvas, source); place.shown = name; }
+      const by = wide * view.k / source.width;
+      place.canvas.style.imageRendering = by * dense < PIXELS ? "auto" : "pixelated";
+      moveTo(place.canvas, (left - 0.5 - view.x) * view.k, (top - 0.5 - view.y) * view.k, by);
+    }
+  }
+
+  /** Draw it into the coordinates of the photograph, at so many screen pixels per pixel. */
+  draw(c, k, width, height) {
     c.imageSmoothingQuality = "medium";
-    const { part } = this;
     paint(c, this.image, -0.5, -0.5, width, height, k);
-    if (fine && part && k * width > ENOUGH * this.image.width) { const [left, top, right, bottom] = part.window; paint(c, part.image, left - 0.5, top - 0.5, right - left, bottom - top, k); }
+    const fine = this.finer(k, width);
+    if (fine) { const [left, top, right, bottom] = fine.window; paint(c, fine.image, left - 0.5, top - 0.5, right - left, bottom - top, k); }
   }
 
   /** Brightness and contrast with which the darkest and the brightest hundredth become black and white. */
@@ -77,7 +99,7 @@ export class Picture {
 }
 
 function paint(c, image, x, y, width, height, k) {
-  c.imageSmoothingEnabled = k * width / image.width < 3; // pixels are seen as such
+  c.imageSmoothingEnabled = k * width / image.width < PIXELS;
   c.drawImage(adjusted(image), x, y, width, height);
 }
 
@@ -87,7 +109,18 @@ const clip = ([left, top, right, bottom], width, height, more) => {
 };
 const covers = (a, b) => a[0] <= b[0] && a[1] <= b[1] && a[2] >= b[2] && a[3] >= b[3];
 
-const made = new WeakMap(); // pictures with another brightness, by the ones that were sent
+/** Move a canvas to a place of the stage, enlarged. */
+export function moveTo(canvas, x, y, by) { canvas.style.transform = `translate(${x}px, ${y}px) scale(${by})`; }
+
+const pictures = new WeakMap(); // numbers of pictures, by which canvases know what they show
+let count = 0;
+
+/** A name of a picture with its brightness. */
+function look(image) {
+  if (!pictures.has(image)) pictures.set(image, ++count);
+  const { brightness, contrast, gamma } = layers.photograph;
+  return `${pictures.get(image)} ${brightness} ${contrast} ${gamma}`;
+}
 
 /** A grey level with the chosen brightness, contrast and gamma. */
 export function level(value, { brightness, contrast, gamma }) {
@@ -95,17 +128,25 @@ export function level(value, { brightness, contrast, gamma }) {
   return Math.round(255 * Math.min(Math.max(straight, 0), 1) ** (1 / gamma));
 }
 
-function adjusted(image) {
-  const { brightness, contrast, gamma } = layers.photograph;
-  if (brightness === 1 && contrast === 1 && gamma === 1) return image;
-  const name = `${brightness} ${contrast} ${gamma}`, had = made.get(image);
-  if (had?.name === name) return had.canvas;
-  const canvas = had?.canvas ?? new OffscreenCanvas(image.width, image.height), c = canvas.getContext("2d", { willReadFrequently: true });
+function fill(canvas, image) {
+  canvas.width = image.width; canvas.height = image.height;
+  const { brightness, contrast, gamma } = layers.photograph, plain = brightness === 1 && contrast === 1 && gamma === 1;
+  const c = canvas.getContext("2d", { willReadFrequently: !plain });
   c.drawImage(image, 0, 0);
+  if (plain) return;
   const pixels = c.getImageData(0, 0, image.width, image.height), { data } = pixels;
   const table = Uint8ClampedArray.from({ length: 256 }, (_, value) => level(value, layers.photograph));
   for (let n = 0; n < data.length; n += 4) { data[n] = table[data[n]]; data[n + 1] = table[data[n + 1]]; data[n + 2] = table[data[n + 2]]; }
   c.putImageData(pixels, 0, 0);
+}
+
+const made = new WeakMap(); // pictures with another brightness, by the ones that were sent
+
+function adjusted(image) {
+  const name = look(image), had = made.get(image);
+  if (had?.name === name) return had.canvas;
+  const canvas = had?.canvas ?? document.createElement("canvas");
+  fill(canvas, image);
   made.set(image, { name, canvas });
   return canvas;
 }

@@ -2,28 +2,29 @@
 
 import { at } from "/page/dom.js";
 import { paintLayer } from "/page/layers/settings.js";
-import { Picture } from "/page/picture.js";
+import { Picture, moveTo } from "/page/picture.js";
 
 const LOUPE = 172, LOUPE_TOP = 52, MAGNIFIED = 6;
 const HINT = 36; // [px] above the picture, for the hint and the layers
 const IDLE = 300; // [ms] after which the neighbours of a picture are requested
 const MARGIN = 0.2; // [of the stage] drawn around it, so that a movement uncovers what is there already
-const CHEAP = 5, SETTLED = 140; // [ms] of a drawing that is made anew at once; without a movement, after which it is
-const MAGNIFICATION = [0.55, 1.8]; // of a former drawing, beyond which it is made anew
+const SETTLED = 110; // [ms] without a movement, after which the drawing is made anew
+const MAGNIFICATION = [0.4, 2.5]; // of a former drawing, beyond which it is made anew at once
 
 /** Two fingers on a touchpad pan, and pinched they zoom (the browser sets Ctrl); a wheel's notch is longer and straight. */
 const isTouchpad = (event) => !event.ctrlKey && event.deltaMode === 0 && (event.deltaX !== 0 || Math.abs(event.deltaY) < 40);
 
 export class Stage {
   constructor() {
-    this.canvas = at("canvas");
+    // Photograph and drawing are canvases of their own that the browser moves and enlarges: a movement paints nothing.
+    this.canvas = at("canvas"); // what is fixed to the screen, and all input
     this.context = this.canvas.getContext("2d");
     this.view = { x: 0, y: 0, k: 1 };
-    this.picture = new Picture(() => this.shift());
+    this.picture = new Picture(at("photograph"), () => this.shift());
     this.wanted = ""; this.width = 0; this.height = 0;
     this.draw = () => {}; this.fixed = () => {}; this.tool = {}; this.loupe = false; this.mouse = null;
     this.pending = false; this.drawn = 0; this.fitted = ""; this.idle = 0;
-    this.drawing = { canvas: document.createElement("canvas"), view: null, took: 0, stale: true, settling: 0 };
+    this.drawing = { canvas: at("drawing"), view: null, stale: true, settling: 0 };
     this.window = [0, 0, 0, 0]; // [px] left, top, right, bottom of what is being drawn
     this.cursor = null; this.pressed = null; // of the keyboard: a place, and where it was pressed
     new ResizeObserver(() => { this.resize(); }).observe(this.canvas.parentElement);
@@ -96,10 +97,10 @@ export class Stage {
   /** What is drawn has changed. */
   redraw() { this.drawing.stale = true; this.request(); }
 
-  /** The view alone has changed: a drawing that takes long is moved, and made anew once the view is still. */
+  /** The view alone has changed: the drawing is moved, and made anew once the view is still. */
   shift() {
     clearTimeout(this.drawing.settling);
-    this.drawing.settling = setTimeout(() => { if (!this.isExact()) this.redraw(); else this.request(); }, SETTLED);
+    this.drawing.settling = setTimeout(() => { if (this.isExact()) this.request(); else this.redraw(); }, SETTLED);
     this.request();
   }
 
@@ -112,24 +113,22 @@ export class Stage {
   isExact() { const { view } = this.drawing; return Boolean(view) && view.x === this.view.x && view.y === this.view.y && view.k === this.view.k; }
 
   paint() {
-    const { context: c, view, drawing } = this, dense = devicePixelRatio || 1;
-    const by = drawing.view ? view.k / drawing.view.k : 0;
-    if (drawing.stale || (!this.isExact() && (drawing.took < CHEAP || by < MAGNIFICATION[0] || by > MAGNIFICATION[1]))) this.renew(dense);
-    c.setTransform(dense, 0, 0, dense, 0, 0);
-    c.clearRect(0, 0, this.boxWidth, this.boxHeight);
-    this.scene(c, view, () => this.place(c));
-    if (this.loupe && this.mouse && this.picture.image) this.paintLoupe(c);
-    if (this.cursor) this.paintCursor(c);
+    const { view, drawing } = this, dense = devicePixelRatio || 1, by = drawing.view ? view.k / drawing.view.k : 0;
+    const anew = drawing.stale || by < MAGNIFICATION[0] || by > MAGNIFICATION[1];
+    if (anew) this.renew(dense);
+    this.picture.place(view, this.width, this.height, dense, this.dim ?? 1);
+    moveTo(drawing.canvas, (drawing.left - view.x) * view.k, (drawing.top - view.y) * view.k, view.k / drawing.view.k / dense);
+    if (anew || this.loupe || this.cursor) this.paintFixed(dense);
     this.drawn += 1;
     const k = this.loupe && this.mouse ? Math.max(view.k * MAGNIFIED, 6) : view.k;
     this.picture.sharpen(this.visible(), k * dense, this.width, this.height);
   }
 
-  visible(view = this.view, wide = this.boxWidth, high = this.boxHeight) { return [view.x, view.y, view.x + wide / view.k, view.y + high / view.k]; }
+  visible(view = this.view) { return [view.x, view.y, view.x + this.boxWidth / view.k, view.y + this.boxHeight / view.k]; }
 
-  /** Draw the step anew, with a margin, on a canvas of its own. */
+  /** Draw the step anew, with a margin. */
   renew(dense) {
-    const { drawing, view } = this, { canvas } = drawing, since = performance.now();
+    const { drawing, view } = this, { canvas } = drawing;
     const wide = Math.round((1 + 2 * MARGIN) * this.boxWidth * dense), high = Math.round((1 + 2 * MARGIN) * this.boxHeight * dense);
     if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
     const c = canvas.getContext("2d"), left = view.x - MARGIN * this.boxWidth / view.k, top = view.y - MARGIN * this.boxHeight / view.k;
@@ -138,24 +137,33 @@ export class Stage {
     c.setTransform(dense * view.k, 0, 0, dense * view.k, -dense * view.k * left, -dense * view.k * top);
     this.window = [left, top, left + wide / dense / view.k, top + high / dense / view.k];
     this.draw(c, view.k);
-    Object.assign(drawing, { view: { ...view }, left, top, wide: wide / dense / view.k, high: high / dense / view.k, stale: false, took: performance.now() - since });
+    Object.assign(drawing, { view: { ...view }, left, top, stale: false });
   }
 
-  /** Put the drawing where it belongs, and what is fixed to the screen over it. */
-  place(c) {
-    const { drawing, view } = this;
-    c.imageSmoothingEnabled = !this.isExact();
-    c.drawImage(drawing.canvas, drawing.left, drawing.top, drawing.wide, drawing.high);
+  /** Legends, the loupe, the keyboard's cursor. */
+  paintFixed(dense) {
+    const { context: c, view } = this;
+    c.setTransform(dense, 0, 0, dense, 0, 0);
+    c.clearRect(0, 0, this.boxWidth, this.boxHeight);
+    this.inPhotograph(c, view, () => this.fixed(c, view.k));
+    if (this.loupe && this.mouse && this.picture.image) this.paintLoupe(c);
+    if (this.cursor) this.paintCursor(c);
+  }
+
+  inPhotograph(c, view, draw) { c.save(); c.scale(view.k, view.k); c.translate(-view.x, -view.y); draw(); c.restore(); }
+
+  paintPhotograph(c, view) {
+    if (this.picture.image) paintLayer(c, "photograph", () => this.picture.draw(c, view.k * (devicePixelRatio || 1), this.width, this.height), this.dim ?? 1);
+  }
+
+  /** All that is shown on one canvas, to be taken away. */
+  composed() {
+    const dense = devicePixelRatio || 1, copy = document.createElement("canvas"), c = copy.getContext("2d");
+    copy.width = this.canvas.width; copy.height = this.canvas.height;
+    c.setTransform(dense, 0, 0, dense, 0, 0);
     this.window = this.visible();
-    this.fixed(c, view.k);
-  }
-
-  scene(c, view, over) {
-    c.save();
-    c.scale(view.k, view.k); c.translate(-view.x, -view.y);
-    if (this.picture.image) paintLayer(c, "photograph", () => this.picture.draw(c, view.k * (devicePixelRatio || 1), this.width, this.height, true), this.dim ?? 1);
-    over();
-    c.restore();
+    this.inPhotograph(c, this.view, () => { this.paintPhotograph(c, this.view); this.draw(c, this.view.k); this.fixed(c, this.view.k); });
+    return copy;
   }
 
   paintLoupe(c) {
@@ -166,7 +174,7 @@ export class Stage {
     c.fillStyle = "#08090b"; c.fillRect(left, LOUPE_TOP, LOUPE, LOUPE);
     c.translate(left, LOUPE_TOP);
     this.window = [x - half, y - half, x + half, y + half];
-    this.scene(c, { k, x: x - half, y: y - half }, () => this.draw(c, k));
+    this.inPhotograph(c, { k, x: x - half, y: y - half }, () => { this.paintPhotograph(c, { k }); this.draw(c, k); });
     c.strokeStyle = "#ffffffb0"; c.lineWidth = 1;
     c.beginPath(); c.moveTo(LOUPE / 2, 0); c.lineTo(LOUPE / 2, LOUPE / 2 - 6); c.moveTo(LOUPE / 2, LOUPE / 2 + 6); c.lineTo(LOUPE / 2, LOUPE);
     c.moveTo(0, LOUPE / 2); c.lineTo(LOUPE / 2 - 6, LOUPE / 2); c.moveTo(LOUPE / 2 + 6, LOUPE / 2); c.lineTo(LOUPE, LOUPE / 2); c.stroke();

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 import threading
 import zlib
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ...experiment.experiment import GrainGuess
-from ...experiment.photographs import Channel, Image, ImageSelection, Rotation, read_photograph, rotated
+from ...experiment.photographs import Image, ImageSelection
 from ...experiment.reading.input_files import InputFiles
 from ...experiment.units import Scale
 from ...out_of_date import recording_out_of_date
@@ -30,6 +27,7 @@ from ...run_folder import RESULTS, SUMMARY, is_same_file, owner_of
 from ...tracking.picture_quality import PictureQuality
 from ...verdicts.log import VERDICTS
 from ..correcting.pose_editor import PoseEditor
+from ..inspecting.photograph_store import WHOLE, Name, Part, PhotographStore
 from ..inspecting.run_data import RunData, read_finished_run, read_run, run_stamp
 from ..inspecting.run_overview import run_overview
 from ..inspecting.run_scene import Scene, run_scene, tracks_scale
@@ -43,24 +41,6 @@ from ..setup.photograph_series import describe_series
 from ..setup.validation import ValidationResult, outside_walls, validate
 
 NOT_OWN = "of_another_experiment"  # below the run's folder of another experiment: nothing is there
-KEPT = 6  # photographs in memory: the one shown, two to either side, the first
-KEPT_PICTURES, SMALL_PICTURE = 32, 2_000_000  # of them as they were sent; [bytes]
-WHOLE = (slice(None), slice(None))
-QUALITY = 90  # of JPEG
-PhotographKey = tuple[Path, int, Channel, Rotation]  # of a file as it is now
-BEYOND = 58  # grey level of a crop beyond the edge of the photograph
-
-
-def encode_jpeg(image: Image, widest: int) -> bytes:
-    """Encode a photograph as JPEG, no wider or higher than so many pixels."""
-    shrink = min(1.0, widest / max(image.shape))
-    small = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA) if shrink < 1.0 else image
-    return _jpeg(small)
-
-
-def _jpeg(image: NDArray[Any]) -> bytes:
-    grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-    return cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
 
 
 class Project:
@@ -72,8 +52,7 @@ class Project:
         self.draft = Draft(folder, Journal(folder / PLACE), root=root)
         self.lock = threading.RLock()
         self.editing = threading.RLock()  # held from what an edit reads to what it writes
-        self._photographs: OrderedDict[PhotographKey, Image] = OrderedDict()
-        self._pictures: OrderedDict[tuple[object, ...], bytes] = OrderedDict()
+        self._photographs = PhotographStore()
         self._stamp: Any = None
         self._validation: ValidationResult | None = None
         self._job: Job | None = None
@@ -121,17 +100,7 @@ class Project:
 
     def photograph(self, frame: int) -> Image:
         """Read one photograph, grey; those used last are kept."""
-        key = self._photograph_key(frame)
-        with self.lock:
-            if key in self._photographs:
-                self._photographs.move_to_end(key)
-                return self._photographs[key]
-        image = rotated(read_photograph(key[0], channel=key[2]), key[3])
-        with self.lock:
-            self._photographs[key] = image
-            while len(self._photographs) > KEPT:
-                self._photographs.popitem(last=False)
-        return image
+        return self._photographs.measured(self._photograph_name(frame))
 
     def used_photograph(self, frame: int) -> Image:
         """Read one photograph without what lies outside its region, or under its mask."""
@@ -139,7 +108,7 @@ class Project:
         section = None if experiment is None else experiment.config.photographs
         return image if section is None else ImageSelection(region=section.region, mask=section.mask).cut(image)
 
-    def _photograph_key(self, frame: int) -> PhotographKey:
+    def _photograph_name(self, frame: int) -> Name:
         """A name of a photograph that changes with its file and the channel. Raises InputError."""
         found = self.validation()
         if not 0 <= frame < len(found.files):
@@ -149,26 +118,16 @@ class Project:
         rotation = section.get("rotation", 0)
         return file, hash(stamp_of(file)), section.get("channel", "grey"), rotation if rotation in (90, 180, 270) else 0
 
-    def picture(self, frame: int, widest: int, part: tuple[slice, slice] = WHOLE) -> bytes:
-        """Encode one photograph as JPEG, no wider or higher than so many pixels; small ones sent last are kept.
-
-        part: its rows and columns that are sent.
-        """
-        key = *self._photograph_key(frame), widest, *(end for each in part for end in (each.start, each.stop))
-        with self.lock:
-            if key in self._pictures:
-                self._pictures.move_to_end(key)
-                return self._pictures[key]
-        cut = self.photograph(frame)[part]
-        if not cut.size:
+    def picture(self, frame: int, widest: int, part: Part = WHOLE) -> bytes:
+        """Encode rows and columns of a photograph as JPEG, no wider or higher than so many pixels."""
+        picture = self._photographs.picture(self._photograph_name(frame), widest, part)
+        if picture is None:
             raise InputError(self.draft.file, f"photograph {frame}", "has no such part")
-        picture = encode_jpeg(cut, widest)
-        if len(picture) <= SMALL_PICTURE:
-            with self.lock:
-                self._pictures[key] = picture
-                while len(self._pictures) > KEPT_PICTURES:
-                    self._pictures.popitem(last=False)
         return picture
+
+    def crop(self, frame: int, place: tuple[float, float], width: float, shape: tuple[int, int]) -> bytes:
+        """Encode a part of a photograph as JPEG: its centre and width [px], rows and columns of what is sent."""
+        return self._photographs.crop(self._photograph_name(frame), place, width, shape)
 
     @property
     def name(self) -> str:
@@ -201,31 +160,6 @@ class Project:
         if self._owner_read is None or self._owner_read[0] != stamp:
             self._owner_read = stamp, owner_of(folder)
         return self._owner_read[1]
-
-    def crop(self, frame: int, place: tuple[float, float], width: float, shape: tuple[int, int]) -> bytes:
-        """Encode a part of a photograph as JPEG, moved by fractions of a pixel.
-
-        Parameters
-        ----------
-        frame : int
-            Number of the photograph.
-        place : tuple of float
-            Centre of the part [px].
-        width : float
-            Width of the part [px].
-        shape : tuple of int
-            Rows and columns of the picture that is sent.
-        """
-        rows, columns = shape
-        zoom = columns / width
-        # A place is the centre of a pixel where it is a whole number.
-        matrix = np.array([
-            [zoom, 0.0, 0.5 * (columns - 1) - zoom * place[0]], [0.0, zoom, 0.5 * (rows - 1) - zoom * place[1]]
-        ])  # fmt: skip
-        return _jpeg(cv2.warpAffine(
-            self.photograph(frame), matrix, (columns, rows), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT,
-            borderValue=(BEYOND,),
-        ))  # fmt: skip
 
     def photograph_count(self) -> int:
         """Count the photographs that are there now."""

@@ -11,6 +11,7 @@ from ... import __version__
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import read_photograph
 from ...process.errors import InputError
+from ..inspecting.photograph_store import encode_jpeg
 from ..setup import edits
 from ..setup.draft import Draft
 from ..setup.experiment_folders import (
@@ -23,7 +24,7 @@ from ..setup.experiment_folders import (
     sample_folder,
     valid_name,
 )
-from .project import Project, encode_jpeg
+from .project import Project
 
 
 class Workbench:

@@ -31,9 +31,8 @@ def solved(photographs_only: Path) -> Path:
 
 def grey(tab: Page) -> float:
     """Mean level of the picture as it is painted."""
-    tab.evaluate("workbench.stage.paint()")
     return tab.evaluate("""() => {
-        const { canvas } = workbench.stage, c = canvas.getContext("2d"), { data } = c.getImageData(0, 0, canvas.width, canvas.height);
+        const canvas = workbench.stage.composed(), c = canvas.getContext("2d"), { data } = c.getImageData(0, 0, canvas.width, canvas.height);
         let sum = 0;
         for (let k = 0; k < data.length; k += 4) sum += data[k];
         return 4 * sum / data.length;

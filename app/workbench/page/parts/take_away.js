@@ -14,7 +14,7 @@ export const fileName = (app, ending) => `${app.project.name.replace(/[^\w.-]+/g
 
 /** The picture as it is shown, with a line below it that states what it is. */
 export function savePicture(app, words) {
-  const { canvas } = app.stage, dense = devicePixelRatio || 1, line = Math.round(30 * dense);
+  const canvas = app.stage.composed(), dense = devicePixelRatio || 1, line = Math.round(30 * dense);
   const copy = h("canvas", { width: canvas.width, height: canvas.height + line }), c = copy.getContext("2d");
   c.fillStyle = "#08090b"; c.fillRect(0, 0, copy.width, copy.height);
   c.drawImage(canvas, 0, 0);

@@ -1,0 +1,194 @@
+"""Processor time of the page and memory of its server with 5 400 rods and 20 megapixels.
+
+    python -m tests.benchmarks.workbench_speed EXPERIMENT RUN [--folder DIR]     # of about 300 rods, finished
+
+The run is tiled (tests/benchmarks/tiled_results.py). Every event is one that a user's hand causes; the page's processor
+time is that of its main thread, of all browser processes together where stated. Clock times depend on other work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import CDPSession, Page, sync_playwright
+
+from tests.app.workbench.hand import idle
+from tests.benchmarks.tiled_results import tile_run
+from tests.browser import find_chromium
+
+FLAGS = ("--disable-gpu", "--disable-dev-shm-usage")  # drawn by the processor, as on a machine without a graphics card
+EVENTS = 30
+AIMS = {"pan": 0.03, "zoom": 0.03, "next": 0.3, "server": 600.0}
+SIZE = {"width": 1920, "height": 1080}
+LAYERS = """async (names) => {
+    const { layers, resetLayers, setLayer } = await import("/page/layers/settings.js");
+    resetLayers();
+    for (const name of names) setLayer(name, { on: true });
+    workbench.stage.redraw();
+}"""
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[tuple[str, int]]:
+    """A workbench in a process of its own: its address and process."""
+    work = [sys.executable, "-c", SERVER, str(folder)]
+    with subprocess.Popen(work, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]) as server:
+        assert server.stdout is not None
+        try:
+            yield server.stdout.readline().strip(), server.pid
+        finally:
+            server.terminate()
+
+
+SERVER = """
+import sys
+from pathlib import Path
+from rodsight.workbench.service.server import WorkbenchServer
+from rodsight.workbench.service.workbench import Workbench
+server = WorkbenchServer(Workbench(Path(sys.argv[1])))
+print(server.address, flush=True)
+server.serve()
+"""
+
+
+def memory(process: int, name: str = "VmRSS") -> float:
+    """Memory of a process [MB]."""
+    for line in Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines():
+        if line.startswith(f"{name}:"):
+            return int(line.split()[1]) / 1024
+    raise ValueError(f"no {name}")
+
+
+def browser_seconds() -> float:
+    """Processor time of all processes that this one has started [s], the server's excepted by the caller."""
+    ticks, found = os.sysconf("SC_CLK_TCK"), 0.0
+    children = {os.getpid()}
+    table = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                parts = (entry / "stat").read_text(encoding="utf-8", errors="replace").rsplit(")", 1)[1].split()
+            except OSError:  # it has ended
+                continue
+            table[int(entry.name)] = int(parts[1]), (int(parts[11]) + int(parts[12])) / ticks
+    for _ in range(6):
+        children |= {process for process, (parent, _) in table.items() if parent in children}
+    for process in children - {os.getpid()}:
+        name = Path(f"/proc/{process}/comm")
+        found += table[process][1] if name.exists() and "chrom" in name.read_text(encoding="utf-8") else 0.0
+    return found
+
+
+class Meter:
+    """Processor time per event of a page."""
+
+    def __init__(self, tab: Page, session: CDPSession) -> None:
+        self.tab, self.session = tab, session
+
+    def task_seconds(self) -> float:
+        metrics = self.session.send("Performance.getMetrics")["metrics"]
+        return next(each["value"] for each in metrics if each["name"] == "TaskDuration")
+
+    def measure(self, name: str, event: Callable[[int], object], aim: float, count: int = EVENTS) -> bool:
+        """Perform events one picture apart, wait until the picture has settled, and print the time of each."""
+        self.settle()
+        page, whole = self.task_seconds(), browser_seconds()
+        for k in range(count):
+            event(k)
+            self.tab.evaluate("new Promise((drawn) => requestAnimationFrame(() => drawn(null)))")
+        self.settle()
+        page, whole = (self.task_seconds() - page) / count, (browser_seconds() - whole) / count
+        met = page <= aim
+        print(f"{name:<44} {1e3 * page:7.1f} ms page  {1e3 * whole:7.1f} ms browser  aim {1e3 * aim:.0f}"
+              f"{'' if met else '   MISSED'}", flush=True)  # fmt: skip
+        return met
+
+    def settle(self) -> None:
+        idle(self.tab)
+        self.tab.wait_for_timeout(400)
+        idle(self.tab)
+
+
+def pan(meter: Meter, name: str) -> bool:
+    tab, box = meter.tab, meter.tab.locator("#canvas").bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    met = meter.measure(f"pan, {name}", lambda k: tab.mouse.move(x + 5 * (k % 20), y + 3 * (k % 20)), AIMS["pan"])
+    tab.mouse.up()
+    tab.mouse.move(x, y)
+    met &= meter.measure(f"zoom, {name}", lambda k: tab.mouse.wheel(0, -60 if k < EVENTS // 2 else 60), AIMS["zoom"])
+    return met
+
+
+def measure(folder: Path, dense: float) -> bool:
+    """Measure everything on a screen of so many device pixels per pixel."""
+    met = True
+    with served(folder) as (address, server), sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=find_chromium(), args=FLAGS, chromium_sandbox=False)
+        tab = browser.new_context(color_scheme="dark", device_scale_factor=dense, viewport=SIZE).new_page()
+        tab.set_default_timeout(1e5)
+        session = tab.context.new_cdp_session(tab)
+        session.send("Performance.enable", {"timeDomain": "threadTicks"})
+        tab.goto(address)
+        idle(tab)
+        tab.locator(".tile").first.click()
+        idle(tab)
+        meter = Meter(tab, session)
+        tab.keyboard.press("7")
+        tab.wait_for_selector("#colour-by")
+        idle(tab)
+        print(f"{dense:g} device pixels per pixel, {tab.evaluate('workbench.step.names().length')} rods, "
+              f"{tab.evaluate('workbench.project.width * workbench.project.height') / 1e6:.1f} megapixels")  # fmt: skip
+        met &= pan(meter, "forces, whole picture")
+        tab.evaluate(LAYERS, ["uncertainty", "contacts", "displacement", "strain"])
+        met &= pan(meter, "all layers, whole picture")
+        tab.evaluate(LAYERS, [])
+        tab.evaluate("workbench.stage.zoom(6)")
+        met &= pan(meter, "forces, enlarged six times")
+        tab.keyboard.press("f")
+        met &= next_photograph(meter)
+        now, peak = memory(server), memory(server, "VmHWM")
+        met &= peak <= AIMS["server"]
+        print(f"{'server':<44} {now:7.0f} MB now   {peak:7.0f} MB at most   aim {AIMS['server']:.0f}"
+              f"{'' if peak <= AIMS['server'] else '   MISSED'}\n", flush=True)  # fmt: skip
+        browser.close()
+    return met
+
+
+def next_photograph(meter: Meter) -> bool:
+    """The next photograph with its forces: clock time until it is drawn, the least of several."""
+    tab, took = meter.tab, []
+    for key in ("ArrowRight", "ArrowRight", "ArrowRight", "ArrowLeft", "ArrowLeft", "ArrowLeft"):
+        meter.settle()
+        time.sleep(0.6)  # a hand's pause, in which the neighbours are requested
+        since = time.perf_counter()
+        tab.keyboard.press(key)
+        idle(tab)
+        took.append(time.perf_counter() - since)
+    least, median = 1e3 * min(took), 1e3 * sorted(took)[len(took) // 2]
+    met = min(took) <= AIMS["next"]
+    print(f"{'the next photograph, with its forces':<44} {least:7.0f} ms least  {median:7.0f} ms median   "
+          f"aim {1e3 * AIMS['next']:.0f}{'' if met else '   MISSED'}", flush=True)  # fmt: skip
+    return met
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.workbench_speed", description=__doc__)
+    parser.add_argument("experiment", type=Path)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "rodsight-benchmark-page")
+    given = parser.parse_args()
+    place = tile_run(given.experiment, given.run, given.folder)
+    print(f"{os.cpu_count()} cores, {os.getloadavg()[0]:.1f} processes at work\n")
+    results = [measure(place, dense) for dense in (1.0, 2.0)]
+    sys.exit(0 if all(results) else 1)
