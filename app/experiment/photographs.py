@@ -261,6 +261,15 @@ def rotated(image: Image, rotation: Rotation) -> Image:
     return np.ascontiguousarray(np.rot90(image, -rotation // 90)) if rotation else image
 
 
+def read_levels(file: Path, channel: Channel = "grey", rotation: Rotation = 0) -> NDArray[np.uint8]:
+    """Read one photograph at the eight bits (H, W) that a screen shows. Raises InputError as `read_photograph`."""
+    pixels = _pixels_of(file, _content_of(file, None, MAX_PIXELS))
+    if pixels.dtype != np.uint8 or pixels.ndim != 2:
+        grey = _to_grey(file, pixels, CHANNELS[channel])
+        pixels = np.rint(grey, out=grey).astype(np.uint8)
+    return np.ascontiguousarray(np.rot90(pixels, -rotation // 90)) if rotation else pixels
+
+
 def _grey_of(file: Path, content: bytes, selection: ImageSelection) -> Image:
     return rotated(_to_grey(file, _pixels_of(file, content), CHANNELS[selection.channel]), selection.rotation)
 

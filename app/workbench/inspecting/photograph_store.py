@@ -12,17 +12,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Channel, Image, read_photograph
+from ...experiment.photographs import Channel, Image, Rotation, read_levels, read_photograph, rotated
 
-Name = tuple[Path, int, Channel]  # of a photograph: changes with its file and its channel
+Name = tuple[Path, int, Channel, Rotation]  # of a photograph: changes with its file, its channel, its rotation
 Levels = NDArray[np.uint8]  # (h, w)
 Part = tuple[slice, slice]  # rows and columns
 Kept = TypeVar("Kept")
 
 WHOLE: Part = (slice(None), slice(None))
 MEASURED_BYTES = 100 << 20  # a photograph of 20 megapixels has 80 MB as it is measured
-SHOWN_BYTES = 100 << 20  # the one shown, two to either side, the first
-SENT_BYTES = 32 << 20  # of pictures as they were sent
+SHOWN_BYTES = 60 << 20  # three photographs of 20 megapixels
+SENT_BYTES = 16 << 20  # of pictures as they were sent
 SMALL_PICTURE = 2_000_000  # [bytes] of those that are kept
 QUALITY = 90  # of JPEG
 BEYOND = 58  # grey level of a crop beyond the edge of the photograph
@@ -35,16 +35,16 @@ class PhotographStore:
         self._measured: _LastUsed[Image] = _LastUsed(MEASURED_BYTES, lambda image: image.nbytes)
         self._shown: _LastUsed[Levels] = _LastUsed(SHOWN_BYTES, lambda levels: levels.nbytes)
         self._sent: _LastUsed[bytes] = _LastUsed(SENT_BYTES, len)
-        self._reading = threading.Lock()  # one photograph at a time: each takes six times its size meanwhile
+        self._reading = threading.Lock()  # one photograph at a time: each takes up to six times its size meanwhile
 
     def measured(self, name: Name) -> Image:
         """Return a photograph as it is measured, with the precision of its file."""
         with self._reading:
-            return self._measured.get(name, lambda: read_photograph(name[0], channel=name[2]))
+            return self._measured.get(name, lambda: rotated(read_photograph(name[0], channel=name[2]), name[3]))
 
     def _levels(self, name: Name) -> Levels:
         with self._reading:
-            return self._shown.get(name, lambda: _eight_bits(self._measured.peek(name), name))
+            return self._shown.get(name, lambda: read_levels(name[0], name[2], name[3]))
 
     def picture(self, name: Name, widest: int, part: Part = WHOLE) -> bytes | None:
         """Encode a part of a photograph as JPEG, no wider or higher than so many pixels; None: it is empty."""
@@ -108,11 +108,6 @@ class _LastUsed(Generic[Kept]):
             while len(self._values) > 1 and sum(map(self._size, self._values.values())) > self._most:
                 self._values.popitem(last=False)
         return found
-
-
-def _eight_bits(measured: Image | None, name: Name) -> Levels:
-    image = read_photograph(name[0], channel=name[2]) if measured is None else measured
-    return cv2.convertScaleAbs(image)  # rounded, and no level is below 0 or above 255
 
 
 def encode_jpeg(image: Image | Levels, widest: int) -> bytes:

@@ -7,8 +7,8 @@ import { Picture, moveTo } from "/page/picture.js";
 const LOUPE = 172, LOUPE_TOP = 52, MAGNIFIED = 6;
 const HINT = 36; // [px] above the picture, for the hint and the layers
 const IDLE = 300; // [ms] after which the neighbours of a picture are requested
-const MARGIN = 0.2; // [of the stage] drawn around it, so that a movement uncovers what is there already
-const SETTLED = 110; // [ms] without a movement, after which the drawing is made anew
+const MARGIN = 0.12; // [of the stage] drawn around it, so that a movement uncovers what is there already
+const SETTLED = 180; // [ms] without a movement, after which the drawing is made anew
 const MAGNIFICATION = [0.4, 2.5]; // of a former drawing, beyond which it is made anew at once
 
 /** Two fingers on a touchpad pan, and pinched they zoom (the browser sets Ctrl); a wheel's notch is longer and straight. */
@@ -160,6 +160,7 @@ export class Stage {
   composed() {
     const dense = devicePixelRatio || 1, copy = document.createElement("canvas"), c = copy.getContext("2d");
     copy.width = this.canvas.width; copy.height = this.canvas.height;
+    c.fillStyle = "#08090b"; c.fillRect(0, 0, copy.width, copy.height);
     c.setTransform(dense, 0, 0, dense, 0, 0);
     this.window = this.visible();
     this.inPhotograph(c, this.view, () => { this.paintPhotograph(c, this.view); this.draw(c, this.view.k); this.fixed(c, this.view.k); });

@@ -27,7 +27,7 @@ export const CONTACTS = {
   age: { words: "age", unit: "photographs", of: (net, n) => net.age[n], map: "uncertainty", zero: true },
 };
 /** States differ in shape as well as colour: a disc, a bar along the tangent, a ring. */
-export const STATES = { sticking: "#f2f4f8", sliding: "#40d6de", open: "#9aa0ac" };
+export const STATES = { sticking: "#f8f6ea", sliding: "#40d6de", open: "#6f7683" };
 
 const known = new Map(); // motion by experiment, photograph and the one it is measured from
 
@@ -46,6 +46,8 @@ export function motionOf(app, facts) {
   }
   return found;
 }
+
+export const isLoaded = () => [...known.values()].every((each) => each !== null); // for tests
 
 export function scaleOfValues(motion) {
   const how = VALUES[layers.strain.by], [low, high] = how.high !== undefined ? [how.low, how.high] : rangeOfValues(how.of(motion), how);

@@ -27,6 +27,8 @@ export const inspect = {
   leave() { closeRecording(); },
   rodsOfFrame: () => net.rods.x.flatMap((x, n) => [x, net.rods.y[n], net.rods.r[n]]), // for tests
   names: () => net.rods.id, // for tests
+  isLoaded: (app) => net?.frame === app.frame, // for tests
+  contactAt: (row) => net.point[row], // for tests
   chosen: () => (chosen?.j === undefined ? null : { i: chosen.i, j: chosen.j }), // for tests
   moved(app) { recording?.show(Math.max(app.frame - (facts?.first ?? 0), 0)); app.queue(() => load(app)); },
   taken(app) { if (facts) app.queue(async () => { facts = (await request("run_state", { at: app.project.at })).frames; await load(app, true); }); },

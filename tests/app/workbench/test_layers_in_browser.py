@@ -1,0 +1,195 @@
+"""Layers of the picture in a real Chromium: what each draws, opacity, colours and range; colours that all can tell."""
+
+from base64 import b64decode
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+from rodsight.results.hdf5.store import load_results
+from rodsight.workbench.setup.draft import Draft
+
+from tests.app.workbench.hand import go, idle, on_screen, opened
+from tests.browser import read_picture
+from tests.golden.stored import unpack
+
+pytestmark = pytest.mark.screen
+FRAME = 3  # a photograph with forces and motion; the stored run begins at photograph 2
+LEGENDS = 200  # [px] to their right
+BOX = [-8, 416, 236, 606]  # [px] of the photograph around the walls of the stored run
+
+
+@pytest.fixture
+def solved(photographs_only: Path) -> Path:
+    folder = photographs_only / "my photographs"
+    Draft(folder).set_keys("all", {
+        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
+        "photographs.pixel_size": 2.5e-4,
+    })  # fmt: skip
+    run = photographs_only / "runs" / "mine"
+    run.mkdir(parents=True)
+    unpack(2, run)
+    return photographs_only
+
+
+@pytest.fixture
+def tab(page: Page, solved: Path) -> Iterator[Page]:
+    with opened(page, solved) as tab:
+        tab.locator(".tile").first.click()
+        idle(tab)
+        go(tab, "inspect")
+        tab.evaluate(f"workbench.show({FRAME})")
+        idle(tab)
+        tab.wait_for_function("workbench.step.isLoaded(workbench)")
+        tab.evaluate(f"workbench.stage.fit({BOX})")
+        yield tab
+
+
+def shown(tab: Page, **layers: dict | bool) -> np.ndarray:
+    """The composed picture (h, w, 3) with these layers alone."""
+    settings = {name: {"on": True, **(each if isinstance(each, dict) else {})} for name, each in layers.items()}
+    tab.evaluate("""async (settings) => {
+        const { layers, resetLayers, setLayer } = await import("/page/layers/settings.js");
+        resetLayers();
+        for (const name of Object.keys(layers)) setLayer(name, { on: false });
+        for (const [name, values] of Object.entries(settings)) setLayer(name, values);
+        workbench.stage.redraw();
+    }""", settings)  # fmt: skip
+    idle(tab)
+    tab.wait_for_function("import('/page/layers/rods.js').then((rods) => rods.isLoaded())")
+    idle(tab)
+    png = tab.evaluate("workbench.stage.composed().toDataURL('image/png')")
+    return read_picture(b64decode(png.split(",")[1]))
+
+
+def drawn(picture: np.ndarray) -> float:
+    """Fraction of the picture beside the legends that is not empty."""
+    return float((picture[:, LEGENDS:].max(axis=2) > 40).mean())
+
+
+def light(picture: np.ndarray, empty: np.ndarray) -> float:
+    """Sum of the picture over that of an empty one, beside the legends."""
+    return float((picture.astype(float) - empty)[:, LEGENDS:].sum())
+
+
+def test_every_layer_draws_something_of_its_own_and_less_with_less_opacity(tab: Page):
+    empty = shown(tab)
+    assert drawn(empty) == 0.0
+    for name in ("photograph", "walls", "rods", "forces", "uncertainty", "contacts", "displacement", "strain"):
+        full = shown(tab, **{name: {"since": "first"} if name in ("displacement", "strain") else True})
+        assert drawn(full) > 0.002, name
+        faint = shown(tab, **{name: {"opacity": 0.2, "since": "first"}})
+        assert light(faint, empty) < 0.6 * light(full, empty), name
+        assert not np.array_equal(full, empty)
+
+
+def test_forces_have_the_range_of_the_recording_until_it_is_changed(tab: Page, solved: Path):
+    results = load_results(solved / "runs" / "mine" / "results.h5")
+    strong = np.concatenate([frame.fn for frame in results.frames])
+    own = "import('/page/layers/network.js').then((n) => n.networkLegends(NET)[0])"
+    net = f"fetch('/api/network', {{ method: 'POST', headers: {{ 'Content-Type': 'application/json' }}, body: JSON.stringify({{ at: workbench.project.at, frame: {FRAME} }}) }}).then((a) => a.json())"  # noqa: E501
+    script = f"{net}.then((NET) => {own}).then((l) => [l.words, l.scale.low, l.scale.high])"
+    words, low, high = tab.evaluate(script)
+    assert words == "normal force, all frames"
+    assert low == pytest.approx(0.5 * strong[strong > 0].mean(), rel=1e-3)
+    assert high == pytest.approx(max(np.quantile(strong[strong > 0], 0.998), 4.0 * low), rel=1e-3)
+    tab.keyboard.press("y")
+    tab.locator(".layer", has=tab.locator("#layer-forces")).locator("summary").click()
+    tab.fill("#layer-forces-high", "500")
+    tab.keyboard.press("Enter")
+    words, _, high = tab.evaluate(script)
+    assert (words, high) == ("normal force, not as in the recording", 500.0)
+    tab.fill("#layer-forces-high", "much")
+    tab.keyboard.press("Enter")
+    expect(tab.locator("#toast")).to_contain_text("much is not a number")
+    tab.click("#layers-reset")
+    assert tab.evaluate(script)[0] == "normal force, all frames"
+
+
+def test_bars_get_thinner_than_the_rods_when_they_are_enlarged(tab: Page):
+    def widest(zoom: float) -> float:
+        tab.evaluate(f"workbench.stage.fit(); workbench.stage.zoom({zoom})")
+        return tab.evaluate("""() => new Promise((done) => {
+            const c = new OffscreenCanvas(1, 1).getContext("2d"), { stage } = workbench;
+            let most = 0;
+            Object.defineProperty(c, "lineWidth", { set: (wide) => { most = Math.max(most, wide * stage.view.k); } });
+            stage.window = [-1e9, -1e9, 1e9, 1e9];
+            stage.draw(c, stage.view.k);
+            done(most / stage.view.k);
+        })""")  # fmt: skip
+
+    assert widest(12.0) < 0.6 * widest(1.0)
+
+
+def test_gamma_lightens_the_dark_and_the_stretch_uses_the_whole_range(tab: Page):
+    plain = shown(tab, photograph=True)
+    light = shown(tab, photograph={"gamma": 2.5})
+    dark, bright = plain[..., 0] < 60, plain[..., 0] > 120
+    assert light[dark].mean() > 1.4 * max(plain[dark].mean(), 1.0)
+    assert light[bright].mean() < 255.0
+    stretched = tab.evaluate("workbench.stage.picture.stretched()")
+    picture = shown(tab, photograph=stretched)[..., 0]
+    dim = tab.evaluate("workbench.step.dim")  # of all photographs below forces
+    assert np.ptp(np.percentile(picture, (0.5, 99.5))) > max(0.93 * 255 * dim, 1.05 * np.ptp(plain[..., 0]))
+
+
+# Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15, 1291 (2009), severity 1, on linear sRGB.
+DEFICIENCIES = {
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
+}
+APART = 20.0  # CIE76 difference of two marks that mean different things
+
+
+def seen_by(colours: list[str], matrix: list[list[float]]) -> np.ndarray:
+    """CIELAB (k, 3) of colours as a person with a deficiency sees them."""
+    rgb = np.array([[int(each[k : k + 2], 16) for k in (1, 3, 5)] for each in colours]) / 255.0
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.array(matrix).T, 0.0, 1.0)
+    srgb = np.where(seen <= 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)
+    return cv2.cvtColor(srgb[None].astype(np.float32), cv2.COLOR_RGB2LAB)[0]
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_colours_of_every_layer_differ_for_everybody(tab: Page, scheme: Literal["dark", "light"]):
+    tab.emulate_media(color_scheme=scheme)
+    ramps, states, series, tones = tab.evaluate("""async () => {
+        const { look } = await import("/page/layers/colours.js"), { STATES } = await import("/page/layers/rods.js");
+        const { TONES } = await import("/page/time/strip.js"), { colour } = await import("/page/dom.js");
+        const series = [1, 2, 3, 4].map((n) => colour(`series-${n}`));
+        return [look.ramps, Object.values(STATES), series, Object.values(TONES)];
+    }""")  # fmt: skip
+    for name, matrix in {"all": np.eye(3).tolist(), **DEFICIENCIES}.items():
+        for ramp, colours in ramps.items():
+            lab = seen_by(colours, matrix)
+            lightness = np.diff(lab[:, 0])
+            assert (lightness > -0.6).all() or (lightness < 0.6).all(), (name, ramp)  # monotonic: read in grey
+            ends = np.linalg.norm(lab[-1] - lab[0])
+            assert ends > 2.5 * APART, (name, ramp)
+        for group in (states, series):
+            lab = seen_by(group, matrix)
+            apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)[~np.eye(len(lab), dtype=bool)]
+            assert apart.min() > APART, (name, group)
+    assert len(set(tones)) == len(tones)  # statuses are named beside their colour
+
+
+def test_a_chosen_rod_shows_its_track(tab: Page):
+    rods = tab.evaluate("workbench.step.rodsOfFrame()")
+    card = tab.locator("#card")
+    for place in zip(rods[0::3], rods[1::3], strict=True):
+        tab.keyboard.press("Escape")
+        before = shown(tab, marks=True)
+        tab.mouse.click(*on_screen(tab, place))
+        idle(tab)
+        if "–" not in (card.locator(".fact").first.text_content() or "") and card.get_by_text("radius").count():
+            break
+    tab.wait_for_selector("#card canvas")
+    after = shown(tab, marks=True)
+    yellow = (after[..., 0] > 200) & (after[..., 1] > 190) & (after[..., 2] < 130)
+    assert yellow.any()
+    assert not ((before[..., 0] > 200) & (before[..., 1] > 190) & (before[..., 2] < 130)).any()
+    assert not np.array_equal(before, after)
