@@ -182,7 +182,7 @@ def next_photograph(meter: Meter, server: int) -> bool:
     aim = 1e3 * AIMS["next"]
     met = median <= aim
     print(f"{'the next photograph, with its forces':<40} {page:6.0f} ms page, {serving:.0f} ms server, "
-          f"{least:.0f} ms least clock  aim {aim:.0f}{"" if met else "   MISSED"}", flush=True)  # fmt: skip
+          f"{least:.0f} ms least clock  aim {aim:.0f}{'' if met else '   MISSED'}", flush=True)  # fmt: skip
     return met
 
 
