@@ -265,8 +265,7 @@ def read_levels(file: Path, channel: Channel = "grey", rotation: Rotation = 0) -
     """Read one photograph at the eight bits (H, W) that a screen shows. Raises InputError as `read_photograph`."""
     pixels = _pixels_of(file, _content_of(file, None, MAX_PIXELS))
     if pixels.dtype != np.uint8 or pixels.ndim != 2:
-        grey = _to_grey(file, pixels, CHANNELS[channel])
-        pixels = np.rint(grey, out=grey).astype(np.uint8)
+        pixels = np.rint(_to_grey(file, pixels, CHANNELS[channel])).astype(np.uint8)
     return np.ascontiguousarray(np.rot90(pixels, -rotation // 90)) if rotation else pixels
 
 

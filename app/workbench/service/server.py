@@ -7,9 +7,11 @@ system except through the list of experiments.
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import json
 import socket
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -51,6 +53,7 @@ from .workbench import Workbench
 LARGEST_BODY = 256 * 1024  # bytes of a request without a table
 LARGEST_TABLE = 4 * LARGEST_WRITTEN  # bytes of a request with one: a character has up to four, an escaped line end two
 THUMBNAIL = 480  # [px] of a picture on the first page
+M_ARENA_MAX = -8  # of mallopt(3)
 POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
     ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
@@ -134,6 +137,7 @@ class WorkbenchServer:
         """Bind the port; command: that prints the address; entry: address to which the first visit is redirected."""
         import uvicorn
 
+        _limit_arenas()
         from .http_connection import HttpConnection
 
         self.workbench = workbench
@@ -171,6 +175,12 @@ class WorkbenchServer:
         """Release the port, and pause every run."""
         self.workbench.close()
         self._socket.close()
+
+
+def _limit_arenas() -> None:
+    """Let the threads of this process share two areas of memory: with one each, as much as a photograph is lost."""
+    with suppress(AttributeError, OSError):  # a C library without this setting
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
 
 
 async def _run_events(workbench: Workbench, opened: Project, request: Request) -> AsyncIterator[str]:

@@ -29,7 +29,7 @@ def solved(made_photographs: Path, photographs_only: Path) -> Path:
     return photographs_only
 
 
-# What axe does not judge: canvases have a role and a name, one step is the present one, steps name their state.
+# Rules beside those of axe: canvases have a role and a name, one step is the present one, steps show their state.
 UNNAMED = """() => {
     const seen = (each) => each.checkVisibility() && !each.closest("[aria-hidden=true]");
     const steps = [...document.querySelectorAll("#steps button")];

@@ -1,4 +1,4 @@
-"""Layers of the picture in a real Chromium: what each draws, opacity, colours and range; colours that all can tell."""
+"""Layers of the picture in a real Chromium: drawing, opacity, colours and range; colours that everybody distinguishes."""
 
 from base64 import b64decode
 from collections.abc import Iterator
