@@ -1,4 +1,4 @@
-"""Layers of the picture in a real Chromium: drawing, opacity, colours and range; colours that everybody distinguishes."""
+"""Layers of the picture in a real Chromium: drawing, opacity, colours and range; colours that everybody can separate."""
 
 from base64 import b64decode
 from collections.abc import Iterator
