@@ -1,4 +1,4 @@
-"""Layers of the picture in a real Chromium: drawing, opacity, colours and range; colours that everybody can separate."""
+"""Layers of the picture in a real Chromium: drawing, opacity, colours and range; colours that differ for everybody."""
 
 from base64 import b64decode
 from collections.abc import Iterator
