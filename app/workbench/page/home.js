@@ -14,11 +14,19 @@ export function showHome(app) {
         ? `There are no photographs and no experiments in ${folder.root} yet. Put the photographs of one test into a folder there (PNG, TIFF, JPEG or raw), then reload; or begin with the sample.`
         : `In ${folder.root}. Every action writes ordinary files there, which rodsight run reads.`),
       folder.experiments.length ? h("div", { class: "tiles" }, folder.experiments.map((each) => experimentTile(app, each))) : null,
-      folder.series.length ? [h("h2", {}, "New from photographs"), h("div", { class: "tiles" }, folder.series.map((each) => seriesTile(app, each)))] : null,
+      folder.series.length ? [h("h2", {}, "New from photographs"), likeField(folder.experiments), h("div", { class: "tiles" }, folder.series.map((each) => seriesTile(app, each)))] : null,
       folder.sample ? [h("h2", {}, "To begin with"), h("div", { class: "tiles" }, sampleTile(app))] : null,
       h("p", { style: { marginTop: "28px" } }, h("button", { class: "quiet", onclick: app.home }, "Reload"), ` Rodsight ${folder.version}`),
     ].flat(9).filter(Boolean));
   });
+}
+
+/** The experiment whose set-up a new one takes over: scale, lens, walls, material, not its rods. */
+function likeField(experiments) {
+  const known = experiments.filter((each) => !each.error);
+  if (!known.length) return null;
+  return h("div", { class: "field", style: { maxWidth: "420px" } }, h("label", { htmlFor: "like" }, "set up like"),
+    h("select", { id: "like", title: "Scale, lens, walls, material and settings are taken over; rods are detected anew" }, h("option", { value: "" }, "nothing: from the beginning"), known.map((each) => h("option", { value: each.at }, each.at === "." ? each.name : each.at))));
 }
 
 function experimentTile(app, each) {
@@ -41,7 +49,7 @@ function experimentTile(app, each) {
 const TONE = { settled: "good", settling: "good", rearranging: "doubtful", suspect: "bad", failed: "bad", reset: "", "out of date": "doubtful" };
 
 function seriesTile(app, each) {
-  return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await request("begin", { folder: each.folder, suffix: each.suffix, name: each.name })), "Reading photographs …", `begin ${each.folder} ${each.suffix}`) },
+  return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await request("begin", { folder: each.folder, suffix: each.suffix, name: each.name, like: at("like")?.value || null })), "Reading photographs …", `begin ${each.folder} ${each.suffix}`) },
     h("img", { class: "picture", alt: "", src: `/thumbnail?${new URLSearchParams({ folder: each.folder, suffix: each.suffix })}` }),
     h("span", { class: "words" }, h("b", {}, each.folder === "." ? each.name : each.folder), h("span", {}, `${each.count} photographs, ${each.first} … ${each.last}`), h("span", {}, "Set up an experiment from these")));
 }

@@ -10,6 +10,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstra
 from starlette.requests import Request
 
 from ...process.errors import InputError
+from ..action_script import as_script
+from ..setup.journal import requested
 from .workbench import Workbench
 
 Endpoint = Callable[..., Any]
@@ -72,7 +74,10 @@ def call_endpoint(workbench: Workbench, name: str, values: dict[str, Any]) -> An
     if name not in ENDPOINTS or "workbench" in values:
         raise BadRequest(f"there is no endpoint {name}")
     try:
-        with _edit_lock(workbench, values.get("at")) if name in EDITING else nullcontext():
+        with (
+            _edit_lock(workbench, values.get("at")) if name in EDITING else nullcontext(),
+            requested(name, values),
+        ):
             return ENDPOINTS[name](workbench, **values)
     except ValidationError as error:
         raise BadRequest(f"{name}: {first_error(error)}") from None
@@ -103,15 +108,27 @@ def sample(workbench: Workbench) -> dict[str, Any]:
 
 
 @endpoint
-def begin(workbench: Workbench, folder: Text, suffix: Text, name: Text) -> dict[str, Any]:
-    """Make an experiment of a series of photographs: a folder, by its path from the root, and the ending of names."""
-    return workbench.begin(folder, suffix, name).describe()
+def begin(workbench: Workbench, folder: Text, suffix: Text, name: Text, like: Text | None = None) -> dict[str, Any]:
+    """Make an experiment of a series of photographs: a folder, by its path from the root, and the ending of names.
+
+    like: the experiment whose set-up it takes over.
+    """
+    return workbench.begin(folder, suffix, name, like).describe()
 
 
 @endpoint
 def duplicate(workbench: Workbench, at: Text) -> dict[str, Any]:
     """Copy an experiment, without its run, into a new folder beside it."""
     return workbench.duplicate(at).describe()
+
+
+@endpoint
+def script(workbench: Workbench, at: Text) -> dict[str, Any]:
+    """Return the actions that are not undone as a Python script."""
+    opened = workbench.project(at)
+    files = opened.validation().data.get("photographs", {}).get("files", "")
+    actions = opened.draft.journal.done()
+    return {"script": as_script(actions, at=at, name=opened.name, files=files), "count": len(actions)}
 
 
 @endpoint

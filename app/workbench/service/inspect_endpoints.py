@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,22 @@ def motion(workbench: Workbench, at: Text, frame: Whole, since: Whole) -> dict[s
     data = opened.run_data()
     assert data is not None
     return grain_motion(data, frame, since, opened.scene().scale, run.experiment.config.material.length)
+
+
+@endpoint
+def figure(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
+    """Draw the forces of a photograph as SVG, as `rodsight export figures` does."""
+    from ...figures.figure_style import paper_style  # drawing is imported where it is used
+    from ...figures.force_network import draw_forces
+
+    opened = workbench.project(at)
+    results, first = _results(opened)
+    if not first <= frame < first + len(results.frames):
+        raise InputError(opened.results, f"photograph {frame}", f"is not there: {len(results.frames)} are")
+    stream = io.StringIO()
+    with paper_style():
+        draw_forces(results, frame - first, "double").savefig(stream, format="svg", metadata={"Date": None})
+    return {"svg": stream.getvalue()}
 
 
 @endpoint

@@ -6,13 +6,9 @@ import math
 import threading
 import zlib
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Image, ImageSelection
 from ...experiment.reading.input_files import InputFiles
 from ...experiment.units import Scale
@@ -32,13 +28,12 @@ from ..inspecting.run_data import RunData, read_finished_run, read_run, run_stam
 from ..inspecting.run_overview import run_overview
 from ..inspecting.run_scene import Scene, run_scene, tracks_scale
 from ..running.job import Job
-from ..setup.circles import circles_of
+from ..setup.description import coarse_size, describe_rods, describe_tables, describe_walls, table_names
 from ..setup.draft import Draft, stamp_of
-from ..setup.edits import TABLES
 from ..setup.experiment_folders import run_folder, valid_name
 from ..setup.journal import PLACE, Journal
 from ..setup.photograph_series import describe_series
-from ..setup.validation import ValidationResult, outside_walls, validate
+from ..setup.validation import Mark, ValidationResult, outside_walls, validate
 
 NOT_OWN = "of_another_experiment"  # below the run's folder of another experiment: nothing is there
 
@@ -80,7 +75,7 @@ class Project:
         """Validate the files; they are read again only where one has changed."""
         with self.lock:
             data = self.draft.data()
-            stamp = self.draft.stamps(_tables(data)), self._pattern_stamp(data)
+            stamp = self.draft.stamps(table_names(data)), self._pattern_stamp(data)
             if self._validation is None or stamp != self._stamp:
                 self._stamp, self._validation = stamp, validate(self.draft)
             return self._validation
@@ -92,7 +87,7 @@ class Project:
             raise InputError(self.draft.file, "key photographs", "names no photograph that can be measured yet")
         section, rods = found.data.get("photographs", {}), found.rods
         settings = tuple(str(section.get(key)) for key in ("channel", "region", "mask", "follow"))
-        stamp = found.files, self._pattern_stamp(found.data), settings, _size_of(rods)
+        stamp = found.files, self._pattern_stamp(found.data), settings, coarse_size(rods)
         with self._measuring:  # not the other lock: pictures are served meanwhile
             if self._quality is None or self._quality[0] != stamp:
                 self._quality = stamp, measure_photographs(found.experiment, rods)
@@ -201,7 +196,7 @@ class Project:
     def review_session(self) -> ReviewSession:
         """Return the review of the finished results; a new one where the results or the experiment have changed."""
         with self.lock:
-            stamp = self.results, run_stamp(self.results), self.draft.stamps(_tables(self.draft.data()))
+            stamp = self.results, run_stamp(self.results), self.draft.stamps(table_names(self.draft.data()))
             if self._session is None or self._session[0] != stamp:
                 self._session = (
                     stamp,
@@ -242,7 +237,7 @@ class Project:
         """Return a text that changes with every file of the experiment and its run, whoever changed it."""
         data = self.draft.data()
         written = [stamp_of(self.results / name) for name in (VERDICTS, SUMMARY, MANIFEST)]
-        stamps = self.draft.stamps(_tables(data)), self._pattern_stamp(data), run_stamp(self.results)[1:]
+        stamps = self.draft.stamps(table_names(data)), self._pattern_stamp(data), run_stamp(self.results)[1:]
         return f"{zlib.crc32(repr((stamps, written)).encode()):08x}"
 
     def out_of_date(self) -> list[str]:
@@ -268,7 +263,7 @@ class Project:
             found = self.validation()
             return values | {
                 "name": self.name, "run": self._run_overview(), "frames": len(found.files),
-                "steps": [each.mark.value for each in found.steps.values()],
+                "steps": [each["mark"] for each in self._steps(found)],
             }  # fmt: skip
         except (InputError, OSError, RecursionError) as error:
             return values | {"error": str(error) or "is nested too deeply"}
@@ -284,20 +279,36 @@ class Project:
             bounds = self.scene().bounds
             width, height = math.ceil(bounds[2] - bounds[0]), math.ceil(bounds[3] - bounds[1])
         return {
-            "at": self.key, "stamp": self.stamp(), "name": self.name, "folder": str(self.folder), "ready": found.ready,
-            "steps": [{"name": s.name, "mark": s.mark.value, "messages": s.messages} for s in found.steps.values()],
+            "at": self.key, "stamp": self.stamp(), "name": self.name, "folder": str(self.folder),
+            "ready": found.ready and not self._taken(), "steps": self._steps(found),
             "other_messages": found.other_messages, "tracked": found.tracked, "width": width, "height": height,
             "bounds": bounds,
             "files": [file.name for file in found.files], "series": describe_series(found),
             "frames": self.frame_count(), "photographs": section,
             "pixel": None if found.scale is None else found.scale.mean_size,
-            "walls": _walls(found), "rods": _rods(found),
+            "walls": describe_walls(found), "rods": describe_rods(found),
             "outside": outside_walls(found), "material": found.data.get("material", {}),
-            "tables": _named_tables(found),
+            "tables": describe_tables(found),
             "undo": None if (done := self.draft.journal.last_done()) is None else done.name,
             "redo": None if (undone := self.draft.journal.last_undone()) is None else undone.name,
             "run": self._run_overview(),
         }  # fmt: skip
+
+    def _steps(self, found: ValidationResult) -> list[dict[str, Any]]:
+        steps = [
+            {"name": s.name, "mark": s.mark.value, "messages": list(s.messages)} for s in found.steps.values()
+        ]  # fmt: skip
+        if taken := self._taken():
+            steps[0] |= {"mark": Mark.MISSING.value, "messages": [taken, *steps[0]["messages"]]}
+        return steps
+
+    def _taken(self) -> str:
+        """State that another experiment has the folder of the run, as after a copy; empty: none has."""
+        if self.results == (folder := self.run_folder):
+            return ""
+        owner = self._owner(folder)
+        other = "another experiment" if owner is None else owner.parent.name
+        return f"runs/{self.name} holds the run of {other}: give this experiment another name to run it."
 
     def _pattern_stamp(self, data: dict[str, Any]) -> Any:
         section = data.get("photographs", {})
@@ -310,53 +321,3 @@ class Project:
             return folder.stat().st_mtime_ns, hash(tuple(map(stamp_of, known)))
         except (OSError, ValueError):
             return None
-
-
-def _tables(data: dict[str, Any]) -> list[str]:
-    """Names of the tables in an experiment file, valid or not."""
-    names = []
-    for section in data.values():
-        if isinstance(section, dict):
-            names += [value for value in section.values() if isinstance(value, str) and value.endswith(".csv")]
-    return names
-
-
-def _walls(found: ValidationResult) -> list[dict[str, Any]]:
-    if found.walls is None or found.scale is None:
-        return []
-    ends = found.scale.to_pixels(found.walls.endpoints[0])
-    plates = found.data.get("walls", {})
-    circles = {each.name: asdict(each) for each in circles_of(found)}
-    listed = []
-    for name, line, pressure in zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True):
-        plate = plates.get(name)
-        listed.append({
-            "name": name, "line": line, "circle": circles.get(name),
-            "pressure": None if pressure != pressure else pressure,
-            "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
-        })  # fmt: skip
-    return listed
-
-
-def _size_of(rods: GrainGuess | None) -> tuple[int, int] | None:
-    """Number and size of the rods, coarse: a measurement on some of them stays valid when a rod moves."""
-    return None if rods is None or not len(rods.id) else (len(rods.id) // 10, round(float(np.median(rods.radius))))
-
-
-def _named_tables(found: ValidationResult) -> dict[str, Any]:
-    """Tables of other programs that the experiment names, by their content; None: no such table."""
-    sections = {section: found.data.get(section) for section, *_ in TABLES.values()}
-    return {
-        name: given.get(name) if isinstance(given := sections[section], dict) else None
-        for name, (section, *_) in TABLES.items()
-    }
-
-
-def _rods(found: ValidationResult) -> dict[str, Any] | None:
-    rods = found.rods
-    if rods is None:
-        return None
-    return {
-        "id": rods.id.tolist(), "x": np.round(rods.x, 2).tolist(), "y": np.round(rods.y, 2).tolist(),
-        "r": np.round(rods.radius, 3).tolist(),
-    }  # fmt: skip

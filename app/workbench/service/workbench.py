@@ -22,6 +22,7 @@ from ..setup.experiment_folders import (
     find_image_series,
     find_series,
     sample_folder,
+    take_over,
     valid_name,
 )
 from .project import Project
@@ -109,10 +110,16 @@ class Workbench:
             raise InputError(self.root, "photographs", "are not there any more")
         return encode_jpeg(read_photograph(files[0]), widest)
 
-    def begin(self, folder: str, suffix: str, name: str) -> Project:
-        """Make an experiment of a series of photographs, named by their folder, not by their place in a list."""
+    def begin(self, folder: str, suffix: str, name: str, like: str | None = None) -> Project:
+        """Make an experiment of a series of photographs, named by their folder, not by their place in a list.
+
+        like: the experiment whose set-up it takes over.
+        """
         home, pattern, _ = experiment_place(find_series(self.root, folder, suffix), self.root)
-        edits.begin(Draft(home, root=self.root), valid_name(name), pattern)
+        draft, source = Draft(home, root=self.root), None if like is None else self.project(like).validation()
+        edits.begin(draft, valid_name(name), pattern)
+        if source is not None:
+            take_over(draft, source)
         return self.project(home.relative_to(self.root).as_posix())
 
     def duplicate(self, at: str) -> Project:

@@ -10,18 +10,33 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ...experiment.experiment import CONFIG_NAME
 from ...experiment.photographs import RAW_SUFFIXES
 from ...experiment.reading.photograph_order import in_order, natural_key
 from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError
+from ...solver.bodies.wall_shapes import STRAIGHT
+from .circles import ARCS, arcs_table, circles_of
+from .draft import Draft
+from .edits import WALLS, walls_table
 from .toml_edit import set_values
+from .validation import ValidationResult
 
 PICTURES = frozenset((".png", ".tif", ".tiff", ".jpg", ".jpeg")) | RAW_SUFFIXES
 DEEPEST = 3  # folders below the one that was opened
 SKIPPED = frozenset(("runs", "node_modules", "__pycache__"))
 SAMPLE = "shear"
+# Settings of the apparatus and the camera. Rods, corrections, times, loads and truths belong to one test.
+SECTIONS = ("material", "tracking", "calibration", "contacts", "solver", "recording")
+PHOTOGRAPHS = (
+    "interval", "pixel_size", "distance", "lens", "radii", "channel", "rotation", "region", "mask", "follow",
+    "max_pixels",
+)  # fmt: skip
+OF_ONE_TEST = ("file", "arcs", "load", "forces", "corners")  # keys of walls that name tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +141,28 @@ def duplicate(folder: Path, root: Path) -> Path:
         described = set_values(file.read_bytes().decode("utf-8"), {"name": valid_name(target.name)})
         write_atomically(file, described.encode())
     return target
+
+
+def take_over(draft: Draft, source: ValidationResult) -> None:
+    """Write the set-up of another experiment into a new one: settings, scale, walls as they stand on photograph 0."""
+    data = source.data
+    keys: dict[str, Any] = {name: data[name] for name in SECTIONS if name in data}
+    section = data.get("photographs", {})
+    keys |= {f"photographs.{name}": section[name] for name in PHOTOGRAPHS if name in section}
+    tables: dict[str, bytes | None] = {}
+    walls, scale = source.walls, source.scale
+    if walls is not None and scale is not None:
+        bars, circles = walls.sides == STRAIGHT, circles_of(source)
+        names = [walls.name[w] for w in np.flatnonzero(bars).tolist()]
+        kept = {key: value for key, value in data["walls"].items() if key not in OF_ONE_TEST}
+        if names:
+            tables[WALLS] = walls_table(names, scale.to_pixels(walls.endpoints[0])[bars], scale)
+            kept["file"] = WALLS
+        if circles:
+            tables[ARCS] = arcs_table(circles, scale)
+            kept["arcs"] = ARCS
+        keys["walls"] = kept
+    draft.set_keys("set-up taken over", keys, tables)
 
 
 def _link_picture(source: str, target: str) -> None:

@@ -10,7 +10,9 @@ import hashlib
 import json
 import secrets
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +24,8 @@ PLACE = ".rodsight"  # folder of the journal in that of the experiment
 JOURNAL, CONTENTS = "journal.jsonl", "contents"
 MOST, KEPT = 600, 300  # actions: above MOST the journal is shortened to KEPT
 
+TABLE = "table"  # value of a request that is a whole table: the folder holds it
+_REQUEST: ContextVar[dict[str, Any] | None] = ContextVar("request", default=None)
 Contents = dict[str, bytes | None]  # of files by name; None: no such file
 
 
@@ -33,6 +37,7 @@ class Action:
     before: dict[str, str | None] = field(default_factory=dict)  # checksums of contents by file; None: no such file
     after: dict[str, str | None] = field(default_factory=dict)
     verdict: dict[str, Any] | None = None  # the line of the verdict log
+    request: dict[str, Any] | None = None  # of the page: its id, endpoint and values
     id: str = ""
     time: str = ""
 
@@ -56,7 +61,12 @@ class Journal:
         try:
             self._add(Action(name, verdict=line))
         except OSError:
-            self._take({"do": asdict(_stamped(Action(name, verdict=line)))})
+            self._take({"do": asdict(_stamped(Action(name, verdict=line, request=_REQUEST.get())))})
+
+    def done(self) -> list[Action]:
+        """Return the actions that are not undone, in their order."""
+        self._read()
+        return list(self._done)
 
     def last_done(self) -> Action | None:
         """Return the action that would be undone; None: there is none."""
@@ -82,7 +92,7 @@ class Journal:
 
     def _add(self, action: Action) -> None:
         self._read()
-        self._append({"do": asdict(_stamped(action))})
+        self._append({"do": asdict(_stamped(replace(action, request=_REQUEST.get())))})
         if len(self._done) > MOST:
             self._shorten()
 
@@ -161,6 +171,19 @@ class Journal:
         for file in (self._place / CONTENTS).iterdir():
             if file.name not in needed:
                 file.unlink(missing_ok=True)
+
+
+@contextmanager
+def requested(endpoint: str, values: Mapping[str, Any]) -> Iterator[None]:
+    """Record that actions inside the block were requested by the page: so, a script can repeat them."""
+    kept = {key: value for key, value in values.items() if key not in ("at", TABLE)}
+    if values.get(TABLE) is not None:
+        kept["given"] = True
+    token = _REQUEST.set({"id": secrets.token_hex(4), "endpoint": endpoint, "values": kept})
+    try:
+        yield
+    finally:
+        _REQUEST.reset(token)
 
 
 def checksum_of(content: bytes) -> str:

@@ -1,10 +1,12 @@
 """The run as the page states it: drawn at its own scale, and never good where photographs failed."""
 
 import json
+import shutil
 
 import h5py
 import pytest
-from rodsight.run_folder import SUMMARY
+from rodsight.experiment.experiment import load_experiment
+from rodsight.run_folder import SUMMARY, Run
 from rodsight.workbench.inspecting.run_overview import run_overview
 from rodsight.workbench.service.workbench import Workbench
 
@@ -64,3 +66,17 @@ def test_a_run_without_a_usable_frame_is_not_good(solved):
     *_, run = solved
     assert summarise(run, status_count={"reset": 1, "suspect": 2})[0].startswith("Every frame is suspect")
     assert summarise(run, status_count={"reset": 1}) == []
+
+
+def test_a_copied_experiment_needs_another_name(made_tracks, tmp_path):
+    for name in ("first", "copy"):
+        shutil.copytree(made_tracks, tmp_path / name)
+    run = Run(load_experiment(tmp_path / "first"), tmp_path / "runs" / load_experiment(tmp_path / "first").name)
+    run.claim()
+    visitor = Visitor(Workbench(tmp_path)).enter()
+    assert "holds the run of" not in str(visitor.request("project", at="first")["steps"])
+    described = visitor.request("project", at="copy")
+    assert "holds the run of first: give this experiment another name" in described["steps"][0]["messages"][0]
+    assert not described["ready"]
+    visitor.request("set_photographs", at="copy", name="copy")
+    assert "holds the run of" not in str(visitor.request("project", at="copy")["steps"])

@@ -1,5 +1,6 @@
 """Layers, brightness, a touchpad, and what is taken away: a picture, a table, a duplicate. In a real Chromium."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from playwright.sync_api import Page, expect
 from rodsight.results.hdf5.store import load_results
 from rodsight.workbench.setup.draft import Draft
 
-from tests.app.workbench.hand import go, idle, opened
+from tests.app.workbench.hand import fill, go, idle, opened
 from tests.browser import read_picture
 from tests.golden.stored import unpack
 
@@ -79,11 +80,27 @@ def test_layers_touchpad_and_what_is_taken_away(page: Page, solved: Path):
             tab.click("#save-picture")
         picture = read_picture(taken.value.path().read_bytes())
         assert picture[-25:-5].max() > 200  # the line that states what it is
+        with tab.expect_download() as taken:
+            tab.click("#save-figure")
+        drawn = taken.value.path().read_text()
+        assert drawn.lstrip().startswith("<?xml")
+        assert "normal force" in drawn  # text stays text
         go(tab, "photographs")
+        fill(tab, "interval", "31")
+        with tab.expect_download() as taken:
+            tab.click("#save-script")
+        assert "test.set_photographs(interval=31)" in taken.value.path().read_text()
         tab.click("#duplicate")
         idle(tab)
         assert tab.evaluate("workbench.project.at") == "my photographs copy"
         assert tab.evaluate("workbench.project.run") is None
         tab.wait_for_function("() => workbench.stage.image !== null")
+        shutil.copytree(solved / "my photographs" / "pictures", solved / "tuesday" / "pictures")
+        tab.click("#brand")
+        idle(tab)
+        tab.select_option("#like", "my photographs")
+        tab.get_by_text("Set up an experiment from these").click()
+        idle(tab)
+        assert tab.evaluate("[workbench.project.at, workbench.project.pixel]") == ["tuesday", 2.5e-4]
     assert (solved / "my photographs copy" / "experiment.toml").is_file()
     assert (solved / "my photographs copy" / "pictures" / "DSC_7.jpg").stat().st_nlink == 2

@@ -1,6 +1,6 @@
 // What is shown, taken away: the picture as PNG, the contacts of the photograph as a table.
 
-import { h } from "/page/dom.js";
+import { h, notify, request } from "/page/dom.js";
 
 export function download(blob, name) {
   const link = h("a", { href: URL.createObjectURL(blob), download: name });
@@ -32,3 +32,16 @@ export function saveTable(app, net) {
   const head = ["frame", "i", "j", "x_px", "y_px", ...COLUMNS.map(([, name]) => name)].join(",");
   download(new Blob([[head, ...rows].join("\n"), "\n"], { type: "text/csv" }), fileName(app, "csv"));
 }
+
+/** The forces of the photograph as a figure for a paper: lines that stay lines, text that stays text. */
+export const saveFigure = (app) => app.queue(async () => {
+  const { svg } = await request("figure", { at: app.project.at, frame: app.frame });
+  download(new Blob([svg], { type: "image/svg+xml" }), fileName(app, "svg"));
+}, "Drawing the figure …", "figure");
+
+/** Every action that is not undone, as a Python script that does it again. */
+export const saveScript = (app) => app.queue(async () => {
+  const { script, count } = await request("script", { at: app.project.at });
+  download(new Blob([script], { type: "text/x-python" }), `${app.project.name.replace(/[^\w.-]+/g, "_")}.py`);
+  notify(`${count} action${count === 1 ? "" : "s"} written`);
+}, "", "script");

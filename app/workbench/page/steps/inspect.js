@@ -6,7 +6,7 @@ import { COLOURINGS, drawChange, drawNetwork, loadLook, meanRadius as meanRadius
 import { drawContacts, drawDisplacement, drawRods, drawTrack, drawValues, drawWalls, motionOf, rodLegends } from "/page/layers/rods.js";
 import { layers, paintLayer, setLayer } from "/page/layers/settings.js";
 import { showLayers } from "/page/layers/panel.js";
-import { savePicture, saveTable } from "/page/parts/take_away.js";
+import { saveFigure, savePicture, saveTable } from "/page/parts/take_away.js";
 import { showLanes, jump } from "/page/time/lanes.js";
 import { runMark } from "/page/parts/run_state.js";
 import { Recording } from "/page/parts/recording.js";
@@ -40,7 +40,7 @@ export const inspect = {
       chosen ? null : facts.diagnosis.map((text) => h("p", { class: "diagnosis" }, sign("doubtful"), text)),
       h("div", { class: "field" }, h("label", { htmlFor: "colour-by" }, "colour by"), h("select", { id: "colour-by", onchange: (event) => { setLayer("forces", { by: event.target.value, map: null, low: null, high: null }); showLayers(app); app.paint(); } }, Object.entries(COLOURINGS).map(([name, how]) => h("option", { value: name, selected: name === layers.forces.by }, how.words)))),
       h("div", { class: "row" }, h("button", { class: recording ? "on" : "", id: "show-recording", onclick: () => toggleRecording(app), title: "V" }, recording ? "Photograph" : "Recording"), recording ? h("button", { id: "panels", onclick: () => recording.toggle(), title: "Entities, selection and time of the viewer" }, "Its panels") : null),
-      net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table")) : null,
+      net && !recording ? h("div", { class: "row" }, h("button", { id: "save-picture", title: "What is shown, as PNG", onclick: () => savePicture(app, caption(app)) }, "Save picture"), h("button", { id: "save-table", title: "The contacts of this photograph, as CSV", onclick: () => saveTable(app, net) }, "Save table"), h("button", { id: "save-figure", title: "The forces of this photograph as a figure for a paper, SVG", disabled: facts.provisional, onclick: () => saveFigure(app) }, "Save figure")) : null,
       chosen?.j !== undefined ? pairCard(app) : chosen ? rodCard(app) : h("p", {}, facts.reason[app.frame] ?? ""),
       chosen ? null : [list ? h("button", { id: "to-review", onclick: () => app.goTo("review") }, "Review contacts") : null, givenSection(app, (each) => show(app, each))],
     ];

@@ -2,6 +2,7 @@
 
 import { request, chart, colour, digits, fact, h, numberField, parse, sign, notify } from "/page/dom.js";
 import { leaveOut, orderSection, shift } from "/page/parts/order.js";
+import { saveScript } from "/page/parts/take_away.js";
 import { tableField } from "/page/parts/tables.js";
 
 const SOON = 400; // [ms]
@@ -44,7 +45,8 @@ export const photographs = {
         [0, 90, 180, 270].map((angle) => h("option", { value: angle, selected: angle === (section.rotation ?? 0) }, `${angle}°`)))),
       project.files.length ? [h("h2", {}, "Quality"), quality(app)] : null,
       orderSection(app),
-      h("div", { class: "row" }, h("button", { id: "duplicate", disabled: project.at === ".", title: "A new experiment beside this one with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment")),
+      h("div", { class: "row" }, h("button", { id: "duplicate", disabled: project.at === ".", title: "A new experiment beside this one with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment"),
+        h("button", { id: "save-script", disabled: !project.undo, title: "Everything that was done here, verdicts included, as a Python script that does it again", onclick: () => saveScript(app) }, "Save the actions as a script")),
     ];
   },
   draw(app, c, k) {
