@@ -15,8 +15,8 @@ Width = Literal["single", "double"]
 WIDTHS: dict[Width, float] = {"single": 85.0, "double": 175.0}  # [mm] of one column, and of a page with two
 MILLIMETRE = 1.0 / 25.4  # in inches
 
-# Dark enough on white; CIE76 differences of at least 25 under deuteranopia and protanopia; in grey the dashes differ.
-BLUE, VERMILION, GREEN, PURPLE = "#006CD3", "#D55D00", "#009E74", "#AB4695"
+# Dark enough on white; CIE76 differences of at least 25 under all kinds of colour blindness; in grey the dashes differ.
+BLUE, VERMILION, GREEN, PURPLE = "#005AD4", "#D55D00", "#009E74", "#AB4695"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 INK, GRID, OUTLINE = "#1a1a1a", "#d8d8d8", "#b4b8c0"

@@ -71,7 +71,7 @@ def import_table(
     columns : mapping of str to str, optional
         Names of columns by role: frame, id, x, y, theta, radius or diameter, time.
     **options
-        - form : 'table' (default), 'trackpy', 'trackmate', 'rodtracker', 'lammps', 'yade', 'pegs', 'dic'.
+        - form : 'table' (default), 'trackpy', 'trackmate', 'rodtracker', 'lammps', 'yade', 'mercury', 'pegs', 'dic'.
         - pixel_size : float, the files' unit of length [m]; default: metres.
         - y_down : bool, y points down, as in pictures; height [px] of a photograph: y is measured from its last row.
         - degrees : bool, theta is in degrees.

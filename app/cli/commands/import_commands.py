@@ -25,7 +25,8 @@ def import_(
         tyro.conf.Positional,
         tyro.conf.arg(
             help="table: of any tracker, by --columns; trackpy, trackmate, rodtracker: trackers; lammps (and "
-            "LIGGGHTS), yade: simulations; pegs: photoelastic discs with their forces; dic: dic_out_N.txt or CONFNNNN"
+            "LIGGGHTS), yade, mercury: simulations; pegs: photoelastic discs with their forces; dic: dic_out_N.txt "
+            "or CONFNNNN"
         ),
     ],
     source: Annotated[
@@ -72,7 +73,8 @@ def import_(
         Path | None,
         tyro.conf.arg(
             metavar="FILE",
-            help="pair forces of a simulation [N] as truth: dump local, or a table frame,i,j,fx,fy; names by --columns",
+            help="pair forces of a simulation [N] as truth: dump local, .fstat, or a table frame,i,j,fx,fy; names by "
+            "--columns",
         ),
     ] = None,
     quiet: Quiet = False,

@@ -14,13 +14,14 @@ from ...solver.bodies.grains import Array
 from ..dic_files import DicSequence, read_sequence
 from .format_names import FileFormat
 from .imported_corners import ImportedCorners
-from .lammps_dump import read_lammps
 from .observations import Convention, Observations
 from .pegs import ForceReadings, read_edge, read_pegs
 from .proposed_walls import Walls, bars_of_cell, periodic_cell
+from .simulations.lammps_dump import read_lammps
+from .simulations.mercury_files import read_mercury
+from .simulations.yade_text import read_yade
 from .tracker_tables import read_by_columns, read_rodtracker, read_trackpy
 from .trackmate import read_trackmate
-from .yade_text import read_yade
 
 PIXEL_FORMATS = frozenset({"trackpy", "rodtracker", "dic", "pegs"})
 DEFAULT_PIXEL_SIZE = 1e-4  # [m], assumed for photoelastic tests without a scale
@@ -110,6 +111,8 @@ def read_format(
         return ImportedData(dump.observed, in_unit, walls=bars, cell=cell, relative_precision=FINE_PRECISION)
     if form == "yade":
         return ImportedData(read_yade(source, columns), in_unit, relative_precision=FINE_PRECISION)
+    if form == "mercury":
+        return ImportedData(read_mercury(source, columns), in_unit, relative_precision=FINE_PRECISION)
     observed, truth = read_pegs(source)
     if unit is None:
         observed = observed.with_remark(

@@ -2,4 +2,4 @@
 
 from typing import Literal
 
-FileFormat = Literal["table", "trackpy", "trackmate", "rodtracker", "lammps", "yade", "pegs", "dic"]
+FileFormat = Literal["table", "trackpy", "trackmate", "rodtracker", "lammps", "yade", "mercury", "pegs", "dic"]

@@ -10,18 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from ...process.errors import InputError
-from ...solver.bodies.cell import Cell
-from ...solver.bodies.grains import Array
 from .experiment_folder import FolderContents, refuse_existing, write_folder
 from .file_formats import ImportedData, read_format
 from .format_names import FileFormat
 from .imported_corners import make_corners
-from .lammps_dump import PairForces, read_pair_forces
-from .observations import Convention, ImportedTracks, make_tracks
+from .observations import Convention, ImportedTracks, Observations, make_tracks
 from .pegs import true_contacts
 from .proposed_walls import propose_box, read_foreign_walls
+from .simulations.pair_forces import contacts_of_pairs, read_pair_forces
 
-SIMULATIONS = ("lammps", "yade", "table")
+SIMULATIONS = ("lammps", "yade", "mercury", "table")
 BOX, OUTER, NONE = "box", "outer", "none"
 OTHER_BOUNDARIES = (BOX, OUTER, NONE)  # they replace walls and corners of the files
 
@@ -78,51 +76,22 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
     if request.pairs is not None:
         if request.form not in SIMULATIONS:
             raise InputError("--pairs", str(request.pairs), f"applies to {' and '.join(SIMULATIONS)} only")
-        forces = read_pair_forces(request.pairs, request.columns)
-        truth, remark = contacts_of_pairs(forces, imported, contents.cell, upside_down=convention.y_down)
+        forces = read_pair_forces(request.pairs, request.columns, _times_of(foreign.observed))
+        truth, remarks = contacts_of_pairs(
+            forces, imported, contents.walls, contents.cell, upside_down=convention.y_down
+        )
         contents = replace(contents, truth=truth)
-        imported = replace(imported, remarks=(*imported.remarks, *([remark] if remark else [])))
+        imported = replace(imported, remarks=(*imported.remarks, *remarks))
     write_folder(folder, imported, contents, f"From {request.source.name}, by rodsight import {request.form}.")
     return imported, contents
 
 
-def contacts_of_pairs(
-    forces: PairForces, imported: ImportedTracks, cell: Array | None, *, upside_down: bool
-) -> tuple[dict[str, list[object]], str]:
-    """Return columns of a table of true forces from pair forces, and a remark on pairs that were left out.
-
-    Notes
-    -----
-    With the unit normal n from i to j, n rotated by +90° as t, and the force F that j exerts on i: f_n = −F·n and
-    f_t = −F·t.
-    """
-    tracks = imported.tracks
-    frame_of = {int(number): k for k, number in enumerate(imported.number)}
-    row_of = {name: row for row, name in enumerate(imported.name)}
-    columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft")}
-    left_out = 0
-    for step, first, second, force in zip(forces.step, forces.i, forces.j, forces.force, strict=True):
-        if step not in frame_of or not force.any():
-            continue
-        i, j = row_of.get(first), row_of.get(second)
-        if i is None or j is None or i == j:
-            left_out += 1
-            continue
-        k = frame_of[step]
-        branch = tracks.position[k, j] - tracks.position[k, i]
-        if cell is not None:
-            branch = branch + Cell.at_rest(cell[k]).shift(branch[None])[0]
-        if not np.isfinite(branch).all():
-            left_out += 1
-            continue
-        normal = branch / np.linalg.norm(branch)
-        on_i = force * np.array([1.0, -1.0]) if upside_down else force
-        tangent = np.array([-normal[1], normal[0]])
-        values = (k, int(tracks.id[i]), int(tracks.id[j]), -float(on_i @ normal), -float(on_i @ tangent))
-        for name, value in zip(columns, values, strict=True):
-            columns[name].append(value)
-    remark = f"{left_out} pair forces are left out: they name no grain of this frame." if left_out else ""
-    return columns, remark
+def _times_of(observed: Observations) -> list[float]:
+    """Return the times of the frames as the other program gives them [s]; empty where it gives none."""
+    if observed.time is None:
+        return []
+    _, first = np.unique(observed.frame, return_index=True)
+    return observed.time[first].tolist()
 
 
 def _folder_contents(

@@ -12,8 +12,8 @@ from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...tracks import Tracks
 from .foreign_table import read_foreign
-from .lammps_dump import DumpData
 from .observations import Convention, ImportedTracks
+from .simulations.lammps_dump import DumpData
 
 SIDES = ("bottom", "right", "top", "left")
 

@@ -21,7 +21,7 @@ STATUS_COLOURS: dict[FrameStatus, Rgba] = {
     FrameStatus.RESET: (188, 180, 244, 255),
     FrameStatus.SUSPECT: (229, 109, 122, 255),
     FrameStatus.REARRANGING: (249, 221, 115, 255),
-    FrameStatus.SETTLING: (51, 119, 190, 255),
+    FrameStatus.SETTLING: (50, 136, 231, 255),
     FrameStatus.SETTLED: (15, 106, 49, 255),
     FrameStatus.FAILED: (82, 16, 44, 255),
 }

@@ -36,10 +36,10 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_there_are_three_without_outputs_and_the_page_names_them():
+def test_there_are_four_without_outputs_and_the_page_names_them():
     nbformat = pytest.importorskip("nbformat", reason="needs the extra notebooks")
     page = (FOLDER / "python.md").read_text(encoding="utf-8")
-    assert len(NOTEBOOKS) == 3
+    assert len(NOTEBOOKS) == 4
     for file in NOTEBOOKS:
         assert file.name in page
         book = nbformat.read(file, 4)

@@ -55,3 +55,63 @@ def test_missing_columns_and_other_formats_are_named(tmp_path):
         rodsight.import_table(grains, tmp_path / "a", form="lammps", pairs=local(tmp_path, "1 1 2 0 0"))
     with pytest.raises(rodsight.InputError, match="holds ATOMS, where ITEM: ENTRIES is expected"):
         rodsight.import_table(grains, tmp_path / "b", form="lammps", pairs=grains)
+
+
+DATA = """2 0.5 0 0 0.1 0.1
+0.03 0.01 0 0 0.01 0.0 0.0 0
+0.05 0.01 0 0 0.01 0.0 0.0 0
+2 1.0 0 0 0.1 0.1
+0.03 0.01 0 0 0.01 -0.1 0.2 0
+0.05 0.01 0 0 0.01 0.1 -0.2 0
+"""
+# Grain 1 pushes grain 0 to the left with 5 N and up with 2 N; the floor pushes it up with 3 N, to the right with 1 N.
+FSTAT = """# 0.25 1
+# 0 0 0 0.1 0.1 0
+# 0.01 0.01 0 0 0 0
+0.25 0 1 0.04 0.01 0 1e-5 0 99 0 -1 0 0 0 1 0
+# 1 1
+# 0 0 0 0.1 0.1 0
+# 0.01 0.01 0 0 0 0
+1 0 1 0.04 0.01 0 1e-5 0 5 2 -1 0 0 0 1 0
+1 1 0 0.04 0.01 0 1e-5 0 5 2 1 0 0 0 -1 0
+1 0 -1 0.03 0 0 1e-5 0 3 1 0 -1 0 -1 0 0
+"""
+
+
+def test_forces_of_mercury_are_the_truth_at_grains_and_walls(tmp_path):
+    (tmp_path / "run.data").write_text(DATA)
+    (tmp_path / "run.fstat").write_text(FSTAT)
+    found = rodsight.import_table(
+        tmp_path / "run.data", tmp_path / "out", form="mercury", pairs=tmp_path / "run.fstat", walls="box"
+    )
+    truth = pd.read_csv(tmp_path / "out/truth_contacts.csv", dtype={"i": str, "j": str})
+    between, floor = truth.to_dict("records")  # forces at times without particles are left out, pairs are there once
+    assert (between["frame"], between["i"], between["j"]) == (1, "0", "1")
+    assert (between["fn"], between["ft"]) == pytest.approx((5.0, -2.0))
+    assert (floor["i"], floor["j"]) == ("0", "bottom")
+    assert (floor["fn"], floor["ft"]) == pytest.approx((3.0, -1.0))
+    # Angles are against the angular velocities in this file, and are reversed.
+    assert found.sort_values(["frame", "id"])["theta"].tolist() == pytest.approx([0.0, 0.0, 0.1, -0.1])
+    assert pd.read_csv(tmp_path / "out/times.csv")["time"].diff().iloc[1] == pytest.approx(0.5)
+
+
+def test_wrong_files_of_mercury_are_named(tmp_path):
+    (tmp_path / "run.data").write_text(DATA.replace("0.05 0.01 0 0 0.01 0.0 0.0 0", "0.05 0.01"))
+    with pytest.raises(rodsight.InputError, match="row 3: does not have 8 numbers"):
+        rodsight.import_table(tmp_path / "run.data", tmp_path / "a", form="mercury")
+    (tmp_path / "run.data").write_text(DATA)
+    (tmp_path / "late.fstat").write_text(FSTAT.replace("# 1 1", "# 7 1"))
+    with pytest.raises(rodsight.InputError, match="has no forces at a time of the particles"):
+        rodsight.import_table(tmp_path / "run.data", tmp_path / "b", form="mercury", pairs=tmp_path / "late.fstat")
+
+
+def test_a_table_names_walls(tmp_path):
+    grains = dump(tmp_path, "1 0.03 0.01 0.01\n2 0.05 0.01 0.01")
+    pairs = tmp_path / "pairs.csv"
+    pairs.write_text("frame,i,j,fx,fy\n100,bottom,1,0.0,-4.0\n100,2,-1,0.5,3.0\n100,2,roof,0.0,1.0\n")
+    found = rodsight.import_table(grains, tmp_path / "out", form="lammps", pairs=pairs, walls="box")
+    truth = pd.read_csv(tmp_path / "out/truth_contacts.csv", dtype={"i": str, "j": str})
+    assert truth[["i", "j"]].to_numpy().tolist() == [["1", "bottom"], ["2", "bottom"]]
+    assert truth["fn"].tolist() == pytest.approx([4.0, 3.0])
+    assert truth["ft"].tolist() == pytest.approx([0.0, -0.5])
+    assert any("1 pair forces are left out" in each for each in found.attrs["remarks"])

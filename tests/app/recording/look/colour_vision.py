@@ -1,4 +1,4 @@
-"""Differences of colours in normal, red-blind and green-blind vision and in grey."""
+"""Differences of colours in normal vision, in three kinds of colour blindness, and in grey."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ VISIONS: dict[str, np.ndarray] = {
     ]),
     "protanopia": np.array([
         [0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998],
+    ]),
+    "tritanopia": np.array([
+        [1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900],
     ]),
     "grey": np.tile([0.2126, 0.7152, 0.0722], (3, 1)),
 }  # fmt: skip

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...experiment.reading.photograph_order import natural_key
-from ...experiment.reading.tables import Table
-from ...process.errors import InputError
-from ...solver.bodies.grains import Array
-from .foreign_table import read_text
-from .observations import Observations, layer_remarks
+from ....experiment.reading.photograph_order import natural_key
+from ....experiment.reading.tables import Table
+from ....process.errors import InputError
+from ....solver.bodies.grains import Array
+from ..foreign_table import read_text
+from ..observations import Observations, layer_remarks
 
 PLAIN = "x_y_z_r"
 AXES = ("x", "y", "z")

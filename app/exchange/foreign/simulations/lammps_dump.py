@@ -7,29 +7,24 @@ cell, a fixed box gives walls at its faces.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from ...experiment.reading.tables import Table
-from ...process.errors import InputError
-from ...solver.bodies.grains import Array
-from .foreign_table import column_names, read_foreign, read_text
-from .observations import Observations, layer_remarks
+from ....experiment.reading.tables import Table
+from ....process.errors import InputError
+from ....solver.bodies.grains import Array
+from ..foreign_table import read_text
+from ..observations import Observations, layer_remarks
 
 COORDINATES = {  # names of a coordinate, the best first; the last two are fractions of the box
     "x": ("x", "xu", "xs", "xsu"), "y": ("y", "yu", "ys", "ysu"), "z": ("z", "zu", "zs", "zsu"),
 }  # fmt: skip
 SCALED = ("s", "su")
 QUATERNIONS = (("c_q[1]", "c_q[2]", "c_q[3]", "c_q[4]"), ("quatw", "quati", "quatj", "quatk"))
-# Usual names of the columns of pairs, the best first.
-PAIR_COLUMNS = {
-    "i": ("id1", "patom1", "itag", "id_i"), "j": ("id2", "patom2", "jtag", "id_j"),
-    "frame": ("step", "timestep", "iter"),
-}  # fmt: skip
 ANGULAR_VELOCITIES = {"z": "omegaz", "y": "omegay", "x": "omegax"}
 
 
@@ -72,8 +67,8 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     InputError
         Naming file, row and value.
     """
-    files = _files(source)
-    steps = {step.number: step for file in files for step in _steps(file)}
+    files = dump_files(source)
+    steps = {step.number: step for file in files for step in dump_steps(file)}
     if not steps:
         raise InputError(source, "", "contains no ITEM: TIMESTEP")
     ordered = [steps[number] for number in sorted(steps)]
@@ -85,7 +80,7 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     velocity = ANGULAR_VELOCITIES[third]
     frames, names, lines, position, radius, angle, spin, depth = [], [], [], [], [], [], [], []
     for step in ordered:
-        step_columns = _StepColumns(step)
+        step_columns = StepColumns(step)
         frames.append(np.full(len(step.rows), step.number, np.int64))
         names += step_columns.text("id")
         lines += range(step.line, step.line + len(step.rows))
@@ -100,7 +95,7 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     integrated = bool(np.isnan(rotation).all() and np.isfinite(joined(spin)).any())
     if integrated:
         rotation = _integrate_spin(
-            [step.number for step in ordered], [_StepColumns(step).text("id") for step in ordered], spin, interval
+            [step.number for step in ordered], [StepColumns(step).text("id") for step in ordered], spin, interval
         )
         remarks.append(
             f"Rotations are {velocity} integrated over the dumped steps, which is coarse if grains rotated in between."
@@ -137,7 +132,7 @@ def read_lammps(source: Path, columns: Mapping[str, str], interval: float) -> Du
     return DumpData(observed, low, cell, periodic, shrinking)
 
 
-class _StepColumns:
+class StepColumns:
     """Columns of one step by their meaning."""
 
     def __init__(self, step: _Step) -> None:
@@ -191,87 +186,21 @@ class _StepColumns:
         return np.full(len(self._step.rows), np.nan)
 
 
-@dataclass(frozen=True, slots=True)
-class PairForces:
-    """Forces between pairs of grains in a simulation, in newtons."""
-
-    step: list[int]  # (m,)
-    i: list[str]  # (m,) names
-    j: list[str]
-    force: Array  # (m, 2) [N] that j exerts on i, along the first and the second axis
-
-
-def read_pair_forces(source: Path, columns: Mapping[str, str]) -> PairForces:
-    """Read pair forces: `dump local` of LAMMPS and LIGGGHTS (ITEM: ENTRIES), or a table with one row per pair.
-
-    Parameters
-    ----------
-    source : Path
-        A file, or a folder of dumps.
-    columns : mapping of str to str
-        Columns of the roles i, j, fx, fy (frame, in a table); `x` and `y` may name other axes, such as y=z. Defaults
-        are the names in PAIR_COLUMNS, the first that exists.
-
-    Raises
-    ------
-    InputError
-        Naming file, row and value.
-    """
-    axes = tuple(columns.get(role, role) for role in "xy")
-    wanted = {"i": "i", "j": "j", **{f"f{role}": f"f{axis}" for role, axis in zip("xy", axes, strict=True)}}
-    if not source.is_dir() and not _is_dump(source):
-        return _pair_table(source, columns, wanted)
-    found = PairForces([], [], [], np.empty((0, 2)))
-    parts: list[Array] = []
-    for file in _files(source):
-        for step in _steps(file, "ENTRIES"):
-            cells = _StepColumns(step)
-            name = {role: columns.get(role) or _known_name(role, default, step.columns)
-                    for role, default in wanted.items()}  # fmt: skip
-            found.step.extend([step.number] * len(step.rows))
-            found.i.extend(_as_names(cells.text(name["i"])))
-            found.j.extend(_as_names(cells.text(name["j"])))
-            parts.append(np.column_stack([cells.numbers(name["fx"]), cells.numbers(name["fy"])]))
-    if not parts:
-        raise InputError(source, "", "contains no ITEM: ENTRIES, as dump local writes them")
-    return PairForces(found.step, found.i, found.j, np.concatenate(parts))
-
-
-def _pair_table(file: Path, columns: Mapping[str, str], wanted: Mapping[str, str]) -> PairForces:
-    header = column_names(file)
-    name = {role: columns.get(role) or _known_name(role, default, header)
-            for role, default in {"frame": "frame", **wanted}.items()}  # fmt: skip
-    table = read_foreign(file, list(name.values()))
-    force = np.column_stack([table.numbers(name["fx"]), table.numbers(name["fy"])])
-    step = table.integers(name["frame"]).tolist()
-    return PairForces(step, _as_names(table.text(name["i"])), _as_names(table.text(name["j"])), force)
-
-
-def _known_name(role: str, default: str, present: Sequence[str]) -> str:
-    """Return the first existing one of the usual names of a role; else its default, which the reader names missing."""
-    return next((each for each in (default, *PAIR_COLUMNS.get(role, ())) if each in present), default)
-
-
-def _as_names(texts: Sequence[str]) -> list[str]:
-    """Return names of grains without the decimals that computed columns have: 12.0 is 12."""
-    return [re.sub(r"\.0*$", "", each.strip()) for each in texts]
-
-
-def _files(source: Path) -> list[Path]:
+def dump_files(source: Path) -> list[Path]:
     if not source.is_dir():
         return [source]
-    found = [file for file in source.iterdir() if file.is_file() and _is_dump(file)]
+    found = [file for file in source.iterdir() if file.is_file() and is_dump(file)]
     if not found:
         raise InputError(source, "", "contains no file that begins with ITEM: TIMESTEP")
     return sorted(found, key=lambda file: [int(part) for part in re.findall(r"\d+", file.name)])
 
 
-def _is_dump(file: Path) -> bool:
+def is_dump(file: Path) -> bool:
     with file.open("rb") as stream:
         return stream.read(5) == b"ITEM:"
 
 
-def _steps(file: Path, of: str = "ATOMS") -> Iterator[_Step]:
+def dump_steps(file: Path, of: str = "ATOMS") -> Iterator[_Step]:
     """Yield the steps of a dump with their rows of atoms, or of other entries."""
     lines = read_text(file).splitlines()
     at, number, count = 0, None, None
