@@ -82,7 +82,7 @@ def expected_interval(evidence: Evidence) -> tuple[float, float, float]:
 
 def rests_on_overlaps(evidence: Evidence) -> bool:
     """Whether the field follows from the overlaps of soft grains: a contradiction with the motion then means little."""
-    return evidence.information.soft and evidence.position_weight > MOSTLY_OVERLAPS
+    return bool(evidence.information.soft and evidence.position_weight > MOSTLY_OVERLAPS)
 
 
 def losses(evidence: Evidence) -> dict[str, float]:

@@ -24,7 +24,7 @@ class RodMaterial:
     gravity: tuple[float, float] = (0.0, 0.0)  # [m/s²]
     base_friction: float = 0.0  # coefficient between the rods and the base on which they slide
     base_gravity: float = 9.81  # [m/s²] normal to the picture
-    base_friction_measured: bool = False  # True: estimated from trial solutions
+    base_friction_measured: bool = False  # True: estimated from the motion
     friction_measured: bool = False  # True: `friction` is an initial guess, estimated from the motion
     stiffness: float | Literal["rigid", "estimate"] | None = (
         None  # [Pa] contact stiffness per length; None: estimated from the gaps where they show it
