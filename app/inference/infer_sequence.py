@@ -13,7 +13,7 @@ import numpy as np
 
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
-from ..solver.assessment.penalties import penalise_friction
+from ..solver.assessment.penalties import limit_for_few_photographs, penalise_friction
 from ..solver.assessment.statistic_intervals import widen_for_friction
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
@@ -76,7 +76,10 @@ def infer_sequence(
     frames, statistics = _with_first_frame(sequence, frames, statistics, observer)
     check = check_sequence_friction(sequence, frames)
     count, measured = len(frames), sequence.friction_measured
-    assessed = LazySequence(count, lambda k: penalise_friction(frames[k], check, measured=measured))
+    assessed = LazySequence(
+        count,
+        lambda k: limit_for_few_photographs(penalise_friction(frames[k], check, measured=measured), count),
+    )
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
     kinematics = _measure_kinematics(sequence)
     return replace(unsolved, frames=assessed, statistics=widened, friction_check=check, kinematics=kinematics)

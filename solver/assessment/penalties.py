@@ -19,6 +19,7 @@ from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed
 SOFT_CHAIN_LOSS = 0.15  # where a single chain treats soft grains as hard
 BEYOND_WALL_LOSS = 12.0  # for each grain beyond a wall, per grain
+FEW_PHOTOGRAPHS, TRUST_OF_FEW = 3, 0.28  # of a test, below which the trust is at most the second
 REPORTED = 0.04  # fraction of the trust above which a penalty is reported in words
 
 
@@ -94,6 +95,21 @@ def penalise_friction(frame: FrameForces, check: FrictionCheck | None, *, measur
         )
         penalised = replace(penalised, sliding_probability=slides, state=contact_state(frame.fn, slides))
     return widen_for_friction(penalised, check.given, check.measured)
+
+
+def limit_for_few_photographs(frame: FrameForces, count: int) -> FrameForces:
+    """Limit the trust in a frame of a test of so few photographs that no motion confirms that of another.
+
+    Parameters
+    ----------
+    frame : FrameForces
+    count : int
+        Photographs of the whole test.
+    """
+    if count >= FEW_PHOTOGRAPHS or not frame.trust > TRUST_OF_FEW:
+        return frame
+    words = f"the test has only {count} photographs: one motion alone is not confirmed by another; take more"
+    return replace(frame, trust=TRUST_OF_FEW, trust_penalties="; ".join(filter(None, (words, frame.trust_penalties))))
 
 
 def _contradictions(evidence: Evidence) -> list[Penalty]:

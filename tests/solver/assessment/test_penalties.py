@@ -14,6 +14,7 @@ from rodsight.solver.assessment.penalties import (
     assess,
     describe_penalties,
     find_penalties,
+    limit_for_few_photographs,
     penalise_friction,
 )
 from rodsight.solver.assessment.trust import motion_assessment
@@ -148,3 +149,14 @@ def test_positions_do_not_depend_on_a_friction_that_the_motion_contradicts():
         odds.append(np.log(penalised.sliding_probability[0] / (1.0 - penalised.sliding_probability[0]) / (0.4 / 0.6)))
     assert odds == pytest.approx([odds[0], 0.5 * odds[0], 0.0], abs=1e-9)
     assert odds[0] < -0.1
+
+
+def test_two_photographs_alone_are_not_trusted():
+    frame = replace(make_results(1, 8, 7, sweeps=2).frames[0], trust=0.9, trust_penalties="noise")
+    limited = limit_for_few_photographs(frame, 2)
+    assert limited.trust < 0.3
+    assert limited.trust_penalties.startswith("the test has only 2 photographs")
+    assert limited.expected_correlation == pytest.approx(frame.expected_correlation, nan_ok=True)
+    assert limit_for_few_photographs(frame, 3) is frame
+    low = replace(frame, trust=0.1)
+    assert limit_for_few_photographs(low, 2) is low

@@ -36,6 +36,10 @@ def test_an_attraction_is_a_shift_of_the_normal_forces(frames):
 
 def test_the_base_drags_against_the_motion(frames):
     packing, unit, (frame, *_) = frames
+    _, snapshots = sheared_frames(6)
+    moved = (snapshots[2].position - snapshots[0].position)[snapshots[1].present & packing.grains.free]
+    for axis, load in enumerate(frame.drag[: 2 * frame.grain_count].reshape(2, -1)):  # b is minus the force
+        assert (load * moved[:, axis] >= 0.0).all()
     drag = frame.balance_of(replace(GIVEN, base_drag=0.2)).load - frame.balance.load
     assert drag == pytest.approx(0.2 * frame.drag)
     size = np.hypot(*frame.drag[: 2 * frame.grain_count].reshape(2, -1))

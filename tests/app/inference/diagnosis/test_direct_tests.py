@@ -161,6 +161,7 @@ def test_walls_that_lag_behind_are_named():
     endpoints[..., 1] += rise[:, None, None]
     moved, right = replace(tracks, position=moved), replace(walls, endpoints=endpoints)
     assert examine_wall_times(moved, right) == []
+    assert examine_wall_times(moved, replace(right, endpoints=endpoints - 2e-3)) == []  # no time helps
     late = endpoints[np.maximum(np.arange(FRAMES) - 1, 0)]
     (found,) = examine_wall_times(moved, replace(right, endpoints=late))
     assert found.cause == "walls_shifted"
