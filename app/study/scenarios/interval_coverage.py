@@ -21,10 +21,11 @@ from .contact_errors import ContactErrors
 
 FIT_SCENARIOS: tuple[ScenarioName, ...] = (
     "shear", "biaxial", "gravity", "isotropic", "radii_03", "step_05", "soft", "softer", "loads", "circle",
-    "nearly_jammed", "sheared", "soft_radii_03",
+    "nearly_jammed", "sheared", "soft_radii_03", "noise_40", "smooth_walls", "stiff",
 )  # fmt: skip
 JUDGE_SCENARIOS: tuple[ScenarioName, ...] = (
     "step_1", "periodic", "radii_1", "centres", "unseen", "corners", "ten_frames", "mu_low", "mu_high",
+    "stiff_noise_40", "stiff_moving", "friction_spread", "annulus",
 )  # fmt: skip
 COVERED = (0.683, 0.954)  # of one and of two standard deviations
 TOLERANCE = (0.05, 0.02)  # of these coverages

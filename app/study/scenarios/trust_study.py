@@ -19,7 +19,7 @@ from scipy.stats import spearmanr
 from ...solver.assessment.expected_correlation import LEAST, MEASURES
 from ...solver.bodies.grains import Array
 from ...synthetic.scenarios.preset_names import Group
-from ...synthetic.scenarios.scenario_table import SCENARIOS
+from ...synthetic.scenarios.scenario_table import SCENARIOS, Scenario
 from .scenario_score import TRUST_TOLERANCE, ScenarioScore
 
 GROUPS: tuple[Group, ...] = ("correct", "missing physics", "wrong input")
@@ -31,6 +31,7 @@ LEFT_OUT = frozenset({
 })  # fmt: skip
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
 COVERED = 0.03  # fraction of frames of any group that may have T too high
+SOFT = 1.9e6  # [N/m] stiffness of contacts below which overlaps are forces
 KNOTS, ROUNDS = 9, 12
 SMOOTH = 0.15  # of the range of a measure, over which its isotonic regression is averaged
 START = 2.6  # arctanh r below which the margin grows
@@ -52,7 +53,7 @@ RANGES = {
     "correction": (0.02, 2.0),
     "previous_residual": (0.004, 0.2),
     "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6),
-    "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.02, 1.0),
+    "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.003, 1.0),
 }  # fmt: skip
 
 
@@ -168,8 +169,14 @@ def refit(sample: TrustSample, fits: dict[str, tuple[AdditiveFit, Margin]]) -> T
 
 
 def rows_of(sample: TrustSample, fit: str) -> TrustSample:
-    """The frames that a fit of this name is for."""
-    return sample.select(sample.overlaps if fit == "overlaps" else ~sample.overlaps)
+    """The frames that a fit of this name reads: for overlaps all of soft grains, whether that was detected or not."""
+    if fit == "overlaps":
+        return sample.select(np.isin(sample.kind, [name for name, each in SCENARIOS.items() if _is_soft(each)]))
+    return sample.select(~sample.overlaps)
+
+
+def _is_soft(scenario: Scenario) -> bool:
+    return scenario.loading.settings.normal_stiffness < SOFT
 
 
 def describe_fit(title: str, fit: AdditiveFit, margin: Margin) -> str:
