@@ -66,7 +66,7 @@ def test_every_penalty_lowers_the_trust_and_states_cause_and_cure(evidence, word
 
 
 def test_a_wide_step_is_named_where_the_force_pattern_is_new():
-    wide = replace(ASSESSED, shear=4 * COARSE_STEP, force_change=0.5)
+    wide = replace(ASSESSED, shear=4 * COARSE_STEP, force_change=0.5, correction=0.4)
     assert "1° of shear apart" in describe_penalties(wide)
     assert "of shear apart" not in describe_penalties(replace(wide, shear=COARSE_STEP))
 

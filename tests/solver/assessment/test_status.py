@@ -41,7 +41,8 @@ def test_sound_evidence_is_settled_and_trusted():
     assert not is_suspect(SOUND)
     assert 0.5 < trust(SOUND) < motion_assessment(SOUND).expected_correlation < 1.0
     compared = replace(SOUND, agreement=0.94, position_agreement=0.93, overlap_agreement=0.9)
-    assert trust(compared) > trust(SOUND) + 0.1  # two estimates that agree are evidence
+    contradicted = replace(compared, agreement=0.4, overlap_agreement=0.4)
+    assert trust(compared) > trust(contradicted) + 0.1  # two estimates that agree are evidence
 
 
 @pytest.mark.parametrize(
@@ -106,7 +107,8 @@ def test_a_frame_is_settled_some_frames_after_an_event_if_motion_and_forces_agre
 def test_trust_falls_with_disagreement_and_with_correction_within_its_bounds():
     assert trust(replace(SOUND, disagreement=0.3)) < trust(SOUND)
     assert trust(replace(SOUND, correction=0.3)) < trust(SOUND)
-    assert 0.0 <= trust(replace(SOUND, correction=1e6)) < 0.5
+    assert trust(replace(SOUND, correction=1e6)) < 0.7 * trust(SOUND)  # one contradiction among sound evidence
+    assert 0.0 <= trust(replace(SOUND, correction=1e6, old_unbalance=1.0, disagreement=1.0)) < 0.3
     assert trust(SOUND) < trust(replace(SOUND, correction=0.0, disagreement=0.0)) < 1.0
 
 
