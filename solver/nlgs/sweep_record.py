@@ -110,9 +110,26 @@ class SweepHistory:
     natural_map: Annotated[Array, Quantity("relative natural-map residual", dims="sweep")]
     unbalance: Annotated[Array, Quantity("worst |ΣF| on a grain / mean f_n", dims="sweep")]
     recorded: Annotated[NDArray[np.int64], Quantity("sweeps, from 0, whose forces are kept", dims="kept_sweep")]
-    fn: Annotated[NDArray[np.float32], Quantity("f_n after each kept sweep", "N", "kept_sweep contact")]
-    ft: Annotated[NDArray[np.float32], Quantity("f_t after each kept sweep", "N", "kept_sweep contact")]
+    fn: Annotated[
+        NDArray[np.float32],
+        Quantity(
+            "f_n after each kept sweep; to 1/512 of the mean where every sweep is kept", "N", "kept_sweep contact"
+        ),
+    ]
+    ft: Annotated[
+        NDArray[np.float32],
+        Quantity(
+            "f_t after each kept sweep; to 1/512 of the mean f_n where every sweep is kept", "N", "kept_sweep contact"
+        ),
+    ]
 
     @property
     def count(self) -> int:
         return len(self.force_change)
+
+    @property
+    def spaced_rows(self) -> NDArray[np.intp]:
+        """Rows of the kept sweeps that are logarithmically spaced: all of them, unless every sweep was kept."""
+        if len(self.recorded) < self.count:
+            return np.arange(len(self.recorded))
+        return np.flatnonzero(np.isin(self.recorded, recorded_sweeps(self.count, "log")))

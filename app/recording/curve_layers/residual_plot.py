@@ -149,14 +149,16 @@ def mean_changes(history: SweepHistory) -> Array:
     Returns
     -------
     array (s,)
-        The mean since the kept sweep before; NaN at sweeps whose forces were not kept.
+        The mean since the logarithmically spaced sweep before; NaN at others.
     """
     mean = np.full(history.count, np.nan)
     if len(history.recorded) > 1 and history.fn.shape[1]:
-        change = changes_per_sweep(history.recorded, history.fn, history.ft).mean(axis=1)
+        rows = history.spaced_rows  # others are stored rounded
+        recorded = history.recorded[rows]
+        change = changes_per_sweep(recorded, history.fn[rows], history.ft[rows]).mean(axis=1)
         level = mean_normal_force(history.fn[-1])
         if level > 0.0:
-            mean[history.recorded[1:]] = change / level
+            mean[recorded[1:]] = change / level
     return mean
 
 

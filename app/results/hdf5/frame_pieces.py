@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ..schema import (
     Entry,
     entries,
 )
+from .sweep_precision import round_sweeps
 
 Columns = dict[str, np.ndarray]  # by path
 Shapes = dict[str, tuple[int, ...]]
@@ -36,6 +37,7 @@ class Extents:
 
 def rows_of_frame(forces: FrameForces, statistics: FrameStatistics) -> Columns:
     """Return the rows of one frame for each column; columns that the frame lacks are left out."""
+    forces = replace(forces, history=round_sweeps(forces.history))
     measured = measured_sweeps(forces.history)
     piece = {SWEEP_NUMBER.path: measured, SWEEP_COUNT.path: np.array([forces.history.count])}
     for part, whole in (("frames", forces), ("statistics", statistics)):

@@ -17,6 +17,7 @@ from ..results import Results
 from ..schema import DIMENSIONS, PARTS, PER_FRAME, Entry, entries
 from .frame_pieces import Columns, Shapes, measure_extents, rows_of_frame
 
+STRONGLY = ("kept_force",)  # dimensions of the largest datasets, which a third more time makes a quarter smaller
 MIN_COMPRESSED = 1024  # [bytes]: smaller datasets would double by the index of their compressed blocks
 BLOCK = 1 << 15  # [bytes] of a compressed block, and of the rows in memory before it is written
 TEXTS = 256  # number of texts in memory before they are written
@@ -164,7 +165,8 @@ def _make_dataset(store: h5py.File, entry: Entry, shape: tuple[int, ...]) -> h5p
     size = int(np.prod(shape)) * entry.dtype.itemsize
     if size >= MIN_COMPRESSED and entry.dtype.kind != "O":
         rows = max(min(BLOCK * shape[0] // size, shape[0]), 1)
-        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": 1, "shuffle": True}
+        level = 4 if entry.dims == STRONGLY else 1
+        options = {"chunks": (rows, *shape[1:]), "compression": "gzip", "compression_opts": level, "shuffle": True}
     dataset = store.create_dataset(entry.path, shape, kind, **options)
     for axis, name in enumerate(entry.dims):
         dataset.dims[axis].label = name

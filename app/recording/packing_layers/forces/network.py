@@ -134,13 +134,16 @@ def visible_sweeps(
 
 def chosen_sweeps(history: SweepHistory, choice: SweepChoice, kept: int) -> NDArray[np.int64]:
     """Return the rows of history.recorded that are written, ascending."""
-    available = np.arange(len(history.recorded))
-    if choice is SweepChoice.ALL or len(available) <= kept:
+    if choice is SweepChoice.ALL or len(history.recorded) <= kept:
+        return np.arange(len(history.recorded))
+    available = history.spaced_rows  # whose forces are stored with all digits
+    if len(available) <= kept:
         return available
-    early = available[history.recorded < FIRST_SWEEPS][:kept]
+    number = history.recorded[available]
+    early = available[number < FIRST_SWEEPS][:kept]
     spaced = np.geomspace(FIRST_SWEEPS, max(history.count - 1, FIRST_SWEEPS), max(kept - len(early), 1))
-    nearest = np.clip(np.searchsorted(history.recorded, spaced), 0, available[-1])
-    return np.union1d(early, nearest)
+    nearest = np.clip(np.searchsorted(number, spaced), 0, len(available) - 1)
+    return np.union1d(early, available[nearest])
 
 
 def contact_values(scene: Scene, forces: FrameForces) -> rr.AnyValues:
