@@ -222,8 +222,8 @@ class RecordingSection(Section):
     """Settings of the recording."""
 
     sweeps: Literal["all", "log", "none"] = key(
-        "Sweeps whose forces are recorded: log records 1, 2, 4, … of every sub-step; all makes large files, the forces of "
-        "further sweeps in steps of 1/256 of the mean f_n.",
+        "Sweeps whose forces are recorded: log records 1, 2, 4, … of every sub-step; all makes large files, the forces "
+        "of further sweeps in steps of 1/256 of the mean f_n.",
         default=CHAIN.keep,
     )
 
