@@ -37,7 +37,9 @@ class Extents:
 
 def rows_of_frame(forces: FrameForces, statistics: FrameStatistics) -> Columns:
     """Return the rows of one frame for each column; columns that the frame lacks are left out."""
-    forces = replace(forces, history=round_sweeps(forces.history))
+    history = round_sweeps(forces.history)
+    if history is not forces.history:
+        forces = replace(forces, history=history)
     measured = measured_sweeps(forces.history)
     piece = {SWEEP_NUMBER.path: measured, SWEEP_COUNT.path: np.array([forces.history.count])}
     for part, whole in (("frames", forces), ("statistics", statistics)):
