@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from functools import partial, wraps
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import tyro
@@ -50,11 +51,11 @@ def overview(title: str | None = None) -> str:
 
 
 def command_line() -> tyro.extras.SubcommandApp:
-    """Build the command line that parses arguments and calls a command."""
+    """Build the command line that parses arguments and returns the call of a command, which is not made yet."""
     app = tyro.extras.SubcommandApp()
     for commands in GROUPS.values():
         for command in commands:
-            app.command(name=name_of(command))(_with_plain_defaults(command))
+            app.command(name=name_of(command))(_deferred(_with_plain_defaults(command)))
     return app
 
 
@@ -82,6 +83,16 @@ def _with_plain_defaults(command: Command) -> Command:
     }
     command.__annotations__ = explained | {"return": result}
     return command
+
+
+def _deferred(command: Command) -> Callable[..., Callable[[], int]]:
+    """Return a function of the same arguments that returns the call of a command."""
+
+    @wraps(command)
+    def deferred(*arguments: Any, **options: Any) -> Callable[[], int]:
+        return partial(command, *arguments, **options)
+
+    return deferred
 
 
 def _named(hint: Any) -> Any:

@@ -51,7 +51,7 @@ def _run(arguments: list[str]) -> int:
     if arguments == ["--version"]:
         print(f"rodsight {__version__}")
         return 0
-    from .command_list import command_line, command_names, overview
+    from .command_list import command_names, overview
 
     if arguments in ([], ["-h"], ["--help"], ["help"]):
         print(overview())
@@ -63,7 +63,9 @@ def _run(arguments: list[str]) -> int:
         if len(arguments) != 2 or arguments[1] not in SHELLS:
             raise InputError("--completion", " ".join(arguments[1:]), f"is not one of {', '.join(SHELLS)}")
         arguments = ["--tyro-print-completion", arguments[1]]
-    return command_line().cli(prog="rodsight", description="Contact forces from photographs.", args=arguments)
+    from .parsing import parse
+
+    return parse(arguments)()
 
 
 def _report(sentence: str, status: int) -> int:

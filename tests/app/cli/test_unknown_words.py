@@ -18,6 +18,13 @@ from tests.program import rodsight
         (("export", "csv", "x"), "did you mean `rodsight export tables RESULTS`?"),
         (("export", "hdf5", "x"), "results.h5 is HDF5"),
         (("export", "tabels", "x"), "did you mean `rodsight export tables`?"),
+        (("run", "x", "--worker", "2"), "rodsight run: --worker: is not an option: did you mean --workers?"),
+        (("check", "--jsn", "x"), "--jsn: is not an option: did you mean --json?"),
+        (("run", "x", "--sweeps", "some"), "--sweeps some: is not one of none, log, all"),
+        (("run", "x", "--max-size", "big"), "--max-size big: is not a value of this option"),
+        (("run", "x", "y"), "rodsight run: y: is one argument too many"),
+        (("run",), "rodsight run: EXPERIMENT: is missing; see rodsight run --help"),
+        (("study",), "rodsight study: KIND: is missing"),
     ],
 )
 def test_what_was_meant_is_named_in_one_line(words, hint, capsys):
@@ -25,6 +32,7 @@ def test_what_was_meant_is_named_in_one_line(words, hint, capsys):
     error = capsys.readouterr().err
     assert hint in error
     assert len(error.splitlines()) == 1
+    assert "class" not in error
 
 
 def test_help_with_a_command_is_the_help_of_the_command(capsys):

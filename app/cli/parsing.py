@@ -1,0 +1,78 @@
+"""Arguments of a command: parsed by tyro, whose boxes of text about mistakes become one line."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from difflib import get_close_matches
+
+from ..process.errors import InputError
+from .command_list import command_line
+
+HELP = ("-h", "--help")
+DESCRIPTION = "Contact forces from photographs."
+_CHOICE = re.compile(r"invalid choice '(.*?)' for argument '(\S+)'\. Expected one of \((.*?)\)")
+_VALUE = re.compile(r"Error parsing (\S+):.*?\['(.*?)'")
+_MISSING = re.compile(r"Missing value for argument '(.+?)'|Missing from [^:]+: (\S+)")
+_UNRECOGNISED = re.compile(r"Unrecognized options: (.+)")
+_OPTION = re.compile(r"--[a-z][\w-]*")
+
+
+def parse(arguments: Sequence[str]) -> Callable[[], int]:
+    """Return the call of the command; raises InputError for arguments that it does not take, and ends after help."""
+    if any(each in HELP or each.startswith("--tyro-") for each in arguments):
+        return _parse(arguments)
+    printed = io.StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            return _parse(arguments)
+    except SystemExit:
+        raise _error(arguments, printed.getvalue()) from None
+
+
+def _parse(arguments: Sequence[str]) -> Callable[[], int]:
+    return command_line().cli(prog="rodsight", description=DESCRIPTION, args=list(arguments))
+
+
+def _error(arguments: Sequence[str], box: str) -> InputError:
+    """Return the mistake that a box describes, in the words of other errors."""
+    command = f"rodsight {arguments[0]}"
+    known = _options(arguments[0])
+    for each in arguments[1:]:
+        name = each.partition("=")[0]
+        if each.startswith("--") and name.replace("_", "-") not in known:
+            near = get_close_matches(name, known, 1)
+            return InputError(command, name, "is not an option" + (f": did you mean {near[0]}?" if near else ""))
+    text = _text(box)
+    if found := _CHOICE.search(text):
+        choices = [each for each in re.findall(r"'(.*?)'", found[3]) if each != "None"]
+        return InputError(command, f"{found[2]} {found[1]}", f"is not one of {', '.join(choices)}")
+    if found := _VALUE.search(text):
+        return InputError(command, f"{found[1]} {found[2]}", f"is not a value of this option; see {command} --help")
+    if found := _MISSING.search(text):
+        name = (found[1] or found[2]).upper()
+        return InputError(command, "KIND" if name.startswith("{") else name, f"is missing; see {command} --help")
+    if found := _UNRECOGNISED.search(text):
+        surplus = found[1].partition(",")[0]
+        return InputError(command, surplus, f"is one argument too many; see {command} --help")
+    return InputError(command, "", text)
+
+
+def _options(command: str) -> list[str]:
+    """Return the options of a command, by its help."""
+    printed = io.StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            _parse([command, "--help"])
+    except SystemExit:
+        pass
+    return sorted(set(_OPTION.findall(printed.getvalue())))
+
+
+def _text(box: str) -> str:
+    """Return the first paragraph of a box without its frame."""
+    lines = [line.strip("│ ") for line in box.splitlines() if not line.startswith(("╭", "╰"))]
+    rules = [k for k, line in enumerate(lines) if line.startswith("──")]
+    return " ".join(" ".join(lines[: rules[0] if rules else len(lines)]).split())
