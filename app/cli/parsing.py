@@ -72,7 +72,7 @@ def _options(command: str) -> list[str]:
 
 
 def _text(box: str) -> str:
-    """Return the first paragraph of a box without its frame."""
-    lines = [line.strip("│ ") for line in box.splitlines() if not line.startswith(("╭", "╰"))]
-    rules = [k for k, line in enumerate(lines) if line.startswith("──")]
+    """Return the first paragraph of a box without its frame, which is of ASCII on some terminals."""
+    lines = [line.strip("│| ") for line in box.splitlines() if not line.startswith(("╭", "╰", "+"))]
+    rules = [k for k, line in enumerate(lines) if line.startswith(("──", "--------"))]
     return " ".join(" ".join(lines[: rules[0] if rules else len(lines)]).split())
