@@ -16,7 +16,8 @@ DESCRIPTION = "Contact forces from photographs."
 _CHOICE = re.compile(r"invalid choice '(.*?)' for argument '(\S+)'\. Expected one of \((.*?)\)")
 _VALUE = re.compile(r"Error parsing (\S+):.*?\['(.*?)'")
 _MISSING = re.compile(r"Missing value for argument '(.+?)'|Missing from [^:]+: (\S+)")
-_UNRECOGNISED = re.compile(r"Unrecognized options: (.+)")
+_UNRECOGNISED = re.compile(r"Unrecognized options: ([^,\s]+)")
+FRAME = "─-│|╭╰╮╯+"
 _OPTION = re.compile(r"--[a-z][\w-]*")
 
 
@@ -47,7 +48,7 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
             return InputError(command, name, "is not an option" + (f": did you mean {near[0]}?" if near else ""))
     text = _text(box)
     if found := _CHOICE.search(text):
-        choices = [each for each in re.findall(r"'(.*?)'", found[3]) if each != "None"]
+        choices = sorted({*re.findall(r"'(.*?)'", found[3])} - {"None"})
         return InputError(command, f"{found[2]} {found[1]}", f"is not one of {', '.join(choices)}")
     if found := _VALUE.search(text):
         return InputError(command, f"{found[1]} {found[2]}", f"is not a value of this option; see {command} --help")
@@ -55,8 +56,7 @@ def _error(arguments: Sequence[str], box: str) -> InputError:
         name = (found[1] or found[2]).upper()
         return InputError(command, "KIND" if name.startswith("{") else name, f"is missing; see {command} --help")
     if found := _UNRECOGNISED.search(text):
-        surplus = found[1].partition(",")[0]
-        return InputError(command, surplus, f"is one argument too many; see {command} --help")
+        return InputError(command, found[1], f"is one argument too many; see {command} --help")
     return InputError(command, "", text)
 
 
@@ -72,7 +72,5 @@ def _options(command: str) -> list[str]:
 
 
 def _text(box: str) -> str:
-    """Return the first paragraph of a box without its frame, which is of ASCII on some terminals."""
-    lines = [line.strip("│| ") for line in box.splitlines() if not line.startswith(("╭", "╰", "+"))]
-    rules = [k for k, line in enumerate(lines) if line.startswith(("──", "--------"))]
-    return " ".join(" ".join(lines[: rules[0] if rules else len(lines)]).split())
+    """Return the words of a box without its frame, which is of ASCII on some terminals."""
+    return " ".join(word for word in box.split() if word.strip(FRAME))

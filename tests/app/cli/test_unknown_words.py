@@ -20,7 +20,7 @@ from tests.program import rodsight
         (("export", "tabels", "x"), "did you mean `rodsight export tables`?"),
         (("run", "x", "--worker", "2"), "rodsight run: --worker: is not an option: did you mean --workers?"),
         (("check", "--jsn", "x"), "--jsn: is not an option: did you mean --json?"),
-        (("run", "x", "--sweeps", "some"), "--sweeps some: is not one of none, log, all"),
+        (("run", "x", "--sweeps", "some"), "--sweeps some: is not one of all, log, none"),
         (("run", "x", "--max-size", "big"), "--max-size big: is not a value of this option"),
         (("run", "x", "y"), "rodsight run: y: is one argument too many"),
         (("run",), "rodsight run: EXPERIMENT: is missing; see rodsight run --help"),
