@@ -6,7 +6,7 @@ export const TONES = { settled: "#2fbf93", settling: "#56b4e9", rearranging: "#e
 
 /** A press on a canvas, and a movement after it, go to the photograph that is there. */
 export function dragFrames(app, canvas, count) {
-  const go = (event) => app.show(Math.floor((event.clientX - canvas.getBoundingClientRect().left) / canvas.clientWidth * count));
+  const go = (event) => { const { left, width } = canvas.getBoundingClientRect(); app.show(Math.floor((event.clientX - left) / width * count)); };
   canvas.addEventListener("pointerdown", (event) => { go(event); const move = (later) => go(later); addEventListener("pointermove", move); addEventListener("pointerup", () => removeEventListener("pointermove", move), { once: true }); });
 }
 
