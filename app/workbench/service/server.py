@@ -53,7 +53,9 @@ from .workbench import Workbench
 LARGEST_BODY = 256 * 1024  # bytes of a request without a table
 LARGEST_TABLE = 4 * LARGEST_WRITTEN  # bytes of a request with one: a character has up to four, an escaped line end two
 THUMBNAIL = 480  # [px] of a picture on the first page
-M_ARENA_MAX = -8  # of mallopt(3)
+# mallopt(3): two areas of memory for all threads, since one each holds back as much as a photograph; pictures in pages of
+# their own, which return to the system at once.
+MEMORY_SETTINGS = {"M_ARENA_MAX": (-8, 2), "M_MMAP_THRESHOLD": (-3, 1 << 20)}
 POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
     ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
@@ -137,7 +139,7 @@ class WorkbenchServer:
         """Bind the port; command: that prints the address; entry: address to which the first visit is redirected."""
         import uvicorn
 
-        _limit_arenas()
+        _save_memory()
         from .http_connection import HttpConnection
 
         self.workbench = workbench
@@ -177,10 +179,11 @@ class WorkbenchServer:
         self._socket.close()
 
 
-def _limit_arenas() -> None:
-    """Let the threads of this process share two areas of memory: with one each, as much as a photograph is lost."""
-    with suppress(AttributeError, OSError):  # a C library without this setting
-        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
+def _save_memory() -> None:
+    with suppress(AttributeError, OSError):  # a C library without these settings
+        library = ctypes.CDLL(None)
+        for parameter, value in MEMORY_SETTINGS.values():
+            library.mallopt(parameter, value)
 
 
 async def _run_events(workbench: Workbench, opened: Project, request: Request) -> AsyncIterator[str]:
