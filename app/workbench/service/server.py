@@ -53,8 +53,8 @@ from .workbench import Workbench
 LARGEST_BODY = 256 * 1024  # bytes of a request without a table
 LARGEST_TABLE = 4 * LARGEST_WRITTEN  # bytes of a request with one: a character has up to four, an escaped line end two
 THUMBNAIL = 480  # [px] of a picture on the first page
-# mallopt(3): two areas of memory for all threads, since one each holds back as much as a photograph; pictures in pages of
-# their own, which return to the system at once.
+# mallopt(3): two areas of memory for all threads, since one each holds back as much as a photograph; large arrays in
+# pages of their own, which return to the system at once.
 MEMORY_SETTINGS = {"M_ARENA_MAX": (-8, 2), "M_MMAP_THRESHOLD": (-3, 1 << 20)}
 POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
