@@ -30,7 +30,8 @@ LEFT_OUT = frozenset({
     "rough_walls",
 })  # fmt: skip
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
-COVERED = 0.03  # fraction of frames of any group that may have T too high
+# Excess of T over r, and fraction of the frames of any group that may have more.
+LIMITS = ((TOO_HIGH, 0.03), (0.0, 0.05))
 SOFT = 1.9e6  # [N/m] stiffness of contacts below which overlaps are forces
 KNOTS, ROUNDS = 9, 12
 SMOOTH = 0.15  # of the range of a measure, over which its isotonic regression is averaged
@@ -254,19 +255,20 @@ def _evaluate(measure: Array, at: Array, value: Array) -> Array:
 
 
 def _fit_margin(sample: TrustSample, score: Array) -> Margin:
-    """The margin with which T is too high in at most COVERED of the frames of each group, and least often too low."""
+    """The margin with which T is too high in few frames of each group, and least often too low."""
     best, fewest = Margin(0.0, 0.0), math.inf
     for slope in SLOPES:
         low, high = 0.0, 3.0
         for _ in range(30):
             middle = 0.5 * (low + high)
-            above = Margin(middle, slope).bound(score) > sample.r + TOO_HIGH
+            bound = Margin(middle, slope).bound(score)
             worst = max(
-                np.average(above[chosen], weights=sample.weight[chosen])
+                np.average(bound[chosen] > sample.r[chosen] + excess, weights=sample.weight[chosen]) / allowed
                 for group in GROUPS
+                for excess, allowed in LIMITS
                 if (chosen := sample.group == group).any()
             )
-            low, high = (middle, high) if worst > COVERED else (low, middle)
+            low, high = (middle, high) if worst > 1.0 else (low, middle)
         margin = Margin(float(high), float(slope))
         humble = float(np.average(margin.bound(score) < sample.r - TOO_LOW, weights=sample.weight))
         if humble < fewest:
