@@ -1,4 +1,7 @@
-"""Results as tidy tables, one row per observation, CSV or Parquet: contacts, grains, frames, walls. SI units."""
+"""Results as tidy tables, one row per observation, CSV or Parquet: contacts, grains, frames, walls, strain windows.
+
+SI units.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +17,12 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
+from ..drawing.accumulated_strain import accumulated_strains
 from ..process.atomic import replacing
 from ..results.hdf5.writer import columns_of_results
 from ..results.results import Results
 from ..results.schema import DIMENSIONS, entries
+from ..solver.frame_forces import FrameStatus
 from .data_package import write_description
 from .grain_quantities import GRAIN_COLUMNS, measure_grains
 
@@ -42,6 +47,15 @@ IDENTITY = {
     **{f"{axis}{end}": ("m", f"end {end} of the wall; of a circle, of a diameter") for end in "12" for axis in "xy"},
 }
 OF_WALLS = {"wall": ("", "name of the wall"), "pressure": ("Pa", "pressure on the wall")}
+EVENT_COLUMNS = {
+    "frame": ("", "first frame of the event, from 0"),
+    "last": ("", "last frame of the event"),
+    "time": ("s", "time of the first frame"),
+    "accumulated_strain": ("", "strain accumulated until then"),
+    "status": ("", "status of the frames"),
+    "reason": ("", "reason of the first frame"),
+}
+STEADY = (FrameStatus.SETTLING, FrameStatus.SETTLED)
 AT_WALL = -1  # j of a contact with a wall
 IDENTIFIED = ("time", "i", "j", "point", "normal", "position", "rotation")  # quantities in the columns of IDENTITY
 SPLIT_DIMENSIONS = ("xy", "axis", "wall", "anisotropy", "member", "component", "error_part")  # these become columns
@@ -70,13 +84,41 @@ def make_table(results: Results, name: TableName) -> pa.Table:
     return _table(identity(results) | _stored_columns(results, columns_of_results(results), rows))
 
 
+def make_events(results: Results) -> pa.Table:
+    """Return the frames at which a status other than settling or settled begins, with the reason."""
+    frames, rows = list(results.frames), []
+    strain = accumulated_strains([each.strain for each in frames])
+    for k, each in enumerate(frames):
+        if each.status not in STEADY and (k == 0 or frames[k - 1].status is not each.status):
+            until = next((n for n in range(k, len(frames)) if frames[n].status is not each.status), len(frames))
+            time = results.tracks.time[k]
+            rows.append((k, until - 1, time, strain[k], each.status.name.lower(), each.failed_reason or each.reason))
+    columns = list(zip(*rows, strict=True)) or [()] * len(EVENT_COLUMNS)
+    kinds = (np.int64, np.int64, np.float64, np.float64, object, object)
+    return _table({
+        name: Column(np.array(values, kind), *described)
+        for (name, described), values, kind in zip(EVENT_COLUMNS.items(), columns, kinds, strict=True)
+    })  # fmt: skip
+
+
+def make_strain_windows(results: Results) -> pa.Table | None:
+    """Return size, shape and correlation length of fluctuations over windows of strain; None without kinematics."""
+    if results.kinematics is None:
+        return None
+    return _table(_stored_columns(results, columns_of_results(results), ("strain_window",)))
+
+
 def write_tables(results: Results, folder: Path, kind: Kind = "csv") -> list[Path]:
-    """Write contacts, grains, frames and walls with a description to a folder; return the files.
+    """Write contacts, grains, frames, walls, events and strain_windows with a description; return the files.
 
     columns.csv is the dictionary of all columns, datapackage.json the same as a Frictionless data package.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    files, tables = [], make_tables(results)
+    files, tables = [], {str(name): table for name, table in make_tables(results).items()}
+    tables["events"] = make_events(results)
+    windows = make_strain_windows(results)
+    if windows is not None:
+        tables["strain_windows"] = windows
     for name, table in tables.items():
         file = folder / f"{name}.{kind}"
         with replacing(file) as part:
@@ -150,10 +192,10 @@ def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tu
     labels["wall"] = results.walls.name
     columns: dict[str, Column] = {}
     # Recorded wall forces belong to the table of walls; in that of frames they would look like inferred ones.
-    for each in entries("tracks", *(["walls"] if "wall" in rows else []), "frames", "statistics"):
+    for each in entries("tracks", *(["walls"] if "wall" in rows else []), "frames", "statistics", "kinematics"):
         rest = each.dims[len(rows) :]
         fits = each.dims == rows + rest and set(rest) <= set(SPLIT_DIMENSIONS)
-        if each.name in IDENTIFIED or each.path not in stored or not fits:
+        if (each.name in IDENTIFIED and each.part != "kinematics") or each.path not in stored or not fits:
             continue
         stored_values = stored[each.path]
         values = stored_values.reshape(
@@ -164,7 +206,9 @@ def _stored_columns(results: Results, stored: Mapping[str, np.ndarray], rows: tu
             if each.quantity.names is not None:
                 column = _names(each.quantity.names, column)
             parts = ("".join(named),) if rest == ("xy", "axis") else named  # stress_xy, but wall_force_top_x
-            columns["_".join((each.name, *parts))] = Column(column, each.quantity.unit, each.quantity.meaning)
+            # Of the window of the maps, as distinct from those since the frame before.
+            name = f"window_{each.name}" if each.part == "kinematics" and "frame" in rows else each.name
+            columns["_".join((name, *parts))] = Column(column, each.quantity.unit, each.quantity.meaning)
     return columns
 
 

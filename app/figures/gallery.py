@@ -15,6 +15,7 @@ from ..process.atomic import write_atomically
 from ..results.comparison import compare_runs, compare_with_truth
 from ..results.results import Results, TruthContacts
 from ..solver.frame_forces import FrameStatus
+from .contact_sheet import draw_sheet
 from .difference import draw_difference
 from .directions import draw_rose, draw_stress
 from .distributions import draw_density
@@ -25,7 +26,7 @@ from .paper_set import Picture, draw_apparatus, draw_recorded, draw_strip, draw_
 from .time_curves import draw_time
 from .truth_comparison import draw_truth
 
-FigureName = Literal["forces", "density", "rose", "stress", "time", "kinematics", "truth", "difference"]
+FigureName = Literal["forces", "density", "rose", "stress", "time", "sheet", "kinematics", "truth", "difference"]
 FileKind = Literal["pdf", "svg", "png"]
 FigureSet = Literal["results", "paper"]
 ZERO_STARTS = 12  # frames swept from zero forces, of which two are drawn
@@ -34,7 +35,7 @@ NEED_TRUTH = ("truth", "difference")
 
 _DRAW: dict[str, Callable[[Results, int, Width], Figure]] = {
     "forces": draw_forces, "density": draw_density, "rose": draw_rose, "stress": draw_stress, "time": draw_time,
-    "kinematics": draw_kinematics,
+    "sheet": draw_sheet, "kinematics": draw_kinematics,
 }  # fmt: skip
 
 

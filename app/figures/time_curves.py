@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
+from ..drawing.accumulated_strain import accumulated_strains
 from ..results.results import Results
+from ..solver.bodies.grains import Array
 from ..solver.frame_forces import FrameStatus
 from .figure_style import COLOURS, DASHES, GRID, Width, add_title, new_figure
 
@@ -39,9 +42,29 @@ def draw_time(results: Results, frame: int, width: Width) -> Figure:
     for axes in panels:
         axes.axvline(results.tracks.time[frame], color=GRID, linewidth=0.8, zorder=0)
         axes.yaxis.get_major_locator().set_params(nbins=4)
+    _add_strain(panels[0], results)
     figure.align_ylabels()
     add_title(panels[0], f"{results.name}: the test over time")
     return figure
+
+
+def _add_strain(axes: Axes, results: Results) -> None:
+    """Add an axis of the accumulated strain on top, which goes on through a reversal."""
+    strain = 100.0 * np.array(accumulated_strains([each.strain for each in results.frames]))
+    time = results.tracks.time
+    known = np.isfinite(strain)
+    if known.sum() < 2 or not strain[known][-1] > strain[known][0]:
+        return
+    at, value = time[known], np.maximum.accumulate(strain[known] + 1e-9 * np.arange(known.sum()))
+
+    def strain_of(when: ArrayLike) -> Array:
+        return np.asarray(np.interp(np.asarray(when), at, value))
+
+    def time_of(accumulated: ArrayLike) -> Array:
+        return np.asarray(np.interp(np.asarray(accumulated), value, at))
+
+    top = axes.secondary_xaxis("top", functions=(strain_of, time_of))
+    top.set_xlabel("accumulated strain [%]")
 
 
 def _curve(axes: Axes, results: Results, name: str, label: str, factor: float, colour: str, dash: object) -> None:

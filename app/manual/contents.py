@@ -11,6 +11,7 @@ CONTENTS: dict[str, dict[str, str]] = {
         "index.md": "Start",
         "install.md": "Install, update, cite",
         "photographs.md": "Your own photographs",
+        "apparatus.md": "Your 1γ2ε test",
         "workbench.md": "The workbench",
         "views.md": "What the views show",
         "trust.md": "How far to trust it",

@@ -15,6 +15,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from ..drawing.accumulated_strain import accumulated_strains
 from ..drawing.force_range import ForceRange
 from ..experiment.units import Scale
 from ..results.comparison import Comparison, FieldFrame
@@ -24,7 +25,7 @@ from .files.writing import writing
 from .look import entities
 from .look.axes import Axes, round_step
 from .look.canvas import Canvas
-from .look.clock import Clock, accumulated_strains
+from .look.clock import Clock
 from .look.colours import INK, SERIES, packed_one
 from .look.force_style import ForceStyle
 from .look.printable_text import printable

@@ -13,7 +13,7 @@ from ..bodies.grains import Array
 
 INTENSE = 2.0  # local shear strain of a band over the mean of the packing, at least
 LEAST_ELONGATION = 3.0  # length over thickness of a band
-LEAST_FRACTION = 0.02  # of the grains
+LEAST_FRACTION = 0.05  # of the grains
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def find_shear_band(
     Notes
     -----
     With λ₁ ≥ λ₂ the variances of the zone's centres along its principal axes, its length and thickness are √(12 λ):
-    those of a rectangle of uniform density. It is a band if √(λ₁/λ₂) ≥ 3 and it has 2 % of the grains.
+    those of a rectangle of uniform density. It is a band if √(λ₁/λ₂) ≥ 3 and it has 5 % of the grains.
     """
     count = len(shear)
     none = ShearBand(np.zeros(count, np.bool_), float("nan"), float("nan"))

@@ -69,6 +69,10 @@ def import_(
     pressure: Annotated[
         tuple[str, ...], tyro.conf.arg(metavar="WALL=PA", help="pressure on walls [Pa], such as top=50e3")
     ] = (),
+    load: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(metavar="WALL=N", help="measured load on walls [N], such as top=1438; load.csv, to be edited"),
+    ] = (),
     pairs: Annotated[
         Path | None,
         tyro.conf.arg(
@@ -96,14 +100,15 @@ def import_(
 
     request = ImportRequest(
         form, source, parse_columns(columns), pixel_size, y_down, height, degrees, radius, interval, precision, walls,
-        _pressures(pressure), corner_radius, pairs,
+        _by_wall("--pressure", pressure, "WALL=PA, such as top=50e3"), corner_radius,
+        _by_wall("--load", load, "WALL=N, such as top=1438"), pairs,
     )  # fmt: skip
     imported, contents = import_files(request, out)
     _report(Console(quiet=quiet), out, imported, contents)
     return 0
 
 
-def _pressures(given: tuple[str, ...]) -> dict[str, float]:
+def _by_wall(option: str, given: tuple[str, ...], form: str) -> dict[str, float]:
     found = {}
     for each in given:
         name, equals, text = each.partition("=")
@@ -112,7 +117,9 @@ def _pressures(given: tuple[str, ...]) -> dict[str, float]:
         except ValueError:
             value = math.nan
         if not (equals and name and math.isfinite(value)):
-            raise InputError("--pressure", each, "is not WALL=PA, such as top=50e3")
+            raise InputError(option, each, f"is not {form}")
+        if option == "--load" and value < 0.0:
+            raise InputError(option, each, "is negative: a positive force presses the wall against the packing")
         found[name] = value
     return found
 

@@ -27,6 +27,7 @@ class FolderContents:
     walls: Walls | None = None
     corners: CornerDiscs | None = None  # of the frame; without walls, bars run through their centres
     pressure: Mapping[str, float] = field(default_factory=dict)  # [Pa] of walls by their names
+    load: Mapping[str, float] = field(default_factory=dict)  # [N] on walls, the same in all photographs
     outer_grains: bool = False  # the outermost grains are the boundary
     edge: tuple[str, ...] = ()  # names of these grains, where the other program gives them; empty: they are found
     cell: Array | None = None  # (f, 2, 2) [m], vectors of a periodic cell, instead of either
@@ -46,10 +47,13 @@ def write_folder(folder: Path, imported: ImportedTracks, contents: FolderContent
     names = () if contents.walls is None else contents.walls.name
     if contents.walls is None and contents.corners is not None:
         names = bar_names(contents.corners)
-    for wall in contents.pressure:
-        if wall not in names:
-            existing = f"the walls are {', '.join(names)}" if names else "there are no walls: give --walls"
-            raise InputError("--pressure", wall, f"is not a wall ({existing})")
+    for option, given in (("--pressure", contents.pressure), ("--load", contents.load)):
+        for wall in given:
+            if wall not in names:
+                existing = f"the walls are {', '.join(names)}" if names else "there are no walls: give --walls"
+                raise InputError(option, wall, f"is not a wall ({existing})")
+    for wall in contents.load.keys() & contents.pressure.keys():
+        raise InputError("--load", wall, "has a pressure, too: give one of them")
     with replacing_folder(folder) as part:
         _write_files(part, imported, contents)
         description = _describe(folder, imported, contents, source)
@@ -82,6 +86,10 @@ def _write_files(folder: Path, imported: ImportedTracks, contents: FolderContent
         write_table(folder / "boundary.csv", {"id": named.tolist()})
     if contents.corners is not None:
         _write_corners(folder / "corners.csv", contents.corners)
+    if contents.load:
+        rows = [(k, wall, force) for k in range(len(number)) for wall, force in contents.load.items()]
+        frames, walls, forces = zip(*rows, strict=True)
+        write_table(folder / "load.csv", {"frame": frames, "wall": walls, "force": forces})
     if contents.cell is not None:
         vectors = contents.cell.reshape(-1, 4).T.tolist()
         write_table(folder / "cell.csv", dict(zip(CELL_COLUMNS, (range(len(contents.cell)), *vectors), strict=True)))
@@ -144,6 +152,8 @@ def _describe(folder: Path, imported: ImportedTracks, contents: FolderContents, 
             lines.append('file = "walls.csv"')
         if contents.corners is not None:
             lines.append('corners = "corners.csv"')
+        if contents.load:
+            lines.append('load = "load.csv"')
         for wall, pressure in contents.pressure.items():
             lines += [f"[walls.{json.dumps(wall, ensure_ascii=False)}]", f"pressure = {pressure!r}"]
     elif contents.cell is not None:

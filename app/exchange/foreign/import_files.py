@@ -41,6 +41,7 @@ class ImportRequest:
     walls: str | None = None  # box, outer, none, or a table of walls
     pressure: Mapping[str, float] = field(default_factory=dict)  # [Pa] by wall
     corner_radius: float | None = None  # of the frame's corner discs, in the files' unit
+    load: Mapping[str, float] = field(default_factory=dict)  # [N] by wall
     pairs: Path | None = None  # pair forces of a simulation [N], as truth
 
     def __post_init__(self) -> None:
@@ -110,6 +111,7 @@ def _folder_contents(
     return FolderContents(
         bars,
         pressure=request.pressure,
+        load=request.load,
         outer_grains=walls == OUTER,
         edge=edge,
         cell=cell,

@@ -132,7 +132,7 @@ def write_recording(
     scene = Scene(
         results.name, tracks, results.walls, results.grains, results.friction, results.configuration, canvas,
         ForceStyle.on(canvas, survey.force_range), truth, options.tolerance, results.radius_tuning,
-        tuple(each.sentence() for each in results.diagnosis),
+        tuple(each.sentence() for each in results.diagnosis), results.kinematics,
     )  # fmt: skip
     run = _Run(results, survey, scene, photograph, options.active, progress, part_frames)
     parts = [part_of(path, 1 + k) for k in range(max(-(-len(results.frames) // part_frames), 1))]
@@ -179,6 +179,7 @@ def _layout_of(scene: Scene, survey: Survey, frames: int, *, photographs: bool) 
     return RecordingLayout(
         scene.canvas, scene.rod_length, frames, photographs, scene.truth is not None, scene.walls.count,
         scene.radius_tuning is not None, scene.walls.force is not None, survey.has_error_budget, survey.extremes,
+        scene.kinematics is not None,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import rerun as rr
 
+from ...drawing.accumulated_strain import AccumulatedStrain
 from ...experiment.jpeg_photographs import JpegPhotograph
 from ...solver.frame_forces import FrameForces
 from ...solver.statistics.frame_statistics import FrameStatistics
@@ -22,7 +23,7 @@ from ..curve_layers.settling import log_settling, log_settling_styles
 from ..curve_layers.start_residuals import log_start_styles, log_starts
 from ..curve_layers.statistic_curves import log_statistics, log_statistics_styles
 from ..curve_layers.stress_and_fabric import log_polar_axes, log_rose, log_stress
-from ..look.clock import AccumulatedStrain, Clock
+from ..look.clock import Clock
 from ..look.level_of_detail import drawn_contacts, kept_sweeps
 from ..look.printable_text import printable
 from ..look.scene import Scene
@@ -34,6 +35,7 @@ from ..packing_layers.forces.force_uncertainty import log_force_uncertainty
 from ..packing_layers.forces.network import SweepChoice, chosen_sweeps, log_network
 from ..packing_layers.forces.true_forces import TruthWriter
 from ..packing_layers.grains_and_walls import log_grains_and_walls
+from ..packing_layers.kinematic_maps import KinematicMaps
 from ..packing_layers.legends import log_legends
 from ..packing_layers.photograph import log_photograph
 from ..packing_layers.residual_maps import log_residual_maps
@@ -84,6 +86,7 @@ class Recorder:
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._film: FilmWriter | None = None
+        self._kinematics: KinematicMaps | None = None
         self._plot: ResidualPlot | None = None
         self._previous: FrameForces | None = None
         self._density = ForceDensity()
@@ -104,6 +107,8 @@ class Recorder:
         self._scene = scene
         self._film = FilmWriter(scene)
         self._plot = ResidualPlot(scene.tolerance)
+        if scene.kinematics is not None:
+            self._kinematics = KinematicMaps(scene, scene.kinematics)
         if scene.truth is not None:
             self._truth = TruthWriter(scene, scene.truth)
         self._begin(self._stream)
@@ -133,6 +138,8 @@ class Recorder:
             log_radius_curve(stream, scene.radius_tuning)
         if self._film is not None:
             self._film.log_keys(stream)
+        if self._kinematics is not None:
+            self._kinematics.log_styles(stream)
         if self._truth is not None:
             self._truth.log_axes(stream)
 
@@ -165,6 +172,8 @@ class Recorder:
         log_rods(clock, scene, drawn)
         if self._film is not None:
             self._film.log(clock, drawn)
+        if self._kinematics is not None:
+            self._kinematics.log(clock)
         agreement = self._truth.log(clock, forces) if self._truth else None
         self._previous = forces
         self._clipped += scene.style.clipped(forces.fn)

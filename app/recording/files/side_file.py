@@ -9,10 +9,11 @@ from pathlib import Path
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from ...drawing.accumulated_strain import accumulated_strains
 from ...drawing.force_range import ForceRange
 from ...process.errors import InputError
 from ...results.results import Results
-from ..look.clock import Clock, accumulated_strains
+from ..look.clock import Clock
 from ..look.force_style import ForceStyle
 from ..packing_layers.forces.network import SweepChoice, send_sweeps, visible_sweeps
 from ..tabs.layout_property import read_layout

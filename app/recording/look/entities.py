@@ -124,6 +124,13 @@ RADIUS_FOUND = "/statistics/radius_curve/found"
 RADIUS_AXES = "/statistics/radius_curve/axes"
 RADIUS_TICKS = "/statistics/radius_curve/axes/ticks"
 
+LOCAL_SHEAR, D2MIN, LOCAL_ROTATION = "shear_strain", "d2min", "rotation"  # maps of the kinematics
+KINEMATIC_MAPS = "/kinematics/map"
+KINEMATIC_LEGENDS = "/legend/kinematics"
+FLUCTUATIONS = "/kinematics/fluctuation"
+PARTICIPATION = "/kinematics/participation"
+SOLID_FRACTION = "/kinematics/solid_fraction"
+
 RODS = "/rods/bodies"
 ROD_CHAINS = "/rods/chains"
 ROD_CAPTION = "/rods/caption"

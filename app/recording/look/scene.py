@@ -14,6 +14,7 @@ from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.walls import Walls
 from ...solver.contacts.contacts import Contacts
 from ...solver.contacts.radius_tuning import RadiusTuning
+from ...solver.kinematics.sequence_kinematics import SequenceKinematics
 from ...tracks import Tracks, WallTracks
 from .canvas import Canvas
 from .force_style import ForceStyle
@@ -38,6 +39,7 @@ class Scene:
     tolerance: float | None = None  # stopping level of the residual
     radius_tuning: RadiusTuning | None = None
     diagnosis: tuple[str, ...] = ()  # sentences
+    kinematics: SequenceKinematics | None = None
 
     @property
     def rod_length(self) -> float:

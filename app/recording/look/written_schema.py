@@ -62,6 +62,7 @@ class Condition(Enum):
     WALL_FORCES = "where wall forces were recorded"
     BUDGET = "where an error budget was requested"
     CELL = "of a periodic cell"
+    KINEMATICS = "where the kinematics were measured"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +94,13 @@ _CONTACT_VALUES = _FORCE_VALUES | {
 }  # fmt: skip
 _CONTACT_COLOURS = frozenset(f"{entities.coloured_by(name)}:colors" for name in entities.COLOURED_BY)
 _GRAIN_VALUES = frozenset({"id", "x_mm", "y_mm", "theta_deg", "sigma_um", "zncc", "status", "unbalance"})
+
+
+_KINEMATIC_MAPS = (
+    (entities.LOCAL_SHEAR, "rods, colour by the local shear strain over the window"),
+    (entities.D2MIN, "rods, colour by the rms departure of their neighbours from the local field"),
+    (entities.LOCAL_ROTATION, "rods, colour by their rotation minus that of the local field"),
+)
 
 
 def _scalar(path: str, meaning: str, when: When = When.END, condition: Condition = Condition.ALWAYS) -> Entity:
@@ -261,6 +269,21 @@ SCHEMA: tuple[Entity, ...] = (
     Entity(entities.RADIUS_FOUND, "the change that was applied", _POINTS, When.STATIC, Condition.RADII),
     Entity(entities.RADIUS_AXES, "axes and the target coordination number", _STRIPS, When.STATIC, Condition.RADII),
     Entity(entities.RADIUS_TICKS, "their values", _TICKS, When.STATIC, Condition.RADII),
+    *(
+        Entity(f"{entities.KINEMATIC_MAPS}/{name}", meaning, _POINTS, When.START, Condition.KINEMATICS)
+        for name, meaning in _KINEMATIC_MAPS
+    ),
+    *(
+        Entity(f"{entities.KINEMATIC_LEGENDS}/{name}{part}", text, content, When.STATIC, Condition.KINEMATICS)
+        for name, _ in _KINEMATIC_MAPS
+        for part, text, content in (("", "its colours", _STRIPS), ("/ticks", "their values", _TICKS))
+    ),
+    Entity(
+        entities.FLUCTUATIONS, "fluctuations about the mean field, another colour in a shear band",
+        _of("Arrows2D", "origins", "vectors", "radii", "colors", "draw_order"), When.START, Condition.KINEMATICS,
+    ),
+    _scalar(entities.PARTICIPATION, "participation ratio of the local shear", When.END, Condition.KINEMATICS),
+    _scalar(entities.SOLID_FRACTION, "mean local solid fraction", When.END, Condition.KINEMATICS),
     Entity(
         entities.RODS, "rods as cylinders [m]",
         _of("Cylinders3D", "lengths", "radii", "centers", "colors", "fill_mode"), When.END,

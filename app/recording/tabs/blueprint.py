@@ -35,6 +35,7 @@ class Tab(StrEnum):
     CONVERGENCE = "Convergence"
     CONTACTS = "Contacts"
     STATISTICS = "Statistics"
+    KINEMATICS = "Kinematics"
     TRUTH = "Truth"
 
 
@@ -52,6 +53,7 @@ class RecordingLayout:
     wall_forces: bool = False  # recorded by sensors
     budget: bool = False  # error budget
     extremes: Extremes = field(default_factory=dict)  # of the curves known before the recording is written
+    kinematics: bool = False  # measured
 
 
 _PACKING = [entities.WALLS, entities.CELL, f"{entities.GRAINS}/**"]
@@ -93,6 +95,8 @@ def make_blueprint(layout: RecordingLayout, *, active: Tab | None = None, follow
         Tab.CONTACTS: _contacts(layout),
         Tab.STATISTICS: _statistics(layout),
     }
+    if layout.kinematics:
+        tabs[Tab.KINEMATICS] = _kinematics(layout)
     if layout.truth:
         tabs[Tab.TRUTH] = _truth(layout)
     if active is None:
@@ -253,6 +257,30 @@ def _statistics(layout: RecordingLayout) -> rrb.Container:
     return rrb.Vertical(
         rrb.Horizontal(*drawn, column_shares=shares), row(packing), row(stresses), row_shares=[1.3, 1.0, 1.0],
         name=Tab.STATISTICS,
+    )  # fmt: skip
+
+
+def _kinematics(layout: RecordingLayout) -> rrb.Container:
+    """Return maps of the motion beyond the mean field."""
+    views = [packing_view("Fluctuations about the mean field", layout.canvas, [*_PACKING, entities.FLUCTUATIONS])]
+    for quantity, name in (
+        (entities.LOCAL_SHEAR, "Local shear strain"),
+        (entities.D2MIN, "Departure from the local field, √D²min"),
+        (entities.LOCAL_ROTATION, "Rotation minus that of the local field"),
+    ):
+        drawn = f"{entities.KINEMATIC_MAPS}/{quantity}"
+        legend = f"{entities.KINEMATIC_LEGENDS}/{quantity}/**"
+        views.append(packing_view(name, layout.canvas, [entities.WALLS, drawn, legend]))
+    return rrb.Vertical(
+        rrb.Horizontal(*views),
+        rrb.Horizontal(
+            lanes_view(),
+            curve_view("Participation of the local shear; 1: homogeneous", [entities.PARTICIPATION],
+                       y_range=_UNIT_RANGE),
+            curve_view("Mean local solid fraction", [entities.SOLID_FRACTION]),
+        ),
+        row_shares=[2.4, 1.0],
+        name=Tab.KINEMATICS,
     )  # fmt: skip
 
 

@@ -180,3 +180,33 @@ def test_exported_corners_are_imported_again(results, tmp_path):
     assert found.corners.rotation[-1] == pytest.approx(np.full(4, 0.01 * (f - 1)))
     without = write_sequence(tracks, scale, tmp_path, replace(walls, side=np.where(side == OUT, -side, side)))
     assert without[0].read_text().split("\n", 1)[0] == str(tracks.grain_count)
+
+
+def test_a_measured_load_is_written_for_every_photograph(tmp_path, capsys):
+    folder = write(tmp_path / "conf", without_count)
+    options = ("--pixel-size", str(PIXEL), "--corner-radius", "60", "--load", "top=1438")
+    out, _ = imported(folder, *options, capsys=capsys)
+    walls = read_walls(load_experiment(out), 3)
+    assert walls is not None
+    assert walls.load is not None
+    np.testing.assert_array_equal(walls.load[:, walls.name.index("top")], 1438.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        (("--load", "lid=5"), "is not a wall"),
+        (("--load", "top=-5"), "is negative"),
+        (("--load", "top"), "is not WALL=N"),
+        (("--load", "top=5", "--pressure", "top=5e4"), "has a pressure, too"),
+    ],
+)
+def test_a_wrong_load_is_refused_in_one_line(tmp_path, capsys, given, problem):
+    folder = write(tmp_path / "conf", without_count)
+    with pytest.raises(SystemExit) as end:
+        main(["import", "dic", str(folder), str(tmp_path / "out"), "--pixel-size", str(PIXEL), "--corner-radius", "60",
+              *given])  # fmt: skip
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert problem in error.replace("\n", " ")
+    assert not (tmp_path / "out").exists()

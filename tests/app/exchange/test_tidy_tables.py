@@ -2,13 +2,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from rodsight.cli.main import main
-from rodsight.exchange.tidy_tables import make_tables, write_tables
+from rodsight.exchange.tidy_tables import make_events, make_tables, write_tables
+from rodsight.solver.frame_forces import FrameStatus
 
 from tests.app.results.full_results import make_full_results
 
@@ -76,6 +78,8 @@ def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
         "grains.csv",
         "frames.csv",
         "walls.csv",
+        "events.csv",
+        "strain_windows.csv",
         "columns.csv",
         "datapackage.json",
         "ro-crate-metadata.json",
@@ -93,3 +97,34 @@ def test_the_command_writes_beside_the_results(tracked, tmp_path, capsys):
         main(["export", "dic", str(out)])
     assert end.value.code == 2
     assert "--pixel-size" in capsys.readouterr().err
+
+
+def test_kinematics_are_columns_of_rods_and_frames_and_a_table_of_windows(tmp_path):
+    results = make_full_results()
+    found = results.kinematics
+    assert found is not None
+    tables = make_tables(results)
+    grains = tables["grains"]
+    np.testing.assert_array_equal(np.array(grains.column("window_fluctuation_y")), found.fluctuation[..., 1].ravel())
+    np.testing.assert_array_equal(np.array(grains.column("window_rotation")), found.rotation.ravel())
+    assert grains.schema.field("window_d2min").metadata[b"unit"] == b"m2"
+    np.testing.assert_array_equal(np.array(tables["frames"].column("window_gradient_xy")), found.gradient[:, 0, 1])
+    write_tables(results, tmp_path)
+    windows = pyarrow.csv.read_csv(tmp_path / "strain_windows.csv")
+    np.testing.assert_array_equal(np.array(windows.column("window_frames")), found.window_frames)
+    np.testing.assert_allclose(np.array(windows.column("window_rms")), found.window_rms)
+    assert "strain_windows.csv" in (tmp_path / "columns.csv").read_text()
+
+
+def test_events_are_listed_with_their_ends_and_reasons(results):
+    status = [FrameStatus.RESET, FrameStatus.SETTLING, FrameStatus.SUSPECT, FrameStatus.SUSPECT]
+    frames = [
+        replace(each, status=kind, reason=kind.name) for each, kind in zip(results.frames[:4], status, strict=True)
+    ]
+    events = make_events(replace(results, frames=frames))
+    assert events.column("frame").to_pylist() == [0, 2]
+    assert events.column("last").to_pylist() == [0, 3]
+    assert events.column("status").to_pylist() == ["reset", "suspect"]
+    assert events.column("reason").to_pylist() == ["RESET", "SUSPECT"]
+    steady = [replace(each, status=FrameStatus.SETTLED) for each in results.frames]
+    assert len(make_events(replace(results, frames=steady))) == 0

@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from rodsight.figures.contact_sheet import sheet_frames
 from rodsight.figures.figure_style import COLOURS, WIDTHS
 from rodsight.figures.force_network import branch_lines
 from rodsight.figures.gallery import NEED_TRUTH, FigureName, default_frame, draw_figure, write_figures
@@ -134,3 +135,22 @@ def test_the_difference_of_two_fields_is_a_map(results):
     same = draw_figure(results, "difference", 2, against=results).axes[0]
     widths = [each.get_linewidths() for each in same.collections if isinstance(each, LineCollection)]
     assert np.ptp(widths[0]) == 0.0  # no difference
+
+
+def test_the_contact_sheet_shows_every_beginning_of_an_event_and_evenly_spaced_frames(results):
+    kinds = [FrameStatus.SETTLED] * 40
+    for k in (0, 17, 18, 31):
+        kinds[k] = FrameStatus.SUSPECT
+    kinds[5] = FrameStatus.FAILED
+    frames = [replace(results.frames[1], frame=k, status=kind) for k, kind in enumerate(kinds)]
+    chosen = sheet_frames(replace(results, frames=frames), 10)
+    assert {0, 17, 31} <= set(chosen)
+    assert 18 not in chosen or len(chosen) == 10
+    assert 5 not in chosen
+    assert len(chosen) == 10
+    assert max(np.diff(chosen)) < 10
+
+
+def test_the_curves_have_an_axis_of_strain(results):
+    axes = draw_figure(results, "time", 2).axes[0]
+    assert [each.get_xlabel() for each in axes.child_axes] == ["accumulated strain [%]"]

@@ -11,6 +11,7 @@ import rerun as rr
 from rodsight.experiment.units import Scale
 from rodsight.recording.files.finished_run import RecordingFile, RecordingOptions, write_recording
 from rodsight.results.results import Results, TruthContacts
+from rodsight.solver.kinematics.sequence_kinematics import measure_kinematics
 
 from tests.app.recording.fake_photographs import PIXEL, SHAPE, photograph
 from tests.app.recording.fake_results import make_results, make_truth, make_tuning
@@ -40,8 +41,12 @@ def recording(results, truth, tmp_path_factory) -> RecordingFile:
     scale = Scale(PIXEL, SHAPE[0])
     fraction = np.array([0.3, 0.2, 0.1, 0.1, 0.1, 0.2])
     force = np.random.default_rng(5).random((len(results.frames), results.walls.count, 2))
+    tracks = results.tracks
+    found = measure_kinematics(
+        np.where(tracks.present[..., None], tracks.position, np.nan), tracks.rotation, tracks.radius, tracks.sigma
+    )
     tuned = replace(
-        results, radius_tuning=make_tuning(), walls=replace(results.walls, force=force),
+        results, radius_tuning=make_tuning(), kinematics=found, walls=replace(results.walls, force=force),
         frames=[replace(each, error_budget=fraction) for each in results.frames],
     )  # fmt: skip
     return write_recording(

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.drawing.accumulated_strain import AccumulatedStrain, accumulated_strains
 from rodsight.recording.archive.share import share_recording
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.files.side_file import record_side_file
 from rodsight.recording.look import entities
-from rodsight.recording.look.clock import AccumulatedStrain, accumulated_strains
 
 from tests.app.recording.fake_results import make_results
 from tests.app.recording.rows import components, latest, rows
