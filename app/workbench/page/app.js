@@ -27,20 +27,33 @@ globalThis.workbench = app; // for tests
 const waiting = new Set(); // actions that are not done: a second one is a double click
 const PATIENCE = 250, LOOKS = 1000; // [ms]
 
+let inner = null; // actions that the present one begins at once: they follow it, before those that wait already
+
 /** One action after the other; an error is shown. once: name of an action that must not run twice at a time. */
 app.queue = (work, words = "", once = null) => {
   if (once !== null) { if (waiting.has(once)) return app.busy; waiting.add(once); }
-  const { field } = app;
-  app.busy = app.busy.then(async () => {
-    app.field = field; // an action of this one belongs to the same field
-    const slow = setTimeout(() => { at("busy-text").textContent = words || "One moment …"; at("busy").hidden = false; }, words ? PATIENCE : 2 * PATIENCE);
-    try { await work(); if (field?.id === app.refused?.id) app.refused = null; } catch (error) {
-      if (field) app.refused = { ...field, text: error.message || String(error) };
-      notify(error.message || String(error), true); app.paint();
-    } finally { app.field = null; clearTimeout(slow); at("busy").hidden = true; app.done += 1; waiting.delete(once); }
-  });
+  const { field } = app, run = () => perform(work, words, once, field);
+  if (inner) return new Promise((done) => inner.push(() => run().then(done)));
+  app.busy = app.busy.then(run);
   return app.busy;
 };
+
+async function perform(work, words, once, field) {
+  const following = [], outer = inner;
+  app.field = field; // an action of this one belongs to the same field
+  const slow = setTimeout(() => { at("busy-text").textContent = words || "One moment …"; at("busy").hidden = false; }, words ? PATIENCE : 2 * PATIENCE);
+  try {
+    inner = following;
+    let begun;
+    try { begun = work(); } finally { inner = outer; }
+    await begun;
+    if (field?.id === app.refused?.id) app.refused = null;
+  } catch (error) {
+    if (field) app.refused = { ...field, text: error.message || String(error) };
+    notify(error.message || String(error), true); app.paint();
+  } finally { app.field = null; clearTimeout(slow); at("busy").hidden = true; app.done += 1; waiting.delete(once); }
+  for (const next of following) await next();
+}
 
 // The field that an action comes from: a refused value stays in it, with the reason below it.
 app.field = null; app.refused = null;
@@ -269,13 +282,13 @@ addEventListener("keydown", (event) => {
 });
 
 /** Undo the last action, whatever step it was in, or repeat it; a step shows the photograph and pair of a verdict. */
-app.undo = (which = "undo") => {
-  if (!app.project[which]) { notify(`There is no action to ${which}`); return; }
-  app.change(which, {}, "", (answer) => {
-    notify(`${which === "undo" ? "Undone" : "Redone"}: ${answer.undone ?? answer.redone}`);
-    if (answer.verdict) app.step.reverted?.(app, answer.verdict);
-  });
-};
+app.undo = (which = "undo") => app.queue(async () => { // what was typed before it is done first
+  if (!app.project?.[which]) { notify(`There is no action to ${which}`); return; }
+  const answer = await request(which, { at: app.project.at });
+  app.take(answer);
+  notify(`${which === "undo" ? "Undone" : "Redone"}: ${answer.undone ?? answer.redone}`);
+  if (answer.verdict) app.step.reverted?.(app, answer.verdict);
+});
 
 at("brand").addEventListener("click", app.home);
 at("undo").addEventListener("click", () => app.undo("undo"));

@@ -40,7 +40,7 @@ function experimentTile(app, each) {
   return h("button", { class: "tile", onclick: () => app.queue(async () => app.open(await request("project", { at: each.at }))) },
     picture,
     h("span", { class: "words" },
-      h("b", {}, each.name),
+      h("b", {}, each.name, [".", each.name].includes(each.at) ? null : h("span", { class: "soft" }, ` in ${each.at}`)),
       h("span", {}, each.error ?? (each.frames ? `${each.frames} photographs${run?.rods ? ` · ${run.rods} rods` : ""}` : "given tracks")),
       h("span", { class: "row" }, status, run?.trust !== undefined && run?.trust !== null ? h("span", { class: "pill", title: "the least trust of a frame" }, `T ≥ ${run.trust.toFixed(2)}`) : null),
       h("span", { class: "dots", title: "photographs, scale, walls, rods, material" }, each.steps.map((mark) => sign(mark)))));

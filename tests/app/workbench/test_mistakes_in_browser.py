@@ -123,3 +123,13 @@ def test_a_server_that_is_gone_is_a_state_of_the_page(page: Page, begun: Path):
         expect(tab.locator("#toast")).to_contain_text("nothing was changed")
         tab.unroute("**/*")
         expect(tab.locator("#lost")).to_be_hidden()
+
+
+def test_undo_waits_for_what_was_typed_before_it(page: Page, begun: Path):
+    with opened(page, begun) as tab:
+        enter(tab, "photographs")
+        tab.fill("#field-interval", "77")
+        tab.evaluate("""() => { document.getElementById("field-interval").blur(); workbench.undo(); }""")
+        idle(tab)
+        expect(tab.locator("#toast")).to_contain_text("Undone: photographs")
+        assert tab.evaluate("workbench.project.photographs.interval") == 30.0
