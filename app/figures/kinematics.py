@@ -45,7 +45,8 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
         (np.degrees(found.rotation[frame]), "PuOr", "rotation [°]", True),
     )
     _draw_fluctuations(panels[0], results, frame, found)
-    panels[0].set_anchor("N")
+    for axes in panels[:4]:
+        axes.set_anchor("N")
     for axes, (value, colours, label, signed) in zip(panels[1:4], maps, strict=True):
         _draw_map(axes, results, frame, value, colours, label, signed=signed)
     add_title(panels[0], f"{results.name}, frames {max(frame - found.window, 0)} to {frame}\nfluctuations")

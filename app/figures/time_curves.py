@@ -57,6 +57,11 @@ def _add_strain(axes: Axes, results: Results) -> None:
         return
     at, value = time[known], np.maximum.accumulate(strain[known] + 1e-9 * np.arange(known.sum()))
 
+    # An axis is wider than its data: beyond them time and strain go on at their mean rate.
+    rate, margin = (value[-1] - value[0]) / (at[-1] - at[0]), at[-1] - at[0]
+    at = np.concatenate([[at[0] - margin], at, [at[-1] + margin]])
+    value = np.concatenate([[value[0] - rate * margin], value, [value[-1] + rate * margin]])
+
     def strain_of(when: ArrayLike) -> Array:
         return np.asarray(np.interp(np.asarray(when), at, value))
 

@@ -151,7 +151,7 @@ def _fill_in(found: ValidationResult, data: dict[str, Any]) -> dict[str, Any]:
     if "pixel_size" not in section and "distance" not in section:
         steps["scale"].add_missing("The size of a pixel in metres is missing: walls, radii and forces need it.")
         section["pixel_size"] = SUBSTITUTE
-    if not isinstance(filled.get("walls"), dict) or not filled["walls"].keys() & {"file", "arcs"}:
+    if not isinstance(filled.get("walls"), dict) or not filled["walls"].keys() & {"file", "arcs", "corners"}:
         if "boundary" not in data:
             steps["walls"].add_missing("No walls are given: without them grains can be tracked but not solved.")
         filled.pop("walls", None)

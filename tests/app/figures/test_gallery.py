@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from rodsight.drawing.accumulated_strain import accumulated_strains
 from rodsight.figures.contact_sheet import sheet_frames
 from rodsight.figures.figure_style import COLOURS, WIDTHS
 from rodsight.figures.force_network import branch_lines
@@ -153,4 +154,9 @@ def test_the_contact_sheet_shows_every_beginning_of_an_event_and_evenly_spaced_f
 
 def test_the_curves_have_an_axis_of_strain(results):
     axes = draw_figure(results, "time", 2).axes[0]
-    assert [each.get_xlabel() for each in axes.child_axes] == ["accumulated strain [%]"]
+    (top,) = axes.child_axes
+    assert top.get_xlabel() == "accumulated strain [%]"
+    strains = 100.0 * np.array(accumulated_strains([each.strain for each in results.frames]))
+    of_time = top._functions[0]  # pyright: ignore[reportAttributeAccessIssue]
+    np.testing.assert_allclose(of_time(results.tracks.time), strains, atol=1e-6)
+    assert of_time(results.tracks.time[0] - 1.0) < 0.0
