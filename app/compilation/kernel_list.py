@@ -86,6 +86,11 @@ def encode(kind: Any) -> Any:
 def decode(kind: Any) -> Any:
     """Return the type of the compiler that `encode` has written.
 
+    Raises
+    ------
+    TypeError
+        If a named tuple has other fields by now.
+
     Examples
     --------
     >>> decode("float64 2 C")
@@ -98,7 +103,13 @@ def decode(kind: Any) -> Any:
     if isinstance(kind, dict):
         ((name, parts),) = kind.items()
         module, _, owner = name.rpartition(".")
-        return types.BaseTuple.from_types(_decoded(parts), getattr(import_module(f"{PACKAGE}.{module}"), owner))
+        made = getattr(import_module(f"{PACKAGE}.{module}"), owner)
+        if len(made._fields) != len(parts):
+            raise TypeError(
+                f"{name} has {len(made._fields)} fields, not {len(parts)}: write the list of kernels again, "
+                "python -m tests.benchmarks.kernels"
+            )
+        return types.BaseTuple.from_types(_decoded(parts), made)
     if kind == GENERATOR:
         return types.NumPyRandomGeneratorType(GENERATOR)
     name, *shape = kind.split()

@@ -34,6 +34,11 @@ def test_types_are_read_back(kind) -> None:
     assert decode(encode(kind)) == kind
 
 
+def test_a_named_tuple_with_other_fields_than_listed_is_refused() -> None:
+    with pytest.raises(TypeError, match="write the list of kernels again"):
+        decode({"solver.nlgs.problem.ContactProblem": ["float64 2 C"]})
+
+
 @pytest.mark.parametrize("kind", [numba.types.literal(3), numba.types.Omitted(None), numba.types.unicode_type])
 def test_types_that_no_listed_kernel_has_are_refused(kind) -> None:
     with pytest.raises(TypeError, match="no kernel had an argument of this type"):
