@@ -92,9 +92,10 @@ def test_a_press_on_the_plot_goes_to_its_photograph(tab: Page):
     box = tab.locator("#plot").bounding_box()
     assert box is not None
     count = tab.evaluate("workbench.project.frames")
-    tab.mouse.click(box["x"] + 3.5 / count * box["width"], box["y"] + 30)
-    idle(tab)
-    assert tab.evaluate("workbench.frame") == 3
+    for frame in (3, 1, 2):
+        tab.mouse.click(box["x"] + (frame + 0.5) / count * box["width"], box["y"] + 30)
+        idle(tab)
+        assert tab.evaluate("workbench.frame") == frame
     lanes = tab.locator("#lanes").bounding_box()
     assert lanes is not None
     assert (lanes["x"], lanes["width"]) == (box["x"], box["width"])  # one above the other: the same photographs
