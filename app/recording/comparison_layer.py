@@ -31,10 +31,11 @@ from .look.force_style import ForceStyle
 from .look.printable_text import printable
 from .look.scene import Scene, tracks_in_cell
 from .look.values import log_scalar, nullable
+from .packing_layers.captions import log_caption
 from .packing_layers.forces.difference import log_difference, log_difference_legend
 from .packing_layers.forces.network import body_values
 from .packing_layers.grains_and_walls import log_grains_and_walls
-from .packing_layers.legends import log_force_legend
+from .packing_layers.legends import log_force_legend, log_scale_bar
 from .tabs.views import curve_view, drawn_view, packing_view
 
 APPLICATION_ID = "rodsight-compare"  # a separate one, so that the viewer does not apply a layout of runs to comparisons
@@ -139,6 +140,7 @@ def _range_of(comparison: Comparison) -> ForceRange:
 def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison) -> Axes:
     first, second = printable(comparison.first.name), printable(comparison.second.name)
     log_force_legend(stream, scene)
+    log_scale_bar(stream, scene.canvas)
     log_difference_legend(stream, scene, first, second)
     names = (f"φ {first}", f"wall ratio {first}", f"φ {second}", f"wall ratio {second}")
     curves = [
@@ -167,6 +169,7 @@ def _log_styles(stream: rr.RecordingStream, scene: Scene, comparison: Comparison
 def _log_frame(clock: Clock, scene: Scene, comparison: Comparison, axes: Axes) -> None:
     k, stream = clock.frame, clock.stream
     a, b = comparison.first.frames[k], comparison.second.frames[k]
+    log_caption(clock, scene, comparison.base.frames[k])
     log_grains_and_walls(clock, scene, comparison.base.frames[k])
     clock.end()
     for path, field in ((FIRST, a), (SECOND, b)):

@@ -16,11 +16,13 @@ from rerun.chunk import RrdReader
 
 from ..look import entities
 from ..look.canvas import Canvas
-from ..look.colours import BACKGROUND, OUTLINE, Rgba
+from ..look.colours import BACKGROUND, INK, OUTLINE, Rgba
 from ..look.printable_text import printable
 from ..tabs.layout_property import read_layout
 from .catalogue import Value, read_properties
 
+TEXT = 0.04  # height of a text over the width of the packing
+KEY = 0.55  # of the legend below the packing: line and values
 MAX_LINES = 4000  # contacts or grains in a picture, the widest first: it is a few centimetres wide
 
 
@@ -70,21 +72,37 @@ def _facts(known: dict[str, Value]) -> list[str]:
 
 
 def _network(recording: Path, canvas: Canvas) -> str:
-    """Return the force network of the last frame, with grains and walls, as SVG."""
-    forces = _last(recording, entities.FORCES)
+    """Return the force network of the last frame as SVG, with its caption, scale bar and key of forces."""
+    forces, gaps = _last(recording, entities.FORCES), _last(recording, entities.FORCE_UNCERTAINTY)
     walls, grains = _last(recording, entities.WALLS), _last(recording, entities.GRAINS)
     lines = [*_lines(walls), *sorted(_lines(forces), key=lambda line: line[1])[-MAX_LINES:]]
+    over = [*_lines(gaps), *_lines(_static(recording, entities.SCALE_BAR))]
+    over += _lines(_static(recording, entities.FORCE_LEGEND))
+    texts = [
+        *_texts(_last(recording, entities.CAPTION), canvas),
+        *_texts(_static(recording, entities.SCALE_BAR_LENGTH), canvas),
+        *_texts(_static(recording, entities.FORCE_LEGEND_TICKS), canvas),
+    ]
     circles = list(zip(grains.get("Ellipses2D:centers", []), grains.get("Ellipses2D:half_sizes", []), strict=True))
-    box = f"{canvas.left:.0f} {canvas.top:.0f} {canvas.width:.0f} {canvas.height:.0f}"
+    top, height = canvas.top - canvas.header_height, canvas.height + canvas.header_height + KEY * canvas.legend_height
+    box = f"{canvas.left:.0f} {top:.0f} {canvas.width:.0f} {height:.0f}"
     thin = 0.04 * canvas.grain_radius
     return "".join([
         f'<svg viewBox="{box}" style="background:{_hex(BACKGROUND)}" stroke-linecap="round" fill="none">',
         f'<g stroke="{_hex(OUTLINE)}" stroke-opacity="0.5" stroke-width="{thin:.2f}">',
         *(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size[0]:.1f}"/>' for (x, y), size in circles[:MAX_LINES]),
         "</g>",
-        *(f'<path d="{d}" stroke="{colour}" stroke-width="{2.0 * radius:.1f}"/>' for d, radius, colour in lines),
+        *_paths(lines),
+        '<g class="gaps and keys">',
+        *_paths(over),
+        "</g>",
+        *texts,
         "</svg>",
     ])  # fmt: skip
+
+
+def _paths(lines: list[tuple[str, float, str]]) -> list[str]:
+    return [f'<path d="{d}" stroke="{colour}" stroke-width="{2.0 * radius:.1f}"/>' for d, radius, colour in lines]
 
 
 def _lines(shown: dict[str, Any]) -> list[tuple[str, float, str]]:
@@ -93,7 +111,31 @@ def _lines(shown: dict[str, Any]) -> list[tuple[str, float, str]]:
     radii = shown.get("LineStrips2D:radii", [])
     colours = [f"#{colour:08x}" for colour in shown.get("LineStrips2D:colors", [])]
     paths = ["M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in strip) for strip in strips]
+    radii, colours = (each * len(paths) if len(each) == 1 else each for each in (radii, colours))  # one for all
     return list(zip(paths, radii, colours, strict=True))
+
+
+def _texts(shown: dict[str, Any], canvas: Canvas) -> list[str]:
+    """Return the labels of an entity as SVG texts below their points, as the viewer draws them."""
+    size = TEXT * canvas.width
+    found = []
+    for (x, y), label in zip(shown.get("Points2D:positions", []), shown.get("Points2D:labels", []), strict=True):
+        for number, line in enumerate(label.split("\n")):
+            place = f'x="{x:.0f}" y="{y + size * (1.1 + 1.2 * number):.0f}"'
+            found.append(f'<text {place} font-size="{size:.1f}" text-anchor="middle" fill="{_hex(INK)}">'
+                         f"{html.escape(line)}</text>")  # fmt: skip
+    return found
+
+
+def _static(recording: Path, entity: str) -> dict[str, Any]:
+    """Return the components of an entity without time."""
+    shown: dict[str, Any] = {}
+    for chunk in RrdReader(str(recording)).store().stream().filter(content=entity).to_chunks():
+        batch = chunk.to_record_batch()
+        if chunk.entity_path == entity and entities.FRAME not in batch.schema.names:
+            for row in batch.to_pylist():
+                shown |= {name: value for name, value in row.items() if value is not None}
+    return shown
 
 
 def _last(recording: Path, entity: str) -> dict[str, Any]:

@@ -27,7 +27,7 @@ _CHANGES = ("lines 10⁻⁶", "10⁻⁵", "10⁻⁴", "0.001", "0.01")  # labels
 def log_legends(stream: rr.RecordingStream, scene: Scene) -> None:
     """Log all legends, static."""
     log_force_legend(stream, scene)
-    _log_scale_bar(stream, scene.canvas)
+    log_scale_bar(stream, scene.canvas)
     _log_gap_legend(stream, scene)
     power = np.linspace(DECADES[0], DECADES[1], PIECES)
     decades = int(DECADES[1] - DECADES[0])
@@ -93,7 +93,7 @@ def _log_gap_key(stream: rr.RecordingStream, scene: Scene) -> None:
     log_texts(stream, entities.UNCERTAINTY_LEGEND_TICKS, texts)
 
 
-def _log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
+def log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
     """Log a bar of a round length above the grains."""
     pixel = canvas.scale.pixel_size * canvas.shrink
     length = round_step(0.25 * canvas.width * pixel)

@@ -59,8 +59,12 @@ def gap_strokes(gaps: Gaps, line_radius: NDArray[np.floating], mean_radius: floa
 
 def _log_gaps(clock: Clock, scene: Scene, forces: FrameForces, visible: NDArray[np.bool_]) -> None:
     rows = np.flatnonzero(visible)
-    fn, contacts = forces.fn[rows], forces.contacts.select(visible)
+    contacts = forces.contacts.select(visible)
     lines = np.asarray(scene.branches(clock.frame, contacts), np.float64)
+    if scene.walls.cell is not None:  # second halves of contacts across its edge
+        across, halves = scene.far_halves(clock.frame, contacts)
+        rows, lines = np.concatenate([rows, rows[across]]), np.concatenate([lines, scene.canvas.points(halves)])
+    fn = forces.fn[rows]
     grain = scene.canvas.grain_radius
     gaps = line_gaps(lines, relative_uncertainty(fn, forces.fn_sd[rows]), grain)
     strokes, radii = gap_strokes(gaps, scene.style.radii(fn)[gaps.row], grain)

@@ -99,7 +99,11 @@ def test_a_card_names_its_run_and_shows_every_contact_grain_and_wall_of_the_last
     assert "&lt;b&gt;shear" in card
     assert "<b>" not in card
     last = results.frames[-1]
-    assert card.count("<path") == last.contacts.count + results.walls.count
+    network, _, keys = card.partition('<g class="gaps and keys">')
+    assert network.count("<path") == last.contacts.count + results.walls.count
+    assert keys.count("<path") > 48  # the wedge of forces, the scale bar, and gaps
+    for text in (f"frame {last.frame} · ", f"trust {last.trust:.2f}", " mm<", " N<"):
+        assert text in keys
     assert card.count("<circle") == results.grains.count
     style = ForceStyle.on(Canvas.around(results.tracks, None), ForceRange.of(results.frames))
     for colour in set(style.colours(last.fn).tolist()):  # the reported field, not a sweep
