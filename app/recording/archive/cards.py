@@ -111,7 +111,8 @@ def _lines(shown: dict[str, Any]) -> list[tuple[str, float, str]]:
     radii = shown.get("LineStrips2D:radii", [])
     colours = [f"#{colour:08x}" for colour in shown.get("LineStrips2D:colors", [])]
     paths = ["M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in strip) for strip in strips]
-    radii, colours = (each * len(paths) if len(each) == 1 else each for each in (radii, colours))  # one for all
+    radii = radii * len(paths) if len(radii) == 1 else radii  # one for all
+    colours = colours * len(paths) if len(colours) == 1 else colours
     return list(zip(paths, radii, colours, strict=True))
 
 
