@@ -35,6 +35,7 @@ from .inference.solve_frames import InferenceObserver
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError, RunError, UndeterminedError
+from .process.free_memory import release_free_memory
 from .process.sources import hash_of_code
 from .results.checkpoint import Checkpoint
 from .results.hdf5.lazy_sequences import LazySequence
@@ -112,6 +113,7 @@ def track(run: Run) -> tuple[Tracks, WallTracks | None]:
     experiment = run.experiment
     if experiment.config.tracks is not None:
         tracks, walls = check(run)
+        release_free_memory()
         assert tracks is not None
         part = run.frame_range(tracks.frame_count)
         return tracks.frames(*part), walls.frames(*part) if walls is not None else None
@@ -276,6 +278,7 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
         log_file = f"; see {run.file(FAILURES)}" if run.file(FAILURES).exists() else ""
         first = results.frames[0].reason
         raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {first}{log_file}")
+    release_free_memory()
     results = replace(results, diagnosis=tuple(diagnose_solved(inputs, results, run.progress)))
     results = _store(run, _named(run, results), origin, log)
     store.checkpoint.clear()
@@ -372,6 +375,7 @@ def record(run: Run, results: Results, truth: TruthContacts | None) -> Path:
     from .recording.files.side_file import write_side_file
     from .tracking.photograph_cache import CachedPhotographs
 
+    release_free_memory()
     since = time.perf_counter()
     section, scale, file = run.experiment.config.photographs, None, run.file(RECORDING)
     with ExitStack() as opened:

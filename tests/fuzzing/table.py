@@ -21,6 +21,8 @@ _ROWS = {
     "faults": ("failing reads and writes", "ends without a single message", "test_faults"),
     "frames": ("photographs of one long run", "stages whose memory grows by more than 5 % from frame 50 on",
                "test_long_runs"),
+    "peak": ("photographs of whole commands", "commands whose memory grows by more than .05 MB a photograph of 60 rods",
+             "test_peak_memory"),
     "scrubbed": ("photographs of one recording", "pictures that took more than 20 s", "test_scrubbing"),
     "requests": ("hostile requests", "admitted, or answered with a traceback", "test_hostile_requests"),
     "values": ("hostile values in requests of the page itself", "answered with a traceback", "test_hostile_values"),

@@ -106,6 +106,6 @@ def test_some_faults_end_with_one_line_and_lose_nothing(originals, tmp_path):
 @pytest.mark.slow
 def test_all_faults_end_with_one_line_and_lose_nothing(originals, tmp_path):
     met, problems = collect_problems(list(all_faults()), originals, tmp_path / "work")
-    note("faults", tried=met, problems=len(problems))
+    note("faults", tried=met, wrong=len(problems))
     assert problems == []
     assert met >= FAULTS

@@ -2,20 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 MAX_LINE = 1 << 17  # bytes: the csv module refuses longer cells
 COMMA, NEWLINE = b",\n"
+BLANK = 0x20  # bytes up to this are blanks, or are removed as such
+
+
+class Cells(Sequence[str]):
+    """One column of a table's bytes, decoded on access: as texts, the cells of a sequence take ten times the memory."""
+
+    def __init__(self, content: bytes, start: NDArray[np.integer], end: NDArray[np.integer]) -> None:
+        """Make a column of the cells from start (m,) to end (m,) [bytes]."""
+        self._content, self._start, self._end = content, start, end
+
+    def __len__(self) -> int:
+        return len(self._end)
+
+    @overload
+    def __getitem__(self, row: int) -> str: ...
+    @overload
+    def __getitem__(self, row: slice) -> list[str]: ...
+    def __getitem__(self, row: int | slice) -> str | list[str]:
+        if isinstance(row, slice):
+            return [self[each] for each in range(*row.indices(len(self)))]
+        return self._content[self._start[row] : self._end[row]].decode().strip()
+
+    def __iter__(self) -> Iterator[str]:
+        return (cell.decode().strip() for cell in self.coded())
+
+    def has_blank(self, *, plain: bool) -> bool:
+        """Whether a cell is empty; plain: there are no blanks in any."""
+        return bool(np.any(self._start == self._end)) if plain else "" in self
+
+    def coded(self) -> Iterator[bytes]:
+        """Yield the bytes of the cells; numbers are read from them."""
+        content = self._content
+        return (content[first:end] for first, end in zip(self._start.tolist(), self._end.tolist(), strict=True))
 
 
 @dataclass(frozen=True, slots=True)
 class PlainRows:
     """Columns of a table, equal to those that the csv module reads."""
 
-    values: dict[str, list[str]]  # by name of the column, without blanks around
+    values: dict[str, Cells]  # by name of the column, without blanks around
     line: Sequence[int]  # of each row, from 1
 
 
@@ -25,24 +60,36 @@ def split_plain(content: bytes, columns: Sequence[str], optional: Sequence[str])
     A plain table has no quotes, no blank rows, and as many cells in every row.
     """
     content = content.replace(b"\r\n", b"\n").removesuffix(b"\n")
-    if not columns or b'"' in content or b"\r" in content or b"\0" in content:
+    if not columns or b'"' in content or b"\r" in content or b"\0" in content or len(content) >= 1 << 31:
         return None
     raw = np.frombuffer(content, np.uint8)
-    end = np.append(np.flatnonzero(raw == NEWLINE), len(raw))
-    commas = np.diff(np.searchsorted(np.flatnonzero(raw == COMMA), end), prepend=0)
-    if len(end) < 2 or np.any(commas != commas[0]) or np.diff(end, prepend=0).max() > MAX_LINE:
+    place = np.append(np.flatnonzero((raw == COMMA) | (raw == NEWLINE)), len(raw)).astype(np.int32, casting="same_kind")
+    ends_row = np.append(raw[place[:-1]] == NEWLINE, True)
+    last = np.flatnonzero(ends_row)  # the last cell of each row
+    width = int(last[0]) + 1
+    if len(last) < 2 or np.any(np.diff(last) != width):
         return None
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
+    if np.diff(place[last], prepend=0).max() > MAX_LINE or not _is_text(content):
         return None
-    cells = text.replace("\n", ",").split(",")
-    width = int(commas[0]) + 1
-    header = [name.strip() for name in cells[:width]]
+    header = [name.strip() for name in content[: place[width - 1]].decode("utf-8-sig").split(",")]
     columns = [*columns, *(name for name in optional if name in header)]
     if any(header.count(name) != 1 for name in columns):
         return None
-    values = {name: list(map(str.strip, cells[width + header.index(name) :: width])) for name in columns}
-    if "" in values[columns[0]]:  # the row may be blank
-        return None
-    return PlainRows(values, range(2, len(end) + 1))
+    cells = {name: _column(content, place, width, header.index(name)) for name in columns}
+    if cells[columns[0]].has_blank(plain=content.isascii() and not np.any((raw <= BLANK) & (raw != NEWLINE))):
+        return None  # the row may be blank
+    return PlainRows(cells, range(2, len(last) + 1))
+
+
+def _column(content: bytes, place: NDArray[np.int32], width: int, number: int) -> Cells:
+    return Cells(content, place[width + number - 1 : -1 : width] + 1, place[width + number :: width])
+
+
+def _is_text(content: bytes) -> bool:
+    if content.isascii():
+        return True
+    try:
+        content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return False
+    return True

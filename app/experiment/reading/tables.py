@@ -14,7 +14,7 @@ from ...process.atomic import replacing
 from ...process.errors import InputError
 from .column_names import refuse_likely_names
 from .input_files import InputFiles
-from .plain_rows import split_plain
+from .plain_rows import Cells, split_plain
 
 LARGEST = 1e50  # in SI units no length, time or force is larger; its square and its cube are still numbers
 GREATEST = 2**53  # float64 represents all whole numbers up to it
@@ -23,7 +23,9 @@ GREATEST = 2**53  # float64 represents all whole numbers up to it
 class Table:
     """Columns of one file, with the line of each row."""
 
-    def __init__(self, file: Path, columns: Mapping[str, list[str]], line: Sequence[int], *, of: str = "row") -> None:
+    def __init__(
+        self, file: Path, columns: Mapping[str, Sequence[str]], line: Sequence[int], *, of: str = "row"
+    ) -> None:
         self.file = file
         self._columns = columns
         self._line = line
@@ -48,22 +50,24 @@ class Table:
 
     def text(self, column: str) -> list[str]:
         """Return a column as texts."""
-        return self._columns[column]
+        return list(self._columns[column])
 
     def integers(self, column: str) -> NDArray[np.int64]:
         """Return a column of whole numbers (m,). Raises InputError with row and value."""
         try:
-            values = list(map(int, self._columns[column]))
-        except ValueError:
-            values = []
-        if not values or min(values) < -GREATEST or max(values) > GREATEST:  # one by one, to name the wrong value
-            values = [self._number(int, column, row) for row in range(len(self))]
-        return np.array(values, np.int64)
+            values = np.fromiter(map(int, self._coded(column)), np.int64, len(self))
+        except (ValueError, OverflowError):
+            values = np.empty(0, np.int64)
+        if (
+            not len(values) or values.min() < -GREATEST or values.max() > GREATEST
+        ):  # one by one, to name the wrong value
+            return np.array([self._number(int, column, row) for row in range(len(self))], np.int64)
+        return values
 
     def numbers(self, column: str) -> NDArray[np.float64]:
         """Return a column of finite numbers (m,). Raises InputError with row and value."""
         try:
-            values = np.array(list(map(float, self._columns[column])), np.float64)
+            values = np.fromiter(map(float, self._coded(column)), np.float64, len(self))
         except ValueError:  # one by one, to name the wrong value
             values = np.array([self._number(float, column, row) for row in range(len(self))], np.float64)
         self._refuse_large(values, np.arange(len(self)), column)
@@ -73,11 +77,17 @@ class Table:
         """Return the numbers of a column that may be absent or have empty cells (m,), NaN there."""
         if column not in self._columns:
             return np.full(len(self), np.nan)
-        filled = np.flatnonzero([text != "" for text in self._columns[column]])
+        if "" not in self._columns[column]:
+            return self.numbers(column)
+        filled = np.flatnonzero(np.fromiter((text != "" for text in self._columns[column]), np.bool_, len(self)))
         values = np.full(len(self), np.nan)
         values[filled] = [self._number(float, column, int(row)) for row in filled]
         self._refuse_large(values[filled], filled, column)
         return values
+
+    def _coded(self, column: str) -> Iterable[str | bytes]:
+        cells = self._columns[column]
+        return cells.coded() if isinstance(cells, Cells) else cells
 
     def error(self, row: int, column: str, problem: str) -> InputError:
         """Return the error of a value, with file, row, column and value."""

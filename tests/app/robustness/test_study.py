@@ -66,6 +66,11 @@ def test_lower_friction_lowers_the_macroscopic_friction_angle(nominal):
     assert low.friction_angle_change < high.friction_angle_change
 
 
+def test_inputs_that_were_not_varied_have_the_trust_of_the_run(nominal):
+    again = infer(nominal.inputs)
+    np.testing.assert_array_equal(again.trust, nominal.networks.trust)
+
+
 def test_a_finished_run_is_not_run_again(nominal, tmp_path, monkeypatch):
     effect_log = EffectLog(tmp_path / "runs.jsonl", "x")
     first = run_study(nominal, [KAPPA], effect_log)
