@@ -15,13 +15,13 @@ def refuse_links(folder: Path, root: Path) -> None:
     Hidden folders in it, and `contents`, are searched, too; files in them are replaced, not written to.
     """
     for place in (folder, *_links(folder)):
-        if place.is_symlink() and not _is_inside(place, root):
+        if os.path.islink(place) and not _is_inside(place, root):  # no error for a name that no file can have
             raise InputError(place, "", f"is a link that leads outside of {root}: remove it")
 
 
 def refuse_link(place: Path) -> None:
     """Raise InputError for a link in the place of a file or folder of the program's own."""
-    if place.is_symlink():
+    if os.path.islink(place):
         raise InputError(place, "", "is a link, and belongs to the program: remove it")
 
 
@@ -29,7 +29,7 @@ def _links(folder: Path) -> Iterator[Path]:
     try:
         with os.scandir(folder) as found:
             entries = list(found)
-    except OSError:  # it is missing, or may not be read
+    except (OSError, ValueError):  # it is missing, may not be read, or has a name that no file can have
         return
     for each in entries:
         if each.is_symlink():

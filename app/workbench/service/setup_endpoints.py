@@ -146,7 +146,8 @@ def measure_rod(workbench: Workbench, at: Text, x: Number, y: Number, radius: Nu
     """Fit the circle of a rod near a drawn one."""
     opened = workbench.project(at)
     free = ValidationResult(opened.validation().steps, {})
-    x, y, radius = edits.fit_rod(opened.photograph(0), free, x, y, max(radius, 3.0))
+    image = opened.photograph(0)
+    x, y, radius = edits.fit_rod(image, free, x, y, min(max(radius, 3.0), float(max(image.shape))))
     return {"x": x, "y": y, "r": radius}
 
 
@@ -270,7 +271,7 @@ def move_rod(workbench: Workbench, at: Text, id: Whole, x: Number, y: Number, ra
 
 
 @editing_endpoint
-def delete_rods(workbench: Workbench, at: Text, ids: list[Whole]) -> dict[str, Any]:
+def delete_rods(workbench: Workbench, at: Text, ids: Annotated[list[Whole], Field(min_length=1)]) -> dict[str, Any]:
     opened = workbench.project(at)
     rods = opened.validation().rods
     for each in ids:

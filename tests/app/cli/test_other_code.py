@@ -110,8 +110,15 @@ def test_forces_depend_on_every_source_between_their_input_and_their_file(change
     assert changed in sources.needed_by(FORCES.code) | set(FORCES.alone)
 
 
-# Sources that run while a stage does and change no stored number: they refuse input, hold the folder, or name files.
-WITHOUT_EFFECT = ("process/", "experiment/plausibility.py", "results/manifest.py", "run_folder.py", "run_truth.py")
+# Sources that run while a stage does and change no stored number: they compile, refuse input, hold the folder.
+WITHOUT_EFFECT = (
+    "compilation/",
+    "process/",
+    "experiment/plausibility.py",
+    "results/manifest.py",
+    "run_folder.py",
+    "run_truth.py",
+)
 OF_TRUTH = ("results/truth.py",)  # read, and compared with results by name only
 
 

@@ -178,3 +178,18 @@ def test_hostile_names_are_refused_without_a_traceback(root, at):
     for path in ("photograph", "crop", "shared", "events"):
         query = {"at": at.encode(errors="replace").decode(), "x": "nan", "y": "1", "width": "10"}
         assert visitor.client.get(f"/{path}", params=query).status_code in (400, 404, 422), path
+
+
+def test_values_of_an_edit_that_nothing_can_have_are_refused_or_bounded(begun):
+    """Found by hostile requests: each ended in a traceback."""
+    visitor, at = begun
+    assert visitor.post("delete_rods", {"at": at, "ids": []}).status_code == 400
+    found = visitor.post("measure_rod", {"at": at, "x": 50.0, "y": 50.0, "radius": 1e12})
+    assert found.status_code == 200
+
+
+def test_a_name_longer_than_any_file_has_takes_no_folder_with_it(root):
+    edit(root / "tracked" / "experiment.toml", 'name = "tracked"', f'name = "{"x" * 300}"')
+    shutil.copytree(root / "tracked", root / "other")
+    edit(root / "other" / "experiment.toml", "x" * 300, "other")
+    assert len(Visitor(Workbench(root)).enter().request("home")["experiments"]) == 2
