@@ -18,6 +18,7 @@ from ...results.finding import Finding
 from ...results.results import Results
 from ...solver.bodies.grains import Array
 from ..correction.correct_sequence import complete_walls, correct_sequence
+from ..correction.outliers import find_outliers
 from ..inputs import Inputs
 from .causes import finding
 from .direct_tests import (
@@ -39,6 +40,7 @@ CLEAR, AHEAD = 0.2, 0.1
 DOUBTFUL = 0.93  # expected r of some photographs of a solved test below which rivals are compared
 DOUBTFUL_GAP = 0.1  # least power gap of the friction check above which what resists the sliding is examined
 UNEXPLAINED = 0.85  # expected r below which something is wrong although no cause wins
+FEW_OUTLIERS = 0.003  # fraction of the poses that jump, below which they do not explain poor forces
 LEAST_GRAINS = (
     100  # of a packing whose rivals are compared: the evidence of fewer varies by chance as much as by causes
 )
@@ -87,9 +89,9 @@ def diagnose(
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
         found = _compare_rivals(inputs, trial, progress, first)
-    if poses:  # they explain it
+    if poses and float(find_outliers(inputs.tracks).mean()) > FEW_OUTLIERS:  # so many explain it
         found = [each for each in found if each.cause != "not_explained"]
-    if found:  # wrong radii look like jumps
+    if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]
     return [*found, *poses]
 

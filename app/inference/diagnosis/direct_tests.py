@@ -26,7 +26,7 @@ STILL = 1.5  # … or over that of noise alone
 MOVES = 4.0  # noise that the median step must exceed for that
 DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave or penetrate a wall …
 DRIFT = 0.02  # … and fraction of the mean radius
-SHIFTED = 0.5  # distance of shifted walls from the rods over that of the given ones, below which they are right
+LAGGING = 2.0  # times what rods may leave or penetrate a wall: walls off by so much may lag
 BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
 MISSING = 0.03  # fraction of the poses that may be missing
 INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
@@ -186,7 +186,7 @@ def examine_wall_times(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     own = misfit(0)
     for shift, words in ((1, "late"), (-1, "early")):
         other = misfit(shift)
-        if own > allowed and other < SHIFTED * own:
+        if own > LAGGING * allowed and other < allowed:
             evidence = (
                 f"the walls are one photograph {words}: rods are {1e3 * own:.2g} mm off, else {1e3 * other:.2g} mm"
             )

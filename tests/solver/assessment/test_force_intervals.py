@@ -87,13 +87,13 @@ def test_a_penalty_widens_the_intervals_of_motion(frame):
     assert penalised > 1.1 * sure
 
 
-def test_new_forces_widen_no_interval_beyond_what_the_trust_does(frame):
-    for weight in (0.5, 0.0):
+def test_new_forces_widen_intervals_of_mixtures_slightly_beyond_what_the_trust_does(frame):
+    for weight, most in ((0.5, 1.25), (0.0, 1.0)):
         same, new = (
             calibrate_sd(replace(frame, position_weight=weight, force_change=change)).fn_sd[-1]
             for change in (0.02, 0.3)
         )
-        assert new == same
+        assert same <= new <= most * same
     unknown, usual = (interval_factors(replace(frame, position_weight=0.5, force_change=change))
                       for change in (np.nan, USUAL_CHANGE))  # fmt: skip
     assert unknown == pytest.approx(usual)
@@ -158,18 +158,18 @@ def test_a_wrong_friction_widens_by_fractions_of_the_force_and_of_the_mean(frame
 
 
 def test_standard_deviations_are_what_was_fitted(frame):
-    """Of the motion, T = 0.9: factor of the group · exp(6.16 · 0.1 + 0.05 ln(c/500)) · 0.2 (s/0.2)^0.95, and of f_t."""
+    """Of the motion, T = 0.9: factor of the group · exp(5.37 · 0.1 + 0.04 ln(c/500)) · 0.2 (s/0.2)^0.91, and of f_t."""
     mean = frame.fn[frame.fn > 0].mean()
     size = np.log((frame.fn > 0).sum() / 500.0)
     plain = ~frame.contacts.with_wall & (frame.bearing_probability == 1.0)
     calibrated = calibrate_sd(frame)
-    for group, fn_factor, ft_factor in ((Group.MEAN, 0.56, 0.57), (Group.STRONG, 0.53, 0.59)):
+    for group, fn_factor, ft_factor in ((Group.MEAN, 0.52, 0.62), (Group.STRONG, 0.48, 0.68)):
         row = np.flatnonzero(plain & (groups_of(frame) == group))[-1]
         s = np.hypot(0.1 * frame.fn[row] / mean, 0.02)
-        expected = mean * fn_factor * np.exp(6.16 * 0.1 + 0.05 * size) * 0.2 * (s / 0.2) ** 0.95
+        expected = mean * fn_factor * np.exp(5.37 * 0.1 + 0.04 * size) * 0.2 * (s / 0.2) ** 0.91
         assert calibrated.fn_sd[row] == pytest.approx(expected)
         s = np.hypot(0.03 * frame.fn[row] / mean, 0.006)
-        expected = mean * ft_factor * np.exp(6.97 * 0.1 + 0.05 * size) * 0.06 * (s / 0.06) ** 0.79
+        expected = mean * ft_factor * np.exp(4.28 * 0.1 + 0.04 * size) * 0.06 * (s / 0.06) ** 0.82
         assert calibrated.ft_sd[row] == pytest.approx(expected)
 
 
