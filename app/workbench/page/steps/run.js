@@ -34,7 +34,7 @@ export const run = {
       facts ? [h("h2", {}, facts.provisional ? "So far" : "Found"),
         fact("frames", facts.first ? `photographs ${facts.first} to ${facts.count - 1} of ${project.files.length}` : `${facts.count} of ${project.files.length}`),
         solved(app) ? [fact("status", facts.status[app.frame]), fact("trust", digits(facts.trust[app.frame], 2)), fact("contacts", String(facts.contacts[app.frame])), fact("mean f_n", `${digits(facts.mean_fn[app.frame], 3)} N`), fact("friction angle", `${digits(facts.friction_angle[app.frame], 3)}°`), fact("rods lost", String(facts.lost[app.frame]))] : null] : null,
-      job?.messages.length ? [h("h2", {}, "Messages"), h("div", { class: "log", id: "log" }, job.messages.slice(-40).join("\n"))] : null,
+      job?.messages.length ? [h("h2", {}, "Messages"), h("div", { class: "log", id: "log", tabIndex: 0, role: "log", "aria-label": "Messages of the run" }, job.messages.slice(-40).join("\n"))] : null,
     ];
   },
   draw(app, c, k) {
