@@ -193,3 +193,13 @@ def test_a_chosen_rod_shows_its_track(tab: Page):
     assert yellow.any()
     assert not ((before[..., 0] > 200) & (before[..., 1] > 190) & (before[..., 2] < 130)).any()
     assert not np.array_equal(before, after)
+
+
+def test_the_mask_is_a_layer_of_the_photographs(tab: Page):
+    go(tab, "photographs")
+    tab.wait_for_function("workbench.stage.image !== null")
+    tab.evaluate("workbench.change('set_photographs', { region: [0, 400, 240, 600] })")
+    idle(tab)
+    tab.wait_for_function("workbench.stage.image !== null")
+    masked, whole = shown(tab, photograph=True, mask=True), shown(tab, photograph=True)
+    assert masked.astype(float).sum() < 0.8 * whole.astype(float).sum()

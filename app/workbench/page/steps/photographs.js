@@ -1,5 +1,6 @@
 // Step 1: the photographs, their order, their times, and the region that is used.
 
+import { paintLayer } from "/page/layers/settings.js";
 import { request, chart, colour, digits, fact, h, numberField, parse, sign, notify } from "/page/dom.js";
 import { leaveOut, orderSection, shift } from "/page/parts/order.js";
 import { saveScript } from "/page/parts/take_away.js";
@@ -49,21 +50,25 @@ export const photographs = {
         h("button", { id: "save-script", disabled: !project.undo, title: "Everything that was done here, verdicts included, as a Python script that does it again", onclick: () => saveScript(app) }, "Save the actions as a script")),
     ];
   },
-  draw(app, c, k) {
-    for (const polygon of [...(app.project.photographs.mask ?? []), ...(masking?.length ? [masking] : [])]) {
-      c.beginPath(); polygon.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
-      if (polygon !== masking) { c.closePath(); c.fillStyle = "#000b"; c.fill(); }
-      c.strokeStyle = polygon === masking ? "#f0e442" : colour("accent"); c.lineWidth = 2 / k; c.stroke();
-      if (polygon === masking) for (const [x, y] of polygon) { c.fillStyle = "#f0e442"; c.beginPath(); c.arc(x, y, 4 / k, 0, 7); c.fill(); }
-    }
-    const region = cutting?.length ? cutting : app.project.photographs.region;
-    if (!region) return;
-    const [x0, y0, x1, y1] = region;
-    c.fillStyle = "#000a";
-    c.beginPath(); c.rect(-0.5, -0.5, app.project.width, app.project.height); c.rect(x0, y0, x1 - x0, y1 - y0); c.fill("evenodd");
-    c.strokeStyle = colour("accent"); c.lineWidth = 2 / k; c.strokeRect(x0, y0, x1 - x0, y1 - y0);
-  },
+  layers: ["photograph", "mask"],
+  draw: (app, c, k) => paintLayer(c, "mask", () => drawMask(app, c, k)),
 };
+
+/** The ignored polygons, and what lies outside of the region. */
+function drawMask(app, c, k) {
+  for (const polygon of [...(app.project.photographs.mask ?? []), ...(masking?.length ? [masking] : [])]) {
+    c.beginPath(); polygon.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
+    if (polygon !== masking) { c.closePath(); c.fillStyle = "#000b"; c.fill(); }
+    c.strokeStyle = polygon === masking ? "#f0e442" : colour("accent"); c.lineWidth = 2 / k; c.stroke();
+    if (polygon === masking) for (const [x, y] of polygon) { c.fillStyle = "#f0e442"; c.beginPath(); c.arc(x, y, 4 / k, 0, 7); c.fill(); }
+  }
+  const region = cutting?.length ? cutting : app.project.photographs.region;
+  if (!region) return;
+  const [x0, y0, x1, y1] = region;
+  c.fillStyle = "#000a";
+  c.beginPath(); c.rect(-0.5, -0.5, app.project.width, app.project.height); c.rect(x0, y0, x1 - x0, y1 - y0); c.fill("evenodd");
+  c.strokeStyle = colour("accent"); c.lineWidth = 2 / k; c.strokeRect(x0, y0, x1 - x0, y1 - y0);
+}
 
 /** Light, noise and pattern are measured in the background, once the photograph is shown. */
 function measureSoon(app) { clearTimeout(soon); soon = setTimeout(() => measure(app), SOON); }
