@@ -198,7 +198,7 @@ def test_a_chosen_rod_shows_its_track(tab: Page):
 def test_the_mask_is_a_layer_of_the_photographs(tab: Page):
     go(tab, "photographs")
     tab.wait_for_function("workbench.stage.image !== null")
-    tab.evaluate("workbench.change('set_photographs', { region: [0, 400, 240, 600] })")
+    tab.evaluate("workbench.change('set_photographs', { region: [0, 400, 100, 500] })")
     idle(tab)
     tab.wait_for_function("workbench.stage.image !== null")
     masked, whole = shown(tab, photograph=True, mask=True), shown(tab, photograph=True)
