@@ -12,9 +12,11 @@ from tests.program import rodsight
 PLAY = """async source => {
     const video = document.createElement("video");
     document.body.append(video);
+    video.muted = true;
     video.src = source;
+    video.play();
     return await new Promise(answer => {
-        video.oncanplay = () => answer([video.videoWidth, video.videoHeight]);
+        video.onended = () => answer([video.videoWidth, video.videoHeight]);  // played to its end
         video.onerror = () => answer(video.error.message);
     });
 }"""
