@@ -45,9 +45,7 @@ def test_a_study_prints_coverages_and_constants(tmp_path, monkeypatch):
     ("estimator", "noise"),
     [
         ("ensemble", 2e-5),
-        pytest.param(
-            "ensemble", 4e-5, marks=pytest.mark.xfail(reason="too narrow by a fifth at this noise, as documented")
-        ),
+        ("ensemble", 4e-5),
         ("nlgs", 2e-5),
         ("nlgs", 4e-5),
     ],
