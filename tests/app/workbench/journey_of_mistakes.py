@@ -337,7 +337,7 @@ def main(out: Path) -> None:
     from tests.app.workbench.hand import opened
     from tests.browser import FLAGS, SECONDS, find_chromium
 
-    made = make_folder(out, frames=12)
+    made = make_folder(out, grains=60, frames=10)
     pictures = out / "pictures"
     pictures.mkdir()
     with sync_playwright() as driver:

@@ -12,7 +12,7 @@ SETTLED = 5  # photographs after which friction is mobilised
 
 
 def test_ten_mistakes_are_named_and_taken_back(page, tmp_path):
-    made = make_folder(tmp_path, grains=250, frames=12)
+    made = make_folder(tmp_path, grains=60, frames=10)
     with opened(page, made.folder) as tab:
         journey = MistakenJourney(tab, made)
         make_mistakes(journey)
