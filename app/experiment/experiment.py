@@ -19,7 +19,7 @@ from ..solver.bodies.grains import Array
 from ..tracks import Tracks, TrackStatus
 from .config.dotted_keys import leaves
 from .config.experiment_file import ExperimentFile, load_config
-from .photographs import Channel, ImageSelection, Photographs
+from .photographs import Channel, ImageSelection, Photographs, read_photograph
 from .reading.input_files import InputFiles
 from .reading.photograph_order import NUMBER, ORDER_COLUMNS, GivenOrder, arrange_order
 from .reading.tables import Table, check_frames, check_unique, read_table
@@ -66,10 +66,11 @@ class Experiment:
         section = self.config.photographs
         assert section is not None
         self.inputs.refuse_outside(Path(os.path.normpath(self.folder / section.files)))  # before folders are listed
-        selection = ImageSelection(channel or section.channel, section.region, section.mask, section.rotation)
         order = self.given_order()
+        files = self.matching() if order is None else order.files
+        selection = self.selection(files[0], channel)
         return Photographs(
-            self.matching() if order is None else order.files, inputs=self.inputs, max_pixels=section.max_pixels,
+            files, inputs=self.inputs, max_pixels=section.max_pixels,
             selection=selection, ordered=order is not None,
         )  # fmt: skip
 
@@ -86,6 +87,23 @@ class Experiment:
         assert section is not None
         return self.inputs.listed(section.files, lambda: Photographs.matching(self.folder, section.files).files)
 
+    def selection(self, first: Path, channel: Channel | None = None) -> ImageSelection:
+        """Return the part of the photographs that is used; first: a photograph, whose size a mask must have."""
+        section = self.config.photographs
+        assert section is not None
+        used = ImageSelection(channel or section.channel, section.region, rotation=section.rotation)
+        if not isinstance(section.mask, str):
+            return replace(used, mask=section.mask)
+        file = self.folder / section.mask
+        hidden = read_photograph(file, self.inputs, section.max_pixels) > 0.0
+        shape = read_photograph(first, self.inputs, section.max_pixels).shape
+        if section.rotation in (90, 270):
+            shape = shape[::-1]
+        if hidden.shape != shape:
+            found, expected = (f"{columns} x {rows}" for rows, columns in (hidden.shape, shape))
+            raise InputError(file, "key photographs.mask", f"is {found} pixels, the photographs are {expected}")
+        return replace(used, hidden=hidden)
+
     def fringe_photographs(self) -> Photographs | None:
         """Return the photographs in which fringes are read, one for every photograph; None: not given."""
         section = self.config.photographs
@@ -96,7 +114,7 @@ class Experiment:
         pattern = section.fringes
         self.inputs.refuse_outside(Path(os.path.normpath(self.folder / pattern)))
         files = self.inputs.listed(pattern, lambda: Photographs.matching(self.folder, pattern).files)
-        selection = ImageSelection(section.fringe_channel)
+        selection = ImageSelection(section.fringe_channel, rotation=section.rotation)
         return Photographs(files, inputs=self.inputs, max_pixels=section.max_pixels, selection=selection)
 
     def table(self, name: str, columns: Sequence[str], optional: Sequence[str] = ()) -> Table:
@@ -114,6 +132,7 @@ class Experiment:
         if config.photographs:
             section = config.photographs
             names += [section.times, section.order, section.grains, section.corrections]
+            names += [section.mask] if isinstance(section.mask, str) else []
         if config.tracks:
             names += [config.tracks.positions, config.tracks.grains, config.tracks.times]
         if config.walls:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
 from typing import Generic, Literal, Protocol, TypeVar
@@ -52,11 +52,12 @@ class ImageSelection:
     channel: Channel = "grey"
     region: tuple[int, int, int, int] | None = None  # [px] first column and row, last column and row; None: all
     mask: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons [px] that are not used
+    hidden: NDArray[np.bool_] | None = field(default=None, compare=False)  # (H, W) pixels that are not used; None: none
     rotation: Rotation = 0  # [degrees] clockwise, before everything else
 
     def cut(self, image: Image) -> Image:
         """Return the image with all other pixels set to the median grey of those that are used: they show no edge."""
-        if self.region is None and not self.mask:
+        if self.region is None and not self.mask and self.hidden is None:
             return image
         used = np.ones(image.shape, np.uint8)
         if self.region is not None:
@@ -69,6 +70,8 @@ class ImageSelection:
             corners = [np.rint(np.array(polygon)).astype(np.int32) for polygon in self.mask]
             for each in corners:  # one by one: polygons that overlap would cancel
                 cv2.fillPoly(used, [each], 0)
+        if self.hidden is not None:
+            used[self.hidden] = 0
         seen = used.astype(np.bool_)
         if not seen.any():
             return image

@@ -206,6 +206,9 @@ def _detect(
     guess = read_grain_guess(experiment)
     if guess is not None:
         detection = refine_grains(first, guess.x, guess.y, guess.radius)
+        if section.follow == "outline":  # dark discs are given as well
+            dark = refine_grains(np.float32(FULL_SCALE) - first, guess.x, guess.y, guess.radius)
+            detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
         centres = np.stack([detection.x, detection.y], axis=1)
         # The user measured the radius on this photograph, so it contains the lens distortion.
         return ReferenceGrains(guess.id, detection, detection.radius * scale.size_at(centres))

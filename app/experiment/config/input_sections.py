@@ -108,9 +108,9 @@ class PhotographsSection(Section):
     region: tuple[Column, Column, Column, Column] | None = key(
         "First column and row, last column and row of the used part of the photographs.", unit="px", default=None
     )
-    mask: tuple[tuple[tuple[Pixel, Pixel], ...], ...] = key(
-        "Polygons of the photographs in which nothing is looked at, each a list of [column, row]: bolts, cables, "
-        "reflections.",
+    mask: str | tuple[tuple[tuple[Pixel, Pixel], ...], ...] = key(
+        "Parts of the photographs in which nothing is looked at (bolts, cables, reflections): a picture of their size "
+        "that is not black there, or polygons, each a list of [column, row].",
         unit="px", default=(),
     )  # fmt: skip
     order: str | None = key(
@@ -162,7 +162,7 @@ class PhotographsSection(Section):
 
     @model_validator(mode="after")
     def _mask_has_corners(self) -> PhotographsSection:
-        for polygon in self.mask:
+        for polygon in () if isinstance(self.mask, str) else self.mask:
             if len(polygon) < 3:
                 raise ValueError(
                     f"mask value {[list(point) for point in polygon]!r}: a polygon has three corners or more"

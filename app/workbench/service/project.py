@@ -6,10 +6,11 @@ import math
 import threading
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...experiment.photographs import Image, ImageSelection
+from ...experiment.photographs import Image
 from ...experiment.reading.input_files import InputFiles
 from ...experiment.units import Scale
 from ...out_of_date import recording_out_of_date
@@ -101,7 +102,9 @@ class Project:
         """Read one photograph without what lies outside its region, or under its mask."""
         image, experiment = self.photograph(frame), self.validation().experiment
         section = None if experiment is None else experiment.config.photographs
-        return image if section is None else ImageSelection(region=section.region, mask=section.mask).cut(image)
+        if experiment is None or section is None:
+            return image
+        return replace(experiment.selection(experiment.photographs().files[0]), rotation=0).cut(image)
 
     def _photograph_name(self, frame: int) -> Name:
         """A name of a photograph that changes with its file and the channel. Raises InputError."""

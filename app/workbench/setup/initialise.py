@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ...experiment.photographs import Channel, Image, ImageSelection, Photographs, read_photograph
+import numpy as np
+
+from ...experiment.photographs import FULL_SCALE, Channel, Image, ImageSelection, Photographs, read_photograph
 from ...experiment.plausibility import rods_cut_by_walls
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
+from ...tracking.detection.channels import View, compare_views
+from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
+from ...tracking.outline.outline_tracker import OutlineTracker
+from ...tracking.settings import TrackingSettings
+from ...tracking.tracker import Tracker
+from ...tracks import TrackStatus
 from . import edits
 from .draft import Draft
 from .experiment_folders import valid_name
@@ -18,6 +26,9 @@ from .setup_picture import draw_setup
 from .validation import ValidationResult, first_tracks, validate
 
 PICTURE = "understood.png"
+SURE = (TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST)
+MOST_VIEWS, KEPT = 3, 0.8  # of a photograph that are tried; fraction of the discs of the small copy
+BETTER_FOLLOWED = 1.2  # ratio of rods that are followed by their outlines to those by their texture
 FOUND, NONE = "auto", "none"
 
 
@@ -63,24 +74,96 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
         draft.set_keys("values of the flags", {key: value for key, value in keys.items() if value is not None})
         _without_errors(draft, "photographs")
         selection = ImageSelection(flags.channel or "grey", flags.region or None)  # type: ignore[arg-type]
-        found, notes = _find_rods_and_walls(draft, flags, selection.cut(_first(photographs, selection)))
+        views, said = _choose_views(photographs, flags, selection)
+        view, detection = _detect(draft, flags, photographs, selection, views)
+        selection = replace(selection, channel=view.channel)  # type: ignore[arg-type]
+        first = selection.cut(_first(photographs, selection))
+        found, notes = _find_rods_and_walls(draft, flags, first, detection)
+        follow, how = _choose_follow(photographs, flags, selection, view, found)
+        keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
+        draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
+        found = _without_errors(draft, "photographs")
+        notes = [*said, *how, *notes]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
     for note in notes:
         found.steps["walls"].add_warning(note)
     return found
 
 
+def _choose_views(
+    photographs: Photographs, flags: SetupFlags, selection: ImageSelection
+) -> tuple[list[View], list[str]]:
+    """Order channels, and light or dark discs, by how much of the rods' outlines is seen; also a sentence on them."""
+    plain = View(selection.channel, False, 0, 0.0, None)
+    if flags.radii or flags.follow == "texture":
+        return [plain], []
+    channels = {name: selection.cut(image) for name, image in photographs.in_channels(0).items()}
+    if flags.channel is not None:
+        channels = dict.fromkeys(channels, channels[flags.channel])  # not coloured: light and dark discs are compared
+    views = compare_views(channels, DetectionSettings((), flags.radius_range))
+    if flags.channel is not None:
+        views = [replace(view, channel=flags.channel) for view in views]
+    if views[0].count == 0:
+        return [plain], []
+    return views, ["A small copy of the first photograph shows " + ", ".join(v.describe() for v in views[:4]) + "."]
+
+
+def _detect(
+    draft: Draft, flags: SetupFlags, photographs: Photographs, selection: ImageSelection, views: Sequence[View]
+) -> tuple[View, Detection]:
+    """Detect the rods in the first view that keeps what its small copy shows; else in the best of a few."""
+    validated = _without_errors(draft, "photographs", "scale", "material")
+    tried: list[tuple[View, Detection]] = []
+    for view in views[:MOST_VIEWS]:
+        image = selection.cut(read_photograph(photographs.files[0], channel=view.channel))  # type: ignore[arg-type]
+        sizes = view.radius_range if flags.radius_range is None else flags.radius_range
+        lit = np.float32(FULL_SCALE) - image if view.dark else image
+        tried.append((view, edits.detect(lit, validated, flags.radii, sizes)))
+        if tried[-1][1].count >= KEPT * view.count:
+            break
+    view, detection = max(tried, key=lambda each: float(each[1].quality @ each[1].radius))
+    if detection.count == 0:
+        raise InputError(
+            validated.files[0], "", "no rods were found; give their --radii, or mark them by rodsight open"
+        )
+    return view, detection
+
+
+def _choose_follow(
+    photographs: Photographs, flags: SetupFlags, selection: ImageSelection, view: View, found: ValidationResult
+) -> tuple[str | None, list[str]]:
+    """Choose what of the rods is followed by trying both ways from the first photograph to the second."""
+    if flags.follow is not None:
+        return flags.follow, []
+    if view.dark:
+        return "outline", ["Discs that are darker than their surroundings are followed by their outlines."]
+    rods = found.rods
+    if len(photographs) < 2 or rods is None:
+        return None, []
+    images = [selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2]]
+    detection = refine_grains(images[0], rods.x, rods.y, rods.radius)
+    counts = {}
+    for way, tracker in (("texture", Tracker), ("outline", OutlineTracker)):
+        ready = tracker(images[0], detection, TrackingSettings(way))
+        status = ready.follow(images[1], [ready.first()]).status
+        counts[way] = int(np.isin(status, SURE).sum())
+    if counts["outline"] <= max(BETTER_FOLLOWED * counts["texture"], counts["texture"] + 2):
+        return None, []
+    return "outline", [
+        f"By their outlines {counts['outline']} of {len(rods.x)} rods are followed to the second photograph, by their "
+        f'texture {counts["texture"]}: follow = "outline".'
+    ]
+
+
 def _first(photographs: Photographs, selection: ImageSelection) -> Image:
     return read_photograph(photographs.files[0], channel=selection.channel)
 
 
-def _find_rods_and_walls(draft: Draft, flags: SetupFlags, first: Image) -> tuple[ValidationResult, list[str]]:
-    """Find rods and walls, and set the pressures; also return sentences on walls that were left out."""
+def _find_rods_and_walls(
+    draft: Draft, flags: SetupFlags, first: Image, detection: Detection
+) -> tuple[ValidationResult, list[str]]:
+    """Set the rods, find the walls, and set the pressures; also return sentences on walls that were left out."""
     notes: list[str] = []
-    found = _without_errors(draft, "photographs", "scale", "material")
-    detection = edits.detect(first, found, flags.radii, flags.radius_range)
-    if detection.count == 0:
-        raise InputError(found.files[0], "", "no rods were found; give their --radii, or mark them by rodsight open")
     edits.set_rods(draft, "rods", edits.as_guess(detection), flags.radii)
     if flags.walls == NONE:
         if flags.pressure:

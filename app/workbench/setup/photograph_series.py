@@ -196,6 +196,10 @@ def rotate(draft: Draft, found: ValidationResult, rotation: int) -> None:
     if "region" in section:
         corners = turn.of(np.array(section["region"], np.float64).reshape(2, 2))
         keys["photographs.region"] = [*map(int, corners.min(axis=0)), *map(int, corners.max(axis=0))]
+    if isinstance(section.get("mask"), str):
+        raise InputError(
+            section["mask"], "key photographs.mask", "is a picture: turn it by hand, or leave it out first"
+        )
     if "mask" in section:
         keys["photographs.mask"] = [turn.of(np.array(polygon)).tolist() for polygon in section["mask"]]
     tables: dict[str, bytes | None] = {}

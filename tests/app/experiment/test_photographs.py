@@ -10,6 +10,7 @@ from types import ModuleType, SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+from rodsight.experiment.experiment import load_experiment
 from rodsight.experiment.photographs import (
     ImageSelection,
     Photographs,
@@ -323,3 +324,22 @@ def test_what_is_masked_shows_nothing(tmp_path):
     assert seen.min() == 5.0
     both = Photographs([tmp_path / "a.png"], selection=ImageSelection(region=(0, 0, 49, 25), mask=(over,)))[0]
     assert np.unique(both).tolist() == [100.0]
+
+
+def test_a_mask_can_be_a_picture(tmp_path):
+    pixels = np.full((40, 60), 50, np.uint8)
+    pixels[10:20, 10:30] = 200
+    write(tmp_path, "a.png", pixels)
+    mask = np.zeros((40, 60), np.uint8)
+    mask[8:22, 8:32] = 255
+    write(tmp_path, "mask.png", mask)
+    file = tmp_path / "experiment.toml"
+    file.write_text(
+        'name = "x"\n[photographs]\nfiles = "a.png"\npixel_size = 1e-4\ninterval = 1.0\nmask = "mask.png"\n'
+    )
+    experiment = load_experiment(tmp_path)
+    assert (experiment.photographs()[0] == 50.0).all()
+    assert tmp_path / "mask.png" in experiment.input_files()
+    write(tmp_path, "mask.png", mask[:-1])
+    with pytest.raises(InputError, match="mask is 60 x 39 pixels, the photographs are 60 x 40"):
+        load_experiment(tmp_path).photographs()

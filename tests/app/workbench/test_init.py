@@ -99,3 +99,16 @@ def test_walls_that_cut_through_rods_are_left_out_and_named(tmp_path, capsys, mo
     assert "'left' is left out, since it would cut through" in printed
     assert "left" not in (tmp_path / "walls.csv").read_text()
     assert "bottom" in (tmp_path / "walls.csv").read_text()
+
+
+@pytest.mark.screen
+def test_defaults_choose_channel_and_following_and_state_what_they_saw(tmp_path, capsys):
+    discs(tmp_path)
+    flags = ("--photographs", "shots/*.png", "--interval", 5, "--pixel-size", 1e-4, "--walls", "none")
+    assert rodsight("init", tmp_path, *flags) == 0
+    section = load_experiment(tmp_path).config.photographs
+    assert (section.channel, section.follow) == ("red", "outline")
+    assert len((tmp_path / "grains.csv").read_text().splitlines()) - 1 == 30
+    printed = capsys.readouterr().out.replace("\n", " ")
+    assert "light discs in red" in printed
+    assert "30 of 30 rods are followed to the second photograph" in " ".join(printed.split())

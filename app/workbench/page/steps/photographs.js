@@ -41,7 +41,7 @@ export const photographs = {
         h("button", { class: cutting ? "on" : "", id: "cut", onclick: () => { masking = null; cutting = cutting ? null : []; app.tool(cutting ? cutTool(app) : null); app.paint(); } }, section.region ? "Change the region" : "Cut to a region"),
         section.region ? h("button", { onclick: () => app.change("set_photographs", { region: "all" }) }, "Use all of it") : null,
         h("button", { class: masking ? "on" : "", id: "mask", title: "M", onclick: () => maskBegins(app) }, "Mask a part"),
-        section.mask?.length ? h("button", { id: "unmask", onclick: () => app.change("set_photographs", { mask: section.mask.slice(0, -1) }) }, `Remove the last of ${section.mask.length} masks`) : null),
+        polygonsOf(section).length ? h("button", { id: "unmask", onclick: () => app.change("set_photographs", { mask: polygonsOf(section).slice(0, -1) }) }, `Remove the last of ${polygonsOf(section).length} masks`) : null),
       h("div", { class: "field" }, h("label", { htmlFor: "field-rotation" }, "rotated by"), h("select", { id: "field-rotation", title: "Clockwise, with everything that is drawn on them", onchange: (event) => app.change("rotate", { rotation: Number(event.target.value) }) },
         [0, 90, 180, 270].map((angle) => h("option", { value: angle, selected: angle === (section.rotation ?? 0) }, `${angle}°`)))),
       project.files.length ? [h("h2", {}, "Quality"), quality(app)] : null,
@@ -56,7 +56,7 @@ export const photographs = {
 
 /** The ignored polygons, and what lies outside of the region. */
 function drawMask(app, c, k) {
-  for (const polygon of [...(app.project.photographs.mask ?? []), ...(masking?.length ? [masking] : [])]) {
+  for (const polygon of [...polygonsOf(app.project.photographs), ...(masking?.length ? [masking] : [])]) {
     c.beginPath(); polygon.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
     if (polygon !== masking) { c.closePath(); c.fillStyle = "#000b"; c.fill(); }
     c.strokeStyle = polygon === masking ? "#f0e442" : colour("accent"); c.lineWidth = 2 / k; c.stroke();
@@ -106,6 +106,9 @@ function curves(app, c, width, height) {
   c.fillText(digits(high / 1.08, 3), 3, 13); c.fillText("0", 3, height - 4);
 }
 
+// A mask is a picture, named by its file, or polygons.
+function polygonsOf(section) { return Array.isArray(section.mask) ? section.mask : []; }
+
 function maskBegins(app) {
   cutting = null; masking = masking ? null : [];
   const near = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]) * app.stage.view.k < 10;
@@ -118,7 +121,7 @@ function maskBegins(app) {
 
 function maskCloses(app) {
   if (masking.length < 3) { notify("A mask has three corners or more", true); return; }
-  const mask = [...(app.project.photographs.mask ?? []), masking];
+  const mask = [...polygonsOf(app.project.photographs), masking];
   masking = null; app.tool(null);
   app.change("set_photographs", { mask });
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from rodsight.tracking.detection.channels import count_discs, is_coloured
+from rodsight.tracking.detection.channels import compare_views, count_discs, is_coloured
 from rodsight.tracking.detection.detect import Detection, DetectionSettings
 from rodsight.tracking.detection.false_detections import describe_channels, describe_false_detections, separate_circles
 
@@ -62,3 +62,21 @@ def test_discs_are_counted_in_every_channel_of_a_coloured_photograph() -> None:
     count = count_discs({"red": red, "blue": blank}, DetectionSettings(radius_range=(9.0, 20.0)))
     assert count["red"] == 20
     assert count["blue"] < 5
+
+
+def test_views_are_ordered_by_the_outlines_that_they_show() -> None:
+    column, row = np.meshgrid(np.arange(5), np.arange(4))
+    x, y = 30.0 + 32.0 * column.ravel(), 30.0 + 32.0 * row.ravel()
+    red = draw_discs(190, 160, x, y, np.full(20, 13.0), blur=0.6, noise=2.0, noise_seed=1)
+    blank = np.random.default_rng(2).normal(60.0, 2.0, red.shape).astype(np.float32)
+    settings = DetectionSettings(radius_range=(9.0, 20.0))
+    best = compare_views({"grey": blank, "red": red, "green": blank, "blue": blank}, settings)[0]
+    assert (best.channel, best.dark, best.count) == ("red", False, 20)
+    assert best.radius_range is not None
+    assert best.radius_range[0] < 13.0 < best.radius_range[1]
+    inverted = np.float32(255.0) - red
+    dark = compare_views({"grey": blank, "red": inverted, "green": blank, "blue": blank}, settings)[0]
+    assert (dark.channel, dark.dark) == ("red", True)
+    # Without a better view light discs in grey are the first.
+    first = compare_views(dict.fromkeys(("grey", "red", "green", "blue"), red), settings)[0]
+    assert (first.channel, first.dark) == ("grey", False)
