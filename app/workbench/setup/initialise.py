@@ -142,17 +142,20 @@ def _choose_follow(
         return None, []
     images = [selection.cut(read_photograph(file, channel=selection.channel)) for file in photographs.files[:2]]
     detection = refine_grains(images[0], rods.x, rods.y, rods.radius)
-    counts = {}
-    for way, tracker in (("texture", Tracker), ("outline", OutlineTracker)):
-        ready = tracker(images[0], detection, TrackingSettings(way))
-        status = ready.follow(images[1], [ready.first()]).status
-        counts[way] = int(np.isin(status, SURE).sum())
+    counts = {
+        "texture": _count_followed(Tracker(images[0], detection, TrackingSettings("texture")), images[1]),
+        "outline": _count_followed(OutlineTracker(images[0], detection, TrackingSettings("outline")), images[1]),
+    }
     if counts["outline"] <= max(BETTER_FOLLOWED * counts["texture"], counts["texture"] + 2):
         return None, []
     return "outline", [
         f"By their outlines {counts['outline']} of {len(rods.x)} rods are followed to the second photograph, by their "
         f'texture {counts["texture"]}: follow = "outline".'
     ]
+
+
+def _count_followed(tracker: Tracker | OutlineTracker, image: Image) -> int:
+    return int(np.isin(tracker.follow(image, [tracker.first()]).status, SURE).sum())
 
 
 def _first(photographs: Photographs, selection: ImageSelection) -> Image:
