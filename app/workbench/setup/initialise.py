@@ -74,7 +74,7 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
         draft.set_keys("values of the flags", {key: value for key, value in keys.items() if value is not None})
         _without_errors(draft, "photographs")
         selection = ImageSelection(flags.channel or "grey", flags.region or None)  # type: ignore[arg-type]
-        views, said = _choose_views(photographs, flags, selection)
+        views, remarks = _choose_views(photographs, flags, selection)
         view, detection = _detect(draft, flags, photographs, selection, views)
         selection = replace(selection, channel=view.channel)  # type: ignore[arg-type]
         first = selection.cut(_first(photographs, selection))
@@ -83,7 +83,7 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
         draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
         found = _without_errors(draft, "photographs")
-        notes = [*said, *how, *notes]
+        notes = [*remarks, *how, *notes]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
     for note in notes:
         found.steps["walls"].add_warning(note)
