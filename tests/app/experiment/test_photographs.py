@@ -341,5 +341,5 @@ def test_a_mask_can_be_a_picture(tmp_path):
     assert (experiment.photographs()[0] == 50.0).all()
     assert tmp_path / "mask.png" in experiment.input_files()
     write(tmp_path, "mask.png", mask[:-1])
-    with pytest.raises(InputError, match="mask is 60 x 39 pixels, the photographs are 60 x 40"):
+    with pytest.raises(InputError, match="mask: is 60 x 39 pixels, the photographs are 60 x 40"):
         load_experiment(tmp_path).photographs()
