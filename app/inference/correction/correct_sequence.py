@@ -63,7 +63,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     calibration = tuning = boundary = None
     remarks = [outlier_remark, gap_remark, "", "", "", ""]
     if settings.calibration is not None:
-        tracks, remarks[5] = use_size_classes(inputs.material, tracks, walls)
+        tracks, remarks[5] = use_size_classes(inputs.material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
             soft = inputs.material.stiffness not in (None, "rigid")

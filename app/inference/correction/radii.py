@@ -26,11 +26,11 @@ from .calibration import calibrate_tracks
 SEED = 0  # of the draws: the same input gives the same bits
 
 
-def use_size_classes(material: RodMaterial, tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
-    """Replace readings of radii by their nominal sizes, as far as touching pairs support them.
+def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str]:
+    """Replace readings of the radii of soft grains by their nominal sizes, as far as touching pairs support them.
 
-    Errors of the radii of hard grains between walls are calibrated with those of their centres. Overlaps of soft grains
-    are forces, and without walls grains may be soft or hard, so that only the classes of their sizes show these errors.
+    Errors of the radii of hard grains are calibrated with those of their centres; overlaps of soft grains are forces,
+    so that only the classes of their sizes show them.
 
     Returns
     -------
@@ -38,8 +38,7 @@ def use_size_classes(material: RodMaterial, tracks: Tracks, walls: WallTracks) -
     str
         A sentence on the correction; empty: none.
     """
-    calibrated_later = material.stiffness is None and (walls.count > 0 or walls.cell is not None)
-    if material.stiffness == "rigid" or calibrated_later or tracks.grain_count == 0:
+    if material.stiffness in (None, "rigid") or tracks.grain_count == 0:
         return tracks, ""
     found = find_size_classes(np.where(tracks.present[..., None], tracks.position, np.nan), tracks.radius)
     return (tracks, "") if found is None else (replace(tracks, radius=found.radius), found.describe())

@@ -91,21 +91,19 @@ def test_radii_are_estimated_without_the_errors_that_all_grains_share(monkeypatc
     assert endpoints[:, :, 1].min() == pytest.approx(walls.endpoints[0, :, :, 1].min() - 2e-5)  # the bottom
 
 
-def test_sizes_replace_readings_where_radii_are_not_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
-    tracks, walls = lattice()
-    none = walls.select([])
+def test_sizes_replace_readings_of_soft_grains_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks, _ = lattice()
     read = replace(
         tracks, radius=tracks.radius * (1.0 + 5e-3 * np.tile([-1.0, 1.0], tracks.grain_count)[: len(tracks.radius)])
     )
     monkeypatch.setattr(size_classes, "FEWEST_PAIRS", 10)
-    for stiffness, between in ((None, walls), ("rigid", walls), ("rigid", none)):
-        found, remark = use_size_classes(RodMaterial(stiffness=stiffness), read, between)
+    for stiffness in (None, "rigid"):
+        found, remark = use_size_classes(RodMaterial(stiffness=stiffness), read)
         assert found is read
         assert remark == ""
-    for stiffness, between in (("estimate", walls), (None, none)):
-        found, remark = use_size_classes(RodMaterial(stiffness=stiffness), read, between)
-        assert found.radius == pytest.approx(tracks.radius, rel=1e-3)
-        assert "1 size" in remark
-    exact, remark = use_size_classes(RodMaterial(stiffness=1e6), tracks, walls)
+    found, remark = use_size_classes(RodMaterial(stiffness="estimate"), read)
+    assert found.radius == pytest.approx(tracks.radius, rel=1e-3)
+    assert "1 size" in remark
+    exact, remark = use_size_classes(RodMaterial(stiffness=1e6), tracks)
     assert exact is tracks
     assert remark == ""
