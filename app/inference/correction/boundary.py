@@ -52,8 +52,8 @@ def correct_camera(tracks: Tracks, walls: WallTracks, *, soft: bool = False) -> 
     """
     if walls.count or walls.cell is not None:
         return tracks, ""
-    classes = radius_classes(tracks.radius)
-    classes = group_readings(tracks.radius) if classes is None else classes
+    classes = group_readings(tracks.radius)  # whole pixels are few different radii, but no sizes
+    classes = radius_classes(tracks.radius) if classes is None else classes
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     alike = np.zeros(tracks.grain_count, np.int64)
     classes = alike if classes is None else classes
