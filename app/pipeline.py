@@ -35,7 +35,7 @@ from .inference.solve_frames import InferenceObserver
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
 from .process.errors import InputError, RunError, UndeterminedError
-from .process.free_memory import release_free_memory
+from .process.machine.free_memory import release_free_memory
 from .process.sources import hash_of_code
 from .results.checkpoint import Checkpoint
 from .results.hdf5.lazy_sequences import LazySequence

@@ -23,7 +23,7 @@ from ..process.kernel_cache import (
     kernel_folder,
     kernel_key,
 )
-from ..process.processor import FEATURES, LEVELS
+from ..process.machine.processor import FEATURES, LEVELS
 from ..process.sources import program_sources
 from .ahead import KernelsAhead
 from .kernel_list import read_kernels

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
+from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
 from ..solver.assessment.penalties import limit_for_few_photographs, penalise_friction
-from ..solver.assessment.statistic_intervals import widen_for_friction
 from ..solver.convex.friction_check import FrictionCheck
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics, measure_kinematics

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ..process.progress import Progress, no_progress
-from ..solver.assessment.statistic_intervals import with_sd
+from ..solver.assessment.intervals.statistic_intervals import with_sd
 from ..solver.contacts.contacts import ContactSource
 from ..solver.frame_forces import FrameForces, FrameStatus
 from ..solver.parallel import prefetch

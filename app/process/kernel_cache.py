@@ -23,7 +23,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from .processor import FEATURES, described_processor, processor_level
+from .machine.processor import FEATURES, described_processor, processor_level
 from .sources import APP, hash_of_kernels, source_folder
 
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..process.atomic import write_atomically
-from ..solver.assessment.statistic_intervals import CONSTANT
+from ..solver.assessment.intervals.statistic_intervals import CONSTANT
 from ..solver.bodies.walls import Walls
 from ..solver.frame_forces import ERROR_PARTS, FrameForces, FrameStatus
 from ..solver.statistics.agreement import Agreement

@@ -9,8 +9,8 @@ from urllib.parse import urlencode
 from rich.console import Console
 
 from ..experiment.experiment import CONFIG_NAME
-from ..process.browser import open_page
 from ..process.errors import InputError
+from ..process.machine.browser import open_page
 from ..process.signals import Stopped
 from ..results.hdf5.store import origin_of
 from ..reviewing.reviewed_run import find_reviewed_results

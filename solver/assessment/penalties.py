@@ -13,7 +13,7 @@ from ..frame_forces import FrameForces, FrameStatus
 from ..statistics.sliding import contact_state, sliding_probability_at
 from .evidence import Evidence
 from .expected_correlation import losses
-from .force_intervals import widen_for_friction
+from .intervals.force_intervals import widen_for_friction
 from .trust import Assessment, interior_limit, motion_assessment, unseen_penalty
 
 COARSE_STEP = math.radians(0.25)  # [rad] shear of a step beyond which forces cannot be followed

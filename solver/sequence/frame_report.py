@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..assessment.evidence import Evidence
-from ..assessment.force_intervals import calibrate_sd
-from ..assessment.formula_sd import normal_sd, tangential_sd
+from ..assessment.intervals.force_intervals import calibrate_sd
+from ..assessment.intervals.formula_sd import normal_sd, tangential_sd
+from ..assessment.intervals.scale_sd import scale_sd
 from ..assessment.penalties import assess, describe_penalties
-from ..assessment.scale_sd import scale_sd
 from ..assessment.status import StatusDecision
 from ..assessment.trust import hidden_fraction, unseen_penalty
 from ..bodies.grains import Array

@@ -136,7 +136,7 @@ class FrameStatistics:
         Array | None, Quantity("sum of the tangential forces on each wall, towards end 1", "N", "wall", since=2)
     ] = None
 
-    # Calibrated standard deviations, set by `assessment.statistic_intervals`; NaN where unknown.
+    # Calibrated standard deviations, set by `assessment.intervals.statistic_intervals`; NaN where unknown.
     friction_angle_sd: Annotated[float, _sd_of("friction_angle", "rad")] = NAN
     wall_ratio_angle_sd: Annotated[float, _sd_of("wall_ratio_angle", "rad")] = NAN
     principal_direction_sd: Annotated[float, _sd_of("principal_direction", "rad")] = NAN

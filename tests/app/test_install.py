@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from rodsight.process.processor import processor_level
+from rodsight.process.machine.processor import processor_level
 
 from tests.first_run import build_wheel, run_first, unpack_wheel
 

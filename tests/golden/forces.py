@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rodsight.solver.assessment.statistic_intervals import CONSTANT
+from rodsight.solver.assessment.intervals.statistic_intervals import CONSTANT
 from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.bodies.motion import Snapshot
 from rodsight.solver.bodies.packing import Material, Packing

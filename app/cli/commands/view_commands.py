@@ -13,8 +13,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from ...process.browser import open_page
 from ...process.errors import InputError
+from ...process.machine.browser import open_page
 from ..arguments import AsJson, Browser, Port, ResultsPath
 from ..stored_results import has_experiment, load_run, recording_file, results_file, warn_out_of_date
 from ..terminal import print_line, table_console

@@ -23,7 +23,7 @@ import rerun as rr
 
 from ...drawing.force_range import ForceRange
 from ...experiment.units import Scale
-from ...process.browser import open_page
+from ...process.machine.browser import open_page
 from ...results.results import Results
 from ...solver.frame_forces import FrameForces
 from ...solver.statistics.frame_statistics import FrameStatistics

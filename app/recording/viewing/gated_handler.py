@@ -7,7 +7,7 @@ from http.server import BaseHTTPRequestHandler
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ...process.browser import redirect_page
+from ...process.machine.browser import redirect_page
 from .connections import is_other_user
 from .gate import SAFE_HEADERS, Gate, QuietServer
 

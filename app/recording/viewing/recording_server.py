@@ -20,7 +20,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import IO
 
-from ...process.browser import open_page
+from ...process.machine.browser import open_page
 from .gate import Gate, QuietServer
 from .gated_handler import GatedHandler
 from .web_viewer import WebViewer, read_web_viewer

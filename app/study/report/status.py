@@ -23,7 +23,7 @@ from ...inference.inputs import Inputs
 from ...process.progress import Progress, no_progress
 from ...solver.assessment import formula_sd, mixture_trust, status
 from ...solver.assessment.evidence import Evidence
-from ...solver.assessment.force_intervals import FLOOR, formula_sd_of
+from ...solver.assessment.intervals.force_intervals import FLOOR, formula_sd_of
 from ...solver.assessment.trust import motion_assessment
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, match_values

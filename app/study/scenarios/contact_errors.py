@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.assessment.force_intervals import (
+from ...solver.assessment.intervals.force_intervals import (
     SLIDES,
     UNCERTAIN,
     formula_sd_of,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from ...solver.assessment.force_intervals import WEAK, EvidenceSource
+from ...solver.assessment.intervals.force_intervals import WEAK, EvidenceSource
 from ...solver.assessment.motion_information import STRONG
 from ...solver.bodies.grains import Array
 from ...synthetic.scenarios.preset_names import ScenarioName

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from scipy.special import expit
 
 from ...process.progress import Progress, no_progress
-from ...solver.assessment.force_intervals import (
+from ...solver.assessment.intervals.force_intervals import (
     FACTOR,
     POWER,
     SLOPE,
@@ -54,7 +54,7 @@ MIN_ERROR = 1e-9  # over the mean f_n, to take logarithms
 
 @dataclass(frozen=True, slots=True)
 class IntervalFit:
-    """The constants of `solver.assessment.force_intervals`."""
+    """The constants of `solver.assessment.intervals.force_intervals`."""
 
     factor: Array  # (evidence source, group, 2)
     slope: Array  # (evidence source, term, 2)

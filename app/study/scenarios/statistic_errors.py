@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ...inference.corrected_sequence import CorrectedSequence
-from ...solver.assessment.force_intervals import EvidenceSource, evidence_source_of, penalty_of
-from ...solver.assessment.statistic_intervals import (
+from ...solver.assessment.intervals.force_intervals import EvidenceSource, evidence_source_of, penalty_of
+from ...solver.assessment.intervals.statistic_intervals import (
     CONSTANT,
     MIN_PENALTY,
     SIZED,
@@ -178,7 +178,7 @@ def statistic_rows(found: Sequence[StatisticErrors]) -> list[list[str]]:
 
 
 def fit_sd_constants(found: Sequence[StatisticErrors]) -> dict[str, tuple[float, ...]]:
-    """Fit the constants of `solver.assessment.statistic_intervals` by evidence source; NaN without frames."""
+    """Fit the constants of `solver.assessment.intervals.statistic_intervals` by evidence source; NaN without frames."""
     fitted = {}
     for name in CONSTANT:
         rows = [each for each in found if each.name == name and is_compared(each.scenario, name)]

@@ -9,7 +9,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ...process.browser import redirect_page
+from ...process.machine.browser import redirect_page
 from ...recording.viewing.connections import Connections, is_other_user
 from ...recording.viewing.gate import SAFE_HEADERS, Gate
 

@@ -15,7 +15,7 @@ from rodsight.inference.correction import friction
 from rodsight.inference.correction.friction import check_sequence_friction, measure_friction
 from rodsight.inference.inputs import Inputs
 from rodsight.process.errors import UndeterminedError
-from rodsight.solver.assessment.statistic_intervals import FRICTION_ERROR
+from rodsight.solver.assessment.intervals.statistic_intervals import FRICTION_ERROR
 from rodsight.solver.bodies.rods import RodMaterial
 from rodsight.solver.convex.friction_check import FrictionCheck
 from rodsight.solver.detection.touch_probability import ContactProbabilitySettings

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser
-from rodsight.process import browser as opening
-from rodsight.process.browser import open_page, redirect_page
+from rodsight.process.machine import browser as opening
+from rodsight.process.machine.browser import open_page, redirect_page
 from rodsight.workbench.service.server import WorkbenchServer
 from rodsight.workbench.service.workbench import Workbench
 

@@ -21,7 +21,7 @@ from rodsight.process.kernel_cache import (
     kernel_key,
     remove_old,
 )
-from rodsight.process.processor import V3, V4, level_of
+from rodsight.process.machine.processor import V3, V4, level_of
 from rodsight.process.sources import Sources
 
 from tests.program import ROOT

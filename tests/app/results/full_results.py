@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from rodsight.results.results import Results
-from rodsight.solver.assessment.statistic_intervals import CONSTANT
+from rodsight.solver.assessment.intervals.statistic_intervals import CONSTANT
 from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
 from rodsight.solver.boundary.bars import Bars
 from rodsight.solver.boundary.boundary_correction import Boundary

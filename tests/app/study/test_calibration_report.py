@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rodsight
-from rodsight.solver.assessment.force_intervals import Term
+from rodsight.solver.assessment.intervals.force_intervals import Term
 from rodsight.study.report.calibration_report import CalibrationStudy, TrustedFrames, study_calibration, violations
 from rodsight.study.report.report_page import report_page
 from rodsight.study.scenarios.contact_errors import ContactErrors

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.force_intervals import Group, Term
+from rodsight.solver.assessment.intervals.force_intervals import Group, Term
 from rodsight.study.scenarios.contact_errors import ContactErrors, measure_errors
 from rodsight.study.scenarios.interval_coverage import COVERED, TOLERANCE, covered, describe_violations, interval_score
 from rodsight.study.scenarios.interval_fit import fit_intervals

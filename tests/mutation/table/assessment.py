@@ -34,7 +34,7 @@ MUTANTS = [
         ("if math.isnan(evidence.correction):\n", "if False:\n"),
     ),
     *mutants_of(
-        "solver/assessment/formula_sd.py",
+        "solver/assessment/intervals/formula_sd.py",
         STATUS,
         ("a**2 + b**2 * np.maximum(fn, 0.0) / mean", "a**2 + b**2 * (np.maximum(fn, 0.0) / mean) ** 2"),
         ("return friction * normal_sd(fn)", "return normal_sd(fn)"),
@@ -107,7 +107,7 @@ MUTANTS = [
         ("    if not scale_known:\n        return reliability\n", ""),
     ),
     *mutants_of(
-        "solver/assessment/force_intervals.py",
+        "solver/assessment/intervals/force_intervals.py",
         FORCE_INTERVALS,
         ("np.sqrt(unloaded + scale**2)", "np.sqrt(nothing + scale)"),
         ("size ** (1.0 + POWER", "size ** (1.0 - POWER"),
@@ -134,7 +134,7 @@ MUTANTS = [
         ("power = [[-0.05, -0.21]", "power = [[0.05, 0.21]"),
     ),
     *mutants_of(
-        "solver/assessment/statistic_intervals.py",
+        "solver/assessment/intervals/statistic_intervals.py",
         f"{TESTS}/test_statistic_intervals.py",
         ("float(np.sqrt(max(float(penalty_of(trust)), MIN_PENALTY)))", "max(float(penalty_of(trust)), MIN_PENALTY)"),
         ("if scale_is_known or name not in SIZED", "if True"),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.force_intervals import FRICTION_ERROR
+from rodsight.solver.assessment.intervals.force_intervals import FRICTION_ERROR
 from rodsight.solver.assessment.motion_information import MotionInformation
 from rodsight.solver.assessment.penalties import (
     BEYOND_WALL_LOSS,

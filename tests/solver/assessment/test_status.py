@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.assessment.evidence import Evidence
-from rodsight.solver.assessment.formula_sd import normal_sd, tangential_sd
+from rodsight.solver.assessment.intervals.formula_sd import normal_sd, tangential_sd
 from rodsight.solver.assessment.penalties import describe_penalties
 from rodsight.solver.assessment.status import (
     CHAIN_UNBALANCED,

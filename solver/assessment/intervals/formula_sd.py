@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..bodies.grains import Array
-from .fitted import FITTED
+from ...bodies.grains import Array
+from ..fitted import FITTED
 
 NORMAL_SD: tuple[float, float, float] = tuple(FITTED["formula_sd"]["normal"])
 TANGENTIAL_SD: tuple[float, float, float] = tuple(FITTED["formula_sd"]["tangential"])

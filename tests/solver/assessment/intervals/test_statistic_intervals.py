@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.statistic_intervals import CONSTANT, SIZED, widen_for_friction, with_sd
+from rodsight.solver.assessment.intervals.statistic_intervals import CONSTANT, SIZED, widen_for_friction, with_sd
 from rodsight.solver.quantity import quantities
 from rodsight.solver.statistics.frame_statistics import FrameStatistics
 

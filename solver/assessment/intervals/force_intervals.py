@@ -17,10 +17,10 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bodies.grains import Array
-from ..frame_forces import FrameForces
-from ..statistics.force_statistics import mean_normal_force
-from .fitted import FITTED
+from ...bodies.grains import Array
+from ...frame_forces import FrameForces
+from ...statistics.force_statistics import mean_normal_force
+from ..fitted import FITTED
 
 
 class Group(IntEnum):

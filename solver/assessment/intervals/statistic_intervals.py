@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..frame_forces import FrameForces
-from ..statistics.frame_statistics import FrameStatistics
-from .fitted import FITTED
+from ...frame_forces import FrameForces
+from ...statistics.frame_statistics import FrameStatistics
+from ..fitted import FITTED
 from .force_intervals import EvidenceSource, evidence_source_of, penalty_of
 
 # By statistic: where motion, motion and positions, positions were used; rad of angles.

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.solver.assessment.force_intervals import (
+from rodsight.solver.assessment.intervals.force_intervals import (
     FIRST_SCALE,
     FLOOR,
     HIGH_FRICTION,

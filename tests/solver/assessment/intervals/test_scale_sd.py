@@ -4,9 +4,9 @@ import math
 from dataclasses import replace
 
 import pytest
-from rodsight.solver.assessment.scale_sd import LEAST, PER_LOAD, scale_sd
+from rodsight.solver.assessment.intervals.scale_sd import LEAST, PER_LOAD, scale_sd
 
-from .test_penalties import ASSESSED
+from ..test_penalties import ASSESSED
 
 
 def test_a_field_that_does_not_carry_the_load_has_an_uncertain_scale():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .evidence import Evidence
-from .fitted import FITTED
+from ..evidence import Evidence
+from ..fitted import FITTED
 
 LEAST: float = FITTED["scale_sd"]["least"]
 PER_LOAD: float = FITTED["scale_sd"]["per_load"]

@@ -1,0 +1,1 @@
+"""What this machine provides: a browser, memory, a level of the processor."""
