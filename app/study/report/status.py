@@ -21,8 +21,9 @@ from ...inference.frame_store import MemoryStore
 from ...inference.infer_sequence import infer_sequence
 from ...inference.inputs import Inputs
 from ...process.progress import Progress, no_progress
-from ...solver.assessment import formula_sd, mixture_trust, status
+from ...solver.assessment import mixture_trust, status
 from ...solver.assessment.evidence import Evidence
+from ...solver.assessment.intervals import formula_sd
 from ...solver.assessment.intervals.force_intervals import FLOOR, formula_sd_of
 from ...solver.assessment.trust import motion_assessment
 from ...solver.bodies.grains import Array
