@@ -31,7 +31,7 @@ from .process.sources import hash_of_code
 from .process.version import library_versions
 from .results.checkpoint import Checkpoint
 from .results.hdf5.store import Provenance
-from .results.manifest import MANIFEST, Manifest
+from .results.manifest import MANIFEST, NAMES, Manifest
 from .results.results import Results
 from .solver.frame_forces import FrameForces
 from .solver.statistics.frame_statistics import FrameStatistics
@@ -309,12 +309,17 @@ def owner_of(folder: Path) -> Path | None:
     stored, place = manifest.fact("experiment"), manifest.fact("place")
     if not isinstance(stored, str):
         return None
-    beside = Path(os.path.normpath(folder.resolve() / stored))
-    former = Path(place) if isinstance(place, str) else beside
+    beside = Path(os.path.normpath(folder.resolve() / _file_name(stored)))
+    former = Path(_file_name(place)) if isinstance(place, str) else beside
     inputs = manifest.fact("inputs")
     if is_same_file(beside, former) or not isinstance(inputs, dict) or has_input(beside, inputs):
         return beside
     return former
+
+
+def _file_name(text: str) -> str:
+    """The name that this process gives to a file named in a manifest, which is UTF-8 whatever names of files are."""
+    return os.fsdecode(text.encode("utf-8", NAMES))
 
 
 def has_input(file: Path, sums: dict[str, str]) -> bool:

@@ -63,7 +63,7 @@ def examples(made_tracks: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
 @pytest.fixture
 def tracked(made_tracks: Path, tmp_path: Path) -> Path:
     """A copy of the small tracked experiment, to be spoiled at will."""
-    return Path(shutil.copytree(made_tracks, tmp_path / "tracked"))
+    return Path(shutil.copytree(made_tracks, tmp_path / "tracked", ignore=shutil.ignore_patterns(".rodsight")))
 
 
 @pytest.fixture(scope="session")

@@ -98,7 +98,7 @@ def test_all_runs_are_collected_in_joint_tables(done):
     assert catalogue["material.friction"].tolist()[1] == 0.3
     page = write_report(folder, rows).read_text()
     assert 'class="failed"' in page
-    assert page.count("<svg") == 2  # friction angle and trust over frames; one run alone has a coefficient of friction
+    assert page.count("<svg") == 3  # friction angle and trust over frames, and results over the coefficient of friction
 
 
 def test_finished_runs_are_reused(done):

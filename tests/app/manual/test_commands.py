@@ -27,6 +27,7 @@ import pytest
 from rodsight.recording.viewing import open_viewer, recording_server
 from rodsight.synthetic.synthesis import synthesize
 
+from tests.app.exchange.foreign.test_pair_forces import DATA as MERCURY_DATA
 from tests.app.exchange.foreign.test_pegs import write_frame
 from tests.app.manual.test_pages import README, TEXTS, commands
 from tests.program import ROOT, rodsight
@@ -47,9 +48,8 @@ LEFT_OUT = {
     "study report": "simulates packings of 250 rods, four of each world",
     "study uncertainty": "simulates packings of 450 rods",
     "study trust": "simulates every scenario",
-    "study worlds --seeds": "simulates every world",
-    "study worlds --worlds shear mu_low": "simulates packings of 450 rods",
-    "study worlds --worlds mu_low": "simulates packings of 450 rods",
+    "study worlds --grains": "simulates packings of 200 rods",
+    "study mixture": "simulates every scenario",
     "study real": "needs photoelastic experiments, which are not ours to share",
     "solve test": "needs a photoelastic experiment, which is not ours to share",
 }
@@ -57,6 +57,7 @@ LEFT_OUT = {
 SMALLER = {
     "--idle 600": ("--idle 1", "no photograph arrives any more"),
     "--frames 0:12": ("--frames 0:3", "there are four photographs"),
+    "--frames 11:12": ("--frames 3:4", "there are four photographs"),
     "--frame 11": ("--frame 3", "there are four photographs"),
     "--preset small --seed": ("--preset small --grains 20 --frames 3 --seed", "250 rods take half a minute"),
     "--preset paper --seed 1": ("--preset paper --seed 1 --grains 20", "1172 rods take minutes"),
@@ -156,6 +157,7 @@ def _write_foreign_files(folder: Path) -> None:
     (folder / "allspots.csv").write_text("\n".join([header, header.title(), header.title(), units, rows]))
     shutil.copy(WRITTEN / "rodtracker_rods.csv", folder / "rods.csv")
     shutil.copy(WRITTEN / "box_with_floor.dump", folder / "dump.txt")
+    (folder / "Shear.data").write_text(MERCURY_DATA)
     frame = tracks[tracks.frame == 0]
     balls = "".join(f"{x}\t{y}\t0\t0.008\n" for x, y in zip(frame.x, frame.y, strict=True))
     (folder / "spheres.txt").write_text(f"#format x_y_z_r\n{balls}")

@@ -96,7 +96,8 @@ def on_screen(tab: Page, point: Array) -> tuple[float, float]:
 
 
 COUNT = """([x, y, reach, colour, like]) => {
-  const canvas = workbench.stage.canvas, box = canvas.getBoundingClientRect(), dense = canvas.width / box.width;
+  const canvas = workbench.stage.composed(), box = workbench.stage.canvas.getBoundingClientRect();
+  const dense = canvas.width / box.width;
   const [left, top] = [x - box.left - reach, y - box.top - reach].map((each) => Math.round(each * dense));
   const { data } = canvas.getContext("2d").getImageData(left, top, 2 * reach * dense, 2 * reach * dense);
   let found = 0;

@@ -11,7 +11,7 @@ import pytest
 from rodsight.exchange.foreign.observations import Convention, make_tracks
 from rodsight.exchange.foreign.pegs import read_pegs, true_contacts
 from rodsight.process.errors import InputError
-from rodsight.synthetic import photoelastic
+from rodsight.synthetic.photoelastic import pegs_files
 from rodsight.synthetic.photoelastic.pegs_files import RADIUS_DEFICIT, make_photoelastic
 from rodsight.synthetic.scenarios.loading_paths import simulate_loading
 from rodsight.synthetic.scenarios.scenario_folder import load_or_simulate
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="needs th
 
 def test_centres_radii_and_both_readings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = simulate_loading(replace(SCENARIOS["nearly_jammed"].loading, frames=2), COUNT, seed=3)
-    monkeypatch.setattr(photoelastic, load_or_simulate.__name__, lambda *arguments: truth)
+    monkeypatch.setattr(pegs_files, load_or_simulate.__name__, lambda *arguments: truth)
     made = make_photoelastic(tmp_path / "solved", 0, grains=COUNT)
     observed, readings = read_pegs(tmp_path / "solved")
     imported = make_tracks(observed, Convention(unit=made.pixel_size, y_down=True), 1e-5)

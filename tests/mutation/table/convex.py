@@ -41,7 +41,7 @@ MUTANTS = [
             "if gap <= tolerance and residual <= RESIDUAL_TOLERANCE:",
             "if gap <= 1e4 * tolerance and residual <= RESIDUAL_TOLERANCE:",
         ),
-        ("workspace.best[:] = current.edge_force", "pass"),
+        ("copy_matrix(current.edge_force, workspace.best)", "pass"),
         (
             "(4.0 * program.proximal_weight * square + d0 + d1) * inverse_determinant,",
             "(d0 + d1) * inverse_determinant,",

@@ -11,7 +11,7 @@ MUTANTS = [
         ("radius=tracks.radius + found.correction", "radius=tracks.radius - found.correction"),
         ("radius=then.radius + found.correction", "radius=then.radius"),
         ("first is None or not has_radius_errors(", "first is None or has_radius_errors("),
-        ("np.full(tracks.grain_count, found.radius_offset)", "np.full(tracks.grain_count, -found.radius_offset)"),
+        ("radius=found.shared_radius(tracks.radius)", "radius=-found.shared_radius(tracks.radius)"),
     ),
     *mutants_of(
         "app/inference/backward_pass.py",
@@ -30,7 +30,7 @@ MUTANTS = [
         "app/inference/first_frame.py",
         f"{TESTS}/test_first_frame.py",
         ("frames[1 : FRAMES + 1]", "frames[: FRAMES + 1]"),
-        ("tracks.radius - (calibration.radius - calibration.radius_offset)", "tracks.radius"),
+        ("radius=tracks.radius - (calibration.radius - shared)", "radius=tracks.radius"),
         ("position=tracks.position - own", "position=tracks.position + own"),
         ("- noise**2, 0.0)))\n", "- 4.0 * noise**2, 0.0)))\n"),
     ),
@@ -81,12 +81,6 @@ MUTANTS = [
         ("rise[order[0]][0] < CLEAR", "rise[order[0]][0] < 0.1"),
         ("rise[order[1]][0] > AHEAD", "rise[order[1]][0] > 0.0"),
         ("trial.expected[0] < UNEXPLAINED", "trial.expected[0] < 2.0"),
-    ),
-    *mutants_of(
-        "app/inference/diagnosis/base_friction.py",
-        f"{TESTS}/diagnosis/test_base_friction.py",
-        ("np.argmax(found)", "np.argmin(found)"),
-        ("curve.deriv().roots()[0].real", "trials[best]"),
     ),
     *mutants_of(
         "app/inference/correction/friction.py",

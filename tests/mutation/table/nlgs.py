@@ -72,8 +72,8 @@ MUTANTS = [
     *mutants_of(
         "solver/nlgs/sweeping/measured_sweeps.py",
         MEASURES,
-        ("        flat_previous[:] = flat", "        flat_previous[:] = 1.0 * flat_previous"),
-        ("        previous_plate[:] = plate", "        previous_plate[:] = 1.0 * previous_plate"),
+        ("        copy_vector(flat, flat_previous)", "        copy_vector(flat_previous, flat_previous)"),
+        ("        copy_matrix(plate, previous_plate)", "        copy_matrix(previous_plate, previous_plate)"),
         ("        work[RESIDUAL:SIZE] = 0.0", "        work[SQUARES:SIZE] = 0.0"),
         ("- work[DIFFERENCES + 2 * L + k]", "+ work[DIFFERENCES + 2 * L + k]"),
         (

@@ -99,7 +99,7 @@ def test_the_viewer_draws_the_forces_and_every_printable_character(results, tmp_
         viewer.show_tab(Tab.SUMMARY)
         assert viewer.picture() == front  # the requested tab was in front at the start
         # The summary shows the characters in proportional and in monospaced type.
-        text, network = read_picture(viewer.picture("Summary")), read_picture(viewer.picture("Force network"))
+        text, network = read_picture(viewer.picture("The run")), read_picture(viewer.picture("Force network"))
     assert 0.01 < warm_fraction(network) < 0.5  # fraction of the picture covered by strong forces and the legend
     assert len(np.unique(network.reshape(-1, network.shape[-1]), axis=0)) > 100
     assert np.ptp(text[..., 0]) > 100
