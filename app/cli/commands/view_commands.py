@@ -252,11 +252,11 @@ def _serve(files: list[Path], console: Console) -> int:
     from ...recording.viewing.viewer import has_display
 
     server = RecordingServer(files)
-    print_line(console, f"At {server.address} until interrupted (Ctrl+C).")
-    sys.stdout.flush()  # a reader of a pipe waits for the address
-    if has_display():
-        open_page(server.address)
-    try:
+    try:  # from the first moment at which a reader knows the address
+        print_line(console, f"At {server.address} until interrupted (Ctrl+C).")
+        sys.stdout.flush()  # a reader of a pipe waits for the address
+        if has_display():
+            open_page(server.address)
         threading.Event().wait()
     except KeyboardInterrupt:  # the normal end
         return 0

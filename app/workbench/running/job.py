@@ -215,6 +215,8 @@ class Job:
                     break
                 time.sleep(POLLING)
             self.read_line(part)
+        while self._is_alive(process):  # its log is missing or cannot be read: that is not its end
+            time.sleep(POLLING)
         status = self._status if process is None else process.wait()
         with self._lock:
             self.process = self.found = None

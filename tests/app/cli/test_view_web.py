@@ -32,5 +32,4 @@ def test_the_page_is_there_until_ctrl_c_and_a_second_call_takes_another_port(tmp
             each.send_signal(signal.SIGINT)
         for each in running:
             each.communicate(timeout=30)  # closes what it printed through
-    # A signal that comes while the command still sets itself up interrupts it: 130.
-    assert {each.returncode for each in running} <= {0, 130}
+    assert [each.returncode for each in running] == [0, 0]
