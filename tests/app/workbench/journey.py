@@ -55,8 +55,9 @@ class Journey:
 
     def at(self, place: tuple[float, float]) -> tuple[int, int]:
         """Where a place of the photograph is; a mouse knows whole pixels of the screen only."""
-        x, y = on_screen(self.tab, place)
-        return round(x), round(y)
+        x, y = (round(each) for each in on_screen(self.tab, place))
+        assert self.tab.evaluate("([x, y]) => document.elementFromPoint(x, y)?.id", [x, y]) == "canvas", (x, y)
+        return x, y
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         self.tab.mouse.move(*self.at(start))

@@ -1,6 +1,6 @@
 """A person who makes ten mistakes; each is named on the page, and undone there: by mouse and keyboard alone.
 
-python -m tests.app.workbench.journey_of_mistakes DIR     # pictures of every step, and what they took
+python -m tests.app.workbench.journey_of_mistakes DIR [RODS]     # pictures of every step, and what they took
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ def walls_before_scale(journey: Journey) -> None:
     journey.drag(tuple(line[0].tolist()), tuple(line[1].tolist()))
     expect(tab.locator("#panel")).to_contain_text("Set the scale first")
     assert tab.evaluate("workbench.project.walls") == []
+    journey.whole()  # the drag has moved the picture
 
 
 def scale_wrong_by_ten(journey: Journey) -> str:
@@ -228,6 +229,7 @@ def wrong_place(journey: Journey) -> str:
     """A rod is dragged onto its neighbour and kept there, although the card warns."""
     tab, made = journey.tab, journey.made
     go(tab, "correct")
+    journey.whole()  # the contact that was looked at is still large
     tab.evaluate(f"workbench.show({WRONG_FRAME})")
     idle(tab)
     chosen = chosen_rod(journey)
@@ -331,13 +333,13 @@ def make_folder(out: Path, **values: int) -> LaboratorySet:
     return made
 
 
-def main(out: Path) -> None:
+def main(out: Path, grains: str = "60") -> None:
     from playwright.sync_api import sync_playwright
 
     from tests.app.workbench.hand import opened
     from tests.browser import FLAGS, SECONDS, find_chromium
 
-    made = make_folder(out, grains=60, frames=10)
+    made = make_folder(out, grains=int(grains), frames=10)
     pictures = out / "pictures"
     pictures.mkdir()
     with sync_playwright() as driver:
@@ -354,4 +356,4 @@ def main(out: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:])
