@@ -157,6 +157,7 @@ class Run:
             },
             "file_settings": self.experiment.file_settings,
             "verdicts": fingerprint(log),
+            "photographs": self.experiment.photograph_names(),
         }
 
     @property
@@ -176,6 +177,7 @@ class Run:
             **self._ownership(),
             "inputs": _inputs_of(experiment),
             "settings": as_toml(experiment.config),
+            "photographs": experiment.photograph_names(),
             "frames": [self.frames.start, self.frames.stop, *([self.frames.step] if self.frames.step != 1 else [])],
             **verdicts,
         })  # fmt: skip

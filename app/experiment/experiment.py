@@ -21,7 +21,7 @@ from .config.dotted_keys import leaves
 from .config.experiment_file import ExperimentFile, load_config
 from .photographs import Channel, ImageSelection, Photographs, read_photograph
 from .reading.input_files import InputFiles
-from .reading.photograph_order import NUMBER, ORDER_COLUMNS, GivenOrder, arrange_order
+from .reading.photograph_order import NUMBER, ORDER_COLUMNS, GivenOrder, arrange_order, relative_name
 from .reading.tables import Table, check_frames, check_unique, read_table
 
 CONFIG_NAME = "experiment.toml"
@@ -124,6 +124,12 @@ class Experiment:
     def named_inputs(self) -> dict[Path, str]:
         """Return a name of every input file, as `checksums` lists it."""
         return _names_of(self.input_files(), self.folder)
+
+    def photograph_names(self) -> list[str]:
+        """Return the names of the photographs in their order, as a table of the order has them."""
+        return (
+            [relative_name(file, self.folder) for file in self.photographs().files] if self.config.photographs else []
+        )
 
     def input_files(self) -> list[Path]:
         """Return all input files of the experiment, photographs included."""

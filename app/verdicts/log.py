@@ -1,9 +1,10 @@
 """The log of reviewers' verdicts: one JSON object per line, appended and never rewritten.
 
-Three kinds of line. A verdict has `frame`, `a`, `b` (a grain's id each, or a wall's name for `b`) and `verdict`. A
-flag has `frame`, `flag` and `on`. An undo has `undo`, the `line` it takes back. All have `reviewer`, `time` (ISO 8601,
-UTC), `seconds` spent, the program's `version` and a random name `line`; a verdict also has `origin` (why the pair
-was judged) and `blind`. A reviewer's latest verdict on a pair counts.
+Four kinds of line. A verdict has `frame`, `a`, `b` (a grain's id each, or a wall's name for `b`) and `verdict`. A
+flag has `frame`, `flag` and `on`. An undo has `undo`, the `line` it takes back. A new order has `photographs`, their
+names `before` and `after`: lines above it stay with their photographs, whatever number these have then. All have
+`reviewer`, `time` (ISO 8601, UTC), `seconds` spent, the program's `version` and a random name `line`; a verdict also
+has `origin` (why the pair was judged) and `blind`. A reviewer's latest verdict on a pair counts.
 
 A line is written by one call under a lock and flushed to the disk, so that two tabs, or two programs, cannot mix
 their lines. A line cut by a crash is ignored and counted; the next entry begins on a new line.
@@ -15,7 +16,7 @@ import json
 import os
 import secrets
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -89,7 +90,22 @@ class _Lines:
 
     entries: dict[str, Entry] = field(default_factory=dict)  # by line, in the order of the file
     undone: set[str] = field(default_factory=set)
+    photograph: dict[str, str] = field(default_factory=dict)  # by line, where the order has changed since
+    set_aside: set[str] = field(default_factory=set)  # lines of photographs that are left out
     damaged: int = 0
+
+    def reorder(self, before: list[str], after: list[str]) -> None:
+        """Number all lines anew: each stays with its photograph."""
+        number = {name: k for k, name in enumerate(after)}
+        for line, entry in self.entries.items():
+            if line not in self.photograph and 0 <= entry.frame < len(before):
+                self.photograph[line] = before[entry.frame]
+            name = self.photograph.get(line)
+            if name in number:
+                self.entries[line] = replace(entry, frame=number[name])
+                self.set_aside.discard(line)
+            elif name is not None:
+                self.set_aside.add(line)
 
 
 class VerdictLog:
@@ -119,7 +135,9 @@ class VerdictLog:
             self._read()
             lines = self._lines
             copy = VerdictLog(self.file)
-            copy._lines = _Lines(dict(lines.entries), set(lines.undone), lines.damaged)
+            copy._lines = _Lines(
+                dict(lines.entries), set(lines.undone), dict(lines.photograph), set(lines.set_aside), lines.damaged
+            )
             copy._closed = True
             return copy
 
@@ -146,6 +164,19 @@ class VerdictLog:
             self._read()
             entry = self._lines.entries.get(line)
             return None if entry is None else self.append(replace(entry, time=""))
+
+    def reorder(self, before: Sequence[str], after: Sequence[str]) -> None:
+        """Note that the photographs have another order: lines stay with theirs; those of absent ones do not count.
+
+        Parameters
+        ----------
+        before, after
+            Names of the photographs in both orders.
+        """
+        if list(before) != list(after) and self.size:
+            self._write(
+                [{"photographs": {"before": list(before), "after": list(after)}, **_signature(_stamped(Entry(0, "")))}]
+            )
 
     def last_line(self, reviewer: str) -> Entry | None:
         """Return the reviewer's last line that counts; None where there is none."""
@@ -187,7 +218,7 @@ class VerdictLog:
         return self.file.stat().st_size if self.file.exists() else 0
 
     def _counts(self, entry: Entry) -> bool:
-        return entry.line not in self._lines.undone
+        return entry.line not in self._lines.undone and entry.line not in self._lines.set_aside
 
     def _write(self, lines: list[dict[str, Any]]) -> None:
         content = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines).encode()
@@ -239,6 +270,9 @@ class VerdictLog:
         if "undo" in values:
             self._lines.undone.add(str(values["undo"]))
             return
+        if "photographs" in values:
+            self._lines.reorder(*_orders(self.file, where, values["photographs"]))
+            return
         entry = _entry(self.file, where, values)
         self._lines.entries[entry.line] = entry
 
@@ -272,6 +306,15 @@ def _as_json(entry: Entry) -> dict[str, Any]:
         "frame": entry.frame, "a": entry.a, "b": entry.b, "verdict": entry.verdict.value, **_signature(entry),
         "origin": entry.origin.value, "blind": entry.blind,
     }  # fmt: skip
+
+
+def _orders(file: Path, where: str, orders: object) -> tuple[list[str], list[str]]:
+    """The names of the photographs before and after a change of their order."""
+    found = [orders.get(key) if isinstance(orders, dict) else None for key in ("before", "after")]
+    before, after = found
+    if not isinstance(before, list) or not isinstance(after, list):
+        raise InputError(file, f"{where}, photographs", "has no lists before and after")
+    return [str(each) for each in before], [str(each) for each in after]
 
 
 def _entry(file: Path, where: str, values: dict[str, Any]) -> Entry:

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
 from ...tracking.registration.neighbours import local_motion
+from ...tracks import Tracks, TrackStatus
 from .pose_editor import PoseFit
 
 Pose = tuple[float, float, float]
@@ -17,6 +19,9 @@ OVERLAP = 0.2  # [smaller radii] of two rods that tilt and errors of the radii c
 JUMP = 0.5  # [radii] by which a rod moves against its neighbours between two photographs at most, as a rule
 FAR_BELOW = 0.15  # by which a correlation is far below the median of the others, and at least
 SPREADS = 5.0  # of their median deviations
+WEAK = 0.75  # correlation below which a rod is listed as uncertain
+UNCERTAIN = (TrackStatus.SUSPECT, TrackStatus.ROBUST)
+GOOD = (TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +33,13 @@ class TrackedPoses:
     radius: Array  # (n,) [px]
     zncc: Array  # (f, n) correlation with the first photograph; NaN: none
     good: NDArray[np.bool_]  # (f, n) the pose needs no check by a person
+
+    @classmethod
+    def of(cls, tracks: Tracks, scale: Scale) -> TrackedPoses:
+        """Return the poses of tracks without corrections."""
+        pose = np.dstack([scale.to_pixels(tracks.position), -tracks.rotation])
+        good = np.isin(tracks.status, GOOD) & ~(tracks.zncc < WEAK) & tracks.present
+        return cls(tracks.id, pose, tracks.radius / scale.mean_size, tracks.zncc, good)
 
     def row(self, name: int) -> int:
         """Return the row of a rod; raise KeyError for no such rod."""
@@ -41,6 +53,11 @@ class TrackedPoses:
         known = self.good[frame].copy()
         known[row] = False
         return np.column_stack([self.pose[frame, known, :2], self.radius[known]])
+
+
+def uncertain_poses(tracks: Tracks) -> NDArray[np.bool_]:
+    """Return which poses (f, n) a person should check."""
+    return np.isin(tracks.status, UNCERTAIN) | (tracks.zncc < WEAK)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...experiment.photographs import Image
+from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
 from ...tracking.registration.manual_poses import ManualPoses
 from ...tracking.registration.poses import FramePoses
@@ -86,3 +87,13 @@ def _stored(tracks: Tracks, places: Array, k: int, first: FramePoses) -> FramePo
     reference = np.zeros(len(tracks.id), np.int32) if tracks.reference_frame is None else tracks.reference_frame[k]
     x, y, rotation = places[k].T
     return FramePoses(x, y, rotation, unknown, tracks.zncc[k], unknown, tracks.status[k], reference)
+
+
+def with_frame(tracks: Tracks, frame: int, again: FramePoses, scale: Scale) -> Tracks:
+    """Return the tracks with one frame as it was tracked again."""
+    position, rotation, status, zncc = (
+        each.copy() for each in (tracks.position, tracks.rotation, tracks.status, tracks.zncc)
+    )
+    position[frame] = scale.to_world(again.pose[:, :2])
+    rotation[frame], status[frame], zncc[frame] = scale.angle_to_world(again.rotation), again.status, again.zncc
+    return replace(tracks, position=position, rotation=rotation, status=status, zncc=zncc)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,25 +20,27 @@ from ...results.hdf5.store import load_tracks
 from ...reviewing.rounding import rounded, rounded_one
 from ...run_folder import TRACKS
 from ...tracking.registration.manual_poses import ManualPoses
-from ...tracking.registration.poses import FramePoses
-from ...tracks import Tracks, TrackStatus
-from ...verdicts.log import VERDICTS, VerdictLog
+from ...tracks import Tracks
 from ..correcting import corrections
 from ..correcting.correction_log import append_changes, read_changes
 from ..correcting.pose_editor import PoseEditor, PoseFit
-from ..correcting.proposals import OVERLAP, TrackedPoses, overlap, predict_pose, warnings_of, with_corrections
-from ..correcting.retracking import changes, track_again
+from ..correcting.proposals import (
+    OVERLAP,
+    TrackedPoses,
+    overlap,
+    predict_pose,
+    uncertain_poses,
+    warnings_of,
+    with_corrections,
+)
+from ..correcting.retracking import changes, track_again, with_frame
 from ..correcting.rod_following import follow_rod
 from ..inspecting.run_data import first_photograph, list_rods
-from ..setup.journal import Action
 from .endpoints import Number, Text, Whole, editing_endpoint, endpoint
 from .project import Project
 from .workbench import Workbench
 
 DETECTIONS = "detections.csv"
-WEAK = 0.75  # correlation below which a rod is listed as uncertain
-UNCERTAIN = (TrackStatus.SUSPECT, TrackStatus.ROBUST)
-GOOD = (TrackStatus.OK, TrackStatus.RESCUED, TrackStatus.ROBUST)
 APPLIED = 1.0  # [px] largest distance of a track from a correction that it follows
 Pose = tuple[float, float, float]
 
@@ -52,7 +53,7 @@ def poses(workbench: Workbench, at: Text, frame: Whole) -> dict[str, Any]:
     k = frame - first
     if not 0 <= k < tracks.frame_count:
         raise InputError(opened.results, f"photograph {frame}", f"is not tracked yet: {tracks.frame_count} are")
-    weak = _uncertain(tracks)
+    weak = uncertain_poses(tracks)
     return _rods_of(tracks, k, scale, first) | {
         "frame": frame, "corrections": list_corrections(opened), "first": first,
         "lost_count": [0] * first + (~tracks.present).sum(axis=1).tolist(),
@@ -71,7 +72,7 @@ def _rods_of(tracks: Tracks, k: int, scale: Scale, first: int) -> dict[str, Any]
             lost.append(
                 {"frame": int(before[-1]) + first, **{key: last[key][n] for key in ("id", "x", "y", "r", "angle")}}
             )
-    uncertain = tracks.id[_uncertain(tracks)[k] & tracks.present[k]].tolist()
+    uncertain = tracks.id[uncertain_poses(tracks)[k] & tracks.present[k]].tolist()
     return {"rods": list_rods(tracks, k, scale), "lost": lost, "uncertain": uncertain}
 
 
@@ -114,7 +115,7 @@ def tracked_again(workbench: Workbench, at: Text, frame: Whole, id: Whole) -> di
     photograph = _photographs_of(opened, first)
     again = track_again(circles, tracks, places, k, _manual(given, row_of), photograph)
     listed = changes(tracks, places, k, again, circles, row_of[id])
-    after = _with_frame(tracks, k, again, scale)
+    after = with_frame(tracks, k, again, scale)
     lost = [int((~each.present[k]).sum()) for each in (tracks, after)]
     return _rods_of(after, k, scale, first) | {
         "frame": frame, "id": id, "lost_before": lost[0], "lost_after": lost[1],
@@ -136,16 +137,6 @@ def _manual(given: list[corrections.Correction], row_of: dict[int, int]) -> Manu
 def _in_picture(pose: tuple[float, float, float | None]) -> Pose:
     """A stored pose with its angle in the picture; NaN: it is to be found."""
     return pose[0], pose[1], float("nan") if pose[2] is None else -pose[2]
-
-
-def _with_frame(tracks: Tracks, k: int, again: FramePoses, scale: Scale) -> Tracks:
-    """The tracks with frame k as it was tracked again."""
-    position, rotation, status, zncc = (
-        each.copy() for each in (tracks.position, tracks.rotation, tracks.status, tracks.zncc)
-    )
-    position[k] = scale.to_world(again.pose[:, :2])
-    rotation[k], status[k], zncc[k] = scale.angle_to_world(again.rotation), again.status, again.zncc
-    return replace(tracks, position=position, rotation=rotation, status=status, zncc=zncc)
 
 
 @endpoint
@@ -245,7 +236,7 @@ def undo(workbench: Workbench, at: Text) -> dict[str, Any]:
     """
     opened = workbench.project(at)
     with logged(opened, "undone"):
-        action = _revert(opened, back=True)
+        action = opened.revert(back=True)
     if action is None:
         raise InputError("undo", "", "has no action left to undo")
     return opened.describe() | {"undone": action.name, "verdict": action.verdict}
@@ -256,29 +247,10 @@ def redo(workbench: Workbench, at: Text) -> dict[str, Any]:
     """Repeat the action that was undone last."""
     opened = workbench.project(at)
     with logged(opened, "redone"):
-        action = _revert(opened, back=False)
+        action = opened.revert(back=False)
     if action is None:
         raise InputError("redo", "", "has no undone action to repeat")
     return opened.describe() | {"redone": action.name, "verdict": action.verdict}
-
-
-def _revert(opened: Project, *, back: bool) -> Action | None:
-    """Undo the last action, or repeat the one undone last; verdicts that were undone elsewhere are passed over."""
-    journal = opened.draft.journal
-    while (action := journal.last_done() if back else journal.last_undone()) is not None:
-        if action.verdict is None:
-            opened.draft.revert(action, back=back)
-            return action
-        log = VerdictLog(opened.results / VERDICTS)
-        line = str(action.verdict["line"])
-        changed = log.undo_line(line) if back else log.repeat(line)
-        if back:
-            journal.undo(action)
-        else:
-            journal.redo(action, None if changed is None else {**action.verdict, "line": changed.line})
-        if changed is not None:
-            return action
-    return None
 
 
 @contextmanager
@@ -363,11 +335,6 @@ def _as_text(picture: NDArray[np.uint8]) -> str:
     return base64.b64encode(picture.tobytes()).decode("ascii")
 
 
-def _uncertain(tracks: Tracks) -> NDArray[np.bool_]:
-    """The poses (f, n) that a person should check."""
-    return np.isin(tracks.status, UNCERTAIN) | (tracks.zncc < WEAK)
-
-
 def _tracked(opened: Project) -> TrackedPoses:
     """The poses as they were tracked, with all corrections."""
     first = _first(opened)
@@ -383,10 +350,7 @@ def _angle(theta: float | None) -> float | None:
 
 
 def _as_tracked(opened: Project) -> TrackedPoses:
-    tracks, scale = _tracks(opened), opened.tracks_scale()
-    pose = np.dstack([scale.to_pixels(tracks.position), -tracks.rotation])
-    good = np.isin(tracks.status, GOOD) & ~(tracks.zncc < WEAK) & tracks.present
-    return TrackedPoses(tracks.id, pose, tracks.radius / scale.mean_size, tracks.zncc, good)
+    return TrackedPoses.of(_tracks(opened), opened.tracks_scale())
 
 
 def _editor(opened: Project) -> PoseEditor:

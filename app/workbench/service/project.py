@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import threading
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from ...reviewing.reviewed_run import ReviewedRun
 from ...reviewing.session import ReviewSession
 from ...run_folder import RESULTS, SUMMARY, is_same_file, owner_of
 from ...tracking.picture_quality import PictureQuality
-from ...verdicts.log import VERDICTS
+from ...verdicts.log import VERDICTS, VerdictLog
 from ..correcting.pose_editor import PoseEditor
 from ..inspecting.photograph_store import WHOLE, Name, Part, PhotographStore
 from ..inspecting.run_data import RunData, read_finished_run, read_run, run_stamp
@@ -32,7 +33,7 @@ from ..running.job import Job
 from ..setup.description import coarse_size, describe_rods, describe_tables, describe_walls, table_names
 from ..setup.draft import Draft, stamp_of
 from ..setup.experiment_folders import run_folder, valid_name
-from ..setup.journal import PLACE, Journal
+from ..setup.journal import PLACE, Action, Journal
 from ..setup.photograph_series import describe_series
 from ..setup.validation import Mark, ValidationResult, outside_walls, validate
 
@@ -223,6 +224,39 @@ class Project:
     def scene(self) -> Scene:
         """Return scale and size of the picture over which the run is drawn; raise InputError where there is none."""
         return run_scene(self.validation(), self.results, self.run_data())
+
+    @contextmanager
+    def with_verdicts(self) -> Iterator[None]:
+        """Let verdicts follow their photographs where their order changes inside the block."""
+        before = self._photograph_names()
+        yield
+        VerdictLog(self.results / VERDICTS).reorder(before, self._photograph_names())
+
+    def revert(self, *, back: bool) -> Action | None:
+        """Undo the last action, or (back false) repeat the one undone last; None: there is none.
+
+        Verdicts that were undone elsewhere are passed over.
+        """
+        journal = self.draft.journal
+        while (action := journal.last_done() if back else journal.last_undone()) is not None:
+            if action.verdict is None:
+                with self.with_verdicts():
+                    self.draft.revert(action, back=back)
+                return action
+            log = VerdictLog(self.results / VERDICTS)
+            line = str(action.verdict["line"])
+            changed = log.undo_line(line) if back else log.repeat(line)
+            if back:
+                journal.undo(action)
+            else:
+                journal.redo(action, None if changed is None else {**action.verdict, "line": changed.line})
+            if changed is not None:
+                return action
+        return None
+
+    def _photograph_names(self) -> list[str]:
+        experiment = self.validation().experiment
+        return [] if experiment is None else experiment.photograph_names()
 
     def pose_editor(self, make: Callable[[], PoseEditor]) -> PoseEditor:
         """Return the editor of the rods' poses; a new one where the rods of the run have changed."""

@@ -56,7 +56,8 @@ def set_photographs(
 def set_order(workbench: Workbench, at: Text, files: Files, change: Text = "order") -> dict[str, Any]:
     """Use the named photographs in this order, and leave the others out."""
     opened = workbench.project(at)
-    photograph_series.set_order(opened.draft, opened.validation(), files, change)
+    with opened.with_verdicts():
+        photograph_series.set_order(opened.draft, opened.validation(), files, change)
     return opened.describe()
 
 
@@ -72,7 +73,8 @@ def number_by_names(workbench: Workbench, at: Text) -> dict[str, Any]:
 def use_camera_times(workbench: Workbench, at: Text) -> dict[str, Any]:
     """Order the photographs by the camera's clock, and take their times from it."""
     opened = workbench.project(at)
-    photograph_series.use_camera_times(opened.draft, opened.validation())
+    with opened.with_verdicts():
+        photograph_series.use_camera_times(opened.draft, opened.validation())
     return opened.describe()
 
 

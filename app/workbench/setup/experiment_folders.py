@@ -121,22 +121,21 @@ def copy_sample(root: Path) -> Path:
 
 
 def duplicate(folder: Path, root: Path) -> Path:
-    """Copy an experiment into a new folder beside it, with a name of its own; photographs are linked, not copied.
+    """Copy an experiment into a new folder with a name of its own; photographs are linked, not copied.
 
-    Raises
-    ------
-    InputError
-        The experiment is the folder that was opened: there is no place beside it.
+    The new folder is beside that of the experiment; where this is the folder that was opened, below it. Experiments
+    below it are not copied.
     """
-    if folder == root:
-        raise InputError(folder, "", "is the folder that was opened: open the one above it to duplicate the experiment")
+    beside = folder if folder == root else folder.parent
     names = (f"{folder.name} copy", *(f"{folder.name} copy {k}" for k in range(2, 1000)))
-    target = next(folder.with_name(name) for name in names if not folder.with_name(name).exists())
+    target = next(beside / name for name in names if not (beside / name).exists())
+
+    def left_out(place: str, names: list[str]) -> list[str]:
+        below = [name for name in names if _is_file(Path(place, name, CONFIG_NAME))]
+        return [name for name in names if name.startswith(".") or name in ("runs", target.name, *below)]
+
     with replacing_folder(target) as part:
-        shutil.copytree(
-            folder, part, copy_function=_link_picture, symlinks=True, ignore=shutil.ignore_patterns(".*", "runs"),
-            dirs_exist_ok=True,
-        )  # fmt: skip
+        shutil.copytree(folder, part, copy_function=_link_picture, symlinks=True, ignore=left_out, dirs_exist_ok=True)
         file = part / CONFIG_NAME
         described = set_values(file.read_bytes().decode("utf-8"), {"name": valid_name(target.name)})
         write_atomically(file, described.encode())

@@ -49,6 +49,26 @@ def test_the_latest_verdict_counts_in_either_order_of_the_pair(log):
     assert entry.verdict is Verdict.NO_CONTACT
 
 
+def test_verdicts_stay_with_their_photographs(log):
+    names = ["a", "b", "c", "d"]
+    for frame in range(4):
+        log.append(contact(frame=frame))
+    log.append(Entry(2, "anna", flag=Flag.RESET))
+    log.reorder(names, ["a", "d", "b"])  # c is left out
+    assert sorted(pair[0] for pair, _ in log.verdicts()) == [0, 1, 2]
+    assert [entry.flag for entry in log.entries() if entry.flag] == []
+    log.append(contact(frame=1, a=3, b=7))  # on d, as it is numbered now
+    log.reorder(["a", "d", "b"], names)
+    assert sorted((pair[0], pair[1]) for pair, _ in log.snapshot().verdicts()) == [
+        (0, 1),
+        (1, 1),
+        (2, 1),
+        (3, 1),
+        (3, 3),
+    ]
+    assert [entry.frame for entry in VerdictLog(log.file).entries() if entry.flag] == [2]
+
+
 def test_undo_reverts_one_line_of_its_own_reviewer(log):
     log.append(contact())
     log.append(contact(verdict=Verdict.UNSURE))

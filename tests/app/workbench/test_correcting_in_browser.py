@@ -17,6 +17,7 @@ from tests.app.workbench.spoiled_tracks import GONE, ROD, WRONG, pixel_of, true_
 pytestmark = pytest.mark.screen
 OTHER = 4  # a rod that is marked as not visible in photograph 1
 RIGHT = 0.15  # [px] of a place
+SMALL = 9.0  # [px of the screen] of a rod's radius
 
 
 @pytest.fixture
@@ -50,7 +51,12 @@ def test_a_rod_is_dragged_to_its_place_and_the_next_run_applies_it(tab, spoiled)
     assert tab.evaluate("workbench.step.ghost().slice(0, 2)") == pytest.approx([x, y], abs=RIGHT)
     expect(tab.locator("#warnings")).to_have_count(0)
     tab.keyboard.press("f")
-    drag(tab, (x, y), (x + 60.0, y - 60.0))  # onto another rod
+    angle = tab.evaluate("workbench.step.ghost()[2]")
+    tab.evaluate(f"workbench.stage.zoom({SMALL} / workbench.stage.view.k / workbench.step.rods().r[0])")
+    drag(tab, (x, y), (x + 60.0, y - 60.0))  # onto another rod; the handle is close to the middle
+    expect(tab.locator("#warnings")).to_be_visible()
+    assert tab.evaluate("workbench.step.ghost()[2]") == pytest.approx(angle, abs=1e-6)
+    tab.keyboard.press("f")
     expect(tab.locator("#warnings")).to_contain_text("Nothing correlates there")
     expect(tab.locator("#warnings")).to_contain_text("Against its neighbours it has moved by")
     expect(tab.locator("#keep")).to_contain_text("all the same")

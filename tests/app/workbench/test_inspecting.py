@@ -11,12 +11,15 @@ from rodsight.drawing.ramps import FORCE_RAMP
 from rodsight.process.frame_range import FrameRange
 from rodsight.recording.look.force_style import THICKEST, THINNEST
 from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
+from rodsight.results.manifest import Manifest
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
 from rodsight.solver.kinematics.local_motion import measure_local_motion
 from rodsight.verdicts.decisions import BodyNames, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
 from rodsight.workbench.inspecting.run_data import run_stamp
+from rodsight.workbench.service.workbench import Workbench
 
+from tests.app.workbench.conftest import Visitor
 from tests.golden.stored import unpack
 
 FIRST = 2  # the photograph of the stored run's frame 0
@@ -110,6 +113,28 @@ def test_a_verdict_reaches_the_solver_and_is_undone(solved):
     assert visitor.request("undo_verdict", at=at, view=view())["undone"] is None
     decided = decide(log, bodies, frames=FrameRange(first_frame), frame_count=len(results.frames))
     assert decided.count == 0
+
+
+def test_a_verdict_stays_with_its_photograph_when_the_order_changes(solved):
+    visitor, at, _, folder = solved
+    names = visitor.request("project", at=at)["series"]["names"]
+    stored = {"photographs": names}
+    Manifest(folder).store(stored)
+    Manifest(folder).note(RESULTS, stored)
+    pair = visitor.request("candidate_pairs", at=at, view=view())["pairs"][0]
+    judge(visitor, at, pair, "no contact")
+    moved = [*names[:2], *names[3:], names[2]]
+    visitor.request("set_order", at=at, files=moved, change="moved")
+    log = VerdictLog(folder / VERDICTS)
+    assert [entry.frame for entry in log.entries()] == [moved.index(names[SHOWN])]
+    for endpoint, values in (("network", {"frame": SHOWN}), ("candidate_pairs", {"view": view()})):
+        assert "another one than in this run" in visitor.refused(endpoint, at=at, **values)
+    visitor.request("set_order", at=at, files=[each for each in moved if each != names[SHOWN]], change="left out")
+    assert log.entries() == []
+    for _ in range(2):
+        visitor.request("undo", at=at)
+    assert [entry.frame for entry in log.entries()] == [SHOWN]
+    assert visitor.request("candidate_pairs", at=at, view=view())["judged"] == 1
 
 
 def test_an_unknown_pair_cannot_be_judged(solved):
@@ -298,6 +323,17 @@ def test_a_duplicate_has_its_own_name_and_no_run(visitor):
     assert (first["undo"], first["run"]) == (None, None)
     visitor.request("set_photographs", at=first["at"], interval=31.0)
     assert visitor.request("project", at=at)["photographs"]["interval"] == 30.0
+
+
+def test_the_folder_that_is_opened_is_duplicated_below_itself(visitor, photographs_only):
+    folder = photographs_only / "my photographs"
+    visitor.request("begin", folder="my photographs/pictures", suffix=".jpg", name="mine")
+    visitor = Visitor(Workbench(folder)).enter()
+    assert visitor.request("project", at=".")["name"] == "mine"
+    first, second = (visitor.request("duplicate", at=".") for _ in range(2))
+    assert (first["at"], second["at"]) == ("my photographs copy", "my photographs copy 2")
+    assert second["files"] == first["files"] == visitor.request("project", at=".")["files"]
+    assert not (folder / second["at"] / first["at"]).exists()
 
 
 def test_the_motion_of_rods_is_that_of_their_tracks(solved):

@@ -271,8 +271,8 @@ function tool(app) {
       if (!poses || poses.frame !== app.frame) return false;
       if (ghost) {
         const [hx, hy] = handle(ghost);
+        if (Math.hypot(p[0] - ghost.x, p[1] - ghost.y) < ghost.r) { held = { x: ghost.x, y: ghost.y }; return true; } // before the handle, which is close to a small rod
         if (Math.hypot(p[0] - hx, p[1] - hy) * app.stage.view.k < 14) { held = { rotating: true }; return true; }
-        if (Math.hypot(p[0] - ghost.x, p[1] - ghost.y) < ghost.r) { held = { x: ghost.x, y: ghost.y }; return true; }
       }
       return false;
     },

@@ -46,7 +46,7 @@ export const photographs = {
         [0, 90, 180, 270].map((angle) => h("option", { value: angle, selected: angle === (section.rotation ?? 0) }, `${angle}°`)))),
       project.files.length ? [h("h2", {}, "Quality"), quality(app)] : null,
       orderSection(app),
-      h("div", { class: "row" }, h("button", { id: "duplicate", disabled: project.at === ".", title: "A new experiment beside this one with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment"),
+      h("div", { class: "row" }, h("button", { id: "duplicate", title: "A new experiment beside this one, or below the folder that was opened, with the same settings, tables and photographs, without its run", onclick: () => app.queue(async () => { app.open(await request("duplicate", { at: project.at }), "photographs"); notify(`Duplicated: ${app.project.name}`); }, "Duplicating …", "duplicate") }, "Duplicate the experiment"),
         h("button", { id: "save-script", disabled: !project.undo, title: "Everything that was done here, verdicts included, as a Python script that does it again", onclick: () => saveScript(app) }, "Save the actions as a script")),
     ];
   },
