@@ -23,7 +23,7 @@ from .outliers import replace_outliers
 from .radii import calibrate_with_radii, use_size_classes
 from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
-from .softness import find_softness
+from .softness import assume_softness, find_softness
 from .unseen import add_unseen
 
 
@@ -61,24 +61,26 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
-    remarks = [outlier_remark, gap_remark, "", "", "", ""]
+    remarks, material = [outlier_remark, gap_remark, "", "", "", "", ""], inputs.material
     if settings.calibration is not None:
-        tracks, remarks[5] = use_size_classes(inputs.material, tracks)
+        if settings.sequence.uses_positions:
+            material, remarks[6] = assume_softness(material, tracks, walls, failed)
+        tracks, remarks[5] = use_size_classes(material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
-            soft = inputs.material.stiffness not in (None, "rigid")
+            soft = material.stiffness not in (None, "rigid")
             tracks, remarks[2] = correct_camera(tracks, walls, soft=soft)
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
     if settings.calibration is not None:
-        sequence = find_softness(inputs.material, settings.sequence, tracks, walls, failed)
+        sequence = find_softness(material, settings.sequence, tracks, walls, failed)
         # Overlaps of soft grains are forces: calibration would remove them as errors.
         settings = replace(settings, sequence=sequence, calibration=None if sequence.soft else settings.calibration)
     if settings.calibration is not None:
         observed = settings.calibration, tracks, walls, overlap, failed
         if settings.sequence.uses_positions:
-            tracks, walls, calibration = calibrate_with_radii(inputs.material, *observed)
+            tracks, walls, calibration = calibrate_with_radii(material, *observed)
         else:
             tracks, walls, calibration = calibrate_tracks(*observed)
     if not nothing_seen:  # calibration has measured the noise that hides the sliding
@@ -87,7 +89,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     if settings.infer_unseen:
         tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius), settings.sequence.measured_overlap)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)
-    material, inferred = inputs.material, 0 if tracks.inferred is None else int(tracks.inferred.sum())
+    inferred = 0 if tracks.inferred is None else int(tracks.inferred.sum())
     packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
     if settings.coordination is not None:
         tuning = tuned_radii(packing, tracks, walls, settings.coordination, failed)

@@ -5,14 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment, read_tracks
 from rodsight.experiment.walls import read_walls
 from rodsight.inference.correction import softness
-from rodsight.inference.correction.softness import find_softness
+from rodsight.inference.correction.softness import assume_softness, find_softness
 from rodsight.inference.inference_settings import material_of, settings_of
 from rodsight.solver.assessment.mixture_trust import MAX_TRUST_MEASURED, MAX_TRUST_STATED
+from rodsight.solver.bodies.rods import RodMaterial
 from rodsight.solver.nlgs.chain import force_scale
+from rodsight.tracks import Tracks, TrackStatus, WallTracks
+
+from tests.solver.posterior.test_sequence_evidence import RADIUS, lattice_sequence
 
 
 @pytest.mark.parametrize(("stiffness", "soft"), [(None, False), ("rigid", False), ("estimate", True), (1e6, True)])
@@ -45,3 +50,28 @@ def test_overlaps_that_the_gaps_show_are_trusted_more(made_tracks: Path, monkeyp
     assert found.soft
     assert found.measured_overlap == 3e-5
     assert found.soft_trust == MAX_TRUST_MEASURED
+
+
+def lattice_tracks(noise: float) -> tuple[Tracks, WallTracks]:
+    """Tracks of equal rods in a lattice with noise [m], and no walls."""
+    packing, snapshots = lattice_sequence(noise)
+    f, n = len(snapshots), packing.grains.count
+    tracks = Tracks(
+        np.arange(n), packing.grains.radius, np.arange(float(f)), np.stack([each.position for each in snapshots]),
+        np.zeros((f, n)), np.full((f, n), noise), np.full((f, n), np.nan), np.full((f, n), TrackStatus.GIVEN, np.uint8),
+    )  # fmt: skip
+    return tracks, WallTracks((), np.zeros((f, 0, 2, 2)), np.zeros(0))
+
+
+def test_overlaps_are_evidence_without_walls_where_noise_hides_the_motion() -> None:
+    quiet, walls = lattice_tracks(0.002 * 2.0 * RADIUS)
+    assert assume_softness(RodMaterial(), quiet, walls, ()) == (RodMaterial(), "")
+    noisy, walls = lattice_tracks(0.008 * 2.0 * RADIUS)
+    assumed, remark = assume_softness(RodMaterial(), noisy, walls, ())
+    assert assumed.stiffness == "estimate"
+    assert 0.6 < float(remark.split()[3]) < 1.0  # % of a diameter
+    assert "rigid" in remark
+    for given in ("rigid", 1e6):
+        assert assume_softness(RodMaterial(stiffness=given), noisy, walls, ()) == (RodMaterial(stiffness=given), "")
+    between = WallTracks(("bottom",), np.zeros((noisy.frame_count, 1, 2, 2)), np.full(1, np.nan))
+    assert assume_softness(RodMaterial(), noisy, between, ()) == (RodMaterial(), "")
