@@ -35,6 +35,7 @@ from .detection.detect import Detection, DetectionSettings, detect_grains, refin
 from .detection.false_detections import describe_channels, describe_false_detections
 from .follow import Execution, FollowedWalls, ReferenceGrains, Series, follow_photographs, follow_walls
 from .fringes import measure_fringes
+from .outline.missing_discs import add_missing_discs
 from .registration.manual_poses import ManualPoses
 from .report.page import TrackingReportData
 from .settings import TrackingSettings
@@ -222,6 +223,7 @@ def _detect(
         # Dark discs on a light background are detected as well.
         dark = detect_grains(np.float32(FULL_SCALE) - first, settings)
         detection = max(detection, dark, key=lambda found: float(found.quality @ found.radius))
+        detection = add_missing_discs(first, detection)
     centres = np.stack([detection.x, detection.y], axis=1)
     within = _inside_walls(scale.to_world(centres), walls) if walls is not None else None
     messages = [*_channel_messages(experiment, settings), *describe_false_detections(detection, within, first.shape)]

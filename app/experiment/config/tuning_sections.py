@@ -46,8 +46,8 @@ class MaterialSection(Section):
     )
     stiffness: Annotated[float, above(0, 1e13)] | Literal["estimate", "rigid"] | None = key(
         "Normal stiffness of a contact per length; estimate: grains are soft, and it is found from their overlaps; "
-        "rigid: overlaps are not used; absent: decided by the gaps and, without walls, by the noise of the positions. The "
-        "overlap is taken as proportional to the force.",
+        "rigid: overlaps are not used; absent: decided by the gaps and, without walls, by the noise of the positions. "
+        "The overlap is taken as proportional to the force.",
         unit="Pa",
         default=None,
     )

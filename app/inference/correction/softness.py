@@ -53,7 +53,7 @@ def assume_softness(
         return material, ""
     sentence = (
         f"positions vary by {100 * noise:.2g} % of a diameter from photograph to photograph, so that the motion shows "
-        "little: overlaps are read as forces of soft grains (if they are hard: material.stiffness = \"rigid\")"
+        'little: overlaps are read as forces of soft grains (if they are hard: material.stiffness = "rigid")'
     )
     return replace(material, stiffness="estimate"), sentence
 

@@ -1,43 +1,48 @@
 """Tracking of discs by their rims: plain discs, and photoelastic ones whose inside changes with their forces.
 
 The rim gives x and y; the rotation stays unknown. A disc is searched for around its own extrapolated motion, then
-around its neighbours' motion, then in a wide window among the rings of no other disc. The accuracy is that of the
-circle through its edges. A photograph is not compared with any other, so errors do not accumulate.
+around its neighbours' motion. A ring whose radial slopes are much weaker than the disc's in the first photograph is not
+its rim. Lost discs are then assigned to the rings of no other disc in a wide window, so that their total motion is
+least. The accuracy is that of the circle through its edges. A photograph is not compared with any other, so errors do
+not accumulate.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from ...experiment.photographs import Image
 from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from ..correlation.correlator import Rows
-from ..correlation.noise import image_noise
-from ..correlation.splines import spline_coefficients
 from ..detection.detect import Detection
+from ..detection.rings import without_overlap
 from ..registration.manual_poses import MANUAL_SIGMA, ManualPoses
 from ..registration.neighbours import local_motion, overlaps
 from ..registration.poses import FramePoses
 from ..settings import TrackingSettings
-from .rim_kernels import COLUMNS, QUALITY, SIGMA, VIEW, X, Y, find_rings, measure_rims
+from .rim_image import RADIUS_SD, RimImage
+from .rim_kernels import QUALITY, SIGMA, VIEW
 
 # Half width of the search for a ring around its prediction, as a fraction of the radius, and at least [px].
 NEAR_FRACTION, NEAR_MIN = 0.35, 3.0
-# Half widths of the search for edges [px]: the first around a ring, the second around the circle that was then fitted.
-WINDOWS = (2.5, 1.3)
-# Standard deviation of the apparent radius about that of the first photograph [px]: edges move with the light.
-RADIUS_SD = 0.3
 # Least fraction of the rim in view with an edge on the circle, and its least ratio to that of the first photograph.
 MIN_QUALITY, MIN_QUALITY_RATIO = 0.3, 0.4
 # Least fraction of a rim that must be in view.
 MIN_VIEW = 0.55
-MAX_SIGMA = 0.5  # [px] standard deviation of a centre above which it is suspect
+# Standard deviation of a centre above which it is suspect [px], and as a fraction of the radius where that is more.
+MAX_SIGMA, MAX_RELATIVE_SIGMA = 0.5, 0.02
+# Strength of a ring over that of the disc's rim in the first photograph, and over the median of all discs: below the
+# first it is not its rim, below the second it is suspect. Of 65 photoelastic discs in motion, the rims under fringes
+# have 0.85 and more, wrong places at most 0.3.
+LEAST_STRENGTH, WEAK_STRENGTH = 0.6, 0.75
+OWN_WINDOW = 2.0  # [px] within which the strength of a disc's rim is read
+# Radii: least half width of the search for lost discs; its growth by every photograph without the disc, and its limit.
+WIDE, GROWTH, WIDEST = 2.0, 0.5, 3.0
 PLACES = 6  # rings that are measured in a wide search
 ROUNDS = 3  # of searches around the neighbours' predictions
 
@@ -52,7 +57,7 @@ class OutlineTracker:
         self.reference = np.zeros(grains.count, dtype=np.int32)
         self._shape = reference_image.shape
         rough = np.asarray(grains.radius, np.float64)
-        rim_image = _RimImage(reference_image)
+        rim_image = RimImage(reference_image)
         centre = np.stack([grains.x, grains.y], axis=1)
         # The definition of an edge differs from that of detection, by the same for all discs: radii are measured anew.
         measured = rim_image.measure(centre, rough, np.full(len(rough), np.inf))
@@ -62,6 +67,7 @@ class OutlineTracker:
         found = rim_image.measure(centre, self.radius, np.full(len(rough), RADIUS_SD))
         self._quality = np.where(np.isfinite(found[:, SIGMA]), found[:, QUALITY], 0.0)
         good = np.isfinite(found[:, SIGMA]) & (found[:, VIEW] >= MIN_VIEW)
+        self._strength = self._rim_strength(rim_image, np.where(good[:, None], found[:, :2], centre), self.radius)
         position = np.where(good[:, None], found[:, :2], centre)
         sigma = np.where(good, found[:, SIGMA], np.where(np.isfinite(grains.sigma), grains.sigma, MANUAL_SIGMA))
         status = np.where(good, TrackStatus.OK, TrackStatus.SUSPECT).astype(np.uint8)
@@ -86,7 +92,7 @@ class OutlineTracker:
         """Find the discs in the next photograph; parameters as of `Tracker.follow`."""
         if image.shape != self._shape:
             raise ValueError(f"the photograph is {image.shape}, the first one {self._shape}")
-        rim_image = _RimImage(image)
+        rim_image = RimImage(image)
         last = self._last_known(history)
         n = self.grain_count
         position, sigma = np.full((n, 2), np.nan), np.full(n, np.nan)
@@ -123,9 +129,16 @@ class OutlineTracker:
             moved, _ = local_motion(last[known], position[known] - last[known], last[rows], exclude_self=False)
             accept(rows, last[rows] + moved, near[rows], TrackStatus.OK)
             self._resolve_duplicates(position, quality, status)
-        for row in np.flatnonzero((status == TrackStatus.LOST) & ~lost):
-            self._search(rim_image, int(row), last[row], position, sigma, quality, status)
-        self._flag_inconsistent(last, position, sigma, quality, status)
+        strength = self._relative_strength(rim_image, position, status)
+        wrong = (strength < LEAST_STRENGTH) & (status != TrackStatus.GIVEN)
+        position[wrong], status[wrong] = np.nan, TrackStatus.LOST
+        rows = np.flatnonzero((status == TrackStatus.LOST) & ~lost)
+        if len(rows):
+            self._find_again(
+                rim_image, rows, last[rows], self._windows(rows, history), (position, sigma, quality, status)
+            )
+            strength = self._relative_strength(rim_image, position, status)
+        self._flag_inconsistent(last, position, sigma, quality, status, strength)
         leaving = self._leaves(last + step) | (history[-1].status == TrackStatus.OUT_OF_FRAME)
         status[(status == TrackStatus.LOST) & leaving & ~lost] = TrackStatus.OUT_OF_FRAME
         return self._poses(position, sigma, status)
@@ -143,27 +156,63 @@ class OutlineTracker:
             if status[worse] != TrackStatus.GIVEN:
                 position[worse], status[worse] = np.nan, TrackStatus.LOST
 
-    def _search(
-        self, rim_image: _RimImage, row: int, middle: Array, position: Array, sigma: Array, quality: Array,
-        status: NDArray[np.uint8],
+    def _rim_strength(self, rim_image: RimImage, position: Array, radius: Array) -> Array:
+        """Return the strength of the best ring (m,) within two pixels of each position (m, 2)."""
+        x, y = np.ascontiguousarray(position[:, 0]), np.ascontiguousarray(position[:, 1])
+        return rim_image.ring_strength(x, y, radius, np.full(len(x), OWN_WINDOW), 1.0, 1)[:, 0, 2]
+
+    def _relative_strength(self, rim_image: RimImage, position: Array, status: NDArray[np.uint8]) -> Array:
+        """Return the strength of every rim (n,) over that in the first photograph, over the median; NaN where lost."""
+        strength = np.full(self.grain_count, np.nan)
+        rows = np.flatnonzero(status != TrackStatus.LOST)
+        if len(rows) == 0:
+            return strength
+        known = self._rim_strength(rim_image, position[rows], self.radius[rows])
+        strength[rows] = known / np.maximum(self._strength[rows], 1e-6)
+        return strength / max(float(np.median(strength[rows])), 1e-6)
+
+    def _windows(self, rows: Rows, history: Sequence[FramePoses]) -> Array:
+        """Return the half widths (m,) [px] of the search for lost discs, wider the longer they are lost."""
+        seen = np.array([frame.has_pose[rows] for frame in reversed(history)])
+        gone = np.where(seen.any(axis=0), np.argmax(seen, axis=0), len(seen))
+        wide = np.maximum(self.settings.search_window, WIDE * self.radius[rows])
+        return wide * np.minimum(1.0 + GROWTH * gone, WIDEST)
+
+    def _find_again(
+        self, rim_image: RimImage, rows: Rows, last: Array, windows: Array,
+        found_discs: tuple[Array, Array, Array, NDArray[np.uint8]],
     ) -> None:  # fmt: skip
-        """Search in the widest window for a ring of no other disc."""
-        radius = self.radius[row]
+        """Assign lost discs to the rings of no other disc so that the sum of their squared motions is least."""
+        position, sigma, quality, status = found_discs
         taken = np.flatnonzero(status != TrackStatus.LOST)
-        for x, y, value in rim_image.find_strongest(middle, radius, self.settings.search_window, PLACES):
-            apart = np.hypot(position[taken, 0] - x, position[taken, 1] - y)
-            if value < 0.0 or (apart < 0.7 * (radius + self.radius[taken])).any():
-                continue
-            found = rim_image.measure(np.array([[x, y]]), np.array([radius]), np.array([RADIUS_SD]))
-            if self._convincing(np.array([row]), found)[0]:
-                position[row], sigma[row], quality[row] = found[0, :2], found[0, SIGMA], found[0, QUALITY]
+        own = self._rim_strength(rim_image, position[taken], self.radius[taken])
+        light = float(np.median(own / np.maximum(self._strength[taken], 1e-6))) if len(taken) else 1.0
+        rings: list[tuple[float, float, float]] = []  # x, y [px] and relative strength
+        for row, middle, window in zip(rows, last, windows.tolist(), strict=True):
+            radius = float(self.radius[row])
+            for x, y, value in rim_image.find_strongest(middle, radius, window, PLACES):
+                apart = np.hypot(position[taken, 0] - x, position[taken, 1] - y)
+                strength = value / max(light * float(self._strength[row]), 1e-6)
+                if strength > LEAST_STRENGTH and not (apart < 0.7 * (radius + self.radius[taken])).any():
+                    rings.append((x, y, strength))
+        if not rings:
+            return
+        ring = np.array(sorted(rings, key=lambda each: -each[2]))
+        size = float(np.median(self.radius[rows]))
+        ring = ring[without_overlap(ring[:, 0], ring[:, 1], np.full(len(ring), size), allowed=0.6)]
+        away = np.linalg.norm(ring[None, :, :2] - last[:, None], axis=2)
+        reach = windows[:, None] * np.sqrt(2.0)
+        for k, chosen in zip(*linear_sum_assignment(np.where(away < reach, away**2, 1e6 * reach**2)), strict=True):
+            row = int(rows[k])
+            found = rim_image.find(ring[chosen : chosen + 1, :2], self.radius[row : row + 1], np.full(1, OWN_WINDOW))[0]
+            if away[k, chosen] < reach[k, 0] and np.isfinite(found[SIGMA]):
+                position[row], sigma[row], quality[row] = found[:2], found[SIGMA], found[QUALITY]
                 status[row] = TrackStatus.RESCUED
-                return
 
     def _flag_inconsistent(
-        self, last: Array, position: Array, sigma: Array, quality: Array, status: NDArray[np.uint8]
+        self, last: Array, position: Array, sigma: Array, quality: Array, status: NDArray[np.uint8], strength: Array
     ) -> None:
-        """Mark discs as suspect that contradict their neighbours, overlap them, or have a large standard deviation."""
+        """Mark discs as suspect that contradict their neighbours, overlap them, or have a weak or uncertain rim."""
         rows = np.flatnonzero(status != TrackStatus.LOST)
         if len(rows) == 0:
             return
@@ -172,7 +221,8 @@ class OutlineTracker:
         inconsistent = np.linalg.norm(moved - predicted, axis=1) > 6.0 * radius_sd + 0.5 * self.radius[rows]
         pairs = overlaps(position[rows], self.radius[rows], self.settings.overlap_allowed)
         inconsistent[np.where(quality[rows[pairs[:, 0]]] < quality[rows[pairs[:, 1]]], pairs[:, 0], pairs[:, 1])] = True
-        suspect = rows[inconsistent | (sigma[rows] > MAX_SIGMA)]
+        uncertain = sigma[rows] > np.maximum(MAX_SIGMA, MAX_RELATIVE_SIGMA * self.radius[rows])
+        suspect = rows[inconsistent | uncertain | (strength[rows] < WEAK_STRENGTH)]
         status[suspect[status[suspect] != TrackStatus.GIVEN]] = TrackStatus.SUSPECT
 
     def _last_known(self, history: Sequence[FramePoses]) -> Array:
@@ -195,46 +245,3 @@ class OutlineTracker:
             np.where(missing, np.nan, position[:, 0]), np.where(missing, np.nan, position[:, 1]), unknown,
             np.where(missing, np.nan, sigma), unknown, unknown, status, self.reference,
         )  # fmt: skip
-
-
-class _RimImage:
-    """One photograph with the gradients and coefficients that rims are measured with."""
-
-    def __init__(self, image: Image) -> None:
-        image = np.ascontiguousarray(image, np.float32)
-        self._coefficients = spline_coefficients(image)
-        self._noise = image_noise(image)
-        smooth = cv2.GaussianBlur(image, (0, 0), 1.0)
-        slope: dict[str, Any] = {"ddepth": cv2.CV_32F, "ksize": 3, "scale": 1.0 / 8.0}
-        self._slope_x = np.asarray(cv2.Sobel(smooth, dx=1, dy=0, **slope), np.float32)
-        self._slope_y = np.asarray(cv2.Sobel(smooth, dx=0, dy=1, **slope), np.float32)
-
-    def measure(self, centre: Array, radius: Array, radius_sd: Array) -> Array:
-        """Measure the circles (n, 6) through the edges around centre (n, 2) [px]; see `measure_rims`."""
-        found = np.empty((len(radius), COLUMNS))
-        x, y = np.array(centre[:, 0], np.float64), np.array(centre[:, 1], np.float64)
-        for width in WINDOWS:
-            window = np.minimum(width, 0.4 * radius)
-            measure_rims(self._coefficients, x, y, radius, window, float(radius_sd[0]), self._noise, found)
-            good = np.isfinite(found[:, SIGMA])
-            x, y = np.where(good, found[:, X], x), np.where(good, found[:, Y], y)
-        return found
-
-    def find(self, guess: Array, radius: Array, window: Array) -> Array:
-        """Measure the circle (m, 6) of the best ring around each guess (m, 2) [px]."""
-        places = np.empty((len(radius), 1, 3))
-        x, y = np.ascontiguousarray(guess[:, 0]), np.ascontiguousarray(guess[:, 1])
-        find_rings(self._slope_x, self._slope_y, x, y, radius, window, 1.0, places)
-        centre = np.where(places[:, 0, 2:] > 0.0, places[:, 0, :2], guess)
-        radius_sd = np.full(len(radius), RADIUS_SD)
-        found, at_guess = self.measure(centre, radius, radius_sd), self.measure(guess, radius, radius_sd)
-        # Fringes may be stronger than the rim; the circle at the guess is then the better one.
-        return np.where((at_guess[:, QUALITY] > found[:, QUALITY])[:, None], at_guess, found)
-
-    def find_strongest(self, middle: Array, radius: float, window: float, count: int) -> Array:
-        """Find the best rings (c, 3) in a wide window: x, y [px], mean radial slope."""
-        places = np.empty((1, count, 3))
-        x, y = middle[:1].astype(np.float64), middle[1:2].astype(np.float64)
-        step = max(1.0, 0.08 * radius)
-        find_rings(self._slope_x, self._slope_y, x, y, np.array([radius]), np.array([window]), step, places)
-        return places[0]

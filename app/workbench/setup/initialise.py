@@ -15,6 +15,7 @@ from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
+from ...tracking.outline.missing_discs import add_missing_discs
 from ...tracking.outline.outline_tracker import OutlineTracker
 from ...tracking.settings import TrackingSettings
 from ...tracking.tracker import Tracker
@@ -118,7 +119,10 @@ def _detect(
         image = selection.cut(read_photograph(photographs.files[0], channel=view.channel))  # type: ignore[arg-type]
         sizes = view.radius_range if flags.radius_range is None else flags.radius_range
         lit = np.float32(FULL_SCALE) - image if view.dark else image
-        tried.append((view, edits.detect(lit, validated, flags.radii, sizes)))
+        detection = edits.detect(lit, validated, flags.radii, sizes)
+        if flags.follow != "texture":
+            detection = add_missing_discs(image, detection)
+        tried.append((view, detection))
         if tried[-1][1].count >= KEPT * view.count:
             break
     view, detection = max(tried, key=lambda each: float(each[1].quality @ each[1].radius))

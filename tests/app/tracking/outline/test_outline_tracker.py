@@ -83,6 +83,30 @@ def test_a_disc_that_is_taken_away_is_lost_and_found_again(discs: Discs) -> None
     assert abs(again.x[44] - x[44] - 1.0) < 0.2
 
 
+def test_lost_discs_are_assigned_to_the_rings_of_no_other_disc(discs: Discs) -> None:
+    x, y, radius = discs
+    tracker = make_tracker(WHITE, discs)
+    moved = np.isin(np.arange(len(x)), (0, 9, 90))  # three corners jump outwards by more than a radius, one returns
+    outwards = 28.0 * np.stack([np.sign(x - x.mean()), np.sign(y - y.mean())]) * moved
+    at = np.stack([x, y]) + outwards
+    followed = tracker.follow(photograph_discs(WHITE, SHAPE, *at, radius, 0.0 * x, 2), [tracker.first()])
+    assert followed.has_pose.all()
+    assert np.hypot(followed.x - at[0], followed.y - at[1]).max() < 0.5
+    assert (followed.status[~moved] == TrackStatus.OK).all()
+    assert not np.isin(followed.status[moved], (TrackStatus.OK, TrackStatus.LOST)).any()
+
+
+def test_a_place_with_a_weak_ring_is_no_pose(discs: Discs) -> None:
+    x, y, radius = discs
+    tracker = make_tracker(WHITE, discs)
+    faint = photograph_discs(WHITE, SHAPE, x[:1], y[:1], radius[:1], np.zeros(1), 2) - WHITE.outside
+    there = np.arange(len(x)) != 0
+    image = photograph_discs(WHITE, SHAPE, x[there], y[there], radius[there], np.zeros(there.sum()), 3)
+    followed = tracker.follow((image + 0.12 * faint).astype(np.float32), [tracker.first()])
+    assert followed.status[0] == TrackStatus.LOST
+    assert (followed.status[1:] == TrackStatus.OK).all()
+
+
 def test_a_blank_photograph_shows_no_disc(discs: Discs) -> None:
     tracker = make_tracker(WHITE, discs)
     blank = np.random.default_rng(1).normal(90.0, 2.0, SHAPE).astype(np.float32)

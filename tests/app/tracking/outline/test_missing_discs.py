@@ -1,0 +1,54 @@
+"""Discs that detection has missed are added in the sizes of those found, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from rodsight.tracking.detection.detect import Detection
+from rodsight.tracking.outline.missing_discs import add_missing_discs
+
+from tests.app.tracking.outline.discs import KINDS, lay_row_by_row, photograph_discs
+
+RADII = (13.0, 18.0)  # [px]
+SHAPE = (420, 420)
+MISSED = np.array([3, 17, 44, 55, 56, 71, 90])
+
+
+def detection_of(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> Detection:
+    return Detection(x, y, radius, np.full(len(x), 0.1), np.full(len(x), 0.9))
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_missed_discs_are_added_with_their_sizes(kind: str) -> None:
+    x, y, radius = lay_row_by_row(10, 10, RADII)
+    force = np.random.default_rng(3).uniform(0.2, 1.5, len(x))
+    image = photograph_discs(KINDS[kind], SHAPE, x, y, radius, force, 1)
+    known = ~np.isin(np.arange(len(x)), MISSED)
+    found = add_missing_discs(image, detection_of(x[known], y[known], radius[known]))
+    assert found.count == len(x)
+    assert (np.diff(found.y) >= 0.0).all()
+    for row in MISSED:
+        nearest = np.hypot(found.x - x[row], found.y - y[row]).argmin()
+        assert np.hypot(found.x[nearest] - x[row], found.y[nearest] - y[row]) < 1.0
+        assert found.radius[nearest] == radius[row]
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_nothing_is_added_where_no_disc_is(kind: str) -> None:
+    x, y, radius = lay_row_by_row(10, 10, RADII)
+    there = ~np.isin(np.arange(len(x)), MISSED)  # holes as large as a disc
+    discs = x[there], y[there], radius[there]
+    image = photograph_discs(KINDS[kind], SHAPE, *discs, np.full(there.sum(), 0.8), 1)
+    given = detection_of(*discs)
+    found = add_missing_discs(image, given)
+    assert found.count == given.count
+
+
+def test_discs_without_sizes_stay_as_they_are() -> None:
+    x, y, _ = lay_row_by_row(10, 10, RADII)
+    given = detection_of(x, y, np.linspace(5.0, 20.0, len(x)))
+    found = add_missing_discs(np.zeros(SHAPE, np.float32), given)
+    for each in fields(Detection):
+        np.testing.assert_array_equal(getattr(found, each.name), getattr(given, each.name))
