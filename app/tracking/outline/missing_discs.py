@@ -8,6 +8,7 @@ radial slopes are as strong as those of the discs that were found, in a place wh
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...experiment.photographs import Image
 from ...solver.bodies.grains import Array
@@ -78,7 +79,7 @@ def add_missing_discs(image: Image, found: Detection) -> Detection:
     return Detection(*(each[order] for each in columns))
 
 
-def _find_rings(rims: RimImage, found: Detection, rows: Array) -> Array:
+def _find_rings(rims: RimImage, found: Detection, rows: NDArray[np.intp]) -> Array:
     """Find rings x, y, radius [px], relative strength (c, 4) of the size of the discs `rows`, apart from all discs."""
     radius = float(np.median(found.radius[rows]))
     step = float(np.clip(0.025 * radius, 1.0, 2.0))
