@@ -15,11 +15,16 @@ from ..process.signals import Stopped, stop_on_signals
 from .unknown_words import refuse_unknown_words
 
 SHELLS = ("bash", "zsh", "tcsh")
+# Of linear algebra, read where it is loaded; `process.machine.linear_algebra` says why one thread, and limits callers
+# that have loaded it before.
+THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Parse the arguments, run one command, exit."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
     for stream in (sys.stdout, sys.stderr):  # unknown characters are replaced
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")

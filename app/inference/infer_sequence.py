@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..process.machine.linear_algebra import one_thread_each
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
 from ..solver.assessment.intervals.statistic_intervals import widen_for_friction
@@ -31,6 +32,7 @@ from .solve_frames import InferenceObserver, solve_frames, summarise_frame, with
 FIRST_FRAME = "first photograph"  # stage in which the first frame is estimated from all others
 
 
+@one_thread_each
 def infer_sequence(
     inputs: Inputs,
     observer: InferenceObserver | None = None,

@@ -28,7 +28,7 @@ from .packed_arrays import pack, unpack
 T = TypeVar("T")
 CHECKSUM = 32  # bytes at the beginning of a file
 FORMAT = "packed arrays"  # part of the checksum: files of an earlier version in another format are ignored
-CACHE_SIZE = 1 << 24  # [bytes] of recent frames: friction and penalties read each again
+CACHE_SIZE = 1 << 25  # [bytes] of recent frames: friction and penalties read each again
 
 
 class Checkpoint:

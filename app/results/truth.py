@@ -66,15 +66,16 @@ def read_truth(
     body = {int(each): row for row, each in enumerate(ids) if each >= 0}
     wall = {name: len(ids) + row for row, name in enumerate(walls)}
     pair = np.empty((len(table), 2), np.int64)
+    pair[:, 0] = [body.get(each, -1) for each in i.tolist()]
+    named = {str(each): row for each, row in body.items()} | wall
     for row, text in enumerate(table.text("j")):
-        pair[row, 0] = body.get(int(i[row]), -1)
-        if text in wall:
-            pair[row, 1] = wall[text]
-        else:
+        found = named.get(text)
+        if found is None:
             try:
-                pair[row, 1] = body.get(int(text), -1)
+                found = body.get(int(text), -1)  # such as 007
             except ValueError:
                 raise table.error(row, "j", "is neither a grain's id nor the name of a wall") from None
+        pair[row, 1] = found
     if not np.any(ids < 0):  # every grain has an id in the truth, so that an unknown id is a mistake
         for column, values in (("i", pair[:, 0]), ("j", pair[:, 1])):
             unknown = np.flatnonzero(values < 0)

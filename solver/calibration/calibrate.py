@@ -31,6 +31,7 @@ EXCESSIVE_NOISE = 1.3  # measured over stated noise above which the verdict cont
 MISJUDGED_NOISE = 2.0  # … above which the calibration is repeated with the measured noise
 TOLERATED_IMPOSSIBLE = 0.02  # fraction of overlaps that are impossible above which the verdict contains a warning
 EXCESSIVE_WIDTH = 2.0  # width of the errors by the overlaps, over the prior, above which the verdict contains a warning
+MOST_FRAMES = 64  # photographs that are used, evenly spaced: with more the errors are known no better than they matter
 LENS_FRAMES = 16  # photographs used to decide whether the lens is corrected
 LENS_SAMPLES = 30  # draws for its standard deviation there
 POSTERIOR_SAMPLES = 100  # draws for each standard deviation: accurate to 7 %
@@ -180,6 +181,7 @@ def calibrate(
     if radius_class is not None and radius_class.shape != sequence.radius.shape:
         raise ValueError(f"radius_class must name a class for each of the {sequence.grain_count} grains")
     limits = default_priors(sequence) if priors is None else priors
+    sequence = sequence.thinned(MOST_FRAMES)
     found = _calibrate(sequence, limits, rng, typical_overlap, radius_class, 1.0)
     if found.noise_factor < MISJUDGED_NOISE:
         return found

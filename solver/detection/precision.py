@@ -19,7 +19,9 @@ from ..contacts.contacts import detect_contacts, measure_contacts
 
 REACH = 0.02  # [mean diameter] greatest gap of a pair that is used
 MIN_GAPS = 200  # fewer give no estimate
-TRIPLES = 24  # number of photographs used, evenly spaced
+TRIPLES = 24  # number of photographs used, evenly spaced: at most so many, …
+POSES = 10_000  # … and as many as show so many grains, of which the standard deviation is known within 1 %
+FEWEST_TRIPLES = 4
 NORMAL = 1.4826  # standard deviation over median absolute deviation
 VARIANCE_ERROR = 0.1  # relative uncertainty of the noise variance that is subtracted
 CONTRADICTION = 1.3  # ratio of measured and stated precision above which the measured one is used
@@ -48,7 +50,7 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     """
     if len(snapshots) < 3:
         return None
-    middles = np.unique(np.linspace(1, len(snapshots) - 2, min(TRIPLES, len(snapshots) - 2)).astype(int))
+    middles = np.unique(np.linspace(1, len(snapshots) - 2, min(_triple_count(grains), len(snapshots) - 2)).astype(int))
     gaps = np.concatenate([_consecutive_gaps(grains, snapshots[k - 1 : k + 2]) for k in middles], axis=1)
     mean = gaps.mean(axis=0)
     gaps, mean = gaps[:, mean <= 0.0], mean[mean <= 0.0]
@@ -57,6 +59,10 @@ def measure_precision(grains: Grains, snapshots: Sequence[Snapshot]) -> Precisio
     sigma = NORMAL * float(np.median(np.abs(gaps[0] - 2.0 * gaps[1] + gaps[2]))) / np.sqrt(12.0)
     overlap = float(np.sqrt(max(np.mean(mean**2) - 2.0 / 3.0 * sigma**2, 0.0)))
     return Precision(sigma, overlap, len(mean))
+
+
+def _triple_count(grains: Grains) -> int:
+    return min(max(POSES // max(grains.count, 1), FEWEST_TRIPLES), TRIPLES)
 
 
 def contradiction(found: Precision, stated: float) -> float:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import KDTree
+from numba import njit
 
 from ..bodies.grains import Array
 
@@ -37,11 +39,9 @@ def correlate_in_space(position: Float[Array, "n 2"], vector: Float[Array, "n 2"
     square = float(np.mean(np.sum(field**2, axis=1)))
     if not square > 0.0:
         return result
-    i, j = KDTree(place).query_pairs(float(DISTANCE_EDGES[-1]), output_type="ndarray").T
-    distance = np.linalg.norm(place[i] - place[j], axis=1)
-    number = np.clip(np.digitize(distance, DISTANCE_EDGES) - 1, 0, DISTANCE_BINS - 1)
-    pairs = np.bincount(number, minlength=DISTANCE_BINS)
-    total = np.bincount(number, np.einsum("pk,pk->p", field[i], field[j]), DISTANCE_BINS)
+    pairs, total = np.zeros(DISTANCE_BINS, np.int64), np.zeros(DISTANCE_BINS)
+    order = np.argsort(place[:, 0], kind="stable")
+    _add_pairs(place[order], field[order], float(DISTANCE_EDGES[-1]), pairs, total)
     enough = pairs >= FEWEST_PAIRS
     result[enough] = total[enough] / (pairs[enough] * square)
     return result
@@ -57,3 +57,21 @@ def correlation_length(correlation: Array) -> float:
         return float("nan")
     k = int(below[0])
     return float(r[k - 1] + (r[k] - r[k - 1]) * (c[k - 1] - np.exp(-1.0)) / (c[k - 1] - c[k]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_pairs(place, field, reach, pairs, total):  # type: ignore[no-untyped-def]
+    """Count the pairs closer than `reach` in bins of equal width and add up their products; ascending place[:, 0]."""
+    square, scale = reach * reach, len(pairs) / reach
+    for a in range(len(place)):
+        x, y, u, v = place[a, 0], place[a, 1], field[a, 0], field[a, 1]
+        for b in range(a + 1, len(place)):
+            dx = place[b, 0] - x
+            if dx > reach:
+                break
+            dy = place[b, 1] - y
+            distance = dx * dx + dy * dy
+            if distance < square:
+                k = int(scale * math.sqrt(distance))
+                pairs[k] += 1
+                total[k] += u * field[b, 0] + v * field[b, 1]

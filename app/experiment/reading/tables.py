@@ -77,8 +77,13 @@ class Table:
         """Return the numbers of a column that may be absent or have empty cells (m,), NaN there."""
         if column not in self._columns:
             return np.full(len(self), np.nan)
-        if "" not in self._columns[column]:
-            return self.numbers(column)
+        try:
+            values = np.fromiter(map(float, self._coded(column)), np.float64, len(self))
+        except ValueError:  # of an empty cell, or of a wrong one, which is named below
+            pass
+        else:
+            self._refuse_large(values, np.arange(len(self)), column)
+            return values
         filled = np.flatnonzero(np.fromiter((text != "" for text in self._columns[column]), np.bool_, len(self)))
         values = np.full(len(self), np.nan)
         values[filled] = [self._number(float, column, int(row)) for row in filled]

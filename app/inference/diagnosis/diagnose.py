@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...process.errors import UndeterminedError
+from ...process.machine.linear_algebra import one_thread_each
 from ...process.progress import Progress, no_progress
 from ...results.finding import Finding
 from ...results.results import Results
@@ -46,6 +47,7 @@ LEAST_GRAINS = (
 )
 
 
+@one_thread_each
 def diagnose(
     inputs: Inputs,
     trial: Trial | None,
@@ -112,6 +114,7 @@ def _compare_rivals(inputs: Inputs, trial: Trial, progress: Progress, first: int
     return [finding("not_explained", trial.worst)] if trial.expected[0] < UNEXPLAINED and trial.worst else []
 
 
+@one_thread_each
 def diagnose_solved(inputs: Inputs, results: Results, progress: Progress = no_progress) -> list[Finding]:
     """Diagnose a solved test, on the photographs whose forces are expected to be worst.
 

@@ -30,6 +30,7 @@ LAGGING = 2.0  # times what rods may leave or penetrate a wall: walls off by so 
 BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
 MISSING = 0.03  # fraction of the poses that may be missing
 INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
+ROTATING_POSES, FEWEST_STEPS = 6000, 4  # poses, and steps between photographs, whose rotations are compared
 SEVERAL = 6  # rods that stand beyond a wall at least: with fewer, their radii may be wrong
 NEAREST = 3  # rods at a wall: the distance of the third nearest is judged
 
@@ -47,14 +48,10 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
         return []
     if not stated[known].any():
         return [finding("rotation_zero", "no rod rotates in any photograph")]
-    inferred = np.diff(
-        fill_unknown_rotations(
-            tracks.radius, tracks.position, np.full_like(tracks.rotation, np.nan), tracks.present, walls.endpoints,
-            side=walls.side, cell=walls.cell,
-        ),
-        axis=0,
-    )  # fmt: skip
-    known &= np.isfinite(inferred)
+    steps = min(max(ROTATING_POSES // tracks.grain_count, FEWEST_STEPS), len(stated))
+    chosen = np.unique(np.linspace(0, len(stated) - 1, steps).round().astype(int))
+    inferred = np.array([_rolled(tracks, walls, k) for k in chosen.tolist()])
+    stated, known = stated[chosen], known[chosen] & np.isfinite(inferred)
     stated, inferred = stated[known], inferred[known]
     if len(stated) < 2 or not inferred.any():
         return []
@@ -70,6 +67,16 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     if ratio > DEGREES:
         return [finding("rotation_in_degrees", f"rods rotate {ratio:.0f} times as much as rolling leads to expect")]
     return []
+
+
+def _rolled(tracks: Tracks, walls: WallTracks, k: int) -> Array:
+    """Rotations (n,) [rad] from photograph k to the next that rolling among the neighbours leads to expect."""
+    part = slice(k, k + 2)
+    filled = fill_unknown_rotations(
+        tracks.radius, tracks.position[part], np.full_like(tracks.rotation[part], np.nan), tracks.present[part],
+        walls.endpoints[part], side=walls.side, cell=None if walls.cell is None else walls.cell[part],
+    )  # fmt: skip
+    return filled[1] - filled[0]
 
 
 def examine_order(tracks: Tracks) -> list[Finding]:

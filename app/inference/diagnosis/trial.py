@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...process.errors import UndeterminedError
+from ...process.machine.linear_algebra import one_thread_each
 from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.expected_correlation import correlation_score, expected_interval
 from ...solver.assessment.penalties import assess, find_penalties
@@ -57,6 +58,7 @@ class Trial:
         return max(found).words if found else ""
 
 
+@one_thread_each
 def solve_trial(
     inputs: Inputs, photographs: int = TRIAL_PHOTOGRAPHS, observer: InferenceObserver | None = None, *, first: int = 0
 ) -> Trial | None:

@@ -35,9 +35,12 @@ class Extents:
     rows: Columns  # offsets and counts
 
 
-def rows_of_frame(forces: FrameForces, statistics: FrameStatistics) -> Columns:
-    """Return the rows of one frame for each column; columns that the frame lacks are left out."""
-    history = round_sweeps(forces.history)
+def rows_of_frame(forces: FrameForces, statistics: FrameStatistics, *, exact: bool = False) -> Columns:
+    """Return the rows of one frame for each column; columns that the frame lacks are left out.
+
+    exact: forces of sweeps are not rounded, for what depends on the lengths alone.
+    """
+    history = forces.history if exact else round_sweeps(forces.history)
     if history is not forces.history:
         forces = replace(forces, history=history)
     measured = measured_sweeps(forces.history)

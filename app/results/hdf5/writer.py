@@ -49,7 +49,7 @@ def write_results(store: h5py.File, results: Results) -> None:
 
     Raises ValueError where sizes disagree.
     """
-    extents = measure_extents(_pieces(results))
+    extents = measure_extents(_pieces(results, exact=True))
     whole = _columns_of_run(results) | extents.rows
     _write_scales(store, _shapes(whole) | extents.shape, whole)
     _write_whole(store, whole)
@@ -104,9 +104,9 @@ def _columns_of_run(results: Results) -> Columns:
     return columns
 
 
-def _pieces(results: Results) -> Iterator[Columns]:
+def _pieces(results: Results, *, exact: bool = False) -> Iterator[Columns]:
     for forces, statistics in zip(results.frames, results.statistics, strict=True):
-        yield rows_of_frame(forces, statistics)
+        yield rows_of_frame(forces, statistics, exact=exact)
 
 
 def _as_stored(entry: Entry, values: np.ndarray) -> np.ndarray:

@@ -1,0 +1,44 @@
+"""Linear algebra uses one thread while forces are inferred, and in every process of the command."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from rodsight.process.machine.linear_algebra import one_thread_each
+from threadpoolctl import threadpool_info, threadpool_limits
+
+
+def _threads() -> set[int]:
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+def test_a_decorated_function_has_one_thread_and_leaves_as_many_as_before() -> None:
+    with threadpool_limits(2, user_api="blas"):
+        before = _threads()
+        assert one_thread_each(_threads)() == {1}
+        assert _threads() == before != {1}
+
+
+def test_forces_are_inferred_with_one_thread() -> None:
+    from rodsight.inference.diagnosis.diagnose import diagnose, diagnose_solved
+    from rodsight.inference.diagnosis.trial import solve_trial
+    from rodsight.inference.infer_sequence import infer_sequence
+
+    for function in (infer_sequence, solve_trial, diagnose, diagnose_solved):
+        assert hasattr(function, "__wrapped__")
+
+
+def test_the_command_loads_linear_algebra_with_one_thread_unless_the_user_chose() -> None:
+    code = (
+        "import contextlib, os; from rodsight.cli.main import main\n"
+        "with contextlib.suppress(SystemExit): main(['--version'])\n"
+        "print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    for chosen, expected in (({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")):
+        environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"} | chosen
+        found = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+        )  # fmt: skip
+        assert found.stdout.split()[-1] == expected
