@@ -15,7 +15,7 @@ from ..process.signals import Stopped, stop_on_signals
 from .unknown_words import refuse_unknown_words
 
 SHELLS = ("bash", "zsh", "tcsh")
-# Of linear algebra, read where it is loaded; `process.machine.linear_algebra` says why one thread, and limits callers
+# Of linear algebra, read where it is loaded; `process.machine.linear_algebra` states why one thread, and limits callers
 # that have loaded it before.
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
