@@ -7,6 +7,7 @@ same container is looked up; and the holder renews the file's time, a lease that
 
 from __future__ import annotations
 
+import _thread
 import json
 import os
 import socket
@@ -78,24 +79,29 @@ def hold_folder(folder: Path, notify: Callable[[str], None]) -> Iterator[None]:
     Raises
     ------
     RunError
-        Another process holds the folder.
+        Another process holds the folder, or took it over while this one was suspended for longer than its lease.
     """
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     lock = folder / LOCK
     handle, dead = _take(lock)
-    ended = threading.Event()
-    renewal = threading.Thread(target=_renew, args=(handle, ended), daemon=True)
+    ended, taken = threading.Event(), threading.Event()
+    renewal = threading.Thread(target=_renew, args=(handle, ended, taken), daemon=True)
     _held.add(handle)
     renewal.start()
     try:
         if dead is not None:
             notify(f"Process {dead.process} ended without releasing this folder: its lock was taken over.")
         yield
+    except KeyboardInterrupt:
+        if taken.is_set():
+            raise RunError(f"{folder}: another process took it over while this one was suspended") from None
+        raise
     finally:
         ended.set()
         renewal.join()
-        lock.unlink(missing_ok=True)
+        if not _is_taken(handle):
+            lock.unlink(missing_ok=True)
         _held.discard(handle)
         os.close(handle)
         with suppress(OSError):  # not empty
@@ -158,10 +164,24 @@ def _lock(handle: int) -> bool:
     return True
 
 
-def _renew(handle: int, ended: threading.Event) -> None:
+def _renew(handle: int, ended: threading.Event, taken: threading.Event) -> None:
+    """Renew the lease until the end of the block; interrupt the block where another process took the folder over."""
     while not ended.wait(RENEWAL):
+        if _is_taken(handle):
+            taken.set()
+            _thread.interrupt_main()
+            return
         with suppress(OSError):  # the disk is away for a while
             os.utime(handle)
+
+
+def _is_taken(handle: int) -> bool:
+    """Whether another process stands in a lock that this one took: its lease expired while this one was suspended."""
+    try:
+        holder = _read(handle)
+    except OSError:  # the disk is away for a while
+        return False
+    return holder is not None and holder != Holder.this()
 
 
 def _read(handle: int) -> Holder | None:

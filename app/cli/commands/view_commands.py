@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 import threading
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -264,11 +263,8 @@ def _serve(files: list[Path], console: Console) -> int:
 
 
 def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) -> int:
-    """List the recordings of a folder by their properties and open them together. Exit status 0.
-
-    Waits for the viewer, since this process serves the catalogue.
-    """
-    from ...recording.archive.catalogue import can_serve, find_recordings, read_catalogue, serve, show_catalogue
+    """List the recordings of a folder by their properties and open them together. Exit status 0."""
+    from ...recording.archive.catalogue import find_recordings, read_catalogue, show_recordings
     from ...recording.viewing.viewer import has_display
 
     files = find_recordings(folder)
@@ -284,15 +280,11 @@ def _view_folder(folder: Path, *, web: bool, only_list: bool, console: Console) 
         return 0
     if web:
         return _serve(files, console)
-    with ExitStack() as stack:
-        if can_serve():
-            shown = stack.enter_context(serve(files))
-        else:
-            shown = files
-            print_line(console, "Opened side by side. pip install 'rodsight[catalog]' adds this table to the viewer.")
-        viewer = show_catalogue(shown)
-        stack.callback(viewer.terminate)
+    viewer = show_recordings(files)
+    try:
         viewer.wait()
+    finally:
+        viewer.terminate()
     return 0
 
 

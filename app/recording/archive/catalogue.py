@@ -1,17 +1,10 @@
-"""A folder of recordings as a catalogue: their properties as a table, or in the viewer.
-
-The table is read from the files. The viewer shows the same properties as columns if Rerun's catalogue server can
-register the blueprint, which requires the package `datafusion` (extra `catalog`).
-"""
+"""A folder of recordings as a catalogue: their properties as a table."""
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
-import tempfile
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,14 +12,10 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from ..files.properties import EXPERIMENT, OUTCOME
-from ..look import entities
 from ..parts import is_later_part
-from ..tabs.blueprint import make_blueprint
-from ..tabs.layout_property import read_layout
 from ..viewing.viewer import viewer_binary, viewer_environment
 
 RECORDING = "recording.rrd"  # of a run, in a folder of its own
-DATASET = "runs"
 # Side files of another recording, and recordings that are being written.
 _SIDE_FILES = ("recording-sweeps.rrd", "recording-live.rrd")
 
@@ -77,42 +66,9 @@ def read_properties(file: Path) -> dict[str, Value]:
     return found
 
 
-def can_serve() -> bool:
-    """Return whether the catalogue server can register a blueprint in this environment."""
-    return importlib.util.find_spec("datafusion") is not None
-
-
-@contextmanager
-def serve(files: Sequence[Path]) -> Iterator[str]:
-    """Serve recordings as a catalogue on this machine while the block runs.
-
-    Every recording opens with the tabs and the view bounds of the first one.
-
-    Yields
-    ------
-    str
-        The address of the table of recordings.
-
-    Raises
-    ------
-    ImportError
-        If `datafusion` is not installed.
-    """
-    with (
-        rr.server.Server(host="127.0.0.1", datasets={DATASET: [str(file.resolve()) for file in files]}) as server,
-        tempfile.TemporaryDirectory(prefix="rodsight-") as folder,
-    ):
-        blueprint = Path(folder) / "tabs.rbl"
-        make_blueprint(read_layout(files[0])).save(entities.APPLICATION_ID, str(blueprint))
-        dataset = server.client().get_dataset(DATASET)
-        dataset.register_blueprint(blueprint.resolve().as_uri())
-        yield f"{server.url()}/dataset/{dataset.id}"
-
-
-def show_catalogue(address: str | Sequence[Path]) -> subprocess.Popen[bytes]:
-    """Open the viewer on the address of a catalogue, or on several recordings at once, and return its process."""
-    shown = [address] if isinstance(address, str) else [str(file) for file in address]
+def show_recordings(files: Sequence[Path]) -> subprocess.Popen[bytes]:
+    """Open the viewer on several recordings at once, and return its process."""
     return subprocess.Popen(
-        [str(viewer_binary()), "--hide-welcome-screen", *shown],
+        [str(viewer_binary()), "--hide-welcome-screen", *map(str, files)],
         env=viewer_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip

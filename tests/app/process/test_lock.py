@@ -95,6 +95,20 @@ def test_the_lease_is_renewed_while_the_folder_is_held(tmp_path, monkeypatch):
         assert (tmp_path / LOCK).stat().st_mtime > 0.0
 
 
+def test_a_process_that_was_suspended_for_longer_than_its_lease_ends_and_leaves_the_new_lock(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "RENEWAL", 0.01)
+
+    def lose_it() -> None:
+        with hold_folder(tmp_path, print):
+            left(tmp_path, 0.0, boot="another", host="far")
+            locks.threading.Event().wait(20.0)
+            pytest.fail("nothing interrupted this block")
+
+    with pytest.raises(RunError, match="took it over while this one was suspended"):
+        lose_it()
+    assert json.loads((tmp_path / LOCK).read_text())["host"] == "far"
+
+
 def test_a_process_holds_a_folder_once(tmp_path):
     with (
         hold_folder(tmp_path, print),

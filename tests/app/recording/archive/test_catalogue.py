@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 from rodsight.cli.main import main
-from rodsight.recording.archive.catalogue import can_serve, find_recordings, read_properties, serve
+from rodsight.recording.archive.catalogue import find_recordings, read_properties
 from rodsight.recording.files.finished_run import write_recording
 from rodsight.recording.viewing.recording_server import RecordingServer
 
@@ -84,21 +84,6 @@ def test_a_damaged_recording_does_not_hide_the_others(folder, tmp_path, capsys):
     output = capsys.readouterr().out
     assert ["good.rrd", "fake"] in [line.split()[:2] for line in output.splitlines()]
     assert f"--repair {tmp_path / 'bad.rrd'}" in output.replace("\n", "")
-
-
-@pytest.mark.screen
-def test_the_catalogue_server_has_the_properties_as_columns_and_the_tabs_as_blueprint(folder):
-    if not can_serve():
-        pytest.skip("no datafusion: pip install 'rodsight[catalog]'")
-    from rerun.catalog import CatalogClient
-
-    with serve(find_recordings(folder)) as address:
-        dataset = CatalogClient(address.split("/dataset/")[0]).get_dataset("runs")
-        table = dataset.segment_table().to_pydict()
-        frames = sorted(value[0] for value in table["property:experiment:frames"])
-        assert frames == [1, 3, 4]
-        assert "property:outcome:settled_share" in table
-        assert dataset.default_blueprint() is not None
 
 
 @pytest.mark.slow
