@@ -84,7 +84,9 @@ def infer_sequence(
     )
     widened = LazySequence(count, lambda k: _widen_statistics(sequence, statistics[k], assessed[k], check))
     kinematics = _measure_kinematics(sequence)
-    return replace(unsolved, frames=assessed, statistics=widened, friction_check=check, kinematics=kinematics)
+    return replace(
+        unsolved, frames=assessed, statistics=widened, friction_check=check, read_kinematics=lambda: kinematics
+    )
 
 
 def _measure_kinematics(sequence: CorrectedSequence) -> SequenceKinematics | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -48,6 +48,10 @@ class TruthContacts:
         return tuple((key[a:b], force[a:b]) for a, b in pairwise(bounds))
 
 
+def _none() -> None:
+    """No kinematics."""
+
+
 @dataclass(frozen=True, slots=True)
 class Results:
     """All results of one run."""
@@ -65,9 +69,14 @@ class Results:
     radius_tuning: RadiusTuning | None = None  # None: not requested
     boundary: Boundary | None = None  # None: used as given
     base_friction: float = 0.0  # coefficient of the base that was used; 0: none
-    kinematics: SequenceKinematics | None = None  # None: fewer than two frames, or not all are there
+    read_kinematics: Callable[[], SequenceKinematics | None] = _none  # on every access: it is as long as the tracks
     diagnosis: tuple[Finding, ...] = ()  # causes of wrong forces that the evidence supports
     ensemble_size: int = 0  # resampled sequences behind the standard deviations of the forces; 0: free formula
+
+    @property
+    def kinematics(self) -> SequenceKinematics | None:
+        """Motion beyond the mean field; None: fewer than two frames, or not all are there. A file is read each time."""
+        return self.read_kinematics()
 
     def contact_friction(self, frame: int) -> Array:
         """Coefficient of friction used at every contact of a frame (c,); files of earlier versions hold one for all."""

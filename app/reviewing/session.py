@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from .reviewed_run import ReviewedRun
 from .rounding import rounded, rounded_one
 
 CROP_WIDTHS = (4.4, 2.2, 1.0)  # width of the magnified crop in mean grain diameters, one for each zoom
+KEPT_FRAMES = 16  # whose candidate pairs and queues stay in memory
 MOST_LISTED = 5000  # candidate pairs in the list of a frame
 _OUTCOMES = {Verdict.CONTACT: YES, Verdict.NO_CONTACT: NO, Verdict.UNSURE: UNJUDGED}
 _ESTIMATE_SEED = 7  # the same verdicts give the same interval
@@ -63,8 +65,8 @@ class ReviewSession:
         self.log = run.log
         self.bodies = run.bodies
         self._rows = self.bodies.rows()
-        self._candidates: dict[int, CandidatePairs] = {}
-        self._queues: dict[tuple[Order, int | None, bool], tuple[Queue, dict[tuple[int, int], int]]] = {}
+        self.candidates = lru_cache(KEPT_FRAMES)(self._find_candidates)  # of a frame of the run
+        self._queue_of = lru_cache(KEPT_FRAMES)(self._make_queue)
         self._detected: dict[int, dict[Pair, bool]] = {}
         self._lock = threading.RLock()
 
@@ -238,12 +240,8 @@ class ReviewSession:
                 values |= more
         return listed
 
-    def candidates(self, frame: int) -> CandidatePairs:
-        """Return the candidate pairs of a frame of the run."""
-        with self._lock:
-            if frame not in self._candidates:
-                self._candidates[frame] = find_candidate_pairs(self.results, frame, self.run.threshold)
-            return self._candidates[frame]
+    def _find_candidates(self, frame: int) -> CandidatePairs:
+        return find_candidate_pairs(self.results, frame, self.run.threshold)
 
     def _append(self, view: View, frame: int, key: int, verdict: Verdict, seconds: float, origin: Origin) -> None:
         """Write a verdict to the log, and the force of its pair beside it."""
@@ -254,20 +252,18 @@ class ReviewSession:
 
     def _queue(self, view: View) -> tuple[Queue, dict[tuple[int, int], int]]:
         """The queue of a frame or of the sample, with the place of every pair in it."""
-        frame = None if view.order is Order.SAMPLE else self._frame(view.frame)
-        name = view.order, frame, view.blind
-        with self._lock:
-            if name not in self._queues:
-                if frame is None:
-                    every = [self.candidates(k) for k in range(len(self.results.frames))]
-                    queue = sampled_queue(every, blind=view.blind)
-                elif view.order is Order.FRAME:
-                    queue = frame_queue(self.candidates(frame), blind=view.blind)
-                else:
-                    queue = influence_queue(self.results, self.candidates(frame), blind=view.blind)
-                pairs = zip(queue.frame.tolist(), queue.key.tolist(), strict=True)
-                self._queues[name] = queue, {pair: place for place, pair in enumerate(pairs)}
-            return self._queues[name]
+        return self._queue_of(view.order, None if view.order is Order.SAMPLE else self._frame(view.frame), view.blind)
+
+    def _make_queue(self, order: Order, frame: int | None, blind: bool) -> tuple[Queue, dict[tuple[int, int], int]]:
+        if frame is None:
+            every = [self._find_candidates(k) for k in range(len(self.results.frames))]
+            queue = sampled_queue(every, blind=blind)
+        elif order is Order.FRAME:
+            queue = frame_queue(self.candidates(frame), blind=blind)
+        else:
+            queue = influence_queue(self.results, self.candidates(frame), blind=blind)
+        pairs = zip(queue.frame.tolist(), queue.key.tolist(), strict=True)
+        return queue, {pair: place for place, pair in enumerate(pairs)}
 
     def _detected_by_name(self, photograph: int) -> dict[Pair, bool]:
         with self._lock:

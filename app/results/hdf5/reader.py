@@ -12,6 +12,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ from ..schema import (
 from .lazy_sequences import LazySequence
 
 CACHED_FRAMES = 4  # most recent frames
+BLOCK = 64  # frames whose numbers of sweeps are checked at once
 KEPT = ("kept_sweep", "kept_force")  # dimensions of sweeps with stored forces
 CACHE = 1 << 16  # [bytes] of cached decompressed values per dataset
 
@@ -62,6 +64,12 @@ class StoredRun:
             raise InputError(self.file, f"group {part}", "is missing")
         return whole
 
+    def deferred(self, part: str) -> StoredPart:
+        """Check one of PARTS, and return its reader."""
+        for each in entries(part):
+            self._dataset(each)
+        return StoredPart(self._reopened(), part)
+
     def frames(self, grain_count: int, wall_count: int) -> StoredFrames:
         """Return the forces of every frame, read on access; all columns are checked at once."""
         rows = self._rows_of_frames()
@@ -74,7 +82,11 @@ class StoredRun:
 
     def frame(self, k: int, rows: _FrameRows, bodies: dict[str, int]) -> Any:
         """Read the forces of one frame."""
-        own = {each.attribute: rows.shaped(k, each, self._part(each, rows.of(k, each))) for each in entries("frames")}
+        number = self._part(SWEEP_NUMBER, rows.of(k, SWEEP_NUMBER))
+        own = {
+            each.attribute: rows.shaped(k, each, self._part(each, rows.of(k, each)), number)
+            for each in entries("frames")
+        }  # fmt: skip
         count = bodies["contacts.grain_count"]
         for name, known in (("i", count), ("j", count + bodies["contacts.wall_count"])):
             body = own[f"contacts.{name}"]
@@ -149,19 +161,22 @@ class StoredRun:
 
     def _rows_of_frames(self) -> _FrameRows:
         """Return the rows of each frame; sweeps are absent where one of their offsets is missing."""
-        contact, count, sweep, number, kept = (self._ascending(each) for each in ROWS)
+        contact, count, sweep, kept = (self._ascending(each) for each in ROWS if each is not SWEEP_NUMBER)
         empty = np.zeros_like(contact)
-        if count is None or sweep is None or number is None:
-            count, sweep, number = empty[1:], empty, empty[:0]
+        if count is None or sweep is None or self._dataset(SWEEP_NUMBER) is None:
+            count, sweep = empty[1:], empty
             self._treat_as_absent("sweep")
+        for k in range(0, len(count), BLOCK):  # together they are longer than all tracks
+            edges = sweep[k : k + BLOCK + 1]
+            number = self._part(SWEEP_NUMBER, slice(int(edges[0]), int(edges[-1])))
+            if number is not None and np.any(number >= np.repeat(count[k : k + BLOCK], np.diff(edges))):
+                raise self._error(SWEEP_NUMBER, f"names a sweep beyond those of {SWEEP_COUNT.path}")
         if kept is None or any(self._find(each) is None for each in entries("frames") if each.dims[0] in KEPT):
             kept = empty
             self._treat_as_absent(*KEPT)
-        if np.any(number >= np.repeat(count, np.diff(sweep))):
-            raise self._error(SWEEP_NUMBER, f"names a sweep beyond those of {SWEEP_COUNT.path}")
         force = np.concatenate([[0], np.cumsum(np.diff(kept) * np.diff(contact))])
         self._sizes["kept_force"] = int(force[-1])
-        return _FrameRows(contact, count, sweep, number, kept, force)
+        return _FrameRows(contact, count, sweep, kept, force)
 
     def _ascending(self, entry: Entry) -> Any:
         values = self.read(entry)
@@ -255,7 +270,6 @@ class _FrameRows:
     contact: np.ndarray  # (f + 1,)
     sweep_count: np.ndarray  # (f,) number of sweeps
     sweep: np.ndarray  # (f + 1,) rows of measured sweeps
-    number: np.ndarray  # indices of the measured sweeps, from 0
     kept: np.ndarray  # (f + 1,) rows of sweeps with stored forces
     force: np.ndarray  # (f + 1,) rows of their forces
 
@@ -266,17 +280,36 @@ class _FrameRows:
         }.get(entry.dims[0])  # fmt: skip
         return slice(k, k + 1) if edges is None else slice(int(edges[k]), int(edges[k + 1]))
 
-    def shaped(self, k: int, entry: Entry, values: Any) -> Any:
-        """Return rows in the shape of a frame's field: one value per sweep, NaN where it was not measured."""
+    def shaped(self, k: int, entry: Entry, values: Any, number: np.ndarray) -> Any:
+        """Return rows in the shape of a frame's field: one value per sweep, NaN where it was not measured.
+
+        number: indices of the measured sweeps, from 0.
+        """
         if values is None:
             return None
         if entry.dims[0] == "sweep":
             every = np.full(self.sweep_count[k], np.nan)
-            every[self.number[self.sweep[k] : self.sweep[k + 1]]] = values
+            every[number] = values
             return every
         if entry.dims[0] == "kept_force":
             return values.reshape(self.kept[k + 1] - self.kept[k], self.contact[k + 1] - self.contact[k])
         return values if entry.dims[0] in ("contact", "kept_sweep") else values[0]
+
+
+class StoredPart:
+    """Reads a part of a file on every call; None if the file has no dataset of it."""
+
+    def __init__(self, stored: StoredRun, part: str) -> None:
+        self._stored, self._part = stored, part
+
+    def __call__(self) -> Any:
+        try:
+            return self._stored.part(self._part)
+        except (OSError, RuntimeError) as error:
+            raise InputError(self._stored.file, f"group {self._part}", f"is damaged: {error}") from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial, (copy, self())  # another process cannot read it
 
 
 class StoredFrames(LazySequence[Any]):

@@ -103,7 +103,7 @@ def load_results(file: Path) -> Results:
             boundary=stored.part("boundary"),
             friction_check=stored.part("friction_check"),
             radius_tuning=stored.part("radius_tuning"),
-            kinematics=stored.part("kinematics"),
+            read_kinematics=stored.deferred("kinematics"),
             base_friction=float(store.attrs.get("base_friction", 0.0)),
             diagnosis=tuple(Finding(**each) for each in json.loads(str(store.attrs.get("diagnosis", "[]")))),
             ensemble_size=_ensemble_size(store),

@@ -27,7 +27,7 @@ def results():
     made = make_results(4, 8, 7, sweeps=2)
     tracks = made.tracks
     found = measure_kinematics(tracks.position, tracks.rotation, tracks.radius, tracks.sigma)
-    return replace(made, kinematics=found)
+    return replace(made, read_kinematics=lambda: found)
 
 
 def test_every_figure_has_the_width_of_a_column_and_units(results):
@@ -61,7 +61,7 @@ def test_a_figure_that_cannot_be_drawn_raises(results):
     with pytest.raises(IndexError, match="from 0 to 3"):
         draw_figure(results, "forces", 4)
     with pytest.raises(ValueError, match="no kinematics"):
-        draw_figure(replace(results, kinematics=None), "kinematics")
+        draw_figure(replace(results, read_kinematics=lambda: None), "kinematics")
 
 
 def test_the_default_frame_is_the_last_settled_one(results):
@@ -75,7 +75,7 @@ def test_files_are_written_for_all_figures_with_data(results, tmp_path):
     assert {each.name for each in files} == {
         f"{name}.{kind}" for name in get_args(FigureName) if name not in NEED_TRUTH for kind in ("pdf", "svg")
     }
-    earlier = write_figures(replace(results, kinematics=None), tmp_path / "earlier", ("png",))
+    earlier = write_figures(replace(results, read_kinematics=lambda: None), tmp_path / "earlier", ("png",))
     assert "kinematics.png" not in {each.name for each in earlier}
     assert (tmp_path / "figures" / "forces.pdf").read_bytes().startswith(b"%PDF")
     text = (tmp_path / "figures" / "density.svg").read_text()

@@ -46,7 +46,7 @@ def recording(results, truth, tmp_path_factory) -> RecordingFile:
         np.where(tracks.present[..., None], tracks.position, np.nan), tracks.rotation, tracks.radius, tracks.sigma
     )
     tuned = replace(
-        results, radius_tuning=make_tuning(), kinematics=found, walls=replace(results.walls, force=force),
+        results, radius_tuning=make_tuning(), read_kinematics=lambda: found, walls=replace(results.walls, force=force),
         frames=[replace(each, error_budget=fraction) for each in results.frames],
     )  # fmt: skip
     return write_recording(

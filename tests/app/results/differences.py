@@ -16,6 +16,8 @@ def differences(one: Results, other: Results, rounding: float = 0.0) -> list[str
     found: list[str] = []
     for each in fields(Results):
         a, b = getattr(one, each.name), getattr(other, each.name)
+        if callable(a):  # a part that is read on access
+            a, b = a(), b()
         if isinstance(a, Sequence) and not isinstance(a, str):
             found += [] if len(a) == len(b) else [f"number of {each.name}"]
             for k, (x, y) in enumerate(zip(a, b, strict=False)):

@@ -72,7 +72,7 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         ),
         radius_tuning=tuning,
         boundary=_boundary(f, w, np.random.default_rng(seed + 1)),
-        kinematics=_kinematics(f, n, np.random.default_rng(seed + 2)),
+        read_kinematics=lambda: _kinematics(f, n, np.random.default_rng(seed + 2)),
         ensemble_size=2,
     )
 

@@ -69,7 +69,7 @@ def test_memory_is_independent_of_the_number_of_frames(tmp_path, monkeypatch):
             "calibration": None,
             "friction_check": None,
             "radius_tuning": None,
-            "kinematics": None,
+            "read_kinematics": lambda: None,
         }
         tracks = few.tracks.frames(0, 3)
         over = np.arange(count) % 3

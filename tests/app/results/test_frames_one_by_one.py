@@ -41,7 +41,7 @@ def full():
         walls=walls,
         boundary=None,
         radius_tuning=None,
-        kinematics=None,
+        read_kinematics=lambda: None,
         friction_check=None,
         calibration=None,
     )

@@ -78,7 +78,7 @@ def test_any_results_read_back_unchanged(tmp_path, seed, frame_count, columns, r
             "calibration": None,
             "friction_check": None,
             "radius_tuning": None,
-            "kinematics": None,
+            "read_kinematics": lambda: None,
             "ensemble_size": 0,
         }
         frames = [replace(frame, member_force=None) for frame in results.frames]
