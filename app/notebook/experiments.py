@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 import pandas as pd
@@ -38,6 +38,13 @@ class InitOptions(TypedDict, total=False):
     walls: str
     pressure: Mapping[str, float]
     material: Mapping[str, object]
+    channel: Literal["grey", "red", "green", "blue"]
+    region: tuple[int, int, int, int]
+    follow: Literal["texture", "outline"]
+    radius_range: tuple[float, float]
+    frames: tuple[int, int | None] | tuple[int, int | None, int]
+    lens: str | PathLike[str]
+    grains: str | PathLike[str]
 
 
 def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOptions]) -> pd.DataFrame:
@@ -50,7 +57,7 @@ def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOp
     folder : path
         Folder of the experiment.
     photographs : str
-        Pattern of the photographs, relative to the folder: "photos/*.png".
+        Pattern of the photographs, or name of a video, relative to the folder: "photos/*.png".
     **options
         - name : str; default: of the folder.
         - pixel_size : float, side of a pixel [m].
@@ -59,6 +66,14 @@ def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOp
         - walls : 'auto' (default: found around the rods), 'none', or a table of their ends [m].
         - pressure : mapping of str to float, pressure on walls [Pa].
         - material : mapping, keys of [material]: density, length, friction.
+        - channel : 'grey', 'red', 'green' or 'blue'; default: the one that shows the rods best.
+        - region : tuple of int, first column and row, last column and row [px] of what is looked at.
+        - follow : 'texture' or 'outline'; default: by trying both.
+        - radius_range : tuple of float, least and greatest radius to look for [px].
+        - frames : tuple of int, start, stop and step of the frames of a video.
+        - lens : path, calibration of OpenCV.
+        - grains : path, the rods as another program has found them: a label image, a table of ImageJ, or a table
+          id,x,y,radius [px].
 
     Returns
     -------
@@ -84,7 +99,11 @@ def init(folder: str | PathLike[str], photographs: str, **options: Unpack[InitOp
     unknown = sorted(set(options) - InitOptions.__annotations__.keys())
     if unknown:
         raise InputError("init", unknown[0], f"is not an option: there are {', '.join(InitOptions.__annotations__)}")
-    found = initialise(place, SetupFlags(photographs, **options))
+    given: dict[str, Any] = dict(options)
+    if "frames" in given:
+        given["frames"] = FrameRange(*given["frames"])
+    given |= {name: Path(given[name]) for name in ("lens", "grains") if name in given}
+    found = initialise(place, SetupFlags(photographs, **given))
     rows = [
         (step.name, step.mark.value, message) for step in found.steps.values() for message in (step.messages or [""])
     ]

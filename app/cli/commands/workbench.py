@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ..arguments import Browser, Port, Quiet
+from ..arguments import Browser, Port, Quiet, parse_frames
 
 
 def open_(
@@ -34,7 +34,9 @@ def init(
         Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="of the experiment, with the photographs")
     ],
     /,
-    photographs: Annotated[str, tyro.conf.arg(metavar="PATTERN", help="of the photographs, relative to FOLDER")],
+    photographs: Annotated[
+        str, tyro.conf.arg(metavar="PATTERN", help="of the photographs, or a video, relative to FOLDER")
+    ],
     pixel_size: Annotated[float | None, tyro.conf.arg(metavar="METRES", help="side of a pixel [m]")] = None,
     interval: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help="between photographs [s]")] = None,
     radii: Annotated[str | None, tyro.conf.arg(metavar="R,R,…", help="known radius classes [m]")] = None,
@@ -68,6 +70,23 @@ def init(
     radius_range: Annotated[
         str | None, tyro.conf.arg(metavar="A:B", help="of the radii to look for [px], where --radii are unknown")
     ] = None,
+    frames: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="A:B[:STEP]", help="of a video, by their numbers from 0; --interval chooses them by time as well"
+        ),
+    ] = None,
+    lens: Annotated[
+        Path | None, tyro.conf.arg(metavar="FILE", help="calibration of OpenCV: .yml, .xml, .json or .npz")
+    ] = None,
+    grains: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="FILE",
+            help="the rods of the first photograph as another program has found them: a label image (StarDist, "
+            "Cellpose, napari), a table of ImageJ, or a table id,x,y,radius [px]",
+        ),
+    ] = None,
     name: Annotated[str | None, tyro.conf.arg(help="of the experiment; default: of the folder")] = None,
     quiet: Quiet = False,
 ) -> int:
@@ -89,6 +108,7 @@ def init(
         photographs, name, pixel_size, interval, parse_radii(radii), walls, parse_pressures(pressure),
         {"density": density, "length": length, "friction": _number_or_word(friction)},
         channel, parse_region(region), follow, parse_radius_range(radius_range),
+        parse_frames(frames), lens, grains,
     )  # fmt: skip
     return command.initialise_experiment(folder, flags, quiet=quiet)
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...exchange.photographic.opencv_calibration import read_calibration
+from ...exchange.photographic.rod_readings import read_rods
+from ...exchange.photographic.video_frames import extract_frames, is_video
 from ...experiment.photographs import FULL_SCALE, Channel, Image, ImageSelection, Photographs, read_photograph
 from ...experiment.plausibility import rods_cut_by_walls
 from ...process.atomic import write_atomically
 from ...process.errors import InputError
+from ...process.frame_range import ALL_FRAMES, FrameRange
 from ...tracking.detection.channels import View, compare_views
 from ...tracking.detection.detect import Detection, DetectionSettings, refine_grains
 from ...tracking.outline.missing_discs import add_missing_discs
@@ -49,6 +55,9 @@ class SetupFlags:
     region: tuple[int, ...] = ()  # [px] first column and row, last column and row
     follow: str | None = None  # texture or outline
     radius_range: tuple[float, float] | None = None  # [px] where the radii are unknown
+    frames: FrameRange = ALL_FRAMES  # of a video
+    lens: Path | None = None  # calibration of OpenCV
+    grains: Path | None = None  # rods as another program has found them
 
 
 def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
@@ -62,6 +71,14 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
     draft = Draft(folder)
     if draft.file.exists():
         raise InputError(draft.file, "", "is there already: change it by rodsight open, or delete it")
+    with ExitStack() as on_failure:
+        flags, video = _without_video(folder, flags, on_failure)
+        found = _initialise(folder, draft, flags, video)
+        on_failure.pop_all()
+    return found
+
+
+def _initialise(folder: Path, draft: Draft, flags: SetupFlags, video: list[str]) -> ValidationResult:
     photographs = Photographs.matching(folder, flags.photographs)
     name = flags.name if flags.name is not None else valid_name(folder.resolve().name)
     with draft.one_step("new experiment"):
@@ -70,13 +87,14 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
             "photographs.interval": flags.interval, "photographs.pixel_size": flags.pixel_size,
             "photographs.radii": list(flags.radii) or None, "photographs.channel": flags.channel,
             "photographs.region": list(flags.region) or None, "photographs.follow": flags.follow,
+            "photographs.lens": None if flags.lens is None else read_calibration(flags.lens, photographs.shape),
             **{f"material.{key}": value for key, value in flags.material.items() if value is not None},
         }  # fmt: skip
         draft.set_keys("values of the flags", {key: value for key, value in keys.items() if value is not None})
         _without_errors(draft, "photographs")
         selection = ImageSelection(flags.channel or "grey", flags.region or None)  # type: ignore[arg-type]
         views, remarks = _choose_views(photographs, flags, selection)
-        view, detection = _detect(draft, flags, photographs, selection, views)
+        view, detection, left_out = _detect(draft, flags, photographs, selection, views)
         selection = replace(selection, channel=view.channel)  # type: ignore[arg-type]
         first = selection.cut(_first(photographs, selection))
         found, notes = _find_rods_and_walls(draft, flags, first, detection)
@@ -84,7 +102,7 @@ def initialise(folder: Path, flags: SetupFlags) -> ValidationResult:
         keys = {"photographs.channel": view.channel if view.channel != "grey" else None, "photographs.follow": follow}
         draft.set_keys("channel and following", {key: value for key, value in keys.items() if value is not None})
         found = _without_errors(draft, "photographs")
-        notes = [*remarks, *how, *notes]
+        notes = [*video, *left_out, *remarks, *how, *notes]
         write_atomically(folder / PICTURE, draw_setup(_first(photographs, selection), found))
     for note in notes:
         found.steps["walls"].add_warning(note)
@@ -111,9 +129,13 @@ def _choose_views(
 
 def _detect(
     draft: Draft, flags: SetupFlags, photographs: Photographs, selection: ImageSelection, views: Sequence[View]
-) -> tuple[View, Detection]:
+) -> tuple[View, Detection, list[str]]:
     """Detect the rods in the first view that keeps what its small copy shows; else in the best of a few."""
     validated = _without_errors(draft, "photographs", "scale", "material")
+    if flags.grains is not None:
+        rods, notes = read_rods(flags.grains, photographs.shape)
+        count = len(rods.id)
+        return views[0], Detection(rods.x, rods.y, rods.radius, np.full(count, np.nan), np.ones(count)), notes
     tried: list[tuple[View, Detection]] = []
     for view in views[:MOST_VIEWS]:
         image = selection.cut(read_photograph(photographs.files[0], channel=view.channel))  # type: ignore[arg-type]
@@ -130,7 +152,21 @@ def _detect(
         raise InputError(
             validated.files[0], "", "no rods were found; give their --radii, or mark them by rodsight open"
         )
-    return view, detection
+    return view, detection, []
+
+
+def _without_video(folder: Path, flags: SetupFlags, on_failure: ExitStack) -> tuple[SetupFlags, list[str]]:
+    """Replace a video by photographs of its frames, and the interval by their times; also return a sentence."""
+    if not is_video(flags.photographs):
+        if flags.frames != ALL_FRAMES:
+            raise InputError("--frames", str(flags.frames), "applies to videos only; photographs are chosen by a run")
+        return flags, []
+    video = folder / flags.photographs
+    frames = folder / f"{video.stem}_frames"
+    count, interval = extract_frames(video, frames, flags.frames, flags.interval)
+    on_failure.callback(shutil.rmtree, frames)
+    sentence = f"{count} frames of {video.name}, {interval:.4g} s apart, are photographs in {frames.name}."
+    return replace(flags, photographs=f"{frames.name}/*.png", interval=interval), [sentence]
 
 
 def _choose_follow(

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.experiment import load_experiment
+from rodsight.experiment.experiment import load_experiment, read_grain_guess
 
 from tests.program import rodsight
 
@@ -114,3 +114,49 @@ def test_defaults_choose_channel_and_following_and_state_what_they_saw(tmp_path,
     printed = capsys.readouterr().out.replace("\n", " ")
     assert "light discs in" in printed
     assert "30 of 30 rods are followed to the second photograph" in " ".join(printed.split())
+
+
+def labelled_discs(folder, radius: float = 24.0) -> np.ndarray:
+    """The photographs of `discs` as a video, and the label image of their first one."""
+    discs(folder, radius=radius)
+    pictures = [cv2.imread(str(file)) for file in sorted((folder / "shots").iterdir())]
+    height, width = pictures[0].shape[:2]
+    writer = cv2.VideoWriter(str(folder / "test.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 2.0, (width, height))
+    for picture in pictures:
+        writer.write(picture)
+    writer.release()
+    red = pictures[0][..., 2]
+    distance = cv2.distanceTransform((red > red.mean()).astype(np.uint8), cv2.DIST_L2, 5)
+    _, labels = cv2.connectedComponents((distance > 3.0).astype(np.uint8))
+    cv2.imwrite(str(folder / "labels.png"), labels.astype(np.uint16))
+    return labels
+
+
+@pytest.mark.screen
+def test_a_video_and_the_rods_of_another_program_make_an_experiment(tmp_path):
+    labels = labelled_discs(tmp_path)
+    camera = cv2.FileStorage(str(tmp_path / "camera.yml"), cv2.FILE_STORAGE_WRITE)
+    camera.write("camera_matrix", np.array([[900.0, 0.0, 150.0], [0.0, 900.0, 130.0], [0.0, 0.0, 1.0]]))
+    camera.write("distortion_coefficients", np.array([[-0.01, 0.0, 0.0, 0.0, 0.0]]))
+    camera.release()
+    status = rodsight(
+        "init", tmp_path, "--photographs", "test.avi", "--pixel-size", 1e-4, "--interval", 0.5, "--walls", "none",
+        "--lens", tmp_path / "camera.yml", "--grains", tmp_path / "labels.png", "--quiet",
+    )  # fmt: skip
+    assert status == 0
+    made = load_experiment(tmp_path)
+    section = made.config.photographs
+    assert section.files == "test_frames/*.png"
+    assert section.interval == pytest.approx(0.5)
+    assert section.lens.k1 == -0.01
+    assert len(made.photographs()) == 3
+    assert len(read_grain_guess(made).id) == labels.max()
+
+
+def test_a_failure_leaves_no_frames_of_a_video(tmp_path, capsys):
+    labelled_discs(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    flags = ("--photographs", "test.avi", "--pixel-size", 1e-4, "--lens", tmp_path / "none.yml")
+    assert rodsight("init", tmp_path, *flags) == 2
+    assert "none.yml: there is no such file" in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == before
