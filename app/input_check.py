@@ -8,7 +8,7 @@ from typing import Any
 
 from . import pipeline
 from .compilation.ahead import SOLVER_KERNELS
-from .inference.diagnosis.trial import TRIAL_PHOTOGRAPHS
+from .inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS
 from .prediction import Prediction, describe_photographs, predict_accuracy
 from .results.finding import Finding
 from .run_folder import Run
@@ -74,7 +74,7 @@ def _check_input(run: Run, predict: bool) -> InputReport:
     count = len(run.experiment.photographs()) if tracks is None else tracks.frame_count
     first, first_walls, found = tracks, walls, Prediction(None, None)
     if first is None:  # rods and walls that run would refuse are refused here
-        first, first_walls = pipeline.check_first_photographs(run, TRIAL_PHOTOGRAPHS if predict else 1)
+        first, first_walls = pipeline.check_first_photographs(run, PREDICTED_PHOTOGRAPHS if predict else 1)
     sentences: list[str] = []
     if predict:
         run.kernels.wait(SOLVER_KERNELS)

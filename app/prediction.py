@@ -13,7 +13,7 @@ from .experiment.config.experiment_file import ExperimentFile
 from .experiment.experiment import Experiment, GrainGuess, read_grain_guess
 from .inference.diagnosis.data_quality import DataQuality, measure_data_quality
 from .inference.diagnosis.diagnose import diagnose
-from .inference.diagnosis.trial import TRIAL_PHOTOGRAPHS, Trial, solve_trial
+from .inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS, Trial, solve_trial
 from .inference.inference_settings import material_of, settings_of
 from .inference.inputs import Inputs
 from .inference.solve_frames import InferenceObserver
@@ -97,8 +97,9 @@ def predict_accuracy(
         return Prediction(quality, None)
     inputs = Inputs(tracks, walls, material_of(config), settings_of(config))
     try:
-        trial = solve_trial(inputs, observer=InferenceObserver(progress))
-        doubted = trial if trial is not None and trial.expected[0] < DOUBTFUL else None
+        trial = solve_trial(inputs, PREDICTED_PHOTOGRAPHS, InferenceObserver(progress))
+        doubtful = trial is not None and trial.expected[0] < DOUBTFUL
+        doubted = solve_trial(inputs, observer=InferenceObserver(progress)) if doubtful else None
         return Prediction(quality, trial, diagnosis=tuple(diagnose(inputs, doubted, progress)))
     except UndeterminedError as error:
         return Prediction(quality, None, f"The first photographs alone do not determine everything: {error}.")
@@ -110,7 +111,7 @@ def track_first_photographs(
     """Track the first photographs without storing the result. Raises InputError where no grain is found."""
     from .tracking.stage import track_first  # imported late: given tracks do not need it
 
-    return track_first(experiment, TRIAL_PHOTOGRAPHS, progress, notify)
+    return track_first(experiment, PREDICTED_PHOTOGRAPHS, progress, notify)
 
 
 def measure_photographs(experiment: Experiment, rods: GrainGuess | None) -> PictureQuality:

@@ -139,6 +139,10 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         f"{evidence.position_agreement:.2f} only: radii, centres or the camera are wrong, or noise hides the overlaps",
         "power_gap": f"{100.0 * evidence.power_gap:.0f} % of the power of friction at its limit is missing from the "
         "measured sliding: the friction of rods, walls or base, rotations, or the order of the photographs",
+        "hidden_sliding": f"contacts slide by {found.slide_signal:.2g} times the noise of a slide only: use a step "
+        "with more shear, or more exact positions",
+        "load_mismatch": f"the mean stress is {evidence.load_fraction:.2f} of the load: walls, loads or contacts "
+        "are wrong",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
     return [Penalty(loss, words[name], counted=True) for name, loss in losses(evidence).items()]

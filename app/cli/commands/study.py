@@ -295,23 +295,26 @@ def _study_worlds(request: _StudyRequest, *, jobs: int, as_json: bool) -> int:
 def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> int:
     import numpy as np
 
+    from ...inference.diagnosis.trial import PREDICTED_PHOTOGRAPHS
     from ...study.scenarios import trust_study
     from ...study.scenarios.score_table import WIDTH, score_scenarios
     from ...study.scenarios.trust_study import TrustSample
 
     console = table_console(WIDTH)
     scenarios: tuple[ScenarioName, ...] = request.scenarios or get_args(ScenarioName)
-    fits: dict[str, tuple[trust_study.AdditiveFit, trust_study.Margin]] = {}
+    fits: dict[str, trust_study.TrustFit] = {}
     with progress_of(request.quiet) as progress:
         if fit:
             read: list[ScenarioName] = [name for name in scenarios if name not in trust_study.LEFT_OUT]
-            known = TrustSample.of(score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress))
+            read_scores = score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress)
+            known = TrustSample.of(read_scores)
             for title, names in trust_study.FITS.items():
-                found, margin, _ = trust_study.fit_expected(trust_study.rows_of(known, title), names)
-                fits[title] = found, margin
-                console.print(
-                    trust_study.describe_fit(title, found, margin), highlight=False, markup=False, soft_wrap=True
+                fits[title] = trust_study.fit_expected(
+                    trust_study.rows_of(known, title), names, trust_study.BOUNDED_BY[title]
                 )
+                print_line(console, fits[title].describe(title))
+            tests = TrustSample.of_tests([each for each in read_scores if not each.refused], PREDICTED_PHOTOGRAPHS)
+            print_line(console, trust_study.describe_prediction(tests))
         scores = score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
     sample = trust_study.refit(TrustSample.of(scores), fits)
     new = np.isin(sample.kind, list(trust_study.LEFT_OUT))

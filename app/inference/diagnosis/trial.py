@@ -13,7 +13,7 @@ import numpy as np
 from ...process.errors import UndeterminedError
 from ...process.machine.linear_algebra import one_thread_each
 from ...solver.assessment.evidence import Evidence
-from ...solver.assessment.expected_correlation import correlation_score, expected_interval
+from ...solver.assessment.expected_correlation import correlation_score, expect_correlation, predict_correlation
 from ...solver.assessment.penalties import assess, find_penalties
 from ..correction.close_photographs import choose_span
 from ..correction.correct_sequence import correct_sequence
@@ -21,7 +21,8 @@ from ..frame_store import MemoryStore
 from ..inputs import Inputs
 from ..solve_frames import InferenceObserver, solve_frames
 
-TRIAL_PHOTOGRAPHS = 6
+PREDICTED_PHOTOGRAPHS = 12  # at most, from which the accuracy of a whole test is predicted
+TRIAL_PHOTOGRAPHS = 6  # on which rivals are compared
 SETTLED = 2  # frames from which on a trial is judged: earlier ones lack a history
 
 
@@ -34,15 +35,12 @@ class Trial:
 
     @property
     def expected(self) -> tuple[float, float, float]:
-        """Expected r(f_n), mean over the judged frames, and an interval with a coverage of two thirds."""
-        found = [
-            np.array(expected_interval(each)) * _kept(each)
-            for each in self.evidence
-            if not math.isnan(each.disagreement)
-        ]
+        """Predicted r(f_n) of the whole test, and an interval with a coverage of two thirds."""
+        found = [each for each in self.evidence if not math.isnan(each.disagreement)]
         if not found:
             return math.nan, math.nan, math.nan
-        r, low, high = np.mean(found, axis=0).tolist()
+        kept = float(np.mean([_kept(each) for each in found]))
+        r, low, high = (kept * each for each in predict_correlation(found))
         return r, low, high
 
     @property
@@ -109,5 +107,5 @@ def trial_score(inputs: Inputs, first: int = 0) -> float:
 
 def _kept(evidence: Evidence) -> float:
     """Fraction of the expected correlation that is left by penalties outside of the fitted model."""
-    expected = expected_interval(evidence)[0]
+    expected = expect_correlation(evidence)
     return assess(evidence).expected_correlation / expected if expected > 0.0 else 0.0

@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
+from rich.table import Table
 from scipy.optimize import minimize
 from scipy.special import expit
 
@@ -21,7 +22,8 @@ from ...experiment.experiment import load_experiment
 from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...solver.assessment.evidence import Evidence
-from ...solver.assessment.mixture_trust import WEIGHT_TERMS, position_weight_terms
+from ...solver.assessment.fitted import FITTED
+from ...solver.assessment.mixture_trust import LEAST_WEIGHT, WEIGHT_TERMS, position_weight_terms
 from ...solver.baselines.motion_free import overlap_balance
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, align
@@ -102,7 +104,8 @@ def fit_weight(sample: MixtureSample) -> Array:
 
 
 def print_mixture(console: Console, sample: MixtureSample) -> None:
-    """Print the fitted coefficients, and what mixtures reach whose kinds were left out of the fit in turn."""
+    """Print what the present weights reach of every kind, the fitted coefficients, and what they reach left out."""
+    _print_kinds(console, sample)
     coefficients = fit_weight(sample)
     values = ", ".join(f"{name} = {x:.3f}" for name, x in zip(WEIGHT_TERMS, coefficients, strict=True))
     console.print(f"[position_weight] {values}", markup=False, highlight=False, soft_wrap=True)
@@ -124,6 +127,30 @@ def print_mixture(console: Console, sample: MixtureSample) -> None:
             f"part by more than {EXCESS} in {100.0 * np.mean(lost > EXCESS):.1f} % of {len(r)} frames, at most by "
             f"{max(lost.max(), 0.0):.3f}", highlight=False, soft_wrap=True,
         )  # fmt: skip
+
+
+def _print_kinds(console: Console, sample: MixtureSample) -> None:
+    """Print the mean r of both parts and of their mixture with the weights of fitted.toml, of every kind."""
+    table = FITTED["position_weight"]
+    weight = expit(sample.terms @ np.array([table[name] for name in WEIGHT_TERMS]))
+    mixed = sample.reached(np.where(weight < LEAST_WEIGHT, 0.0, weight))
+    rows, worse = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), []
+    for heading in ("kind", "motion", "positions", "mixture", "loss against the better"):
+        rows.add_column(heading, justify="left" if heading == "kind" else "right")
+    for kind in np.unique(sample.kind):
+        of_kind = sample.kind == kind
+        motion, positions, both = (
+            float(each[of_kind].mean()) for each in (sample.r[:, 0], sample.r[:, -1], mixed)
+        )  # fmt: skip
+        lost = max(motion, positions) - both
+        worse += [str(kind)] if lost > EXCESS else []
+        rows.add_row(str(kind), *(f"{each:.3f}" for each in (motion, positions, both, lost)))
+    console.print(rows)
+    console.print(
+        f"The mean of a kind is worse than that of its better part by more than {EXCESS} in {len(worse)} of "
+        f"{len(np.unique(sample.kind))} kinds" + (f": {', '.join(worse)}." if worse else "."),
+        highlight=False, soft_wrap=True,
+    )  # fmt: skip
 
 
 def _mix_frames(solution: ScenarioSolution, true: Sequence[tuple[Keys, Array]]) -> list[tuple[Array, Array]]:

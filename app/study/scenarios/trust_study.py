@@ -1,6 +1,7 @@
 """Trust against the truth by group and kind of input, and the fit of the expected correlation.
 
-The margin of the bound is fitted on seeds left out in turn; kinds of input that no fit reads judge the result.
+The bound is fitted on seeds and kinds left out in turn; kinds that no fit reads judge the result. The prediction of
+`check` is fitted on the first photographs of the same tests.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from scipy.optimize import isotonic_regression
 from scipy.stats import spearmanr
 
 from ...solver.assessment.expected_correlation import LEAST, MEASURES
 from ...solver.bodies.grains import Array
 from ...synthetic.scenarios.preset_names import Group
 from ...synthetic.scenarios.scenario_table import SCENARIOS, Scenario
+from ..fitting.additive_fit import AdditiveFit, correlation_target, fit_additive
+from ..fitting.bound_fit import BoundFit, JudgedFrames, fit_bound
 from .scenario_score import TRUST_TOLERANCE, ScenarioScore
 
 GROUPS: tuple[Group, ...] = ("correct", "missing physics", "wrong input")
@@ -30,31 +32,40 @@ LEFT_OUT = frozenset({
     "rough_walls",
 })  # fmt: skip
 TOO_HIGH, TOO_LOW = TRUST_TOLERANCE, 0.15  # T above r, T below r
-# Excess of T over r, and fraction of the frames of any group that may have more.
-LIMITS = ((TOO_HIGH, 0.03), (0.0, 0.05))
+# Excess of T over r, and fraction of the frames of any group that may have more while their kind is left out; of kinds
+# that a fit has read fewer have more.
+LIMITS = ((TOO_HIGH, 0.04), (0.0, 0.09))
+WITHIN_INTERVAL = 0.68  # of the tests, within one standard deviation of a prediction
 SOFT = 1.9e6  # [N/m] stiffness of contacts below which overlaps are forces
-KNOTS, ROUNDS = 9, 12
-SMOOTH = 0.15  # of the range of a measure, over which its isotonic regression is averaged
-START = 2.6  # arctanh r below which the margin grows
-SLOPES = np.linspace(0.0, 0.6, 7)
-BEST_R, WORST_R = 0.995, -0.2  # limits of r whose arctanh is fitted
+SETTLED = 2  # first photograph of a trial solution that is judged
+FOLDS = 6  # groups of kinds that are left out in turn
 # The fits, each with the measures that it weighs.
 FITS: dict[str, tuple[str, ...]] = {
-    "both": tuple(name for name in MEASURES if name != "disagreement_of_positions"),
+    "both": tuple(MEASURES),
     "motion": (
         "correction", "previous_residual", "disagreement_of_members", "gap_error", "force_change", "power_gap",
+        "hidden_sliding", "load_mismatch",
     ),
     "overlaps": (
         "disagreement_of_positions", "disagreement_of_estimates", "previous_residual", "gap_error", "force_change",
     ),
 }  # fmt: skip
+# Of a prediction from the first photographs.
+PREDICTED_BY = tuple(name for name in MEASURES if name != "gap_error")
+# Measures that each bound depends on, besides the expectation.
+BOUNDED_BY: dict[str, tuple[str, ...]] = {
+    "both": ("disagreement_of_estimates", "correction", "power_gap", "disagreement_of_positions"),
+    "motion": ("disagreement_of_members", "correction", "power_gap"),
+    "overlaps": (),
+}
 # Least and greatest value of each measure: beyond them no more is known.
 RANGES = {
     "disagreement_of_estimates": (0.02, 1.0), "disagreement_with_either": (0.03, 1.0),
     "correction": (0.02, 2.0),
     "previous_residual": (0.004, 0.2),
     "disagreement_of_members": (0.05, 1.0), "gap_error": (1e-4, 5e-3), "force_change": (0.01, 0.6),
-    "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.003, 1.0),
+    "power_gap": (0.01, 1.5), "disagreement_of_positions": (0.003, 1.0), "hidden_sliding": (0.03, 10.0),
+    "load_mismatch": (0.02, 2.0),
 }  # fmt: skip
 
 
@@ -64,6 +75,7 @@ class TrustSample:
 
     kind: NDArray[np.str_]  # (f,)
     seed: NDArray[np.int64]  # (f,)
+    frame: NDArray[np.int64]  # (f,)
     group: NDArray[np.str_]  # (f,)
     suspect: NDArray[np.bool_]  # (f,)
     overlaps: NDArray[np.bool_]  # (f,) whether the forces follow from the overlaps of soft grains
@@ -85,6 +97,7 @@ class TrustSample:
         return cls(
             np.array([score.scenario for score, _ in rows]),
             np.array([score.seed for score, _ in rows]),
+            np.array([k for _, k in rows]),
             np.array([SCENARIOS[score.scenario].group for score, _ in rows]),
             np.array([score.status[k] == "suspect" for score, k in rows]),
             np.array([score.overlaps[k] for score, k in rows]),
@@ -97,10 +110,26 @@ class TrustSample:
             },
         )  # fmt: skip
 
-    def select(self, chosen: NDArray[np.bool_]) -> TrustSample:
-        """The chosen frames (f,)."""
+    @classmethod
+    def of_tests(cls, scores: Sequence[ScenarioScore], photographs: int) -> TrustSample:
+        """Collect whole tests: r from the third photograph on, and the mean evidence of the first photographs."""
+        frames = cls.of([score for score in scores if score.r_late is not None])
+        chosen = (frames.frame >= SETTLED) & (frames.frame < photographs)
+        late = {(score.scenario, score.seed): score.r_late for score in scores}
+        rows = sorted({(str(kind), int(seed)) for kind, seed in zip(frames.kind, frames.seed, strict=True)})
+        of_row = [np.flatnonzero(chosen & (frames.kind == kind) & (frames.seed == seed)) for kind, seed in rows]
+        first, r = np.array([some[0] for some in of_row]), np.array([late[row] for row in rows], float)
+        return replace(
+            frames.select(first), r=r,
+            measures={
+                name: np.array([_mean_known(each[some]) for some in of_row]) for name, each in frames.measures.items()
+            },
+        )  # fmt: skip
+
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> TrustSample:
+        """The chosen frames."""
         return TrustSample(
-            self.kind[chosen], self.seed[chosen], self.group[chosen], self.suspect[chosen],
+            self.kind[chosen], self.seed[chosen], self.frame[chosen], self.group[chosen], self.suspect[chosen],
             self.overlaps[chosen], self.r[chosen], self.trust[chosen], self.expected[chosen],
             {name: each[chosen] for name, each in self.measures.items()},
         )  # fmt: skip
@@ -111,85 +140,88 @@ class TrustSample:
         names, index, count = np.unique(self.kind, return_inverse=True, return_counts=True)
         return 1.0 / (count[index] * len(names))
 
-
-@dataclass(frozen=True, slots=True)
-class AdditiveFit:
-    """arctanh r = constant + Σ value(measure)."""
-
-    constant: float
-    terms: dict[str, tuple[Array, Array]]  # knots of ln measure and values
-
-    def score(self, sample: TrustSample) -> Array:
-        """arctanh of the expected correlation (f,)."""
-        total = np.full(len(sample.r), self.constant)
-        for name, (at, value) in self.terms.items():
-            total += _evaluate(sample.measures[name], at, value)
-        return total
+    def fold(self) -> NDArray[np.int64]:
+        """Number of the group of kinds that is left out with a frame (f,)."""
+        names, index = np.unique(self.kind, return_inverse=True)
+        if len(names) < 2 * FOLDS:  # of so few, those left out would be extrapolated
+            return np.zeros(len(self.kind), np.int64)
+        return np.random.default_rng(0).permutation(len(names))[index] % FOLDS
 
 
 @dataclass(frozen=True, slots=True)
-class Margin:
-    """T = tanh(g − margin − slope max(START − g, 0))."""
+class TrustFit:
+    """Expected correlation, and its bound."""
 
-    margin: float
-    slope: float
+    expected: AdditiveFit
+    bound: BoundFit
 
-    def bound(self, score: Array) -> Array:
-        return np.maximum(np.tanh(score - self.margin - self.slope * np.maximum(START - score, 0.0)), 0.0)
-
-
-def fit_expected(sample: TrustSample, names: Sequence[str]) -> tuple[AdditiveFit, Margin, Array]:
-    """Fit the expected correlation, and the margin of its bound on seeds left out in turn.
-
-    Returns
-    -------
-    AdditiveFit
-        On all frames.
-    Margin
-    ndarray, shape (f,)
-        Scores of each frame by fits without its seed; with one seed by the fit of all.
-    """
-    left_out = _fit(sample, names).score(sample)
-    seeds = np.unique(sample.seed)
-    for seed in seeds if len(seeds) > 1 else []:
-        away = sample.seed == seed
-        left_out[away] = _fit(sample.select(~away), names).score(sample.select(away))
-    return _fit(sample, names), _fit_margin(sample, left_out), left_out
+    def describe(self, title: str) -> str:
+        """The table of fitted.toml."""
+        lines = self.expected.describe()
+        return "\n".join([f"[expected_correlation.{title}]", *lines[:2], self.bound.describe(), *lines[2:]])
 
 
-def refit(sample: TrustSample, fits: dict[str, tuple[AdditiveFit, Margin]]) -> TrustSample:
+def fit_expected(sample: TrustSample, names: Sequence[str], bounded_by: Sequence[str]) -> TrustFit:
+    """Fit the expected correlation by measures, and its bound on seeds and kinds left out in turn."""
+    whole, score = _fit_leaving_out(sample, names)
+    error = correlation_target(sample.r) - score
+    frames = JudgedFrames(sample.r, score, error, sample.measures, sample.weight, sample.fold())
+    groups = [sample.group == group for group in GROUPS]
+    return TrustFit(whole, fit_bound(frames, bounded_by, groups, LIMITS))
+
+
+def describe_prediction(tests: TrustSample) -> str:
+    """Fit the prediction on whole tests, and describe it as the table of fitted.toml."""
+    whole, score = _fit_leaving_out(tests, PREDICTED_BY)
+    sd = float(np.quantile(np.abs(correlation_target(tests.r) - score), WITHIN_INTERVAL))
+    lines = whole.describe()
+    return "\n".join(["[expected_correlation.prediction]", *lines[:2], f"sd = {sd:.3f}", *lines[2:]])
+
+
+def _fit_leaving_out(sample: TrustSample, names: Sequence[str]) -> tuple[AdditiveFit, Array]:
+    """Fit all, and scores (f,) by fits without the seed and the kind; where these leave nothing, by the fit of all."""
+    target, fold = correlation_target(sample.r), sample.fold()
+    whole = fit_additive(sample.measures, names, target, sample.weight)
+    score = whole.score(sample.measures)
+    for seed in np.unique(sample.seed):
+        for each in range(FOLDS):
+            away = (sample.seed == seed) & (fold == each)
+            known = (sample.seed != seed) & ((fold != each) | (fold.max() == 0))
+            if away.any() and known.any():
+                some = sample.select(known)
+                found = fit_additive(some.measures, names, target[known], some.weight)
+                score[away] = found.score(sample.select(away).measures)
+    return whole, score
+
+
+def _mean_known(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def refit(sample: TrustSample, fits: dict[str, TrustFit]) -> TrustSample:
     """The sample with expected correlation and trust by new fits, without the penalties outside of them."""
     expected, trust = sample.expected.copy(), sample.trust.copy()
-    for name, (fit, margin) in fits.items():
+    for name, fit in fits.items():
         here = sample.overlaps if name == "overlaps" else ~sample.overlaps
         if name == "motion" or not here.any():
             continue
-        score = fit.score(sample.select(here))
-        expected[here], trust[here] = np.maximum(np.tanh(score), 0.0), margin.bound(score)
+        measures = sample.select(here).measures
+        score = fit.expected.score(measures)
+        expected[here], trust[here] = np.maximum(np.tanh(score), 0.0), fit.bound.bound(score, measures)
     return replace(sample, expected=expected, trust=trust)
 
 
 def rows_of(sample: TrustSample, fit: str) -> TrustSample:
-    """The frames that a fit of this name reads: for overlaps all of soft grains, whether that was detected or not."""
+    """The frames that a fit of this name reads; for overlaps also all of soft grains where that was not detected."""
     if fit == "overlaps":
-        return sample.select(np.isin(sample.kind, [name for name, each in SCENARIOS.items() if _is_soft(each)]))
+        soft = np.isin(sample.kind, [name for name, each in SCENARIOS.items() if _is_soft(each)])
+        return sample.select(soft | sample.overlaps)
     return sample.select(~sample.overlaps)
 
 
 def _is_soft(scenario: Scenario) -> bool:
     return scenario.loading.settings.normal_stiffness < SOFT
-
-
-def describe_fit(title: str, fit: AdditiveFit, margin: Margin) -> str:
-    """The table of fitted.toml."""
-    lines = [
-        f"[expected_correlation.{title}]", f"constant = {fit.constant:.3f}", f"margin = {margin.margin:.3f}",
-        f"slope = {margin.slope:.2f}", f"start = {START}",
-    ]  # fmt: skip
-    for name, (at, value) in fit.terms.items():
-        knots, values = (", ".join(f"{x:.3g}" for x in np.exp(at))), ", ".join(f"{x:.3f}" for x in value)
-        lines.append(f"{name} = {{ at = [{knots}], value = [{values}] }}")
-    return "\n".join(lines)
 
 
 def print_trust(console: Console, title: str, sample: TrustSample) -> None:
@@ -221,56 +253,3 @@ def print_trust(console: Console, title: str, sample: TrustSample) -> None:
 def _fractions(sample: TrustSample) -> tuple[str, str]:
     high, low = sample.trust > sample.r + TOO_HIGH, sample.trust < sample.r - TOO_LOW
     return f"{100.0 * high.mean():.1f} %", f"{100.0 * low.mean():.1f} %"
-
-
-def _fit(sample: TrustSample, names: Sequence[str]) -> AdditiveFit:
-    """Backfitting of isotonic regressions, each averaged to knots."""
-    target, weight = np.arctanh(np.clip(sample.r, WORST_R, BEST_R)), sample.weight
-    constant = float(np.average(target, weights=weight))
-    parts = {name: np.zeros(len(target)) for name in names}
-    terms: dict[str, tuple[Array, Array]] = {}
-    for _ in range(ROUNDS):
-        for name in names:
-            rest = target - constant - sum((parts[other] for other in names if other != name), np.zeros(len(target)))
-            terms[name] = _regress(sample.measures[name], rest, weight)
-            parts[name] = _evaluate(sample.measures[name], *terms[name])
-    return AdditiveFit(constant, terms)
-
-
-def _regress(measure: Array, rest: Array, weight: Array) -> tuple[Array, Array]:
-    known = np.isfinite(measure)
-    x, y, w = measure[known], rest[known], weight[known]
-    order = np.argsort(x, kind="stable")
-    x, w = x[order], w[order]
-    fitted = isotonic_regression(y[order], weights=w, increasing=False).x
-    at = np.unique(np.quantile(x, np.linspace(0.0, 1.0, KNOTS), method="nearest"))
-    reach = max(SMOOTH * float(at[-1] - at[0]), 1e-9)
-    value = np.array([np.average(fitted[near], weights=w[near]) for near in (np.abs(x - c) <= reach for c in at)])
-    value = np.minimum.accumulate(value)
-    return at, value - np.average(np.interp(x, at, value), weights=w)
-
-
-def _evaluate(measure: Array, at: Array, value: Array) -> Array:
-    return np.where(np.isfinite(measure), np.interp(np.nan_to_num(measure), at, value), 0.0)
-
-
-def _fit_margin(sample: TrustSample, score: Array) -> Margin:
-    """The margin with which T is too high in few frames of each group, and least often too low."""
-    best, fewest = Margin(0.0, 0.0), math.inf
-    for slope in SLOPES:
-        low, high = 0.0, 3.0
-        for _ in range(30):
-            middle = 0.5 * (low + high)
-            bound = Margin(middle, slope).bound(score)
-            worst = max(
-                np.average(bound[chosen] > sample.r[chosen] + excess, weights=sample.weight[chosen]) / allowed
-                for group in GROUPS
-                for excess, allowed in LIMITS
-                if (chosen := sample.group == group).any()
-            )
-            low, high = (middle, high) if worst > 1.0 else (low, middle)
-        margin = Margin(float(high), float(slope))
-        humble = float(np.average(margin.bound(score) < sample.r - TOO_LOW, weights=sample.weight))
-        if humble < fewest:
-            best, fewest = margin, humble
-    return best

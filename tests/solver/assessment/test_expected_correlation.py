@@ -9,6 +9,7 @@ from rodsight.solver.assessment.expected_correlation import (
     bound_correlation,
     expect_correlation,
     losses,
+    predict_correlation,
 )
 from rodsight.solver.assessment.fitted import FITTED
 
@@ -36,9 +37,9 @@ def test_the_bound_is_below_the_expectation_and_the_gap_widens():
 
 
 def test_every_table_is_monotone_and_the_score_is_their_sum():
-    for title in ("both", "motion"):
+    for title in ("both", "motion", "overlaps", "prediction"):
         table = FITTED["expected_correlation"][title]
-        terms = {name: each for name, each in table.items() if isinstance(each, dict)}
+        terms = {name: each for name, each in table.items() if isinstance(each, dict) and name != "bound"}
         assert terms.keys() <= MEASURES.keys()
         for each in terms.values():
             assert each["at"] == sorted(each["at"])
@@ -48,12 +49,34 @@ def test_every_table_is_monotone_and_the_score_is_their_sum():
     correction, members = table["correction"], table["disagreement_of_members"]
     alone = replace(
         ASSESSED, correction=correction["at"][3], disagreement=members["at"][2], old_unbalance=math.nan,
-        force_change=math.nan, information=replace(ASSESSED.information, gap_error=math.nan),
+        force_change=math.nan, load_fraction=math.nan,
+        information=replace(ASSESSED.information, gap_error=math.nan, slide_signal=math.nan),
     )  # fmt: skip
     score = table["constant"] + correction["value"][3] + members["value"][2]
     assert expect_correlation(alone) == pytest.approx(math.tanh(score))
-    margin = table["margin"] + table["slope"] * max(table["start"] - score, 0.0)
+    bound = table["bound"]
+    margin = bound["constant"] + bound["score"] * score
+    for name, value in (("correction", correction["at"][3]), ("disagreement_of_members", members["at"][2])):
+        slope, typical = bound[name]
+        margin += slope * math.log(value / typical)
     assert bound_correlation(alone) == pytest.approx(max(math.tanh(score - margin), 0.0))
+
+
+def test_a_prediction_reads_the_mean_evidence_and_knows_its_interval():
+    bad = replace(BOTH, agreement=0.3, correction=1.0)
+    good, mixed, worse = (predict_correlation(each) for each in ([BOTH], [BOTH, bad], [bad, bad]))
+    assert good[0] > mixed[0] > worse[0]
+    assert predict_correlation([BOTH, BOTH]) == pytest.approx(good)
+    sd = FITTED["expected_correlation"]["prediction"]["sd"]
+    for r, low, high in (good, mixed):
+        assert math.atanh(r) - math.atanh(low) == pytest.approx(sd)
+        assert math.atanh(high) - math.atanh(r) == pytest.approx(sd)
+
+
+def test_evidence_beyond_the_range_of_the_fit_counts_as_its_end():
+    table = FITTED["expected_correlation"]["both"]
+    worst = replace(BOTH, correction=table["correction"]["at"][-1])
+    assert bound_correlation(replace(worst, correction=1e3)) == pytest.approx(bound_correlation(worst))
 
 
 def test_one_confirmation_of_the_motion_suffices_in_part():

@@ -4,19 +4,33 @@ import math
 from dataclasses import replace
 
 import pytest
-from rodsight.solver.assessment.intervals.scale_sd import LEAST, PER_LOAD, scale_sd
+from rodsight.solver.assessment.expected_correlation import expect_correlation
+from rodsight.solver.assessment.intervals.scale_sd import TABLE, scale_sd
 
 from ..test_penalties import ASSESSED
+
+CARRIED = replace(ASSESSED, load_fraction=1.0)
+
+
+@pytest.mark.parametrize(("load_fraction", "mismatch"), [(1.0, 0.0), (0.5, math.log(2.0)), (math.nan, 0.0)])
+def test_the_terms_add_in_squares(load_fraction, mismatch):
+    evidence = replace(ASSESSED, correction=0.3, power_gap=0.5, load_fraction=load_fraction)
+    r = expect_correlation(evidence)
+    expected = math.hypot(
+        TABLE["least"], TABLE["per_load"] * mismatch, 0.3 * TABLE["per_correction"], 0.5 * TABLE["per_power_gap"],
+        TABLE["per_error"] * (1.0 - r) / (1.0 + r),
+    )  # fmt: skip
+    assert scale_sd(evidence) == pytest.approx(expected)
 
 
 def test_a_field_that_does_not_carry_the_load_has_an_uncertain_scale():
     carried, half, twice = (scale_sd(replace(ASSESSED, load_fraction=q)) for q in (1.0, 0.5, 2.0))
-    assert carried == pytest.approx(LEAST)
-    assert half == twice == pytest.approx(math.hypot(LEAST, PER_LOAD * math.log(2.0)))
+    assert half == twice > 1.1 * carried
 
 
-def test_without_a_stated_load_the_least_uncertainty_remains():
-    assert scale_sd(replace(ASSESSED, load_fraction=math.nan)) == pytest.approx(LEAST)
+@pytest.mark.parametrize("worse", [{"correction": 1.0}, {"power_gap": 0.8}, {"disagreement": 0.9}])
+def test_what_contradicts_the_forces_makes_their_scale_uncertain(worse):
+    assert scale_sd(replace(CARRIED, **worse)) > scale_sd(replace(CARRIED, correction=0.05, power_gap=0.02))
 
 
 def test_a_frame_that_is_not_assessed_has_no_scale():

@@ -1,0 +1,1 @@
+"""Fits of the constants of the assessment on scenarios with known forces."""
