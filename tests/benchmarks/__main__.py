@@ -19,7 +19,8 @@ from pathlib import Path
 
 from tests.benchmarks import history
 from tests.benchmarks.first_minute import first_run_rows
-from tests.benchmarks.growth import TILES, growth, run_benchmark_job
+from tests.benchmarks.growth import STEP, TILES, growth, run_benchmark_job, walled_packing
+from tests.benchmarks.marks import mark_rows
 from tests.benchmarks.photograph_rows import detection_rows, tracking_rows
 from tests.benchmarks.solver_rows import load_rows, member_rows, sweep_rows
 from tests.benchmarks.timing import Duration, Row, format_table, in_processor_time, processor_name
@@ -51,6 +52,13 @@ def first_minute() -> Iterator[tuple[str, list[Row]]]:
     yield "The first minute: no folder of kernels", list(first_run_rows())
 
 
+def marks(folder: Path) -> Iterator[tuple[str, list[Row]]]:
+    """Where the time of whole sequences goes, from tracks to results."""
+    for rods, frames, aim in ((1172, 30, "≤ .22 s"), (250, 100, ""), (5000, 8, "≤ 1.0 s")):
+        path = walled_packing(folder, rods, frames, **({"step_degrees": STEP} if frames > 30 else {}))
+        yield f"A sequence of {frames} frames of {rods} rods, by marks", list(mark_rows(path, aim=aim))
+
+
 def sample() -> Iterator[tuple[str, list[Row]]]:
     result = run_benchmark_job(SAMPLE)
     rows = []
@@ -79,13 +87,15 @@ def _time_process(*arguments: str, rounds: int = 3) -> list[Duration]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
-    parser.add_argument("--only", nargs="+", choices=["ratios", "start", "first", "photographs", "growth", "sample"])
+    parser.add_argument(
+        "--only", nargs="+", choices=["ratios", "start", "first", "photographs", "marks", "growth", "sample"]
+    )
     parser.add_argument("--tiles", nargs="+", type=int, default=TILES)
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "rodsight-benchmark")
     parser.add_argument("--append", action="store_true")
     options = parser.parse_args()
     parts = {
-        "ratios": ratios, "start": start, "first": first_minute, "photographs": photographs,
+        "ratios": ratios, "marks": lambda: marks(options.folder), "start": start, "first": first_minute, "photographs": photographs,
         "growth": lambda: growth(options.folder, options.tiles, keep=options.append), "sample": sample,
     }  # fmt: skip
     print(f"{processor_name()}; {date.today().isoformat()}\n", flush=True)

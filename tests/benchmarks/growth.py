@@ -87,7 +87,7 @@ def run_benchmark_job(experiment: Path) -> dict:
 
 def _packings(folder: Path, tiles: Sequence[int]) -> Iterator[tuple[str, Path]]:
     for rods, frames in WALLED:
-        yield BETWEEN_WALLS, _walled(folder, rods, frames)
+        yield BETWEEN_WALLS, walled_packing(folder, rods, frames)
     for each in tiles:
         yield IN_A_CELL, tiled_packing(folder, each)
 
@@ -95,10 +95,10 @@ def _packings(folder: Path, tiles: Sequence[int]) -> Iterator[tuple[str, Path]]:
 def _sequences(folder: Path) -> Iterator[Path]:
     rods, lengths = LONG
     for frames in lengths:
-        yield _walled(folder, rods, frames, step_degrees=STEP)
+        yield walled_packing(folder, rods, frames, step_degrees=STEP)
 
 
-def _walled(folder: Path, rods: int, frames: int, **options: float) -> Path:
+def walled_packing(folder: Path, rods: int, frames: int, **options: float) -> Path:
     """Folder with the tracks of a packing sheared between walls; simulated if missing."""
     path = folder / "walled" / " ".join([f"{rods} rods, {frames} frames", *map(str, options.values())])
     if not (path / "experiment.toml").exists():

@@ -199,6 +199,8 @@ def draw_circle(
     opened = workbench.project(at)
     found = _scaled(opened)
     name = _free("circle", found) if name is None else name
+    if name in circles.corner_names(found):
+        raise InputError("corner", name, "has its place in the table of corners: delete it and draw it again")
     if points is not None:
         circle = circles.circle_through(np.array(points), name, side)
     elif place is not None:
@@ -215,9 +217,20 @@ def draw_circle(
 
 
 @editing_endpoint
+def make_corner(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
+    """Make a circular wall a disc in a corner of the frame: it moves with the bar that it is fixed to."""
+    opened = workbench.project(at)
+    circles.make_corner(opened.draft, _scaled(opened), name)
+    return opened.describe()
+
+
+@editing_endpoint
 def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
     opened = workbench.project(at)
     found = _scaled(opened)
+    if name in circles.corner_names(found):
+        circles.delete_corner(opened.draft, found, name)
+        return opened.describe()
     if any(each.name == name for each in circles.circles_of(found)):
         left = [each for each in circles.circles_of(found) if each.name != name]
         circles.set_circles(opened.draft, found, left, f"wall {name} deleted")

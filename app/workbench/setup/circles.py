@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ...experiment.photographs import Image
+from ...experiment.reading.corners import CORNER_COLUMNS
 from ...experiment.units import Scale
 from ...experiment.walls import ARC_COLUMNS
 from ...process.errors import InputError
@@ -18,7 +19,7 @@ from ...tracking.walls.round_edge import snap_to_rim
 from .draft import Draft, as_table
 from .validation import ValidationResult
 
-ARCS = "arcs.csv"
+ARCS, CORNERS = "arcs.csv", "corners.csv"
 RIM = 24  # points of a rod's rim that a circle around the rods must hold
 SNAP = 0.06  # of its radius, how far beside a drawn circle its edge is looked for
 FLAT = 1e-3  # height of a triangle by its longest side below which it is a line
@@ -36,7 +37,13 @@ class Circle:
 
 
 def circles_of(found: ValidationResult) -> list[Circle]:
-    """List the circular walls of the experiment."""
+    """List the circular walls of the experiment; discs in the corners of a frame have a table of their own."""
+    corners = corner_names(found)
+    return [each for each in discs_of(found) if each.name not in corners]
+
+
+def discs_of(found: ValidationResult) -> list[Circle]:
+    """List the circular walls and the discs in the corners of the frame."""
     walls, scale = found.walls, found.scale
     if walls is None or scale is None:
         return []
@@ -49,6 +56,81 @@ def circles_of(found: ValidationResult) -> list[Circle]:
     ]
 
 
+def corner_names(found: ValidationResult) -> frozenset[str]:
+    """Return the names of the discs in the corners of the frame."""
+    file = found.data.get("walls", {}).get("corners")
+    if file is None or found.experiment is None:
+        return frozenset()
+    return frozenset(found.experiment.table(file, ("corner",)).text("corner"))
+
+
+def make_corner(draft: Draft, found: ValidationResult, name: str) -> None:
+    """Make a circular wall a disc in a corner of the frame, where two of its bars meet."""
+    circles = circles_of(found)
+    chosen = [each for each in circles if each.name == name]
+    section = dict(found.data.get("walls", {}))
+    if not chosen or found.scale is None:
+        raise InputError("circle", name, "is not there")
+    if "file" not in section:
+        raise InputError("corner", name, "needs the bars that meet there: draw them first")
+    rest = [each for each in circles if each.name != name]
+    tables = {
+        section.get("corners", CORNERS): _with_corner(found, chosen[0]),
+        section.get("arcs", ARCS): arcs_table(rest, found.scale) if rest else None,
+    }
+    if not rest:
+        section.pop("arcs", None)
+    draft.set_keys(f"corner {name}", {"walls": {**section, "corners": section.get("corners", CORNERS)}}, tables)
+
+
+def delete_corner(draft: Draft, found: ValidationResult, name: str) -> None:
+    """Delete a disc in a corner of the frame."""
+    section = dict(found.data.get("walls", {}))
+    file = section["corners"]
+    table = _corner_rows(found)
+    left = [row for row in table if row[1] != name]
+    if not left:
+        section.pop("corners")
+    draft.set_keys(
+        f"corner {name} deleted", {"walls": section}, {file: as_table(CORNER_COLUMNS, left) if left else None}
+    )
+
+
+def _with_corner(found: ValidationResult, circle: Circle) -> bytes:
+    assert found.scale is not None
+    place = np.array([[circle.x, circle.y]])
+    (x, y), size = found.scale.to_world(place)[0].tolist(), float(found.scale.size_at(place)[0])
+    row = (0, circle.name, round(x, 7), round(y, 7), round(circle.radius * size, 7))
+    return as_table(CORNER_COLUMNS, [*_corner_rows(found), row])
+
+
+def _corner_rows(found: ValidationResult) -> list[tuple[object, ...]]:
+    """Rows of the table of corner discs; none without a table."""
+    file = found.data.get("walls", {}).get("corners")
+    if file is None or found.experiment is None:
+        return []
+    table = found.experiment.table(file, CORNER_COLUMNS)
+    numbers = (table.numbers(name).tolist() for name in ("x", "y", "radius"))
+    return list(zip(table.integers("frame").tolist(), table.text("corner"), *numbers, strict=True))
+
+
+def rescaled_corners(found: ValidationResult, after: Scale) -> bytes:
+    """Write the table of corner discs anew, in metres of another scale."""
+    assert found.experiment is not None
+    assert found.scale is not None
+    table = found.experiment.table(found.data["walls"]["corners"], CORNER_COLUMNS, optional=("theta",))
+    place = found.scale.to_pixels(np.column_stack([table.numbers("x"), table.numbers("y")]))
+    radius = table.numbers("radius") / found.scale.size_at(place) * after.size_at(place)
+    angle = table.text("theta") if "theta" in table.names else None
+    rows = [
+        (int(frame), corner, *np.round(world, 7).tolist(), round(size, 7), *(() if angle is None else (angle[k],)))
+        for k, (frame, corner, world, size) in enumerate(
+            zip(table.integers("frame"), table.text("corner"), after.to_world(place), radius.tolist(), strict=True)
+        )
+    ]
+    return as_table(CORNER_COLUMNS if angle is None else (*CORNER_COLUMNS, "theta"), rows)
+
+
 def set_circles(draft: Draft, found: ValidationResult, circles: Sequence[Circle], name: str) -> None:
     """Write the circular walls, and delete the settings of those that are removed; bars are not changed."""
     if found.scale is None:
@@ -59,7 +141,7 @@ def set_circles(draft: Draft, found: ValidationResult, circles: Sequence[Circle]
     file = section.pop("arcs", ARCS)
     if circles:
         section = {"arcs": file, **section}
-    elif "file" not in section:
+    elif not section.keys() & {"file", "corners"}:
         section = {}
     draft.set_keys(name, {"walls": section or None}, {file: arcs_table(circles, found.scale) if circles else None})
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...experiment.experiment import GrainGuess
-from .circles import circles_of
+from .circles import corner_names, discs_of
 from .edits import TABLES
 from .validation import ValidationResult
 
@@ -28,12 +28,12 @@ def describe_walls(found: ValidationResult) -> list[dict[str, Any]]:
         return []
     ends = found.scale.to_pixels(found.walls.endpoints[0])
     plates = found.data.get("walls", {})
-    circles = {each.name: asdict(each) for each in circles_of(found)}
+    circles, corners = {each.name: asdict(each) for each in discs_of(found)}, corner_names(found)
     listed = []
     for name, line, pressure in zip(found.walls.name, ends.tolist(), found.walls.pressure.tolist(), strict=True):
         plate = plates.get(name)
         listed.append({
-            "name": name, "line": line, "circle": circles.get(name),
+            "name": name, "line": line, "circle": circles.get(name), "corner": name in corners,
             "pressure": None if pressure != pressure else pressure,
             "ends": plate.get("ends", "auto") if isinstance(plate, dict) else "auto",
         })  # fmt: skip

@@ -21,7 +21,7 @@ from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from ...tracking.walls.inner_edge import find_bars, lines_to_corners, snap_to_edge
-from .circles import arcs_table, circles_of, renamed
+from .circles import arcs_table, circles_of, renamed, rescaled_corners
 from .draft import Draft, as_table
 from .validation import ValidationResult, validate
 
@@ -111,7 +111,9 @@ def _set_and_move_walls(draft: Draft, name: str, keys: dict[str, Any]) -> None:
             bars, circles = walls.sides == STRAIGHT, circles_of(before)
             names = [wall for wall, bar in zip(walls.name, bars, strict=True) if bar]
             ends = scale.to_pixels(walls.endpoints[0])[bars]
-            if names:
+            if "corners" in before.data.get("walls", {}):
+                draft.write("corners", {before.data["walls"]["corners"]: rescaled_corners(before, after)})
+            if names and before.data.get("walls", {}).keys() & {"file"}:  # else they run through the corners
                 draft.write("walls", {walls_file(before): walls_table(names, ends, after)})
             if circles:
                 draft.write("circles", {before.data["walls"]["arcs"]: arcs_table(circles, after)})
@@ -178,7 +180,11 @@ def set_walls(draft: Draft, found: ValidationResult, walls: Sequence[tuple[str, 
     known = {*names, *(each.name for each in circles_of(found))}
     plates = {key: value for key, value in section.items() if isinstance(value, dict) and key in known}
     if not walls:
-        rest = {key: value for key, value in {**kept, **plates}.items() if key != "file"} if "arcs" in kept else None
+        rest = (
+            {key: value for key, value in {**kept, **plates}.items() if key != "file"}
+            if {"arcs", "corners"} & kept.keys()
+            else None
+        )
         draft.set_keys(change, {"walls": rest}, {walls_file(found): None})
         return
     table = walls_table(names, np.array([line for _, line in walls]), found.scale)
