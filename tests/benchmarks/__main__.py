@@ -95,7 +95,8 @@ def main() -> None:
     parser.add_argument("--append", action="store_true")
     options = parser.parse_args()
     parts = {
-        "ratios": ratios, "marks": lambda: marks(options.folder), "start": start, "first": first_minute, "photographs": photographs,
+        "ratios": ratios, "marks": lambda: marks(options.folder), "start": start, "first": first_minute,
+        "photographs": photographs,
         "growth": lambda: growth(options.folder, options.tiles, keep=options.append), "sample": sample,
     }  # fmt: skip
     print(f"{processor_name()}; {date.today().isoformat()}\n", flush=True)
