@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..process.atomic import replacing, write_atomically
+from ..process.errors import InputError
 from ..solver.bodies.grains import Array
 from ..solver.bodies.wall_shapes import IN, circle_parameters, wall_distance
 from ..solver.dem.dem_truth import DemSettings, DemTruth
@@ -37,6 +38,12 @@ class StatedInputs:
             dict.fromkeys(plates, settings.pressure), settings.density, settings.length, settings.friction,
             settings.wall_friction, settings.gravity,
         )  # fmt: skip
+
+
+def refuse_full_folder(out: Path) -> None:
+    """Raise InputError if a folder to be written exists and is not empty."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(out, "", "exists already and is not an empty folder")
 
 
 def write_walls(path: Path, names: Sequence[str], endpoints: Array) -> None:

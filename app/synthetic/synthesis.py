@@ -162,8 +162,7 @@ def synthesize(
         raise InputError("synth", f"radius_error = {radius_error}", limit)
     given = {"grains": grains, "frames": frames, "step_degrees": step_degrees, "pixel_size": pixel_size}
     plan = _plan(PRESETS[preset], {name: value for name, value in given.items() if value is not None}, reversal)
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(out, "", "exists already and is not an empty folder")
+    experiment_files.refuse_full_folder(out)
     speckle = replace(speckle or SpeckleSettings(), pixel_size=plan.pixel_size, depth=depth)
     if jpeg_quality is None and depth == 8:
         jpeg_quality = plan.jpeg_quality

@@ -13,7 +13,6 @@ from ...process.atomic import write_atomically
 from ...process.errors import InputError
 from ...synthetic.scenarios.preset_names import ScenarioName
 from ..arguments import AsJson, Quiet, Settings
-from ..stored_results import load_run
 from ..terminal import print_line, progress_of, table_console
 from .run import Request, open_run
 
@@ -67,7 +66,7 @@ def study(
         tyro.conf.Positional,
         tyro.conf.arg(
             metavar="PATH",
-            help="real: folder of a run, or results.h5; perturbation, paper --program: an experiment with a truth",
+            help="real: a run, or files of PeGS, to be solved; perturbation, paper --program: an experiment with truth",
         ),
     ] = None,
     /,
@@ -122,12 +121,15 @@ def study(
 
     The recipe of the authors' program: rodsight study paper --program authors --seeds 0
 
-    Photoelastic forces: rodsight import pegs, rodsight run, then rodsight study real runs/my_test --page real.html
+    Photoelastic forces, files of PeGS: rodsight study real FOLDER --page real.html; of a run: rodsight study real
+    runs/my_test
 
     Example: rodsight study worlds --worlds shear --seeds 1 --grains 150
     """
     if subject == "real":
-        return _study_real(folder, page, frame, as_json=as_json)
+        from ..measured_forces import study_measured
+
+        return study_measured(folder, page, frame, as_json=as_json)
     from ...study.scenarios.scenario_score import StudyPlan
     from ...synthetic.scenarios.scenario_folder import GRAINS
 
@@ -186,31 +188,6 @@ def study(
             refit_status(seeds[:half], seeds[half:], grains=(grains,), folder=out, console=console, progress=progress)
         else:
             study_claims(seeds, grains=grains, folder=out, console=console, progress=progress)
-    return 0
-
-
-def _study_real(folder: Path | None, page: Path | None, frame: int | None, *, as_json: bool) -> int:
-    from ...run_truth import load_truth
-    from ...study.real import real_forces, real_page
-
-    if folder is None:
-        raise InputError("study real", "RUN", "is missing: give the folder of a run, such as runs/my_test")
-    run, results = load_run(folder)
-    truth = load_truth(run, results)
-    if truth is None or run.experiment.config.truth is None:
-        raise InputError(run.experiment.file, "key truth", "is missing: there are no measured forces to compare with")
-    sides = real_forces.correlate_sides(
-        run.experiment.folder / run.experiment.config.truth, run.frames, len(results.frames)
-    )
-    found = real_forces.study_real(results, truth, sides, frame)
-    if page is not None:
-        write_atomically(page, real_page.real_page(found).encode())
-    if as_json:
-        print(json.dumps(real_forces.as_json(found), indent=1))
-        return 0
-    real_page.print_real(table_console(real_page.WIDTH), found)
-    if page is not None:
-        print_line(table_console(), f"Pictures of frame {found.shown}: {page}")
     return 0
 
 

@@ -57,6 +57,11 @@ def read_pegs(folder: Path) -> tuple[Observations, ForceReadings]:
     raise InputError(folder, "", f"contains neither *{DISCS} nor {POSITIONS}")
 
 
+def is_pegs(folder: Path) -> bool:
+    """Return whether a folder holds files of PeGS in either format."""
+    return folder.is_dir() and ((folder / POSITIONS).exists() or any(folder.glob(f"*{DISCS}")))
+
+
 def read_edge(folder: Path) -> tuple[str, ...]:
     """Return the names of discs whose flag puts them at the edge in most photographs; empty: no flags, or all discs."""
     file = folder / POSITIONS

@@ -80,6 +80,7 @@ class RealFrame:
     sides: float  # correlation of the two readings of a contact; NaN with one reading
     precision: float  # fraction of the contacts with force in the run that truly carry force
     recall: float  # fraction of the true contacts with force that the run lists
+    covered: tuple[float, float]  # fractions of the true f_n within one and two standard deviations; NaN without these
 
     def direction_error(self, source: str) -> float:
         """Return the error of a field's principal direction [°], −90 … 90."""
@@ -150,7 +151,8 @@ def study_real(results: Results, truth: TruthContacts, sides: Sequence[float], s
             "uniform": FrameField(baseline.contacts, baseline.uniform),
             "ceiling": _nearest_equilibrium(packing, snapshots[k], exact, ours.contacts, baseline.candidates),
         }
-        rows.append(_compare(k, found, exact, baseline.candidates, snapshots[k], frame.trust, sides[k]))
+        covered = _coverage(ours, None if frame.fn_sd is None else frame.fn_sd[listed], exact)
+        rows.append(_compare(k, found, exact, baseline.candidates, snapshots[k], (frame.trust, sides[k], covered)))
         if k == shown:
             drawn = exact, found
     assert drawn is not None
@@ -190,8 +192,11 @@ def as_json(study: RealStudy) -> dict[str, object]:
         | {"total_correlation": _plain(study.total_correlation(source))}
         for source in SOURCES
     }
+    covered = {
+        name: mean_of([row.covered[k] for row in study.frames]) for k, name in enumerate(("within_1_sd", "within_2_sd"))
+    }
     excess = dict(zip(("frames_above_r", "frames_with_trust"), study.count_excess(), strict=True))
-    return {"frame": [row.frame for row in study.frames], **truth, **by_source, "mean": mean, **excess}
+    return {"frame": [row.frame for row in study.frames], **truth, **by_source, "mean": mean, **covered, **excess}
 
 
 def mean_of(values: Sequence[float]) -> float | None:
@@ -258,9 +263,10 @@ def _compare(
     exact: FrameField,
     near: Keys,
     snapshot: Snapshot,
-    trust: float,
-    sides: float,
+    known: tuple[float, float, tuple[float, float]],
 ) -> RealFrame:
+    """Compare fields with the truth; known: trust, correlation of both readings, and coverage of the run."""
+    trust, sides, covered = known
     pairs, count = join_keys(near, candidates["ours"].key, exact.key), len(snapshot.position)
     true = match_values(pairs, exact.key, exact.force[:, 0])
     pressure = _pressure(exact, count)
@@ -281,8 +287,24 @@ def _compare(
     listed = compare_forces(ours.key, ours.force, exact.key, exact.force)
     return RealFrame(
         k, **found, direction=_direction(exact.normal_only(), snapshot.position), total=_total(exact), trust=trust,
-        sides=sides, precision=agreement.contact_precision, recall=listed.contact_recall,
+        sides=sides, precision=agreement.contact_precision, recall=listed.contact_recall, covered=covered,
     )  # fmt: skip
+
+
+def _coverage(ours: FrameField, fn_sd: Array | None, exact: FrameField) -> tuple[float, float]:
+    """Return the fractions of true normal forces within one and two standard deviations of the inferred ones.
+
+    The true forces are in a unit of their own: they are divided by the factor that fits the inferred ones best.
+    """
+    if fn_sd is None:
+        return float("nan"), float("nan")
+    fn, true = ours.force[:, 0], match_values(ours.key, exact.key, exact.force[:, 0])
+    used = ~ours.contacts.with_wall & np.isfinite(fn_sd) & (fn_sd > 0.0)
+    factor = float(fn[used] @ true[used]) / max(float(fn[used] @ fn[used]), 1e-300)
+    if not used.any() or not factor > 0.0:
+        return float("nan"), float("nan")
+    off = np.abs(true[used] / factor - fn[used]) / fn_sd[used]
+    return float((off < 1.0).mean()), float((off < 2.0).mean())
 
 
 def _total(field: FrameField) -> float:

@@ -67,8 +67,15 @@ def describe_limits(study: RealStudy) -> str:
     return (
         f"{read}True principal direction {_format(direction, 1)}°. Of the contacts with force in the run, "
         f"{_format(precision, 3)} truly carry force; of the true contacts with force, {_format(recall, 3)} are listed. "
-        f"{_describe_trust(study)}"
-    )
+        f"{_describe_trust(study)} {_describe_coverage(study)}"
+    ).rstrip()
+
+
+def _describe_coverage(study: RealStudy) -> str:
+    one, two = (mean_of([row.covered[k] for row in study.frames]) for k in (0, 1))
+    if one is None or two is None:
+        return ""
+    return f"One and two standard deviations of a force cover {100 * one:.0f} and {100 * two:.0f} % of the true ones."
 
 
 def _describe_trust(study: RealStudy) -> str:

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from ...experiment.units import Scale
 from ...process.atomic import write_atomically
-from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import wall_distance
 from ...solver.dem.dem_truth import DemTruth
 from .. import experiment_files
-from ..scenarios.scenario_folder import GRAINS, LEAST_GRAINS, load_or_simulate
+from ..scenarios.scenario_folder import check_output, load_or_simulate
 from ..scenarios.scenario_table import FRINGED
 from .stress_optics import fringe_light, stress_difference
 
@@ -79,11 +78,7 @@ def make_fringed(
     UnbalancedError
         If the simulation does not come to rest.
     """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(out, "", "exists already and is not an empty folder")
-    grains = GRAINS if grains is None else grains
-    if grains < LEAST_GRAINS:
-        raise InputError("synth", f"grains = {grains}", f"expected at least {LEAST_GRAINS}")
+    grains = check_output(out, grains)
     truth = load_or_simulate(FRINGED, grains, seed, cache, progress)
     if frames is not None:
         truth = truth.frames(0, min(frames, truth.frame_count))

@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ...process.atomic import replacing_folder
-from ...process.errors import InputError
 from ...process.progress import Progress, no_progress
 from ...solver.bodies.grains import Array
 from ...solver.dem.dem_truth import DemTruth
-from ..scenarios.scenario_folder import GRAINS, LEAST_GRAINS, load_or_simulate
+from ..scenarios.scenario_folder import check_output, load_or_simulate
 from ..scenarios.scenario_table import SCENARIOS
 
 DIAMETER = 50.0  # px, mean
@@ -65,11 +64,7 @@ def make_photoelastic(
     UnbalancedError
         If the simulation does not come to rest.
     """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(out, "", "exists already and is not an empty folder")
-    grains = GRAINS if grains is None else grains
-    if grains < LEAST_GRAINS:
-        raise InputError("synth", f"grains = {grains}", f"expected at least {LEAST_GRAINS}")
+    grains = check_output(out, grains)
     truth = load_or_simulate(SCENARIOS["nearly_jammed"].loading, grains, seed, cache, progress)
     rng = np.random.default_rng([seed, 3])
     pixel = 2.0 * float(truth.radius.mean()) / DIAMETER

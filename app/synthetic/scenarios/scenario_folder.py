@@ -15,6 +15,7 @@ from ...process.progress import Progress, no_progress
 from ...solver.dem import boundaries, contact_law, periodic_cell, ring_cell, shear_cell, simulation, time_step
 from ...solver.dem.dem_truth import DemSettings, DemTruth
 from .. import dense_packing, ring_packing
+from ..experiment_files import refuse_full_folder
 from . import loading_paths, periodic_packing
 from .loading_paths import LoadingPath, simulate_loading
 from .observed_data import observe_truth, write_observed
@@ -72,10 +73,8 @@ def make_scenario(
     UnbalancedError
         If the simulation does not come to rest; nothing is written then.
     """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(out, "", "exists already and is not an empty folder")
-    grains = GRAINS if grains is None else grains
-    _check_choices(seed, grains, noise)
+    grains = check_output(out, grains)
+    _check_choices(seed, noise)
     scenario = SCENARIOS[name]
     truth = load_or_simulate(scenario.loading, grains, seed, cache, progress)
     noise = scenario.noise if noise is None else noise
@@ -118,11 +117,18 @@ def load_truth(file: Path, settings: DemSettings) -> DemTruth:
     return DemTruth(**values, settings=settings)
 
 
-def _check_choices(seed: int, grains: int, noise: float | None) -> None:
-    if seed < 0:
-        raise InputError("synth", f"seed = {seed}", "expected 0 or more")
+def check_output(out: Path, grains: int | None) -> int:
+    """Return the number of grains; raise InputError if there are too few, or if the folder is not empty."""
+    refuse_full_folder(out)
+    grains = GRAINS if grains is None else grains
     if grains < LEAST_GRAINS:
         raise InputError("synth", f"grains = {grains}", f"expected at least {LEAST_GRAINS}")
+    return grains
+
+
+def _check_choices(seed: int, noise: float | None) -> None:
+    if seed < 0:
+        raise InputError("synth", f"seed = {seed}", "expected 0 or more")
     if noise is not None and not (math.isfinite(noise) and noise >= 0.0):
         raise InputError("synth", f"noise = {noise}", "expected metres, 0 or more")
 

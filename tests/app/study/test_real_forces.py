@@ -17,6 +17,7 @@ from rodsight.synthetic.photoelastic.pegs_files import make_photoelastic
 
 from tests.app.recording.fake_results import make_results
 from tests.app.study.test_baselines import own_forces
+from tests.program import rodsight
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +129,27 @@ def test_photoelastic_discs_are_imported_solved_and_compared(
     assert 0.5 < np.mean(found["sides"]) < 0.95
     assert found["mean"]["ours"]["r"] > found["mean"]["uniform"]["r"]
     assert (tmp_path / "real.html").read_text().count("<svg") == 3
+
+
+def test_standard_deviations_cover_the_truth_in_its_own_unit(results: Results) -> None:
+    exact = own_forces(results)
+    other_unit = replace(exact, fn=1e-3 * exact.fn, ft=1e-3 * exact.ft)
+    wide = replace(results, frames=[replace(frame, fn_sd=np.full(len(frame.fn), 1e-9)) for frame in results.frames])
+    found = study_real(wide, other_unit, [float("nan")] * len(results.frames))
+    assert all(row.covered == (1.0, 1.0) for row in found.frames)
+    assert "cover 100 and 100 %" in describe_limits(found)
+    rng = np.random.default_rng(2)
+    noise = 0.5 * exact.fn.mean() * rng.standard_normal(len(exact.fn))
+    noisy = study_real(wide, replace(exact, fn=exact.fn + noise), [float("nan")] * len(results.frames))
+    assert all(row.covered[1] < 0.2 for row in noisy.frames)
+
+
+@pytest.mark.slow
+def test_files_of_measured_forces_are_solved_and_compared_by_one_command(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    make_photoelastic(tmp_path / "discs", 3, grains=60)
+    for _ in range(2):  # the second time the results are there
+        assert rodsight("study", "real", "discs", "--json") == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["mean"]["ours"]["r"] > found["mean"]["uniform"]["r"]
+    assert (tmp_path / "runs" / "real" / "discs" / "run" / "results.h5").is_file()

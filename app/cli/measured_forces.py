@@ -1,0 +1,65 @@
+"""The subject real of the command study: measured forces of photoelastic discs, solved anew and compared."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from pathlib import Path
+
+from ..process.atomic import write_atomically
+from ..process.errors import InputError
+from ..process.frame_range import ALL_FRAMES
+from .stored_results import load_run
+from .terminal import print_line, progress_of, table_console
+
+
+def study_measured(folder: Path | None, page: Path | None, frame: int | None, *, as_json: bool) -> int:
+    """Compare a run with measured forces and print the agreement; files of PeGS are solved first. Returns 0."""
+    from ..exchange.foreign.pegs import is_pegs
+    from ..run_truth import load_truth
+    from ..study.real import real_forces, real_page
+
+    if folder is None:
+        raise InputError("study real", "RUN", "is missing: give the folder of a run, such as runs/my_test")
+    run, results = load_run(_solve(folder, quiet=as_json) if is_pegs(folder) else folder)
+    truth = load_truth(run, results)
+    if truth is None or run.experiment.config.truth is None:
+        raise InputError(run.experiment.file, "key truth", "is missing: there are no measured forces to compare with")
+    sides = real_forces.correlate_sides(
+        run.experiment.folder / run.experiment.config.truth, run.frames, len(results.frames)
+    )
+    found = real_forces.study_real(results, truth, sides, frame)
+    if page is not None:
+        write_atomically(page, real_page.real_page(found).encode())
+    if as_json:
+        print(json.dumps(real_forces.as_json(found), indent=1))
+        return 0
+    real_page.print_real(table_console(real_page.WIDTH), found)
+    if page is not None:
+        print_line(table_console(), f"Pictures of frame {found.shown}: {page}")
+    return 0
+
+
+def _solve(folder: Path, *, quiet: bool) -> Path:
+    """Import measured forces of photoelastic discs and infer them anew; returns the folder of the run."""
+    from .. import pipeline
+    from ..exchange.foreign.import_files import ImportRequest, import_files
+    from ..experiment.experiment import CONFIG_NAME, load_experiment
+    from ..run_folder import Run, hold_run
+    from ..run_truth import load_truth
+
+    name = folder.resolve().name
+    place, began = Path("runs") / "real" / name, time.perf_counter()
+    test = place / name
+    made = f"# From {folder.name}, by rodsight import pegs."
+    file = test / CONFIG_NAME
+    if file.is_file() and file.read_text(encoding="utf-8").startswith(made):
+        shutil.rmtree(test)  # the same data may have changed; results of unchanged data are used again
+    import_files(ImportRequest("pegs", folder), test)
+    with progress_of(quiet) as progress:
+        run = Run(load_experiment(test), place / "run", ALL_FRAMES, progress)
+        with hold_run(run):
+            results = pipeline.solve(run)
+            pipeline.conclude(run, results, load_truth(run, results), began)
+    return place / "run"
