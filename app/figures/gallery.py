@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from ..inference.zero_start import solve_from_zero
 from ..process.atomic import write_atomically
 from ..results.comparison import compare_runs, compare_with_truth
+from ..results.fringe_pressures import compare_with_fringes
 from ..results.results import Results, TruthContacts
 from ..solver.frame_forces import FrameStatus
 from .contact_sheet import draw_sheet
@@ -21,12 +22,15 @@ from .directions import draw_rose, draw_stress
 from .distributions import draw_density
 from .figure_style import Width, paper_style
 from .force_network import draw_forces
+from .fringes import draw_fringes
 from .kinematics import draw_kinematics
 from .paper_set import Picture, draw_apparatus, draw_recorded, draw_strip, draw_zero_starts
 from .time_curves import draw_time
 from .truth_comparison import draw_truth
 
-FigureName = Literal["forces", "density", "rose", "stress", "time", "sheet", "kinematics", "truth", "difference"]
+FigureName = Literal[
+    "forces", "density", "rose", "stress", "time", "sheet", "kinematics", "fringes", "truth", "difference"
+]
 FileKind = Literal["pdf", "svg", "png"]
 FigureSet = Literal["results", "paper"]
 ZERO_STARTS = 12  # frames swept from zero forces, of which two are drawn
@@ -35,7 +39,7 @@ NEED_TRUTH = ("truth", "difference")
 
 _DRAW: dict[str, Callable[[Results, int, Width], Figure]] = {
     "forces": draw_forces, "density": draw_density, "rose": draw_rose, "stress": draw_stress, "time": draw_time,
-    "sheet": draw_sheet, "kinematics": draw_kinematics,
+    "sheet": draw_sheet, "kinematics": draw_kinematics, "fringes": draw_fringes,
 }  # fmt: skip
 
 
@@ -145,7 +149,10 @@ def write_figures(
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name in get_args(FigureName):
-        if (name in NEED_TRUTH and truth is None) or (name == "kinematics" and results.kinematics is None):
+        missing = name in NEED_TRUTH and truth is None
+        missing |= name == "kinematics" and results.kinematics is None
+        missing |= name == "fringes" and compare_with_fringes(results) is None
+        if missing:
             continue
         files += _write(draw_figure(results, name, frame, width=width, truth=truth), folder / name, kinds)
     return files

@@ -48,7 +48,7 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
     for axes in panels[:4]:
         axes.set_anchor("N")
     for axes, (value, colours, label, signed) in zip(panels[1:4], maps, strict=True):
-        _draw_map(axes, results, frame, value, colours, label, signed=signed)
+        draw_map(axes, results, frame, value, colours, label, signed=signed)
     add_title(panels[0], f"{results.name}, frames {max(frame - found.window, 0)} to {frame}\nfluctuations")
     add_title(panels[1], _describe_band(found, frame, results))
     add_title(panels[2], "departure of the neighbours\nfrom the local field")
@@ -60,9 +60,8 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
     return figure
 
 
-def _draw_map(
-    axes: Axes, results: Results, frame: int, value: Array, colours: str, label: str, *, signed: bool
-) -> None:
+def draw_map(axes: Axes, results: Results, frame: int, value: Array, colours: str, label: str, *, signed: bool) -> None:
+    """Draw a quantity (n,) of the grains of a frame by colour, with its scale."""
     draw_packing(axes, results, frame)
     here = results.tracks.present[frame]
     known = value[here & np.isfinite(value)]

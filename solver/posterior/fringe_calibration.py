@@ -91,7 +91,7 @@ def calibrate_fringes(
     knot = level = np.empty(0)
     for _ in range(1 if scale is not None else SCALE_ROUNDS):
         per_unit = np.array([known[k] for k in frames])[frame]
-        knot, level = _fit_curve(fringes, pressure / per_unit)
+        knot, level = fit_curve(fringes, pressure / per_unit)
         if scale is None and len(frames) > 1:
             expected = np.interp(fringes, knot, level)
             known = {
@@ -154,8 +154,8 @@ def _gather(readings: Mapping[int, FringeReading], frames: list[int]) -> tuple[A
     return fringes, pressure, variance, frame
 
 
-def _fit_curve(fringes: Array, pressure: Array) -> tuple[Array, Array]:
-    """Isotonic regression of bin means; returns G² and pressure at the bins (q,)."""
+def fit_curve(fringes: Array, pressure: Array) -> tuple[Array, Array]:
+    """Return G² and pressure at the bins (q,): isotonic regression of the means of readings (m,) of equal numbers."""
     order = np.argsort(fringes, kind="stable")
     bins = np.array_split(order, min(BINS, max(len(order) // 10, 2)))
     knot = np.array([fringes[each].mean() for each in bins])

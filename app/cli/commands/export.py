@@ -42,7 +42,8 @@ def export(
     tab: Annotated[str | None, tyro.conf.arg(help="pictures, video: the tab to show; default Forces")] = None,
     view: Annotated[str | None, tyro.conf.arg(help="pictures, video: one view alone, by its title")] = None,
     figure: Annotated[
-        Literal["forces", "density", "rose", "stress", "time", "sheet", "kinematics", "truth", "difference"] | None,
+        Literal["forces", "density", "rose", "stress", "time", "sheet", "kinematics", "fringes", "truth", "difference"]
+        | None,
         tyro.conf.arg(help="pictures, video: this figure of every frame, instead of the viewer"),
     ] = None,
     size: Annotated[
