@@ -261,7 +261,7 @@ def _inside_walls(position: Array, walls: WallTracks) -> NDArray[np.bool_]:
     """
     depth, _ = wall_distance(walls.endpoints[0], walls.sides, position[:, None])
     within = np.asarray((depth > 0.0).all(axis=1))
-    return within if within.mean() > 0.2 else np.ones_like(within)
+    return within if within.sum() > 0.2 * len(within) else np.ones_like(within)
 
 
 def _select(detection: Detection, rows: NDArray[np.bool_]) -> Detection:

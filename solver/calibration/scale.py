@@ -72,15 +72,19 @@ class ScaleErrors:
         if not self.found:
             return sequence
         scale = 1.0 + self.pixel_size
-        classes = np.zeros(sequence.grain_count, np.int64) if radius_class is None else radius_class
         return replace(
             sequence,
-            radius=(1.0 + self.radius_factor) * sequence.radius + self.radius_offset + self.radius_class[classes],
+            radius=self.corrected_radius(sequence.radius, radius_class),
             position=scale * sequence.position,
             endpoints=scale_walls(sequence.endpoints, scale, sequence.side)
             if self.walls_follow
             else sequence.endpoints,
         )
+
+    def corrected_radius(self, radius: Array, radius_class: NDArray[np.integer] | None) -> Array:
+        """Apply the errors to given radii (n,) [m]; radius_class (n,): the class of each grain."""
+        of_class = self.radius_class[0 if radius_class is None else radius_class]
+        return (1.0 + self.radius_factor) * radius + self.radius_offset + of_class
 
 
 def scale_walls(endpoints: Array, scale: float, side: Sides) -> Array:
@@ -152,7 +156,7 @@ def find_scale(
     pixel, pixel_gain = _of_pixel_size(seen, peaks, priors, radius_class)
     chosen, gain = pixel, pixel_gain
     if priors.radius_factor > 0.0:
-        factor, factor_gain = _of_radius_factor(peaks, count, priors)
+        factor, factor_gain = _with_positive_radii(*_of_radius_factor(peaks, count, priors), seen, radius_class)
         by_walls = _wall_evidence(seen, factor, priors, radius_class) - _wall_evidence(
             seen, pixel, priors, radius_class
         )
@@ -186,7 +190,18 @@ def _of_pixel_size(
         float(errors[0]), float(sd[0]), errors[2:], sd[2:], walls_follow=False, found=True,
         radius_offset=float(errors[1]), radius_offset_sd=float(sd[1]), separable=separable,
     )  # fmt: skip
+    found, gain = _with_positive_radii(found, gain, sequence, radius_class)
     return replace(found, walls_follow=_walls_follow(sequence, found, radius_class)), gain
+
+
+def _with_positive_radii(
+    found: ScaleErrors, gain: float, sequence: MeasuredSequence, radius_class: NDArray[np.integer] | None
+) -> tuple[ScaleErrors, float]:
+    """Return errors and their gain; neither where a radius would vanish, as with meaningless positions."""
+    if np.all(found.corrected_radius(sequence.radius, radius_class) > 0.0):
+        return found, gain
+    zeros = np.zeros_like(found.radius_class)
+    return replace(found, pixel_size=0.0, radius_class=zeros, radius_offset=0.0, radius_factor=0.0), -np.inf
 
 
 def _of_radius_factor(peaks: _GapPeaks, count: int, priors: CalibrationPriors) -> tuple[ScaleErrors, float]:

@@ -6,6 +6,8 @@ import json
 import os
 import shutil
 
+import cv2
+import numpy as np
 import pytest
 
 from .attempt import attempt, find_problem
@@ -70,6 +72,21 @@ def test_an_empty_table_of_another_program_is_named(originals, tmp_path, file):
     ended = attempt(["import", "pegs", str(copy), str(tmp_path / "out"), "--pixel-size", "1e-4", "--quiet"])
     assert find_problem(ended, tmp_path / "out", (2,)) == ""
     assert file in ended.errors
+
+
+def test_rods_wider_than_the_photograph_are_not_found(originals):
+    ended = attempt(["check", str(originals.photographed), "--set", "photographs.radii=[1e3]", "--quiet"])
+    assert find_problem(ended, None, (2,)) == ""
+    assert "no grains were found" in ended.errors
+
+
+def test_a_photograph_without_rods_ends_in_one_line(originals, tmp_path):
+    copy = shutil.copytree(originals.photographed, tmp_path / "copy")
+    for file in (copy / "photos").iterdir():
+        cv2.imwrite(str(file), np.full_like(cv2.imread(str(file), cv2.IMREAD_UNCHANGED), 90))
+    ended = attempt(["check", str(copy), "--quiet"])
+    assert find_problem(ended, None, (2,)) == ""
+    assert "no grains were found" in ended.errors
 
 
 def test_a_pattern_that_is_too_long_is_refused(originals):

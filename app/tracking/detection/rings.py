@@ -42,10 +42,13 @@ def find_circles(image: Image, radii: Array, *, min_score: float) -> Circles:
     image : (H, W) array
         The photograph [grey].
     radii : (k,) array
-        Radii that are tried [px].
+        Radii that are tried [px]. Those of circles wider than the photograph find none.
     min_score : float
         Least mean slope, as a fraction of a full edge's.
     """
+    radii = radii[2.0 * radii < max(image.shape)]
+    if len(radii) == 0:
+        return Circles(*np.empty((4, 0)))
     least = max(int(radii.min() / MIN_COARSE_RADIUS), 1)
     factors = np.maximum((radii / COARSE_RADIUS).astype(np.intp), least)
     found = []

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT, circle_ends
+from rodsight.solver.calibration import scale
 from rodsight.solver.calibration.calibrate import calibrate
 from rodsight.solver.calibration.gaps import MeasuredSequence
 from rodsight.solver.calibration.priors import CalibrationPriors
@@ -122,6 +123,15 @@ def test_exact_quantities_are_not_corrected(rng):
     held = find_scale(measured, replace(PRIORS, pixel_size=0.0), 0.0, classes)
     assert held.pixel_size == 0.0
     assert held.pixel_size_sd == 0.0
+
+
+def test_errors_that_make_a_radius_vanish_are_not_applied(rng, monkeypatch):
+    measured, classes = scatter_pairs(rng)
+    errors = np.array([0.0, -RADII[0], 0.0, 0.0, 0.0])
+    monkeypatch.setattr(scale, "_estimate_errors", lambda peaks, limit: (errors, np.full(5, 1e-3), 1e4))
+    found = find_scale(measured, replace(PRIORS, radius_offset=1e-3), 0.0, classes)
+    assert not found.found
+    assert found.correct(measured, classes) is measured
 
 
 @pytest.mark.parametrize("offset", [-3e-4, 3e-4])
