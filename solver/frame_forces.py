@@ -62,7 +62,7 @@ class FrameForces:
     correction: Annotated[float, Quantity("ε: how much the forces must correct the measured motion")]
     old_unbalance: Annotated[float, Quantity("ū: mean |ΣF| of the previous forces on this network / mean f_n")]
     trust: Annotated[
-        float, Quantity("T: the correlation with the true forces is below it in at most one frame of twenty")
+        float, Quantity("T: lower bound of the correlation with the true forces, which few frames are below")
     ]
     frames_since_reset: Annotated[int, Quantity("frames since the last reset", absent=0)]
     history: SweepHistory

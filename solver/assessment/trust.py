@@ -30,7 +30,7 @@ class Assessment(NamedTuple):
     """Both measures of how far the forces of a frame agree with the true ones."""
 
     expected_correlation: float  # best estimate of r(f_n)
-    trust: float  # lower bound: r(f_n) is below it in at most one frame of twenty
+    trust: float  # lower bound: r(f_n) is more than .03 below it in at most three frames of a hundred
 
 
 def motion_assessment(evidence: Evidence) -> Assessment:
