@@ -11,11 +11,11 @@ import tomllib
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .compilation.ahead import SOLVER_KERNELS, TRACKING_KERNELS
+from .compilation.ahead import TRACKING_KERNELS
 from .experiment.boundary import apply_boundary
 from .experiment.config.experiment_file import ExperimentFile, as_toml
 from .experiment.config.unused_keys import refuse_unused_keys
@@ -25,36 +25,29 @@ from .experiment.photographs import PrefetchedPhotographs
 from .experiment.plausibility import check_packing
 from .experiment.scaling import make_scale
 from .experiment.walls import read_walls
-from .inference.corrected_sequence import CorrectedSequence
-from .inference.diagnosis.diagnose import diagnose_solved
-from .inference.frame_store import CheckpointStore, FrameStore, SolvedFrame
-from .inference.infer_sequence import FIRST_FRAME, infer_sequence
-from .inference.inference_settings import material_of, settings_of
-from .inference.inputs import Inputs
-from .inference.solve_frames import InferenceObserver
 from .out_of_date import out_of_date
 from .process.atomic import write_atomically
-from .process.errors import InputError, RunError, UndeterminedError
+from .process.errors import InputError
 from .process.machine.free_memory import release_free_memory
 from .process.sources import hash_of_code
 from .results.checkpoint import Checkpoint
 from .results.hdf5.lazy_sequences import LazySequence
-from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_results, save_tracks
+from .results.hdf5.store import Provenance, load_results, load_tracks, origin_of, save_tracks
 from .results.results import Results, TruthContacts
 from .results.summary import save_summary, summarize
 from .results.truth import TRUTH_COLUMNS, read_truth, score, true_ids
-from .robustness.ensemble_sd import calibrated_inputs, frame_with_ensemble_sd, solve_members
-from .robustness.error_budget import budget_cases, measure_budget
-from .robustness.study import Nominal
-from .run_folder import FAILURES, RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
+from .run_folder import RECORDING, REPORT, RESULTS, SIDE, SUMMARY, TRACKS, Run, find_experiment
 from .run_truth import load_truth, refuse_unnamed_truth
-from .solver.frame_forces import FrameStatus
 from .solver.parallel import available_cores
 from .stages import EFFECTS, FORCES, PHOTOGRAPHS_SHOWN, TRACKING
 from .tracking import DETECTIONS, PICTURES
 from .tracks import Tracks, WallTracks
 from .verdicts.decisions import BodyNames, decide
 from .verdicts.log import VERDICTS, Flag, VerdictLog
+
+if TYPE_CHECKING:  # imported where they are used: the first photograph is read before
+    from .inference.inputs import Inputs
+    from .robustness.study import Nominal
 
 
 def check(run: Run) -> tuple[Tracks | None, WallTracks | None]:
@@ -180,6 +173,8 @@ def solve(run: Run) -> Results:
 
 def nominal_run(run: Run) -> tuple[Nominal, str]:
     """Nominal run of the robustness study, with the fingerprint of effects that are measured from it."""
+    from .robustness.study import Nominal
+
     log = VerdictLog(run.file(VERDICTS)).snapshot()
     results, inputs = _solve_with_inputs(run, log)
     fingerprint = f"{run.origin(FORCES, log).fingerprint} {hash_of_code(EFFECTS.code)}"
@@ -248,6 +243,9 @@ def _solve(run: Run, log: VerdictLog) -> Results:
 
 def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inputs:
     """Inputs of the forces of a run."""
+    from .inference.inference_settings import material_of, settings_of
+    from .inference.inputs import Inputs
+
     config, bodies = run.experiment.config, BodyNames.of(tracks, walls)
     decisions = decide(log, bodies, frames=run.frames, frame_count=tracks.frame_count)
     if decisions.flags and all(Flag.IGNORE in decisions.flags.get(k, ()) for k in range(tracks.frame_count)):
@@ -266,71 +264,16 @@ def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:
     """Infer the forces of the sequence as it was given, and store them."""
     tracks, walls = track(run)
     assert walls is not None
-    since = time.perf_counter()
-    inputs = _inputs(run, log, tracks, walls)
-    store = CheckpointStore(lambda: run.checkpoint("solving", origin.fingerprint))
-    run.kernels.wait(SOLVER_KERNELS)
-    try:
-        results = infer_sequence(inputs, _RunObserver(run, log), store)
-    except UndeterminedError as error:
-        raise InputError(run.experiment.file, f"key {error.key}", str(error)) from None
-    if all(frame.status is FrameStatus.FAILED for frame in results.frames):
-        log_file = f"; see {run.file(FAILURES)}" if run.file(FAILURES).exists() else ""
-        first = results.frames[0].reason
-        raise RunError(f"{run.experiment.file}: no frame could be solved; the first one: {first}{log_file}")
-    release_free_memory()
-    results = replace(results, diagnosis=tuple(diagnose_solved(inputs, results, run.progress)))
-    results = _store(run, _named(run, results), origin, log)
-    store.checkpoint.clear()
-    run.timings.add("solving", since)
-    return results
+    from .forces_of_run import infer_forces  # the first photograph is read before all this is imported
 
-
-def _named(run: Run, results: Results) -> Results:
-    """Results with the name and the resolved configuration of the experiment."""
-    return replace(results, name=run.experiment.name, configuration=as_toml(run.experiment.config))
-
-
-class _RunObserver(InferenceObserver):
-    """Forwards events of the inference to progress, live recording, failure log and notes of a run."""
-
-    def __init__(self, run: Run, log: VerdictLog) -> None:
-        super().__init__(run.progress)
-        self._run, self._log = run, log
-
-    def corrected(self, sequence: CorrectedSequence) -> None:
-        self._run.write_manifest(self._log)
-        if self._run.watch is not None:
-            self._run.watch.start(_named(self._run, sequence.unsolved_results()))
-
-    def restored(self, store: FrameStore, count: int) -> None:
-        if self._run.watch is not None:
-            for k in range(count):
-                frame = store.load(k)
-                self._run.watch.frame(frame.forces, frame.statistics)
-
-    def solved(self, frame: SolvedFrame) -> None:
-        if self._run.watch is not None:
-            self._run.watch.frame(frame.forces, frame.statistics)
-
-    def failed(self, stage: str, frame: int, error: Exception) -> None:
-        self._run.note_failure(stage, frame, error)
-        if stage == FIRST_FRAME:
-            self._run.notes.append(
-                "The first photograph could not be estimated from all others (failures.log); it stays as solved first."
-            )
-
-
-def _store(run: Run, results: Results, origin: Provenance, log: VerdictLog) -> Results:
-    """Results as they are read back from their file: a frame at a time. A summary of earlier results is removed."""
-    save_results(run.file(RESULTS), results, origin)
-    run.file(SUMMARY).unlink(missing_ok=True)
-    run.manifest.add(RESULTS, origin.fingerprint, origin.program | run.state_of_input(log))
-    return load_results(run.file(RESULTS))
+    return infer_forces(run, _inputs(run, log, tracks, walls), origin, log)
 
 
 def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Results) -> Results:
     """Replace the standard deviations by those of an ensemble of sequences solved again, and store the results so."""
+    from .forces_of_run import store_results
+    from .robustness.ensemble_sd import calibrated_inputs, frame_with_ensemble_sd, solve_members
+
     since = time.perf_counter()
     size = run.experiment.config.solver.ensemble_size
     checkpoint = run.checkpoint("ensemble", f"{origin.fingerprint} {size}")
@@ -342,7 +285,7 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
         len(former), lambda k: frame_with_ensemble_sd(former[k], [each.at(k) for each in members], estimator)
     )  # fmt: skip
     results = replace(results, frames=frames, ensemble_size=size, configuration=as_toml(run.experiment.config))
-    results = _store(run, results, origin, log)
+    results = store_results(run, results, origin, log)
     checkpoint.clear()
     run.timings.add("ensemble", since)
     run.notes.append(f"Error bars (forces/fn_sd, ft_sd) from {size} sequences solved again with resampled inputs.")
@@ -351,6 +294,10 @@ def _add_error_bars(run: Run, origin: Provenance, log: VerdictLog, results: Resu
 
 def add_error_budget(run: Run, workers: int) -> Results:
     """Divide the error of every frame of a run among its causes, and store that with its results and its summary."""
+    from .forces_of_run import store_results
+    from .robustness.ensemble_sd import calibrated_inputs
+    from .robustness.error_budget import budget_cases, measure_budget
+
     since = time.perf_counter()
     log = VerdictLog(run.file(VERDICTS)).snapshot()
     results, origin = _solve(run, log), run.origin(FORCES, log)
@@ -363,7 +310,7 @@ def add_error_budget(run: Run, workers: int) -> Results:
     budget = measure_budget(inputs, results.frames, cases, workers=workers, progress=run.progress)
     former = results.frames
     results = replace(results, frames=LazySequence(len(former), lambda k: budget.apply_to(former[k])))
-    results = _store(run, results, origin, log)
+    results = store_results(run, results, origin, log)
     run.timings.add("error budget", since)
     conclude(run, results, load_truth(run, results), since)
     return results

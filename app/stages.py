@@ -28,7 +28,7 @@ FORCES = Stage(
         "inference/inputs.py", "results/hdf5/store.py", "robustness/ensemble_sd.py", "robustness/error_budget.py",
         "verdicts/decisions.py", "inference/diagnosis/diagnose.py",
     ),
-    alone=("pipeline.py",),
+    alone=("pipeline.py", "forces_of_run.py"),
 )  # fmt: skip
 EFFECTS = Stage((), ("robustness/study.py",))  # of the runs of a sensitivity study
 PHOTOGRAPHS_SHOWN = Stage(("photographs",), ("experiment/photographs.py", "experiment/jpeg_photographs.py"))

@@ -19,7 +19,9 @@ from ..solver.bodies.grains import Array
 from ..tracks import Tracks, TrackStatus
 from .config.dotted_keys import leaves
 from .config.experiment_file import ExperimentFile, load_config
-from .photographs import Channel, ImageSelection, Photographs, read_photograph
+from .photographs import Photographs
+from .pictures.image import Channel, ImageSelection
+from .pictures.picture_file import read_photograph
 from .reading.input_files import InputFiles
 from .reading.photograph_order import NUMBER, ORDER_COLUMNS, GivenOrder, arrange_order, relative_name
 from .reading.tables import Table, check_frames, check_unique, read_table

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..process.frame_range import FrameRange
-from .photographs import Image, Readable
+from .photographs import Readable
+from .pictures.image import Image
 
 LARGEST = 4_000_000  # px; above it a photograph is shown at half size
 JPEG_QUALITY = 80

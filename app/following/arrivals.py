@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from ..experiment.photographs import read_photograph
+from ..experiment.pictures.picture_file import read_photograph
 from ..experiment.reading.photograph_order import in_order, last_number
 from ..process.errors import InputError
 

@@ -14,10 +14,15 @@ from ..inference.inputs import Inputs
 from ..inference.solve_frames import InferenceObserver
 from ..process.errors import InputError
 from ..results.results import Results
+from ..reviewing.judging.candidate_pairs import walls_at
+from ..solver.contacts.contacts import Contacts, measure_contacts
 from ..solver.contacts.pairs import find_rows
 from ..solver.contacts.verdicts import Verdicts
+from ..solver.frame_forces import FrameStatus
 from ..solver.statistics.contact_removal import remove_contact
+from ..solver.statistics.local_change import limit_friction, rebalance
 from ..solver.statistics.stress import friction_angle, love_weber_stress, wall_forces
+from ..tracks import Tracks
 from ..verdicts.decisions import BodyNames
 from .comparisons import Source, as_run
 from .run import Run
@@ -51,8 +56,10 @@ def what_if(
     friction : float, optional
         Coefficient of friction between rods, and at walls that have no coefficient of their own.
     local : bool
-        Forbidden contacts only: the nearest forces around each of them that keep every grain balanced, in milliseconds,
-        without using the motion again. Statistics stay those of the run, except stress, friction angle and wall forces.
+        The nearest forces around what changes that keep every grain balanced, in milliseconds, without using the motion
+        again. Forces that are within the cones of another friction stay as they are. Not for forced contacts, which
+        bear nothing in the nearest forces. Statistics stay those of the run, except stress, friction angle and wall
+        forces.
 
     Returns
     -------
@@ -64,7 +71,8 @@ def what_if(
     IndexError
         If there is no such frame.
     InputError
-        A body is unknown, a forbidden contact does not exist (local), or the input of the run changed on the disk.
+        A body is unknown, a forbidden contact does not exist or contacts are forced (local), or the input of the run
+        changed on the disk.
 
     Examples
     --------
@@ -77,12 +85,17 @@ def what_if(
     """
     run = as_run(results)
     stored = run.results
+    if friction is not None and not (np.isfinite(friction) and friction >= 0.0):
+        raise InputError("what_if", f"friction = {friction!r}", "is not a coefficient of friction")
     frames = range(stored.tracks.frame_count) if frame is None else (run.checked_frame(frame),)
     forbidden, forced = _keys(stored, forbid, "forbid"), _keys(stored, force, "force")
     if local:
-        if len(forced) or move or friction is not None:
-            raise InputError("what_if", "local", "applies to forbid only: solve the whole sequence again instead")
-        return Run(_without(stored, frames, forbidden))
+        if len(forced):
+            raise InputError(
+                "what_if", "local", "does not apply to force: a forced contact bears nothing in the nearest forces; "
+                "solve the sequence again, without local",
+            )  # fmt: skip
+        return Run(_changed_locally(stored, frames, forbidden, _steps(stored.tracks, move or {}), friction))
     inputs = run.inputs if run.inputs is not None else _stored_inputs(run)
     inputs = _with_verdicts(inputs, frames, forbidden, forced)
     inputs = _moved(inputs, frames, move or {})
@@ -130,38 +143,77 @@ def _moved(inputs: Inputs, frames: Iterable[int], move: Mapping[int, tuple[float
     if not move:
         return inputs
     position = inputs.tracks.position.copy()
-    for name, step in move.items():
-        row = np.flatnonzero(inputs.tracks.id == name)
-        if not len(row):
-            raise InputError("what_if", f"move = {name}", "is not the id of a grain")
-        position[list(frames), row[0]] += np.asarray(step, np.float64)
+    for row, step in _steps(inputs.tracks, move).items():
+        position[list(frames), row] += step
     return replace(inputs, tracks=replace(inputs.tracks, position=position))
 
 
+def _steps(tracks: Tracks, move: Mapping[int, tuple[float, float]]) -> dict[int, np.ndarray]:
+    """The displacements by row. Raises InputError for unknown grains."""
+    steps = {}
+    for name, step in move.items():
+        row = np.flatnonzero(tracks.id == name)
+        if not len(row):
+            raise InputError("what_if", f"move = {name}", "is not the id of a grain")
+        steps[int(row[0])] = np.asarray(step, np.float64)
+    return steps
+
+
 def _with_friction(inputs: Inputs, friction: float) -> Inputs:
-    if not (np.isfinite(friction) and friction >= 0.0):
-        raise InputError("what_if", f"friction = {friction!r}", "is not a coefficient of friction")
     return replace(inputs, material=replace(inputs.material, friction=float(friction), friction_measured=False))
 
 
-def _without(results: Results, frames: Sequence[int], forbidden: np.ndarray) -> Results:
-    """Return results without these contacts: the nearest balanced forces around each of them."""
+def _changed_locally(
+    results: Results, frames: Sequence[int], forbidden: np.ndarray, steps: Mapping[int, np.ndarray],
+    friction: float | None,
+) -> Results:  # fmt: skip
+    """Return results with the nearest balanced forces around what changes."""
     solved, statistics = list(results.frames), list(results.statistics)
     for k in frames:
         forces = solved[k]
-        rows, known = find_rows(forbidden, forces.contacts.key)
+        if forces.status is FrameStatus.FAILED:
+            continue
+        limit = _coefficients(results, k, friction)
+        contacts, fn, ft = forces.contacts, forces.fn, forces.ft
+        if steps:
+            contacts, fn, ft = _with_steps(results, k, steps, limit)
+        if friction is not None:
+            fn, ft = limit_friction(results.grains, contacts, fn, ft, friction=limit)
+        rows, known = find_rows(forbidden, contacts.key)
         if not known.all() and len(frames) == 1:
             raise InputError("what_if", f"frame {k}", "has no such contact to forbid")
-        fn, ft = forces.fn, forces.ft
         for row in rows[known].tolist():
-            removal = remove_contact(results.grains, forces.contacts, fn, ft, row, friction=results.contact_friction(k))
+            removal = remove_contact(results.grains, contacts, fn, ft, row, friction=limit)
             fn, ft = removal.fn, removal.ft
-        solved[k] = replace(forces, fn=fn, ft=ft)
+        solved[k] = replace(forces, contacts=contacts, fn=fn, ft=ft)
         before, position = statistics[k], results.tracks.position[k]
-        stress = love_weber_stress(forces.contacts, fn, ft, position, before.area, rod_length(results))
-        on_walls = wall_forces(forces.contacts, fn, ft)
+        stress = love_weber_stress(contacts, fn, ft, position, before.area, rod_length(results))
         statistics[k] = replace(
             before, stress=stress, pressure=0.5 * float(np.trace(stress)), friction_angle=friction_angle(stress),
-            wall_force=on_walls,
+            wall_force=wall_forces(contacts, fn, ft),
         )  # fmt: skip
     return replace(results, frames=solved, statistics=statistics)
+
+
+def _coefficients(results: Results, frame: int, friction: float | None) -> np.ndarray:
+    """The coefficient (c,) of every contact of a frame; friction: of rods, and of walls without one of their own."""
+    used = np.array(results.contact_friction(frame), np.float64)
+    if friction is not None:
+        used[used == results.friction] = friction
+    return used
+
+
+def _with_steps(
+    results: Results, frame: int, steps: Mapping[int, np.ndarray], limit: np.ndarray
+) -> tuple[Contacts, np.ndarray, np.ndarray]:
+    """The contacts of a frame with grains elsewhere, and the nearest forces that balance there."""
+    forces, position = results.frames[frame], results.tracks.position[frame].copy()
+    for row, step in steps.items():
+        position[row] += step
+    contacts = forces.contacts
+    moved = measure_contacts(results.grains, position, walls_at(results, frame), contacts.i, contacts.j)
+    rows = np.flatnonzero(np.isin(contacts.i, list(steps)) | np.isin(contacts.j, list(steps)))
+    if not len(rows):
+        return contacts, forces.fn, forces.ft
+    fn, ft = rebalance(results.grains, contacts, forces.fn, forces.ft, rows, friction=limit, moved=moved)
+    return moved, fn, ft

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..experiment.photographs import Image, Photographs, PrefetchedPhotographs
+from ..experiment.photographs import Photographs, PrefetchedPhotographs
+from ..experiment.pictures.image import Image
 from ..experiment.units import Scale
 from ..process.errors import InputError
 from ..process.progress import Progress, no_progress

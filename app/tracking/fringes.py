@@ -11,7 +11,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..experiment.photographs import Image, Photographs
+from ..experiment.photographs import Photographs
+from ..experiment.pictures.image import Image
 from ..experiment.units import Scale
 from ..process.errors import InputError
 from ..process.progress import Progress, no_progress

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..experiment.jpeg_photographs import JpegPhotograph, JpegPhotographs, encode_jpeg
-from ..experiment.photographs import Image, Readable
+from ..experiment.photographs import Readable
+from ..experiment.pictures.image import Image
 from ..process.frame_range import FrameRange
 from ..results.checkpoint import Checkpoint
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..experiment.photographs import FULL_SCALE, Image
+from ..experiment.pictures.image import FULL_SCALE, Image
 from ..solver.bodies.grains import Array
 from .correlation.noise import image_noise
 from .correlation.patches import Patches

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ..experiment.boundary import apply_boundary
 from ..experiment.corrections import read_corrections
 from ..experiment.experiment import Experiment, read_grain_guess, read_times
-from ..experiment.photographs import FULL_SCALE, Image, Photographs
+from ..experiment.photographs import Photographs
+from ..experiment.pictures.image import FULL_SCALE, Image
 from ..experiment.reading.tables import read_table, write_table
 from ..experiment.scaling import make_scale
 from ..experiment.units import Scale

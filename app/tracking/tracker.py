@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..experiment.photographs import Image
+from ..experiment.pictures.image import Image
 from ..solver.bodies.grains import Array
 from .correlation.correlator import Correlator, Rows
 from .correlation.noise import image_noise

@@ -7,7 +7,6 @@ fringes look worse than they are. Whether overlaps are evidence as well is then 
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import rankdata
 
 from ..bodies.grains import Array
 from ..posterior.frame_posterior import FramePosterior, infer_frame
@@ -90,6 +89,8 @@ def _readings(evidence: SequenceEvidence, posteriors: dict[int, FramePosterior])
 
 def _rank_agreement(readings: dict[int, FringeReading]) -> float:
     """Mean rank correlation of fringes and pressures."""
+    from scipy.stats import rankdata  # half a second of imports that few inputs need
+
     found = []
     for each in readings.values():
         seen = each.used & np.isfinite(each.fringes)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.optimize import isotonic_regression
 
 from ..bodies.grains import Array
 
@@ -156,6 +155,8 @@ def _gather(readings: Mapping[int, FringeReading], frames: list[int]) -> tuple[A
 
 def fit_curve(fringes: Array, pressure: Array) -> tuple[Array, Array]:
     """Return G² and pressure at the bins (q,): isotonic regression of the means of readings (m,) of equal numbers."""
+    from scipy.optimize import isotonic_regression  # a tenth of all import time that few inputs need
+
     order = np.argsort(fringes, kind="stable")
     bins = np.array_split(order, min(BINS, max(len(order) // 10, 2)))
     knot = np.array([fringes[each].mean() for each in bins])

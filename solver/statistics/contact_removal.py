@@ -51,18 +51,18 @@ def remove_contact(
     reach
         Number of contacts from the removed one within which forces change.
     """
-    inside = _neighbourhood(contacts, row, reach)
+    inside = neighbourhood(contacts, np.array([row]), reach)
     touching = inside[contacts.i] | (inside[np.minimum(contacts.j, contacts.grain_count - 1)] & ~contacts.with_wall)
     free = touching.copy()
     free[row] = False
     equilibrated = inside if grains.boundary is None else inside & ~grains.boundary
     rows, members = np.flatnonzero(free), np.flatnonzero(equilibrated)
-    matrix = _resultants(grains, contacts, rows, members)
-    removed = _resultants(grains, contacts, np.array([row]), members) @ np.array([fn[row], ft[row]])
+    matrix = resultants(grains, contacts, rows, members)
+    removed = resultants(grains, contacts, np.array([row]), members) @ np.array([fn[row], ft[row]])
     given = np.stack([fn[rows], ft[rows]], axis=1)
     resultant = matrix @ given.ravel() + removed
     scale = max(float(np.mean(np.abs(fn))), 1e-300)
-    changed = _project(matrix, resultant, given, friction[rows], TOLERANCE * scale)
+    changed = project_forces(matrix, resultant, given, friction[rows], TOLERANCE * scale)
     new_fn, new_ft = fn.copy(), ft.copy()
     new_fn[rows], new_ft[rows] = changed[:, 0], changed[:, 1]
     new_fn[row] = new_ft[row] = 0.0
@@ -72,13 +72,12 @@ def remove_contact(
     return Removal(new_fn, new_ft, free, worst)
 
 
-def _neighbourhood(contacts: Contacts, row: int, reach: int) -> NDArray[np.bool_]:
-    """Return the grains (n,) that are at most `reach` contacts away from a contact."""
+def neighbourhood(contacts: Contacts, rows: NDArray[np.intp], reach: int) -> NDArray[np.bool_]:
+    """Return the grains (n,) that are at most `reach` contacts away from some contacts."""
     inside = np.zeros(contacts.grain_count, np.bool_)
-    inside[contacts.i[row]] = True
     between = ~contacts.with_wall
-    if between[row]:
-        inside[contacts.j[row]] = True
+    inside[contacts.i[rows]] = True
+    inside[contacts.j[rows[between[rows]]]] = True
     i, j = contacts.i[between], contacts.j[between]
     for _ in range(reach):
         beside = inside[i] | inside[j]
@@ -86,7 +85,7 @@ def _neighbourhood(contacts: Contacts, row: int, reach: int) -> NDArray[np.bool_
     return inside
 
 
-def _resultants(grains: Grains, contacts: Contacts, rows: NDArray[np.intp], members: NDArray[np.intp]) -> Array:
+def resultants(grains: Grains, contacts: Contacts, rows: NDArray[np.intp], members: NDArray[np.intp]) -> Array:
     """Return the matrix (3p, 2m) from forces (fn, ft) of contacts `rows` (m,) to fx, fy, torque of grains (p,)."""
     at = np.full(contacts.grain_count, -1)
     at[members] = np.arange(len(members))
@@ -100,7 +99,7 @@ def _resultants(grains: Grains, contacts: Contacts, rows: NDArray[np.intp], memb
     return matrix.reshape(3 * len(members), 2 * len(rows))
 
 
-def _project(matrix: Array, resultant: Array, given: Array, limit: Array, tolerance: float) -> Array:
+def project_forces(matrix: Array, resultant: Array, given: Array, limit: Array, tolerance: float) -> Array:
     """Return the forces (m, 2) nearest to `given` with matrix · f = resultant, each within its Coulomb cone."""
     inverse = np.linalg.pinv(matrix)
     # The projection onto equilibrium is null_space · f + particular solution.

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.photographs import LUMA
+from rodsight.experiment.pictures.image import LUMA
 from rodsight.tracking.detection.detect import Detection, DetectionSettings, detect_grains
 from scipy.spatial import KDTree
 

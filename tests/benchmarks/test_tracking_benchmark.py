@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
-from rodsight.experiment.photographs import LUMA
+from rodsight.experiment.pictures.image import LUMA
 from rodsight.experiment.scaling import make_scale
 from rodsight.experiment.walls import read_walls
 from rodsight.tracking.registration.poses import FramePoses

@@ -23,6 +23,7 @@ from ..look.colours import FAINT, INK, LOADED_WALL, Rgba, packed, packed_one
 from ..look.ramp_legend import PIECES
 from ..look.scene import Scene
 from .forces.network import SweepChoice, visible_sweeps
+from .legends import scale_bar_of
 
 COLUMNS, ROWS = 3, 3  # of frames
 SWEEP_COLUMNS = 2  # of sweeps, in ROWS rows
@@ -64,7 +65,7 @@ class FilmWriter:
         self._frames = film_frames(scene.tracks.frame_count)
 
     def log_keys(self, stream: rr.RecordingStream) -> None:
-        """Log the legend of forces below both films, static."""
+        """Log the legend of forces and a scale bar, which hold for all pictures, below both films, static."""
         canvas, style = self._scene.canvas, self._scene.style
         for path, columns in ((entities.FILM_KEY, COLUMNS), (entities.FILM_SWEEPS_KEY, SWEEP_COLUMNS)):
             wide = columns * canvas.width
@@ -72,11 +73,18 @@ class FilmWriter:
             y = np.full(PIECES, canvas.top + ((ROWS - 1) * STEP_DOWN + 1.0 + 0.3 * KEY_HEIGHT) * canvas.height)
             lines = np.stack([np.stack([x[:-1], y], axis=1), np.stack([x[1:], y], axis=1)], axis=1)
             fn = np.linspace(0.0, style.range.top, PIECES + 1)[1:]
+            length, label = scale_bar_of(canvas)
+            bar = np.array([[canvas.left + 0.04 * wide, y[0]], [canvas.left + 0.04 * wide + length, y[0]]])
             stream.log(
-                path, rr.LineStrips2D(lines.astype(np.float32), radii=style.radii(fn), colors=style.colours(fn)),
+                path,
+                rr.LineStrips2D(
+                    np.concatenate([lines, bar[None]]).astype(np.float32),
+                    radii=np.append(style.radii(fn), np.float32(0.16 * self._grain)),
+                    colors=np.append(style.colours(fn), np.uint32(packed_one(INK))),
+                ),
                 static=True,
-            )  # fmt: skip
-            texts = (("0", x[0]), (f"≥ {style.range.top:.3g} N", x[-1]))
+            )
+            texts = (("0", x[0]), (f"≥ {style.range.top:.3g} N", x[-1]), (label, float(bar[:, 0].mean())))
             log_texts(stream, f"{path}/ticks", [(np.array([at, y[0]]), text, INK) for text, at in texts])
 
     def log(self, clock: Clock, forces: FrameForces) -> None:

@@ -93,12 +93,18 @@ def _log_gap_key(stream: rr.RecordingStream, scene: Scene) -> None:
     log_texts(stream, entities.UNCERTAINTY_LEGEND_TICKS, texts)
 
 
-def log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
-    """Log a bar of a round length above the grains."""
+def scale_bar_of(canvas: Canvas) -> tuple[float, str]:
+    """Return length [px] and label of a bar of a round length."""
     pixel = canvas.scale.pixel_size * canvas.shrink
     length = round_step(0.25 * canvas.width * pixel)
+    return length / pixel, f"{1e3 * length:g} mm" if length < 1.0 else f"{length:g} m"
+
+
+def log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
+    """Log a bar of a round length above the grains."""
+    length, label = scale_bar_of(canvas)
     start = np.array([canvas.left + 0.6 * canvas.grain_radius, canvas.top - 0.8 * canvas.header_height])
-    end = start + np.array([length / pixel, 0.0])
+    end = start + np.array([length, 0.0])
     stream.log(
         entities.SCALE_BAR,
         rr.LineStrips2D(
@@ -107,7 +113,6 @@ def log_scale_bar(stream: rr.RecordingStream, canvas: Canvas) -> None:
         ),
         static=True,
     )  # fmt: skip
-    label = f"{1e3 * length:g} mm" if length < 1.0 else f"{length:g} m"
     log_texts(stream, entities.SCALE_BAR_LENGTH, [(0.5 * (start + end), label, INK)])
 
 

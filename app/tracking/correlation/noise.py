@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 
 # Norm of the mask (1, −2, 1) along both axes, whose response to a constant, a slope and an edge along an axis is zero
 # (Immerkær 1996).

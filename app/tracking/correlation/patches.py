@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from . import kernels as kernels
 from .splines import Pyramid

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 
 # Unser, Aldroubi & Eden 1993: the inverse of the sampled cubic B-spline is sqrt(3) z^|k|, z = sqrt(3) − 2.
 # The first tap that is omitted is 1e-6 of the middle one: a thousandth of a grey level.

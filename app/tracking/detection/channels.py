@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...experiment.photographs import FULL_SCALE, Image
+from ...experiment.pictures.image import FULL_SCALE, Image
 from ..correlation.noise import image_noise
 from ..correlation.splines import shrink
 from .detect import Detection, DetectionSettings, detect_grains

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...solver.parallel import available_cores, parallel_map
 from .circle_measurement import CIRCLES_PER_THREAD, CircleMeasurer, MeasuredCircle

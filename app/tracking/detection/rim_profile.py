@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ..short_sort import median
 

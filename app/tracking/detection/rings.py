@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numba import njit
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ..correlation.splines import shrink
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...tracks import TrackStatus
 from ..correlation.correlator import Rows

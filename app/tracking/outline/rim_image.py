@@ -7,7 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ..correlation.noise import image_noise
 from ..correlation.splines import spline_coefficients

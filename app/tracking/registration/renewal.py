@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...tracks import TrackStatus
 from ..correlation.correlator import Correlator, Rows
 from ..correlation.patches import Patches

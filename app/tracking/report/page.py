@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...process.frame_range import FrameRange
 from ...solver.bodies.grains import Array

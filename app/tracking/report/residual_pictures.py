@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 
 SIDE = 132  # [px] of one patch as shown

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from .inner_edge import BLUR, MIN_WINDOW, OUTLIER, PASSES, SPACING, STEP, subpixel_peak
 

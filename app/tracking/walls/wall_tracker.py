@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
 from ..correlation.correlator import Correlator, Fits, Rows, SearchRange

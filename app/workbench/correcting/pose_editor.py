@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...solver.bodies.grains import Array
 from ...tracking.correlation.correlator import Fits, Rows, SearchRange
 from ...tracking.registration.registration import Registration

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...solver.bodies.grains import Array
 from ...tracking.registration.manual_poses import ManualPoses

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,21 +12,35 @@ from ...solver.bodies.cell import Cell
 from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameStatus
 from ...solver.kinematics.local_motion import measure_local_motion
+from ...solver.kinematics.sequence_kinematics import SequenceKinematics
 from ...solver.statistics.stress import grain_stresses
 from .run_data import RunData
 
 PERCENT = 100.0
 
 
-def grain_motion(data: RunData, photograph: int, since: int, scale: Scale, length: float) -> dict[str, Any]:
+class _Values(NamedTuple):
+    """Motion of all rods (n,) between two frames."""
+
+    fluctuation: Array | None  # (n, 2) [m] displacement less the mean field, where it is stored
+    shear: Array
+    volume: Array
+    d2min: Array  # [m²]
+    rotation: Array  # [rad]
+
+
+def grain_motion(data: RunData, photograph: int, since: int | None, scale: Scale, length: float) -> dict[str, Any]:
     """Describe how the rods of a photograph have moved since another one, and what they carry.
 
     Parameters
     ----------
     data : RunData
         The run.
-    photograph, since : int
-        The photograph, and the one from which motion is measured.
+    photograph : int
+        The photograph.
+    since : int or None
+        The photograph from which motion is measured; None: over the window of the results, by their own kinematics,
+        or from the photograph before where the run has none.
     scale : Scale
         From pixels to metres.
     length : float
@@ -36,8 +50,9 @@ def grain_motion(data: RunData, photograph: int, since: int, scale: Scale, lengt
     -------
     dict
         One value per rod that is seen, in the order of `list_rods`: displacement and its departure from the mean
-        deformation [px, y down], rotation [°], largest shear strain and volume strain [%], √D²min over the mean
-        diameter [%], pressure [kPa], contacts that bear force. None where it is unknown. pixel: [m], at the middle.
+        deformation [px, y down], rotation [°] (over the window of the results: against the local field), shear strain
+        and volume strain [%], √D²min over the mean diameter [%], pressure [kPa], contacts that bear force. None where
+        it is unknown. pixel: [m], at the middle. window: photographs of the window of the results; None: measured here.
 
     Notes
     -----
@@ -45,27 +60,50 @@ def grain_motion(data: RunData, photograph: int, since: int, scale: Scale, lengt
     and the volume strain ε₁ + ε₂ (extension positive). The mean deformation is the affine map that fits all
     displacements best.
     """
-    tracks, frame, start = data.tracks, photograph - data.first, since - data.first
+    tracks, frame = data.tracks, photograph - data.first
+    stored = data.results.kinematics if data.results is not None and since is None else None
+    window = None if stored is None else stored.window
+    start = max(frame - (window or 1), 0) if since is None else since - data.first
     here = np.flatnonzero(tracks.present[frame])
     before, after = tracks.position[start], tracks.position[frame]
-    cell = None if data.walls is None else data.walls.cell
-    cells = None if cell is None else (Cell.at_rest(cell[start]), Cell.at_rest(cell[frame]))
-    motion = measure_local_motion(before, after, tracks.radius, cells)
-    strained = np.isfinite(motion.strain).all(axis=(1, 2))
-    principal = np.full((len(tracks.id), 2), np.nan)
-    principal[strained] = np.linalg.eigvalsh(motion.strain[strained])
+    values = _measured(data, start, frame) if stored is None else _stored(stored, frame)
     moved = _pixels_moved(scale, before[here], after[here])
+    if values.fluctuation is None:
+        fluctuation = moved - _affine(after[here], moved)
+    else:
+        fluctuation = _pixels_moved(scale, after[here] - values.fluctuation[here], after[here])
     pressure, coordination = _loads(data, frame, length)
     middle = scale.to_pixels(np.nanmean(after, axis=0)[None])
     return {
-        "frame": photograph, "since": since, "pixel": float(scale.size_at(middle)[0]),
-        **_pairs("d", moved), **_pairs("f", moved - _affine(after[here], moved)),
-        "rotation": rounded(np.degrees(tracks.rotation[frame, here] - tracks.rotation[start, here])),
-        "shear": rounded(PERCENT * (principal[here, 1] - principal[here, 0])),
-        "volume": rounded(PERCENT * principal[here].sum(axis=1)),
-        "d2min": rounded(PERCENT * np.sqrt(motion.d2min[here]) / (2.0 * tracks.radius.mean())),
+        "frame": photograph, "since": start + data.first, "window": window, "pixel": float(scale.size_at(middle)[0]),
+        **_pairs("d", moved), **_pairs("f", fluctuation),
+        "rotation": rounded(np.degrees(values.rotation[here])),
+        "shear": rounded(PERCENT * values.shear[here]),
+        "volume": rounded(PERCENT * values.volume[here]),
+        "d2min": rounded(PERCENT * np.sqrt(values.d2min[here]) / (2.0 * tracks.radius.mean())),
         "pressure": rounded(1e-3 * pressure[here]), "coordination": rounded(coordination[here]),
     }  # fmt: skip
+
+
+def _stored(kinematics: SequenceKinematics, frame: int) -> _Values:
+    """The kinematics of a frame as they are in the results."""
+    return _Values(
+        kinematics.fluctuation[frame], kinematics.shear_strain[frame], kinematics.volumetric_strain[frame],
+        kinematics.d2min[frame], kinematics.rotation[frame],
+    )  # fmt: skip
+
+
+def _measured(data: RunData, start: int, frame: int) -> _Values:
+    """The same between any two frames."""
+    tracks = data.tracks
+    cell = None if data.walls is None else data.walls.cell
+    cells = None if cell is None else (Cell.at_rest(cell[start]), Cell.at_rest(cell[frame]))
+    motion = measure_local_motion(tracks.position[start], tracks.position[frame], tracks.radius, cells)
+    strained = np.isfinite(motion.strain).all(axis=(1, 2))
+    principal = np.full((len(tracks.id), 2), np.nan)
+    principal[strained] = np.linalg.eigvalsh(motion.strain[strained])
+    rotation = tracks.rotation[frame] - tracks.rotation[start]
+    return _Values(None, principal[:, 1] - principal[:, 0], principal.sum(axis=1), motion.d2min, rotation)
 
 
 def _pixels_moved(scale: Scale, before: Array, after: Array) -> Array:

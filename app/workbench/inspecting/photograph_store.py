@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Channel, Image, Rotation, read_levels, read_photograph, rotated
+from ...experiment.pictures.image import Channel, Image, Rotation, rotated
+from ...experiment.pictures.picture_file import read_levels, read_photograph
 
 Name = tuple[Path, int, Channel, Rotation]  # of a photograph: changes with its file, its channel, its rotation
 Levels = NDArray[np.uint8]  # (h, w)

@@ -1,10 +1,11 @@
 // The open experiment, the step that is shown, and the keys that work in every step. All data are on the server.
 
-import { request, at, digits, h, sign, notify } from "/page/dom.js";
+import { context, request, at, digits, h, sign, notify } from "/page/dom.js";
 import { Stage } from "/page/stage.js";
 import { showHome } from "/page/home.js";
 import { showLayers, toggleLayers } from "/page/layers/panel.js";
 import { paintLayer } from "/page/layers/settings.js";
+import { drawSetup } from "/page/layers/setup.js";
 import { clearPlot, togglePlot } from "/page/time/plot.js";
 import { closeSheet, isSheetOpen, sheetButton, toggleSheet } from "/page/time/sheet.js";
 import { runMark, standing } from "/page/parts/run_state.js";
@@ -23,6 +24,8 @@ export const STEPS = [photographs, scale, walls, rods, material, run, inspect, r
 
 export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, looks: 0, notify };
 globalThis.workbench = app; // for tests
+
+context.photograph = (at) => (app.project?.at === at && app.project.series.names[app.frame] ? [app.frame, app.project.series.names[app.frame]] : null);
 
 const waiting = new Set(); // actions that are not done: a second one is a double click
 const PATIENCE = 250, LOOKS = 1000; // [ms]
@@ -213,7 +216,7 @@ app.paint = () => {
   focused();
   const edited = app.edits(), hint = step.hint?.(app) ?? "";
   app.hint(edited === null || project.tracked ? hint : [`Photograph ${edited}`, hint].filter(Boolean).join(" · "));
-  app.stage.draw = (c, k) => { if (step.layers) step.draw?.(app, c, k); else paintLayer(c, "marks", () => step.draw?.(app, c, k)); };
+  app.stage.draw = (c, k) => { if (step.below) drawSetup(app, c, k, step.below); if (step.layered) step.draw?.(app, c, k); else paintLayer(c, "marks", () => step.draw?.(app, c, k)); };
   app.stage.fixed = (c, k) => step.legend?.(app, c, k); // stays where it is when the picture is moved
   app.stage.dim = step.dim ?? 1;
   const beside = app.step.frames || app.step.timeline ? [app.frame + 1, app.frame - 1].filter((each) => project.files[each]) : [];

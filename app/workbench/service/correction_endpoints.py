@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.reading.tables import read_table
 from ...experiment.units import Scale
 from ...process.errors import InputError

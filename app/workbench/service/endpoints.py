@@ -12,6 +12,7 @@ from starlette.requests import Request
 from ...process.errors import InputError
 from ..action_script import as_script
 from ..setup.journal import requested
+from .project import Project
 from .workbench import Workbench
 
 Endpoint = Callable[..., Any]
@@ -36,6 +37,9 @@ WIDEST = 20_000  # [px] of a picture
 
 ENDPOINTS: dict[str, Endpoint] = {}
 EDITING: set[str] = set()  # endpoints that change the files of an experiment: they run one at a time
+# Requests that write about the photograph that is shown: it must be the one that has this number here.
+ABOUT_SHOWN = frozenset(("judge", "flag_frame", "pair_at"))
+FREE = frozenset(("undo", "redo"))  # edits that concern no photograph
 _RULES = ConfigDict(arbitrary_types_allowed=True, strict=True)
 
 
@@ -73,14 +77,30 @@ def call_endpoint(workbench: Workbench, name: str, values: dict[str, Any]) -> An
     """
     if name not in ENDPOINTS or "workbench" in values:
         raise BadRequest(f"there is no endpoint {name}")
+    shown = values.pop("photograph", None)
     try:
         with (
             _edit_lock(workbench, values.get("at")) if name in EDITING else nullcontext(),
             requested(name, values),
         ):
+            if shown is not None and (name in ABOUT_SHOWN or name in EDITING - FREE):
+                _refuse_another_photograph(workbench.project(values["at"]), shown)
             return ENDPOINTS[name](workbench, **values)
     except ValidationError as error:
         raise BadRequest(f"{name}: {first_error(error)}") from None
+
+
+def _refuse_another_photograph(opened: Project, shown: Any) -> None:
+    """Raise InputError where the photograph that the page shows, [number, name], has another number by now."""
+    if not isinstance(shown, list) or [type(each) for each in shown] != [int, str]:
+        raise BadRequest("photograph: is a number and a name")
+    number, name = shown
+    names = opened.photograph_names()
+    if names and name not in names[number : number + 1]:
+        raise InputError(
+            name, f"photograph {number}", "is another one by now: their order or number was changed in another window; "
+            "look again, and repeat the action",
+        )  # fmt: skip
 
 
 def first_error(error: ValidationError) -> str:

@@ -46,12 +46,15 @@ def without_contact(workbench: Workbench, at: Text, frame: Whole, i: Name, j: Na
 
 
 @endpoint
-def motion(workbench: Workbench, at: Text, frame: Whole, since: Whole) -> dict[str, Any]:
-    """Describe how the rods of a photograph have moved since another one, and what they carry."""
+def motion(workbench: Workbench, at: Text, frame: Whole, since: Whole | None = None) -> dict[str, Any]:
+    """Describe how the rods of a photograph have moved, and what they carry.
+
+    since: a photograph; None: over the window of the results.
+    """
     opened = workbench.project(at)
     run = opened.reviewed_run()
     first, stop = run.first_frame, run.first_frame + len(run.results.frames)
-    for photograph in (frame, since):
+    for photograph in (frame, frame if since is None else since):
         if not first <= photograph < stop:
             raise InputError(opened.results, f"photograph {photograph}", f"is not solved: {first} to {stop - 1} are")
     data = opened.run_data()

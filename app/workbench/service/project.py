@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.reading.input_files import InputFiles
 from ...experiment.units import Scale
 from ...out_of_date import recording_out_of_date
@@ -228,9 +228,9 @@ class Project:
     @contextmanager
     def with_verdicts(self) -> Iterator[None]:
         """Let verdicts follow their photographs where their order changes inside the block."""
-        before = self._photograph_names()
+        before = self.photograph_names()
         yield
-        VerdictLog(self.results / VERDICTS).reorder(before, self._photograph_names())
+        VerdictLog(self.results / VERDICTS).reorder(before, self.photograph_names())
 
     def revert(self, *, back: bool) -> Action | None:
         """Undo the last action, or (back false) repeat the one undone last; None: there is none.
@@ -254,7 +254,8 @@ class Project:
                 return action
         return None
 
-    def _photograph_names(self) -> list[str]:
+    def photograph_names(self) -> list[str]:
+        """Return the names of the photographs in their order."""
         experiment = self.validation().experiment
         return [] if experiment is None else experiment.photograph_names()
 

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, StringConstraints
 
 from ...experiment.experiment import GrainGuess
+from ...experiment.pictures.mask import outline_of_stroke
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ..setup import circles, edits, photograph_series
@@ -25,6 +26,8 @@ Written = Annotated[str, StringConstraints(max_length=LARGEST_WRITTEN), AfterVal
 WITH_TABLE = frozenset(("set_table",))  # endpoints whose requests hold a table
 LEAST_CIRCLE = 10.0  # [px] of a circular wall's radius
 Polygon = Annotated[list[Point], Field(min_length=3, max_length=500)]
+Stroke = Annotated[list[Point], Field(min_length=1, max_length=5000)]
+Brush = Annotated[float, Field(ge=0.5, le=2000.0)]
 Files = Annotated[list[Text], Field(min_length=1, max_length=100_000)]
 Region = Annotated[list[Whole], Field(min_length=4, max_length=4)]
 
@@ -49,6 +52,18 @@ def set_photographs(
     if mask is not None:
         keys["photographs.mask"] = [[_rounded(point) for point in polygon] for polygon in mask] or None
     opened.draft.set_keys("photographs" if mask is None else "mask", keys)
+    return opened.describe()
+
+
+@editing_endpoint
+def brush_mask(workbench: Workbench, at: Text, points: Stroke, radius: Brush) -> dict[str, Any]:
+    """Add a stroke of a round brush [px] to the mask."""
+    opened = workbench.project(at)
+    mask = opened.validation().data.get("photographs", {}).get("mask", [])
+    if isinstance(mask, str):
+        raise InputError(mask, "key photographs.mask", "is a picture: paint in it, or leave it out first")
+    added = [[list(point) for point in polygon] for polygon in outline_of_stroke(points, radius)]
+    opened.draft.set_keys("mask", {"photographs.mask": [*mask, *added]})
     return opened.describe()
 
 

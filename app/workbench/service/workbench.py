@@ -9,7 +9,7 @@ from typing import Any
 
 from ... import __version__
 from ...experiment.experiment import CONFIG_NAME
-from ...experiment.photographs import read_photograph
+from ...experiment.pictures.picture_file import read_photograph
 from ...process.errors import InputError
 from ..inspecting.photograph_store import encode_jpeg
 from ..setup import edits

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.reading.corners import CORNER_COLUMNS
 from ...experiment.units import Scale
 from ...experiment.walls import ARC_COLUMNS

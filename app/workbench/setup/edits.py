@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...experiment.experiment import TIME_COLUMNS, GrainGuess
-from ...experiment.photographs import Image
+from ...experiment.pictures.image import Image
 from ...experiment.units import Scale
 from ...experiment.walls import FORCE_COLUMNS, LOAD_COLUMNS, WALL_COLUMNS
 from ...process.errors import InputError

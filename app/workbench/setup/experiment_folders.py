@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...experiment.experiment import CONFIG_NAME
-from ...experiment.photographs import RAW_SUFFIXES
+from ...experiment.pictures.picture_file import RAW_SUFFIXES
 from ...experiment.reading.photograph_order import in_order, natural_key
 from ...process.atomic import replacing_folder, write_atomically
 from ...process.errors import InputError

@@ -14,7 +14,9 @@ import numpy as np
 from ...exchange.photographic.opencv_calibration import read_calibration
 from ...exchange.photographic.rod_readings import read_rods
 from ...exchange.photographic.video_frames import extract_frames, is_video
-from ...experiment.photographs import FULL_SCALE, Channel, Image, ImageSelection, Photographs, read_photograph
+from ...experiment.photographs import Photographs
+from ...experiment.pictures.image import FULL_SCALE, Channel, Image, ImageSelection
+from ...experiment.pictures.picture_file import read_photograph
 from ...experiment.plausibility import rods_cut_by_walls
 from ...process.atomic import write_atomically
 from ...process.errors import InputError

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...experiment.image_header import claimed_size
+from ...experiment.pictures.image_header import claimed_size
 from ...experiment.reading.camera_notes import camera_times, noted_rotation
 from ...experiment.reading.photograph_order import MissingNumbers
 

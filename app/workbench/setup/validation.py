@@ -16,7 +16,8 @@ import numpy as np
 
 from ...experiment.config.experiment_file import ExperimentFile, find_config_errors
 from ...experiment.experiment import Experiment, GrainGuess, read_grain_guess, read_times, read_tracks
-from ...experiment.photographs import Channel, read_photograph
+from ...experiment.pictures.image import Channel
+from ...experiment.pictures.picture_file import read_photograph
 from ...experiment.plausibility import (
     check_inside,
     check_radii,

@@ -10,8 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.image_header import claimed_size
-from rodsight.experiment.photographs import read_photograph
+from rodsight.experiment.pictures.image_header import claimed_size
+from rodsight.experiment.pictures.picture_file import read_photograph
 from rodsight.process.errors import InputError
 
 from tests.app.experiment.tables import edit

@@ -11,12 +11,9 @@ import cv2
 import numpy as np
 import pytest
 from rodsight.experiment.experiment import load_experiment
-from rodsight.experiment.photographs import (
-    ImageSelection,
-    Photographs,
-    PrefetchedPhotographs,
-    read_photograph,
-)
+from rodsight.experiment.photographs import Photographs, PrefetchedPhotographs
+from rodsight.experiment.pictures.image import ImageSelection
+from rodsight.experiment.pictures.picture_file import read_photograph
 from rodsight.experiment.reading.input_files import InputFiles
 from rodsight.experiment.reading.photograph_order import in_order
 from rodsight.process.errors import InputError, RunError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.png_chunks import OVERHEAD, is_whole_png
+from rodsight.experiment.pictures.png_chunks import OVERHEAD, is_whole_png
 
 PICTURE = np.random.default_rng(0).integers(0, 255, (40, 60), dtype=np.uint8)
 WHOLE = cv2.imencode(".png", PICTURE)[1].tobytes()

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rodsight.experiment.photographs import Photographs, read_photograph
+from rodsight.experiment.photographs import Photographs
+from rodsight.experiment.pictures.picture_file import read_photograph
 
 pytest.importorskip("rawpy")
 

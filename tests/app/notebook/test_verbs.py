@@ -109,6 +109,22 @@ def test_a_forbidden_contact_bears_nothing_and_the_input_is_used_again(run):
     assert not np.array_equal(near["fn"], run.contacts(4)["fn"])
 
 
+def test_friction_and_place_are_changed_locally(run):
+    given = run.contacts(4)
+    mu = 0.5 * run.results.friction
+    limited = rodsight.what_if(run, 4, friction=mu, local=True).contacts(4)
+    assert (given["ft"].abs() > mu * given["fn"] + 1.0).any()
+    between = limited["wall"] == ""
+    assert (limited["ft"].abs() <= mu * limited["fn"] + 1e-2 * given["fn"].mean())[between].all()
+    pd.testing.assert_frame_equal(rodsight.what_if(run, 4, friction=0.9, local=True).contacts(4), given)
+    name = int(given.nlargest(1, "fn")["i"].item())
+    moved = rodsight.what_if(run, 4, move={name: (5e-5, 0.0)}, local=True).contacts(4)
+    own = (moved["i"] == name) | (moved["j"] == name)
+    assert not np.allclose(moved["nx"][own], given["nx"][own], atol=1e-6)
+    assert not np.allclose(moved["fn"][own], given["fn"][own], rtol=1e-3)
+    pd.testing.assert_series_equal(moved["nx"][~own], given["nx"][~own])
+
+
 def test_a_forced_contact_is_listed(run):
     contacts = run.contacts(4)
     listed = set(zip(contacts["i"], contacts["j"], strict=True))
@@ -140,7 +156,8 @@ def test_moved_grains_and_another_friction_change_the_inputs(run):
         ({"force": [(1, 1)]}, "is one body"),
         ({"move": {999: (0.0, 0.0)}}, "is not the id of a grain"),
         ({"friction": -1.0}, "is not a coefficient of friction"),
-        ({"local": True, "friction": 0.3}, "applies to forbid only"),
+        ({"local": True, "force": [(0, 39)]}, "does not apply to force"),
+        ({"local": True, "friction": -1.0}, "is not a coefficient of friction"),
         ({"frame": 4, "forbid": [(0, 39)], "local": True}, "has no such contact"),
     ],
 )

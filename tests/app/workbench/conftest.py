@@ -7,10 +7,16 @@ import pytest
 from rodsight.recording.viewing.gate import Gate
 from rodsight.workbench.service.server import make_application
 from rodsight.workbench.service.workbench import Workbench
+from rodsight.workbench.setup.draft import Draft
 from starlette.testclient import TestClient
 
 from tests.app.workbench.spoiled_tracks import spoil
+from tests.golden.stored import unpack
 
+SCALED = {
+    "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
+    "photographs.pixel_size": 2.5e-4,
+}  # fmt: skip
 PORT = 4711
 HOST = f"http://127.0.0.1:{PORT}"
 
@@ -48,6 +54,25 @@ def photographs_only(made_photographs: Path, tmp_path: Path) -> Path:
     for k, file in enumerate(sorted((made_photographs / "photos").iterdir())):
         shutil.copy(file, folder / f"DSC_{7 + 4 * k}{file.suffix}")
     return tmp_path
+
+
+@pytest.fixture
+def solved(photographs_only: Path) -> Path:
+    """A folder with an experiment of photographs and the results of an earlier version."""
+    Draft(photographs_only / "my photographs").set_keys("all", SCALED)
+    run = photographs_only / "runs" / "mine"
+    run.mkdir(parents=True)
+    unpack(2, run)
+    return photographs_only
+
+
+@pytest.fixture
+def begun(made_photographs: Path, photographs_only: Path) -> Path:
+    """A folder with an experiment whose rods are known."""
+    folder = photographs_only / "my photographs"
+    (folder / "grains.csv").write_bytes((made_photographs / "grains.csv").read_bytes())
+    Draft(folder).set_keys("all", SCALED | {"photographs.grains": "grains.csv"})
+    return photographs_only
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from tests.app.workbench.laboratory_set import PAD, PIXEL, RULER, LaboratorySet,
 
 DAMAGED = 7  # the photograph whose file is cut short
 WRONG_FRAME = 4  # the photograph in which a rod is kept at a wrong place
-SHIFT = 1.4  # [radii] by which it is put beside its place: beyond the reach of the search
+SHIFT = 60.0  # [px] by which it is put beside its place, onto a neighbour: beyond the reach of the search
 SAME = 0.5  # [px] within which a rod is tracked alike
 FOLDER, COPY = "monday", "tuesday"
 
@@ -237,7 +237,7 @@ def wrong_place(journey: Journey) -> str:
     journey.click((float(x), float(y)))
     neighbour = int(np.argsort(np.hypot(*(made.poses[WRONG_FRAME, :, :2] - made.poses[WRONG_FRAME, chosen, :2]).T))[1])
     there = made.poses[WRONG_FRAME, neighbour, :2]
-    away = SHIFT * made.radius[chosen] / np.hypot(*(there - (x, y)))
+    away = SHIFT / np.hypot(*(there - (x, y)))
     journey.drag((float(x), float(y)), (float(x + away * (there[0] - x)), float(y + away * (there[1] - y))))
     tab.wait_for_function("() => document.getElementById('warnings')")
     warned = tab.locator("#warnings").inner_text()

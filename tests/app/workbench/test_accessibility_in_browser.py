@@ -6,7 +6,6 @@ from typing import Literal
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
-from rodsight.workbench.setup.draft import Draft
 
 from tests.app.workbench.hand import go, idle, opened
 from tests.golden.stored import unpack
@@ -16,17 +15,11 @@ STEPS = ("photographs", "scale", "walls", "rods", "material", "run", "inspect", 
 
 
 @pytest.fixture
-def solved(made_photographs: Path, photographs_only: Path) -> Path:
-    folder = photographs_only / "my photographs"
-    (folder / "grains.csv").write_bytes((made_photographs / "grains.csv").read_bytes())
-    Draft(folder).set_keys("all", {
-        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
-        "photographs.pixel_size": 2.5e-4, "photographs.grains": "grains.csv",
-    })  # fmt: skip
-    run = photographs_only / "runs" / "mine"
+def solved(begun: Path) -> Path:
+    run = begun / "runs" / "mine"
     run.mkdir(parents=True)
     unpack(2, run)
-    return photographs_only
+    return begun
 
 
 # Rules beside those of axe: canvases have a role and a name, one step is the present one, steps show their state.

@@ -1,6 +1,7 @@
 """Stored numbers are shown as they are stored, and verdicts go to the log that the solver applies."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -10,10 +11,11 @@ from rodsight.drawing.force_range import ForceRange
 from rodsight.drawing.ramps import FORCE_RAMP
 from rodsight.process.frame_range import FrameRange
 from rodsight.recording.look.force_style import THICKEST, THINNEST
-from rodsight.results.hdf5.store import load_results, read_origin, save_tracks
+from rodsight.results.hdf5.store import load_results, origin_of, read_origin, save_results, save_tracks
 from rodsight.results.manifest import Manifest
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
 from rodsight.solver.kinematics.local_motion import measure_local_motion
+from rodsight.solver.kinematics.sequence_kinematics import measure_kinematics
 from rodsight.verdicts.decisions import BodyNames, decide
 from rodsight.verdicts.log import VERDICTS, VerdictLog
 from rodsight.workbench.inspecting.run_data import run_stamp
@@ -352,6 +354,21 @@ def test_the_motion_of_rods_is_that_of_their_tracks(solved):
     np.testing.assert_allclose(volume, 100.0 * np.trace(strain, axis1=1, axis2=2), rtol=1e-3, atol=1e-6)
     assert all(value is None or value >= 0.0 for value in answer["shear"])
     assert "is not solved" in visitor.refused("motion", at=at, frame=last, since=FIRST - 1)
+
+
+def test_the_motion_over_the_window_is_that_of_the_results(solved):
+    visitor, at, results, folder = solved
+    tracks, last = results.tracks, FIRST + len(results.frames) - 1
+    measured = measure_kinematics(tracks.position, tracks.rotation, tracks.radius, tracks.sigma)
+    save_results(folder / RESULTS, replace(results, kinematics=measured), origin_of(folder / RESULTS))
+    answer = visitor.request("motion", at=at, frame=last)
+    here = tracks.present[-1]
+    assert (answer["window"], answer["since"]) == (measured.window, last - measured.window)
+    for name, values in (("shear", measured.shear_strain), ("volume", measured.volumetric_strain)):
+        given = np.array(answer[name], float)
+        np.testing.assert_allclose(given, 100.0 * values[-1, here], rtol=1e-3, atol=1e-6)
+    moved = np.column_stack([answer["fx"], -np.array(answer["fy"], float)]).astype(float) * answer["pixel"]
+    np.testing.assert_allclose(moved, measured.fluctuation[-1, here], rtol=0.02, atol=2e-6)
 
 
 def test_a_rod_has_its_places_in_all_photographs(solved):

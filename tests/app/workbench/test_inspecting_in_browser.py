@@ -4,24 +4,10 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
-from rodsight.workbench.setup.draft import Draft
 
 from tests.app.workbench.hand import fill, go, idle, on_screen, opened
-from tests.golden.stored import unpack
 
 pytestmark = pytest.mark.screen
-
-
-@pytest.fixture
-def solved(photographs_only: Path) -> Path:
-    """A folder with an experiment of photographs and the results of an earlier version."""
-    Draft(photographs_only / "my photographs").set_keys("all", {
-        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
-        "photographs.pixel_size": 2.5e-4,
-    })  # fmt: skip
-    (photographs_only / "runs" / "mine").mkdir(parents=True)
-    unpack(2, photographs_only / "runs" / "mine")
-    return photographs_only
 
 
 def test_a_contact_has_its_card_and_the_review_its_blind_mode(page: Page, solved: Path):

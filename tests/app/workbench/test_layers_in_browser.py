@@ -10,29 +10,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 from rodsight.results.hdf5.store import load_results
-from rodsight.workbench.setup.draft import Draft
 
 from tests.app.workbench.hand import go, idle, on_screen, opened
 from tests.browser import read_picture
-from tests.golden.stored import unpack
 
 pytestmark = pytest.mark.screen
 FRAME = 3  # a photograph with forces and motion; the stored run begins at photograph 2
 LEGENDS = 200  # [px] to their right
 BOX = [-8, 416, 236, 606]  # [px] of the photograph around the walls of the stored run
-
-
-@pytest.fixture
-def solved(photographs_only: Path) -> Path:
-    folder = photographs_only / "my photographs"
-    Draft(folder).set_keys("all", {
-        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
-        "photographs.pixel_size": 2.5e-4,
-    })  # fmt: skip
-    run = photographs_only / "runs" / "mine"
-    run.mkdir(parents=True)
-    unpack(2, run)
-    return photographs_only
 
 
 @pytest.fixture

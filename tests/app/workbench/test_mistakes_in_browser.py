@@ -2,25 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
-from rodsight.workbench.setup.draft import Draft
 
-from tests.app.workbench.hand import fill, go, idle, opened
+from tests.app.workbench.hand import drag, fill, go, idle, opened
 
 pytestmark = pytest.mark.screen
-
-
-@pytest.fixture
-def begun(made_photographs: Path, photographs_only: Path) -> Path:
-    """A folder with an experiment whose rods are known."""
-    folder = photographs_only / "my photographs"
-    (folder / "grains.csv").write_bytes((made_photographs / "grains.csv").read_bytes())
-    Draft(folder).set_keys("all", {
-        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
-        "photographs.pixel_size": 2.5e-4, "photographs.grains": "grains.csv",
-    })  # fmt: skip
-    return photographs_only
 
 
 def enter(tab: Page, step: str) -> None:
@@ -133,3 +121,28 @@ def test_undo_waits_for_what_was_typed_before_it(page: Page, begun: Path):
         idle(tab)
         expect(tab.locator("#toast")).to_contain_text("Undone: photographs")
         assert tab.evaluate("workbench.project.photographs.interval") == 30.0
+
+
+def test_a_mask_is_painted_and_undone(page: Page, begun: Path):
+    with opened(page, begun) as tab:
+        enter(tab, "photographs")
+        tab.keyboard.press("b")
+        tab.keyboard.press("[")
+        expect(tab.locator("#hint")).to_contain_text("Drag over what is to be ignored")
+        radius = 0.5 * float(tab.locator("#hint").inner_text().split("brush of ")[1].split(" px")[0])
+        x, y = (tab.evaluate(f"0.5 * workbench.project.{side}") for side in ("width", "height"))
+        drag(tab, (x - 40.0, y), (x + 40.0, y + 20.0))
+        (polygon,) = tab.evaluate("workbench.project.photographs.mask")
+        place = np.array(polygon)
+        assert place[:, 0].min() == pytest.approx(x - 40.0 - radius, abs=1.5)
+        assert place[:, 0].max() == pytest.approx(x + 40.0 + radius, abs=1.5)
+        area = 0.5 * abs(np.dot(place[:, 0], np.roll(place[:, 1], 1)) - np.dot(place[:, 1], np.roll(place[:, 0], 1)))
+        assert area == pytest.approx(2.0 * radius * np.hypot(80.0, 20.0) + np.pi * radius**2, rel=0.05)
+        for layer in ("mask", "rods"):
+            tab.evaluate("import('/page/layers/settings.js').then((s) => s.resetLayers())")
+            with_it = tab.evaluate("workbench.stage.composed().toDataURL()")
+            tab.evaluate(f"import('/page/layers/settings.js').then((s) => s.setLayer('{layer}', {{ on: false }}))")
+            assert tab.evaluate("workbench.stage.composed().toDataURL()") != with_it
+        tab.keyboard.press("Control+z")
+        idle(tab)
+        assert tab.evaluate("workbench.project.photographs.mask") is None

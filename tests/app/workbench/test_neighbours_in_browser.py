@@ -20,18 +20,6 @@ pytestmark = pytest.mark.screen
 DELAY = 1.0  # [s] that a slow machine takes for a request
 
 
-@pytest.fixture
-def begun(made_photographs: Path, photographs_only: Path) -> Path:
-    """A folder with an experiment whose rods are known."""
-    folder = photographs_only / "my photographs"
-    (folder / "grains.csv").write_bytes((made_photographs / "grains.csv").read_bytes())
-    Draft(folder).set_keys("all", {
-        "name": "mine", "photographs.files": "pictures/*.jpg", "photographs.interval": 30.0,
-        "photographs.pixel_size": 2.5e-4, "photographs.grains": "grains.csv",
-    })  # fmt: skip
-    return photographs_only
-
-
 def enter(tab: Page, step: str) -> None:
     tab.locator(".tile").first.click()
     idle(tab)

@@ -59,6 +59,18 @@ def test_a_new_order_takes_the_same_places_in_time(begun):
     assert as_used(folder) == (NAMES, TIMES)
 
 
+def test_a_window_that_shows_another_order_edits_nothing(begun):
+    visitor, at, folder = begun
+    names = visitor.request("project", at=at)["series"]["names"]
+    visitor.request("set_order", at=at, files=[*names[:1], *names[2:]], change="left out", photograph=[1, names[1]])
+    content = (folder / "experiment.toml").read_bytes()
+    refusal = visitor.refused("set_photographs", at=at, interval=20.0, photograph=[1, names[1]])
+    assert "photograph 1: is another one by now" in refusal
+    assert (folder / "experiment.toml").read_bytes() == content
+    visitor.request("set_photographs", at=at, interval=20.0, photograph=[1, names[2]])
+    visitor.request("undo", at=at, photograph=[1, names[1]])
+
+
 def test_tables_go_with_the_photographs(begun):
     visitor, at, folder = begun
     (folder / "corrections.csv").write_text("frame,id,x,y,theta\n1,5,10.0,20.0,\n3,6,30.0,40.0,lost\n")

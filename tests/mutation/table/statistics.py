@@ -29,6 +29,13 @@ MUTANTS = [
         ),
     ),
     *mutants_of(
+        "solver/statistics/local_change.py",
+        STATISTICS,
+        ("contacts if moved is None else moved, free", "contacts, free"),
+        ("given, friction[free], TOLERANCE", "given, 2.0 * friction[free], TOLERANCE"),
+        ("np.abs(ft[row]) - friction[row] * fn[row] > enough", "np.abs(ft[row]) > enough"),
+    ),
+    *mutants_of(
         "solver/statistics/stress.py",
         STATISTICS,
         ("/ (area * length)", "/ area"),

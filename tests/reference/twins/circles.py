@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from rodsight.experiment.photographs import Image
+from rodsight.experiment.pictures.image import Image
 from rodsight.solver.bodies.grains import Array
 from rodsight.tracking.detection.edges import fit_circle, trace_outline
 

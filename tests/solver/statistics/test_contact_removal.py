@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rodsight.solver.bodies.grains import Grains
 from rodsight.solver.contacts.contacts import Contacts
 from rodsight.solver.statistics.balance import resultant_forces
-from rodsight.solver.statistics.contact_removal import _resultants, remove_contact
+from rodsight.solver.statistics.contact_removal import remove_contact, resultants
+from rodsight.solver.statistics.local_change import limit_friction, rebalance
 from scipy.optimize import minimize
 
 MU = 0.4
@@ -64,9 +67,9 @@ def test_result_is_the_nearest_admissible_field(patch) -> None:
     found = remove_contact(grains, contacts, fn, ft, row, friction=np.full(len(fn), MU))
     rows = np.flatnonzero(found.free)
     places = np.arange(grains.count)
-    matrix = _resultants(grains, contacts, rows, places)
+    matrix = resultants(grains, contacts, rows, places)
     given = np.stack([fn[rows], ft[rows]], axis=1).ravel()
-    wanted = matrix @ given + _resultants(grains, contacts, np.array([row]), places) @ np.array([fn[row], ft[row]])
+    wanted = matrix @ given + resultants(grains, contacts, np.array([row]), places) @ np.array([fn[row], ft[row]])
     torque = np.tile([1.0, 1.0, 100.0], grains.count)
 
     def room(f: np.ndarray) -> np.ndarray:
@@ -106,3 +109,39 @@ def test_irreplaceable_contact_leaves_a_residual() -> None:
     heavy = np.array([5.0, 2.0])  # the difference is its weight
     found = remove_contact(grains, one, heavy, np.zeros(2), 0, friction=np.full(2, MU))
     assert found.unbalance > 0.3
+
+
+def carried(grains, contacts, fn, ft):
+    rows, members = np.arange(contacts.count), np.arange(grains.count)
+    return resultants(grains, contacts, rows, members) @ np.stack([fn, ft], axis=1).ravel()
+
+
+def test_friction_beyond_smaller_cones_is_redistributed(patch) -> None:
+    grains, contacts, fn, ft = patch
+    friction = np.full(len(fn), 0.3 * MU)
+    new_fn, new_ft = limit_friction(grains, contacts, fn, ft, friction=friction)
+    scale = fn.mean()
+    assert (np.abs(ft) > friction * fn + 0.01 * scale).any()
+    assert (np.abs(new_ft) <= friction * new_fn + CLOSE * scale).all()
+    before = carried(grains, contacts, fn, ft)
+    np.testing.assert_allclose(carried(grains, contacts, new_fn, new_ft), before, atol=3.0 * CLOSE * scale)
+
+
+def test_forces_within_larger_cones_stay(patch) -> None:
+    grains, contacts, fn, ft = patch
+    same = limit_friction(grains, contacts, fn, ft, friction=np.full(len(fn), 2.0))
+    assert same[0] is fn
+    assert same[1] is ft
+
+
+def test_moved_normals_carry_the_same_loads(patch) -> None:
+    grains, contacts, fn, ft = patch
+    rows = np.flatnonzero((contacts.i == 5) | (contacts.j == 5))
+    turned, angle = contacts.normal.copy(), 0.05
+    turned[rows] = turned[rows] @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    moved = replace(contacts, normal=turned)
+    friction = np.full(len(fn), MU)
+    new_fn, new_ft = rebalance(grains, contacts, fn, ft, rows, friction=friction, moved=moved)
+    before = carried(grains, contacts, fn, ft)
+    np.testing.assert_allclose(carried(grains, moved, new_fn, new_ft), before, atol=3.0 * CLOSE * fn.mean())
+    assert np.abs(carried(grains, contacts, new_fn, new_ft) - before).max() > 0.01 * fn.mean()

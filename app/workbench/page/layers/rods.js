@@ -9,7 +9,7 @@ const ARROW = 2.2; // [mean radii] of the longest arrows, where no magnification
 const POINT = 0.13; // [mean radii] of a contact's mark
 const LEVELS = 32; // of a colour map, so that many arrows or discs are one stroke
 
-export const SINCE = { before: "the photograph before", first: "the first photograph" };
+export const SINCE = { window: "the window of the results", before: "the photograph before", first: "the first photograph" };
 
 export const VALUES = {
   shear: { words: "shear strain", unit: "%", of: (motion) => motion.shear, map: "uncertainty", zero: true },
@@ -36,11 +36,11 @@ export function motionOf(app, facts) {
   const wanted = ["strain", "displacement"].filter((name) => layers[name].on).map((name) => layers[name].since);
   const found = {};
   for (const since of wanted) {
-    const from = since === "first" ? facts.first : app.frame - 1, name = `${app.project.at} ${app.project.stamp} ${app.frame} ${from}`;
+    const from = since === "window" ? null : Math.max(since === "first" ? facts.first : app.frame - 1, facts.first), name = `${app.project.at} ${app.project.stamp} ${app.frame} ${from}`;
     if (!known.has(name)) {
       if (known.size > 24) known.clear();
       known.set(name, null);
-      request("motion", { at: app.project.at, frame: app.frame, since: Math.max(from, facts.first) }).then((answer) => { known.set(name, answer); app.stage.redraw(); }, (error) => app.notify(error.message, true));
+      request("motion", { at: app.project.at, frame: app.frame, since: from }).then((answer) => { known.set(name, answer); app.stage.redraw(); }, (error) => app.notify(error.message, true));
     }
     found[since] = known.get(name);
   }
@@ -102,10 +102,13 @@ export function drawDisplacement(c, k, stage, net, motion) {
   });
 }
 
+/** Over how many photographs a motion is measured. */
+const over = (motion) => (motion.frame - motion.since > 1 ? ` over ${motion.frame - motion.since} photographs` : "");
+
 export function rodLegends(net, motions) {
   const found = [], strain = motions[layers.strain.since], moved = motions[layers.displacement.since];
-  if (layers.strain.on && strain) { const how = VALUES[layers.strain.by]; found.push({ words: how.words, unit: how.unit, scale: scaleOfValues(strain) }); }
-  if (layers.displacement.on && moved) { const scale = scaleOfDisplacement(net, moved); found.push({ words: `${layers.displacement.by === "all" ? "displacement" : "fluctuation"}, drawn × ${digits(scale.times, 2)}`, unit: "µm", scale }); }
+  if (layers.strain.on && strain) { const how = VALUES[layers.strain.by]; found.push({ words: `${how.words}${over(strain)}`, unit: how.unit, scale: scaleOfValues(strain) }); }
+  if (layers.displacement.on && moved) { const scale = scaleOfDisplacement(net, moved); found.push({ words: `${layers.displacement.by === "all" ? "displacement" : "fluctuation"}${over(moved)}, drawn × ${digits(scale.times, 2)}`, unit: "µm", scale }); }
   if (layers.contacts.on && layers.contacts.by !== "state") { const how = CONTACTS[layers.contacts.by]; found.push({ words: `contacts: ${how.words}`, unit: how.unit, scale: scaleOfContacts(net) }); }
   return found;
 }

@@ -6,10 +6,10 @@ const SCALED = { map: null, low: null, high: null }; // a colour map and a range
 const DEFAULTS = {
   photograph: { on: true, opacity: 1, brightness: 1, contrast: 1, gamma: 1 },
   mask: { on: true, opacity: 1 },
-  strain: { on: false, opacity: 0.75, by: "shear", since: "before", ...SCALED },
+  strain: { on: false, opacity: 0.75, by: "shear", since: "window", ...SCALED },
   walls: { on: true, opacity: 1 },
   rods: { on: true, opacity: 1 },
-  displacement: { on: false, opacity: 1, by: "all", since: "before", times: 0, ...SCALED },
+  displacement: { on: false, opacity: 1, by: "all", since: "window", times: 0, ...SCALED },
   forces: { on: true, opacity: 1, by: "fn", ...SCALED },
   uncertainty: { on: false, opacity: 1, ...SCALED },
   contacts: { on: false, opacity: 1, by: "state", ...SCALED },

@@ -18,7 +18,7 @@ let facts = null, net = null, list = null, chosen = null, past = null, rodPast =
 export const inspect = {
   name: "inspect", title: "Inspect",
   ofRun: true, mark: runMark,
-  layers: ["photograph", "rods", "walls", "forces", "uncertainty", "contacts", "displacement", "strain", "marks"],
+  layered: true, layers: ["photograph", "rods", "walls", "forces", "uncertainty", "contacts", "displacement", "strain", "marks"],
   dim: 0.72,
   hint: (app) => (!facts ? "" : chosen ? "C contact · N no contact · U unsure · Z undo · W without this contact" : "Click a contact or a rod"),
   reverted: (app, pair) => (pair.i === null ? app.queue(() => load(app, true)) : show(app, pair)),

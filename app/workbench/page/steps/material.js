@@ -8,6 +8,7 @@ const ASSUMED = { density: 2700, length: 0.06, friction: 0.25 };
 
 export const material = {
   name: "material", title: "Material", edits: 0,
+  layers: ["photograph", "mask", "walls", "rods", "marks"], below: ["mask", "rods", "walls"],
   enter: (app) => { if (!presets) app.queue(async () => { presets = await request("materials"); app.paint(); }); },
   panel(app) {
     const given = app.project.material, value = (name) => given[name] ?? ASSUMED[name];

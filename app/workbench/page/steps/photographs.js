@@ -1,20 +1,23 @@
 // Step 1: the photographs, their order, their times, and the region that is used.
 
-import { paintLayer } from "/page/layers/settings.js";
+import { polygonsOf } from "/page/layers/setup.js";
 import { request, chart, colour, digits, fact, h, numberField, parse, sign, notify } from "/page/dom.js";
 import { leaveOut, orderSection, shift } from "/page/parts/order.js";
 import { saveScript } from "/page/parts/take_away.js";
 import { tableField } from "/page/parts/tables.js";
 
 const SOON = 400; // [ms]
-let soon = 0, cutting = null, masking = null, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
+const EDITED = "#f0e442";
+let soon = 0, cutting = null, masking = null, brush = null, brushSize = 0, measured = null; // quality: { at, facts, faults, frame, light, contrast }, null while it is measured
 
 export const photographs = {
   name: "photographs", title: "Photographs", frames: true,
-  hint: () => (cutting ? "Drag over the region to use" : masking ? `Click the corners of the part to be ignored (${masking.length}); Enter closes it, Esc ends` : ""),
-  keyHelp: [["M", "mask a part: click its corners, Enter closes it"], ["Alt+← Alt+→", "this photograph earlier, later in the order"], ["Del", "leave this photograph out"]],
+  hint: () => (brush ? `Drag over what is to be ignored; brush of ${digits(2 * brush.radius, 3)} px, Shift+wheel or [ ] changes it; Esc ends` : cutting ? "Drag over the region to use" : masking ? `Click the corners of the part to be ignored (${masking.length}); Enter closes it, Esc ends` : ""),
+  keyHelp: [["M", "mask a part: click its corners, Enter closes it"], ["B", "mask by a brush: drag; [ ] or Shift+wheel changes its size, Esc ends"], ["Alt+← Alt+→", "this photograph earlier, later in the order"], ["Del", "leave this photograph out"]],
   key(app, event) {
     if (event.key === "m") { maskBegins(app); return true; }
+    if (event.key === "b" || (event.key === "Escape" && brush)) { brushBegins(app); return true; }
+    if (brush && (event.key === "[" || event.key === "]")) { resizeBrush(app, event.key === "[" ? 1 / 1.15 : 1.15); return true; }
     if (event.key === "Delete") { leaveOut(app); return true; }
     if (event.altKey && (event.key === "ArrowLeft" || event.key === "ArrowRight")) { shift(app, event.key === "ArrowLeft" ? -1 : 1); return true; }
     if (!masking) return false;
@@ -24,7 +27,7 @@ export const photographs = {
   },
   enter: (app) => { measured = null; measureSoon(app); },
   taken: measureSoon,
-  leave: () => { cutting = null; masking = null; },
+  leave: () => { cutting = null; masking = null; brush = null; },
   panel(app) {
     const { project } = app, section = project.photographs;
     return [
@@ -38,9 +41,10 @@ export const photographs = {
       h("div", { class: "field" }, h("label", { htmlFor: "field-channel" }, "channel"), h("select", { id: "field-channel", onchange: (event) => app.change("set_photographs", { channel: event.target.value }) },
         ["grey", "red", "green", "blue"].map((name) => h("option", { value: name, selected: name === (section.channel ?? "grey") }, name)))),
       h("div", { class: "row" },
-        h("button", { class: cutting ? "on" : "", id: "cut", onclick: () => { masking = null; cutting = cutting ? null : []; app.tool(cutting ? cutTool(app) : null); app.paint(); } }, section.region ? "Change the region" : "Cut to a region"),
+        h("button", { class: cutting ? "on" : "", id: "cut", onclick: () => { masking = null; brush = null; cutting = cutting ? null : []; app.tool(cutting ? cutTool(app) : null); app.paint(); } }, section.region ? "Change the region" : "Cut to a region"),
         section.region ? h("button", { onclick: () => app.change("set_photographs", { region: "all" }) }, "Use all of it") : null,
         h("button", { class: masking ? "on" : "", id: "mask", title: "M", onclick: () => maskBegins(app) }, "Mask a part"),
+        h("button", { class: brush ? "on" : "", id: "brush", title: "B", onclick: () => brushBegins(app) }, "Mask by a brush"),
         polygonsOf(section).length ? h("button", { id: "unmask", onclick: () => app.change("set_photographs", { mask: polygonsOf(section).slice(0, -1) }) }, `Remove the last of ${polygonsOf(section).length} masks`) : null),
       h("div", { class: "field" }, h("label", { htmlFor: "field-rotation" }, "rotated by"), h("select", { id: "field-rotation", title: "Clockwise, with everything that is drawn on them", onchange: (event) => app.change("rotate", { rotation: Number(event.target.value) }) },
         [0, 90, 180, 270].map((angle) => h("option", { value: angle, selected: angle === (section.rotation ?? 0) }, `${angle}°`)))),
@@ -50,24 +54,25 @@ export const photographs = {
         h("button", { id: "save-script", disabled: !project.undo, title: "Everything that was done here, verdicts included, as a Python script that does it again", onclick: () => saveScript(app) }, "Save the actions as a script")),
     ];
   },
-  layers: ["photograph", "mask"],
-  draw: (app, c, k) => paintLayer(c, "mask", () => drawMask(app, c, k)),
+  layers: ["photograph", "mask", "walls", "rods", "marks"], below: ["mask", "rods", "walls"],
+  draw: drawEdited,
 };
 
-/** The ignored polygons, and what lies outside of the region. */
-function drawMask(app, c, k) {
-  for (const polygon of [...polygonsOf(app.project.photographs), ...(masking?.length ? [masking] : [])]) {
-    c.beginPath(); polygon.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
-    if (polygon !== masking) { c.closePath(); c.fillStyle = "#000b"; c.fill(); }
-    c.strokeStyle = polygon === masking ? "#f0e442" : colour("accent"); c.lineWidth = 2 / k; c.stroke();
-    if (polygon === masking) for (const [x, y] of polygon) { c.fillStyle = "#f0e442"; c.beginPath(); c.arc(x, y, 4 / k, 0, 7); c.fill(); }
+/** The corners of a new mask, a stroke of the brush and the brush, a new region. */
+function drawEdited(app, c, k) {
+  if (masking?.length) {
+    c.beginPath(); masking.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
+    c.strokeStyle = EDITED; c.lineWidth = 2 / k; c.stroke();
+    for (const [x, y] of masking) { c.fillStyle = EDITED; c.beginPath(); c.arc(x, y, 4 / k, 0, 7); c.fill(); }
   }
-  const region = cutting?.length ? cutting : app.project.photographs.region;
-  if (!region) return;
-  const [x0, y0, x1, y1] = region;
-  c.fillStyle = "#000a";
-  c.beginPath(); c.rect(-0.5, -0.5, app.project.width, app.project.height); c.rect(x0, y0, x1 - x0, y1 - y0); c.fill("evenodd");
-  c.strokeStyle = colour("accent"); c.lineWidth = 2 / k; c.strokeRect(x0, y0, x1 - x0, y1 - y0);
+  if (brush) {
+    c.strokeStyle = "#f0e442a0"; c.lineWidth = 2 * brush.radius; c.lineCap = c.lineJoin = "round";
+    c.beginPath(); brush.stroke.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y))); c.stroke();
+    c.lineCap = "butt"; c.lineJoin = "miter";
+    const [x, y] = brush.stroke.at(-1) ?? brush.at ?? [NaN, NaN];
+    for (const [wide, style] of [[4, "#000a"], [2, EDITED]]) { c.strokeStyle = style; c.lineWidth = wide / k; c.beginPath(); c.arc(x, y, brush.radius, 0, 7); c.stroke(); }
+  }
+  if (cutting?.length) { const [x0, y0, x1, y1] = cutting; c.strokeStyle = EDITED; c.lineWidth = 2 / k; c.strokeRect(x0, y0, x1 - x0, y1 - y0); }
 }
 
 /** Light, noise and pattern are measured in the background, once the photograph is shown. */
@@ -106,11 +111,32 @@ function curves(app, c, width, height) {
   c.fillText(digits(high / 1.08, 3), 3, 13); c.fillText("0", 3, height - 4);
 }
 
-// A mask is a picture, named by its file, or polygons.
-function polygonsOf(section) { return Array.isArray(section.mask) ? section.mask : []; }
+/** A round brush: a stroke is a part of the mask. */
+function brushBegins(app) {
+  cutting = null; masking = null;
+  brush = brush ? null : { radius: brushSize || Math.max(Math.min(app.project.width, app.project.height) / 60, 4), stroke: [], at: null };
+  app.tool(brush ? {
+    cross: true,
+    hover: (p) => { brush.at = p; },
+    down: (p) => { brush.stroke = [p]; return true; },
+    drag: (p) => { const [x, y] = brush.stroke.at(-1); if (Math.hypot(p[0] - x, p[1] - y) > 0.2 * brush.radius) brush.stroke.push(p); },
+    up: (p) => {
+      const points = [...brush.stroke, p].slice(-5000);
+      app.change("brush_mask", { points, radius: brush.radius }).then(() => { if (brush) brush.stroke = []; app.stage.redraw(); });
+    },
+    wheel: (p, event) => { if (event.shiftKey) resizeBrush(app, (event.deltaY || event.deltaX) > 0 ? 1 / 1.15 : 1.15); return event.shiftKey; },
+  } : null);
+  app.paint();
+}
+
+function resizeBrush(app, by) {
+  if (!brush) return;
+  brushSize = brush.radius = Math.min(Math.max(brush.radius * by, 0.5), 2000);
+  app.paint();
+}
 
 function maskBegins(app) {
-  cutting = null; masking = masking ? null : [];
+  cutting = null; brush = null; masking = masking ? null : [];
   const near = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]) * app.stage.view.k < 10;
   app.tool(masking ? { cross: true, click: (p) => {
     if (masking.length > 2 && near(p, masking[0])) { maskCloses(app); return; }

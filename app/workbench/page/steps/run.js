@@ -9,7 +9,7 @@ import { runMark } from "/page/parts/run_state.js";
 let source = null, job = null, facts = null, net = null, watching = null, following = true, alarmed = 0, predicted = null;
 
 export const run = {
-  name: "run", title: "Run", layers: ["photograph", "forces", "uncertainty"],
+  name: "run", title: "Run", layered: true, layers: ["photograph", "forces", "uncertainty"],
   dim: 0.75,
   ofRun: true, mark: runMark,
   enter(app) { app.queue(loadLook); listen(app); },

@@ -12,6 +12,7 @@ const TURNED = 0.2; // [rad] by which two bars meet no more
 
 export const walls = {
   name: "walls", title: "Walls", edits: 0,
+  layers: ["photograph", "mask", "rods", "marks"], below: ["mask", "rods"],
   hint: (app) => (app.project.pixel ? drawing.circle ? `Click three points on the rim, far apart (${points.length} of 3); drag its centre or rim to correct it` : "Drag along the inner edge of a bar: the line snaps to it. Drag an end to correct it" : "Set the scale first"),
   keyHelp: [["Delete", "delete the chosen wall"], ["S", "snap to the edge, or not"], ["C", "draw circles, or bars"]],
   enter: (app) => { letGo(); chosen = null; drawing.circle = app.project.walls.length > 0 && app.project.walls.every((wall) => wall.circle); },

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.photographs import LUMA
+from rodsight.experiment.pictures.image import LUMA
 from rodsight.tracking.detection.circle_measurement import CircleMeasurer, MeasuredCircle
 from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.experiment.photographs import LUMA
+from rodsight.experiment.pictures.image import LUMA
 from rodsight.tracking.detection.detect import detect_grains
 from scipy.spatial import KDTree
 

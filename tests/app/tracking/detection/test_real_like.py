@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from rodsight.experiment.photographs import read_photograph
+from rodsight.experiment.pictures.picture_file import read_photograph
 from rodsight.tracking.detection.detect import DetectionSettings, detect_grains
 from rodsight.tracking.tracker import Tracker
 from rodsight.tracks import TrackStatus

@@ -1,0 +1,78 @@
+"""Nearest balanced forces around contacts whose friction or geometry is another one.
+
+The motion is not used again: as for a contact that is removed, the result is the force field with the least sum of
+squared differences from the given one that preserves the resultant of every grain in the neighbourhood and satisfies
+f_n ≥ 0 and |f_t| ≤ μ f_n.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bodies.grains import Array, Grains
+from ..contacts.contacts import Contacts
+from .contact_removal import TOLERANCE, neighbourhood, project_forces, resultants
+
+WITHIN = 1e-3  # of the mean normal force: a friction force that is so little beyond the cone is within it
+
+
+def limit_friction(
+    grains: Grains, contacts: Contacts, fn: Array, ft: Array, *, friction: Array, reach: int = 4
+) -> tuple[Array, Array]:
+    """Return the nearest balanced forces (c,), (c,) within cones of another coefficient, one neighbourhood at a time.
+
+    Forces that are within their cones stay as they are, so a larger coefficient changes nothing.
+
+    Parameters
+    ----------
+    grains, contacts
+        Bodies and contacts of the frame.
+    fn, ft : (c,)
+        Forces [N].
+    friction : (c,)
+        The coefficient of every contact.
+    reach
+        Number of contacts from one beyond its cone within which forces change.
+    """
+    beyond = np.abs(ft) - friction * fn
+    enough = WITHIN * max(float(np.mean(np.abs(fn))), 1e-300)
+    for row in np.argsort(-beyond, kind="stable").tolist():
+        if np.abs(ft[row]) - friction[row] * fn[row] > enough:  # not solved beside another one
+            fn, ft = rebalance(grains, contacts, fn, ft, np.array([row]), friction=friction, reach=reach)
+    return fn, ft
+
+
+def rebalance(
+    grains: Grains, contacts: Contacts, fn: Array, ft: Array, rows: NDArray[np.intp], *, friction: Array,
+    moved: Contacts | None = None, reach: int = 4,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the nearest balanced forces (c,), (c,) around some contacts.
+
+    Parameters
+    ----------
+    grains, contacts
+        Bodies and contacts of the frame, for which the forces are in balance with what they carry.
+    fn, ft : (c,)
+        Forces [N].
+    rows
+        Contacts that have changed.
+    friction : (c,)
+        The coefficient of every contact.
+    moved
+        The same contacts with other normals; None: as they are.
+    reach
+        Number of contacts from the changed ones within which forces change.
+    """
+    inside = neighbourhood(contacts, rows, reach)
+    touching = inside[contacts.i] | (inside[np.minimum(contacts.j, contacts.grain_count - 1)] & ~contacts.with_wall)
+    free = np.flatnonzero(touching)
+    members = np.flatnonzero(inside if grains.boundary is None else inside & ~grains.boundary)
+    given = np.stack([fn[free], ft[free]], axis=1)
+    carried = resultants(grains, contacts, free, members) @ given.ravel()
+    matrix = resultants(grains, contacts if moved is None else moved, free, members)
+    scale = max(float(np.mean(np.abs(fn))), 1e-300)
+    changed = project_forces(matrix, carried, given, friction[free], TOLERANCE * scale)
+    new_fn, new_ft = fn.copy(), ft.copy()
+    new_fn[free], new_ft[free] = changed[:, 0], changed[:, 1]
+    return new_fn, new_ft
