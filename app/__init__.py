@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from .notebook.comparisons import compare, review, score
     from .notebook.experiments import check, follow, init, track
     from .notebook.files import export, import_table
-    from .notebook.run import Run, run
-    from .notebook.run import open_run as open
+    from .notebook.made_runs import open_run as open
+    from .notebook.made_runs import run
+    from .notebook.run import Run
     from .notebook.solve import solve
     from .notebook.studies import campaign, sensitivity
     from .notebook.what_if import what_if
@@ -43,9 +44,9 @@ _LAZY = {
     "follow": ("notebook.experiments", "follow"),
     "import_table": ("notebook.files", "import_table"),
     "init": ("notebook.experiments", "init"),
-    "open": ("notebook.run", "open_run"),
+    "open": ("notebook.made_runs", "open_run"),
     "review": ("notebook.comparisons", "review"),
-    "run": ("notebook.run", "run"),
+    "run": ("notebook.made_runs", "run"),
     "score": ("notebook.comparisons", "score"),
     "sensitivity": ("notebook.studies", "sensitivity"),
     "solve": ("notebook.solve", "solve"),

@@ -23,7 +23,8 @@ from ..run_folder import Run as RunFolder
 from ..run_folder import find_experiment
 from ..run_truth import load_truth, truth_beside
 from ..solver.contacts.pairs import align
-from .run import Run, open_run
+from .made_runs import open_run
+from .run import Run
 
 Source = Run | str | PathLike[str]
 TRUTH = "truth"

@@ -20,7 +20,8 @@ from ..process.progress import Progress
 from ..run_folder import Run as RunFolder
 from ..run_folder import hold_run
 from ..tracks import Tracks, TrackStatus
-from .run import Run, run
+from .made_runs import run
+from .run import Run
 from .setting_strings import as_strings
 from .shown_progress import shown_progress
 

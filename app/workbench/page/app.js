@@ -25,7 +25,7 @@ export const STEPS = [photographs, scale, walls, rods, material, run, inspect, r
 export const app = { stage: new Stage(), project: null, step: STEPS[0], frame: 0, busy: Promise.resolve(), done: 0, looks: 0, notify };
 globalThis.workbench = app; // for tests
 
-context.photograph = (at) => (app.project?.at === at && app.project.series.names[app.frame] ? [app.frame, app.project.series.names[app.frame]] : null);
+context.photograph = (at) => (app.project && app.project.at === at && app.project.series.names[app.frame] ? [app.frame, app.project.series.names[app.frame]] : null);
 
 const waiting = new Set(); // actions that are not done: a second one is a double click
 const PATIENCE = 250, LOOKS = 1000; // [ms]
