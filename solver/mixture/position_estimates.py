@@ -32,7 +32,7 @@ class PositionEstimates:
         workers: int | None = None,
         given: Mapping[int, FramePosterior] | None = None,
         *,
-        span: int = 1,
+        alike: int = 1,
     ) -> None:
         """Prepare the estimates of a sequence.
 
@@ -46,21 +46,20 @@ class PositionEstimates:
             Threads; None: one for every core.
         given : mapping of int to FramePosterior, optional
             Posteriors of some frames, used as they are.
-        span : int
-            Photographs over which sliding is read. They are so close together that they share one posterior, that of
-            the first of every so many.
+        alike : int
+            Photographs so close together that they share one posterior, that of the first of every so many.
         """
         self._workers = workers
         self._packing, self._snapshots, self._settings = packing, snapshots, settings
         self._evidence: SequenceEvidence | None = None
-        self._span = span
+        self._alike = alike
         self._fringes: FringeCalibration | None = None
         self._known: dict[int, FramePosterior | None] = dict(given or {})
 
     def at(self, k: int, verdicts: Verdicts = NO_VERDICTS) -> FramePosterior | None:
         """Return the posterior of frame k with its reviewed pairs; None where no two bodies are near."""
         if verdicts is NO_VERDICTS and k not in self._known:
-            k -= k % self._span  # whatever was requested before: an interrupted run goes on with the same bits
+            k -= k % self._alike  # whatever was requested before: an interrupted run goes on with the same bits
         if k not in self._known:
             # Only the last one is kept: a frame is requested again only while it is being solved.
             self._known = {k: self._infer(k, verdicts)}

@@ -167,7 +167,7 @@ def _prepare(
     positions = None
     if settings.uses_positions and len(snapshots) > 1:
         positions = PositionEstimates(
-            packing, snapshots, settings.posterior, settings.workers, posteriors, span=settings.used_span
+            packing, snapshots, settings.posterior, settings.workers, posteriors, alike=settings.alike
         )
     sequence = SequenceProblem(
         packing, snapshots, settings, packing.inferred, positions, known, _find_reversals(snapshots, settings)

@@ -46,6 +46,7 @@ class SequenceSettings:
     # Photographs over which sliding is read and history is carried, where neighbouring ones are closer than noise. Only
     # the ensemble uses it.
     span: int = 1
+    alike: int = 1  # neighbouring photographs that share one position-only estimate
     reset_to_zero: bool = False  # the paper's reset at a rearrangement
     reset_frames: frozenset[int] = frozenset()  # frames that always start from zero forces
     kept_frames: frozenset[int] = frozenset()  # frames that never do

@@ -17,7 +17,7 @@ from ..inputs import Inputs
 from ..snapshots import make_snapshots
 from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii
-from .close_photographs import choose_span
+from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii
 from .outliers import replace_outliers
 from .radii import calibrate_with_radii, use_size_classes
@@ -85,7 +85,8 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             tracks, walls, calibration = calibrate_tracks(*observed)
     if not nothing_seen:  # calibration has measured the noise that hides the sliding
         span, remarks[4] = choose_span(tracks)
-        settings = replace(settings, sequence=replace(settings.sequence, span=span))
+        alike = span if settings.sequence.soft else max(span, count_alike(tracks, walls.load))
+        settings = replace(settings, sequence=replace(settings.sequence, span=span, alike=alike))
     if settings.infer_unseen:
         tracks = add_unseen(tracks, walls, known_radii(inputs.tracks.radius), settings.sequence.measured_overlap)
         calibration = None if calibration is None else calibration.of_grains(tracks.grain_count)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.close_photographs import choose_span
+from rodsight.inference.correction.close_photographs import choose_span, count_alike
 from rodsight.tracks import Tracks, TrackStatus
 
 pytestmark = pytest.mark.unit
@@ -40,3 +40,18 @@ def test_sliding_is_read_from_one_photograph_to_the_next_where_rods_move_enough_
     assert choose_span(tracks_moving(7e-5, noise=4e-5)) == (1, "")
     assert choose_span(tracks_moving(0.0)) == (1, "")  # no span would show anything
     assert choose_span(tracks_moving(7.5e-6).frames(0, 5)) == (1, "")
+
+
+def test_photographs_share_an_estimate_from_positions_while_grains_move_less_than_noise_shows() -> None:
+    assert count_alike(tracks_moving(1.2e-5)) == 4  # sliding is read from one to the next
+    assert choose_span(tracks_moving(1.2e-5))[0] in (1, 4)
+    assert count_alike(tracks_moving(7e-5)) == 1
+    assert count_alike(tracks_moving(0.0)) == 1  # forces may change without motion
+
+
+def test_photographs_under_changing_loads_share_nothing() -> None:
+    tracks = tracks_moving(1.2e-5)
+    load = np.full((tracks.frame_count, 2), [700.0, np.nan])
+    assert count_alike(tracks, load) > 1
+    load[5:, 0] = 900.0
+    assert count_alike(tracks, load) == 1

@@ -38,7 +38,7 @@ def test_given_posteriors_are_used_as_they_are(soft) -> None:
 
 def test_close_photographs_share_the_posterior_of_the_first_of_every_span(soft) -> None:
     every = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS)
-    shared = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS, span=3)
+    shared = PositionEstimates(soft.packing, soft.snapshots, FEW_SWEEPS, alike=3)
     fifth, third = shared.at(5), every.at(3)
     assert fifth is not None
     assert third is not None
