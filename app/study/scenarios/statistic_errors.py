@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ...inference.corrected_sequence import CorrectedSequence
-from ...solver.assessment.intervals.force_intervals import EvidenceSource, evidence_source_of, penalty_of
+from ...solver.assessment.intervals.force_intervals import EvidenceSource, evidence_source_of, penalty_of, usual_trust
 from ...solver.assessment.intervals.statistic_intervals import (
     CONSTANT,
     MIN_PENALTY,
@@ -87,7 +87,7 @@ def measure_statistic_errors(solved: SolvedScenario) -> list[StatisticErrors]:
     sequence, statistics = solved.solution.sequence, solved.solution.results.statistics
     pairs = [(stated, _statistics_of_truth(sequence, k, *true[k])) for k, stated in enumerate(statistics)]
     late = pairs[SETTLED:]
-    penalty = np.array([float(penalty_of(each.trust)) for each in frames[SETTLED:]])
+    penalty = np.array([float(penalty_of(usual_trust(each))) for each in frames[SETTLED:]])
     evidence_source = np.array([evidence_source_of(each.position_weight) for each in frames[SETTLED:]], np.uint8)
     return [
         _compared(scenario, seed, name, values, penalty, evidence_source)

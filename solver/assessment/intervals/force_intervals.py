@@ -48,7 +48,7 @@ class EvidenceSource(IntEnum):
 class Term(IntEnum):
     """Properties of a frame that widen or narrow all its intervals, by a power of e for every unit."""
 
-    PENALTY = 0  # 1 − T, the part for unseen rods excluded
+    PENALTY = 0  # 1 − T by the usual margin, the part for unseen rods excluded
     CHANGE = 1  # ln of the fraction of the force pattern that is new, over its usual value
     SIZE = 2  # ln of the number of contacts, over its usual value
     FRICTION = 3  # ln of the friction that the field carries, over its usual value
@@ -65,6 +65,9 @@ _FITTED = FITTED["force_intervals"]
 FLOOR = np.array(_FITTED["floor"])
 FIRST_SCALE: float = _FITTED["first_scale"]
 TYPICAL = np.array(_FITTED["typical"])
+MARGIN: float = _FITTED["margin"]
+SOFT_MARGIN: float = _FITTED["soft_margin"]
+MAX_EXPECTED = 1.0 - 1e-9  # whose arctanh is finite
 FACTOR = np.array(_FITTED["factor"])
 SLOPE = np.array(_FITTED["slope"])
 POWER = np.array(_FITTED["power"])
@@ -111,6 +114,23 @@ def penalty_of(trust: float | Array) -> Array:
     return np.clip(np.nan_to_num(1.0 - np.asarray(trust, np.float64), nan=MAX_PENALTY), 0.0, MAX_PENALTY)
 
 
+def usual_trust(frame: FrameForces) -> float:
+    """Bound of the expected correlation by the usual margin, with which the intervals were fitted.
+
+    The trust itself depends on the evidence also by its margin, which is no error of the forces; it stands for this
+    bound where there is no separate expectation.
+
+    Notes
+    -----
+    tanh(arctanh r − margin), r the expected correlation, at least 0.
+    """
+    expected = frame.expected_correlation
+    if not expected > frame.trust:
+        return frame.trust
+    margin = SOFT_MARGIN if frame.soft else MARGIN
+    return max(math.tanh(math.atanh(min(expected, MAX_EXPECTED)) - margin), 0.0)
+
+
 def source_of_frame(frame: FrameForces) -> EvidenceSource:
     """Source of the frame's field; no motion leads to the first frame."""
     if frame.frame == 0:
@@ -121,7 +141,7 @@ def source_of_frame(frame: FrameForces) -> EvidenceSource:
 def terms_of(frame: FrameForces) -> Array:
     """Value of every Term of the frame (t,)."""
     hidden = min(frame.unseen_penalty, MAX_PENALTY)
-    penalty = min(float(penalty_of(frame.trust / (1.0 - hidden))), MAX_PENALTY_BY_SOURCE[source_of_frame(frame)])
+    penalty = min(float(penalty_of(usual_trust(frame) / (1.0 - hidden))), MAX_PENALTY_BY_SOURCE[source_of_frame(frame)])
     change = float(np.clip(np.nan_to_num(frame.force_change, nan=USUAL_CHANGE), *CHANGES))
     size = math.log(max(int((frame.fn > 0).sum()), 1) / USUAL_SIZE)
     return np.array([penalty, math.log(change / USUAL_CHANGE), size, math.log(relative_friction(frame))])

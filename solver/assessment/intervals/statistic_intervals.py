@@ -16,7 +16,7 @@ import numpy as np
 from ...frame_forces import FrameForces
 from ...statistics.frame_statistics import FrameStatistics
 from ..fitted import FITTED
-from .force_intervals import EvidenceSource, evidence_source_of, penalty_of
+from .force_intervals import EvidenceSource, evidence_source_of, penalty_of, usual_trust
 
 # By statistic: where motion, motion and positions, positions were used; rad of angles.
 CONSTANT: dict[str, tuple[float, float, float]] = {
@@ -50,7 +50,7 @@ def with_sd(statistics: FrameStatistics, frame: FrameForces, *, scale_is_known: 
         return statistics
     source = evidence_source_of(frame.position_weight)
     added: dict[str, Any] = {
-        f"{name}_sd": sd_of(name, float(getattr(statistics, name)), source, frame.trust)
+        f"{name}_sd": sd_of(name, float(getattr(statistics, name)), source, usual_trust(frame))
         for name in CONSTANT
         if scale_is_known or name not in SIZED
     }

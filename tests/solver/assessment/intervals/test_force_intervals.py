@@ -22,6 +22,7 @@ from rodsight.solver.assessment.intervals.force_intervals import (
     relative_friction,
     source_of_frame,
     terms_of,
+    usual_trust,
     widen_for_friction,
 )
 
@@ -35,6 +36,7 @@ def frame():
     fn = np.linspace(0.0, 2.0, c) * 30.0
     return replace(
         one, frame=3, fn=fn, fn_sd=0.1 * fn, ft_sd=0.03 * fn, trust=0.9, position_weight=0.0,
+        expected_correlation=np.nan,
         bearing_probability=np.where(np.arange(c) % 7 == 0, 0.5, 1.0), sliding_probability=np.zeros(c),
     )  # fmt: skip
 
@@ -106,6 +108,18 @@ def test_intervals_of_motion_widen_with_the_number_of_contacts(frame):
     assert difference == pytest.approx(np.log((frame.fn > 0).sum() / (fewer.fn > 0).sum()))
     assert SLOPE[EvidenceSource.MOTION, Term.SIZE, 0] > 0.0
     assert np.isfinite(terms_of(replace(frame, fn=0.0 * frame.fn))[Term.SIZE])
+
+
+def test_intervals_follow_the_expectation_by_the_usual_margin_not_the_bound(frame):
+    expected = replace(frame, expected_correlation=0.98)
+    assert usual_trust(expected) == pytest.approx(np.tanh(np.arctanh(0.98) - 0.677))
+    assert usual_trust(replace(expected, soft=1)) < usual_trust(expected)
+    humble = replace(expected, trust=0.5)
+    assert interval_factors(humble) == pytest.approx(interval_factors(expected))
+    worse = replace(expected, expected_correlation=0.97)
+    assert (interval_factors(worse) > interval_factors(expected)).all()
+    assert usual_trust(replace(frame, expected_correlation=0.9)) == 0.9  # one number for both: a single chain
+    assert usual_trust(replace(frame, expected_correlation=1.0)) <= 1.0
 
 
 def test_unseen_rods_lower_the_trust_but_do_not_widen_the_intervals_of_reported_forces(frame):
