@@ -15,7 +15,7 @@ from .file_formats import ImportedData, read_format
 from .format_names import FileFormat
 from .imported_corners import make_corners
 from .observations import Convention, ImportedTracks, Observations, make_tracks
-from .pegs import true_contacts
+from .pegs import ForceReadings, true_contacts, true_wall_forces
 from .proposed_walls import propose_box, read_foreign_walls
 from .simulations.pair_forces import contacts_of_pairs, read_pair_forces
 
@@ -74,6 +74,8 @@ def import_files(request: ImportRequest, folder: Path) -> tuple[ImportedTracks, 
     imported = make_tracks(foreign.observed, convention, foreign.precision_of(request.precision))
     discs = None if corners is None else make_corners(corners, imported, convention, request.corner_radius)
     contents = replace(_folder_contents(request, foreign, imported, convention), corners=discs)
+    if foreign.truth is not None:
+        contents, imported = _with_measured_forces(foreign.truth, contents, imported)
     if request.pairs is not None:
         if request.form not in SIMULATIONS:
             raise InputError("--pairs", str(request.pairs), f"applies to {' and '.join(SIMULATIONS)} only")
@@ -106,8 +108,6 @@ def _folder_contents(
         bars = propose_box(imported.tracks)
     else:
         bars = None if walls in (NONE, OUTER) else read_foreign_walls(Path(walls), imported, convention)
-    readings = foreign.truth
-    truth = None if readings is None or not len(readings.fn) else true_contacts(readings, imported)
     return FolderContents(
         bars,
         pressure=request.pressure,
@@ -116,5 +116,16 @@ def _folder_contents(
         edge=edge,
         cell=cell,
         known=foreign.known,
-        truth=truth,
     )
+
+
+def _with_measured_forces(
+    readings: ForceReadings, contents: FolderContents, imported: ImportedTracks
+) -> tuple[FolderContents, ImportedTracks]:
+    """Add measured forces between discs and on walls to the folder, and a remark on what was left out."""
+    between = true_contacts(readings, imported)
+    at_walls, remark = true_wall_forces(readings, imported, contents.walls)
+    if remark:
+        imported = replace(imported, remarks=(*imported.remarks, remark))
+    truth = {name: [*values, *at_walls[name]] for name, values in between.items()}
+    return (replace(contents, truth=truth) if truth["frame"] else contents), imported

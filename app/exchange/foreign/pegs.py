@@ -9,6 +9,7 @@ contact has one row for either disc and j is −1 at a wall. Pixels, y down; f_n
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -20,13 +21,16 @@ from ...experiment.reading.photograph_order import natural_key
 from ...experiment.reading.tables import Table
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import wall_distance
 from ...solver.boundary.size_classes import group_readings
 from .foreign_table import read_text
 from .observations import ImportedTracks, Observations
+from .proposed_walls import Walls
 
 DISCS, BONDS = "_ParticleData.dlm", "_bonds.txt"
 COPY_DIGITS = 1e-6  # relative difference of copies: that of their rounding
 LEAST_COPIES = 4  # rows
+WALL = -1  # instead of the other disc
 NORMAL, TANGENTIAL = "_NormWeightedAdjacencyMatrix.dlm", "_TanWeightedAdjacencyMatrix.dlm"
 POSITIONS, CONTACTS = "particle_positions.txt", "Adjacency_list.txt"
 
@@ -40,7 +44,7 @@ class ForceReadings:
 
     frame: Int[np.ndarray, " s"]
     disc: Int[np.ndarray, " s"]  # id of the disc whose fringes were read
-    other: Int[np.ndarray, " s"]
+    other: Int[np.ndarray, " s"]  # WALL: a wall, which the file does not name
     fn: Float[Array, " s"]  # [N]
     ft: Float[Array, " s"]  # [N], in the sign convention of the program
 
@@ -86,7 +90,7 @@ def without_copies(readings: ForceReadings) -> tuple[ForceReadings, str]:
     )
     contact = np.ravel(contact)
     total = np.bincount(contact, readings.fn)
-    twice = count[contact] == 2
+    twice = (count[contact] == 2) & (readings.other != WALL)
     differs = np.abs(readings.fn - 0.5 * total[contact]) > COPY_DIGITS * np.abs(readings.fn)
     if twice.sum() < LEAST_COPIES or differs[twice].any():
         return readings, ""
@@ -101,14 +105,14 @@ def without_copies(readings: ForceReadings) -> tuple[ForceReadings, str]:
 def true_contacts(readings: ForceReadings, imported: ImportedTracks) -> dict[str, list[object]]:
     """Return columns of a table of true forces: both readings of f_n and their mean, or the only reading.
 
-    Tangential forces change their sign, since y is reversed.
+    Forces on walls are not among them. Tangential forces change their sign, since y is reversed.
     """
     row = {int(number): k for k, number in enumerate(imported.number)}
     readings_by_contact: dict[tuple[int, int, int], list[tuple[float, float] | None]] = {}
     for frame, disc, other, fn, ft in zip(
         *(getattr(readings, each.name) for each in fields(ForceReadings)), strict=True
     ):
-        if int(frame) not in row:
+        if int(frame) not in row or other == WALL:
             continue
         low, high = sorted((int(disc), int(other)))
         both = readings_by_contact.setdefault((row[int(frame)], low, high), [None, None])
@@ -121,6 +125,36 @@ def true_contacts(readings: ForceReadings, imported: ImportedTracks) -> dict[str
         for name, value in zip(columns, values, strict=True):
             columns[name].append(value)
     return columns
+
+
+def true_wall_forces(
+    readings: ForceReadings, imported: ImportedTracks, walls: Walls | None
+) -> tuple[dict[str, list[object]], str]:
+    """Return columns of a table of true forces on walls, and a remark on those that are left out, or "".
+
+    The program names no walls: a force belongs to the wall that is nearest to its disc. Forces of a disc that touches
+    two walls in a photograph cannot be told apart.
+    """
+    columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")}
+    at_wall = np.flatnonzero(readings.other == WALL)
+    if walls is None or not len(at_wall):
+        left = f"{len(at_wall)} forces on walls are left out: no walls are given." if len(at_wall) else ""
+        return columns, left
+    number = {int(value): k for k, value in enumerate(imported.number)}
+    grain = {int(value): k for k, value in enumerate(imported.tracks.id)}
+    place = [(number.get(int(readings.frame[s]), -1), grain.get(int(readings.disc[s]), -1)) for s in at_wall]
+    count = Counter(place)
+    for (frame, row), s in zip(place, at_wall, strict=True):
+        if frame < 0 or row < 0 or count[frame, row] > 1:
+            continue
+        centre = imported.tracks.position[frame, row]
+        distance = [float(wall_distance(ends, None, centre)[0]) for ends in walls.endpoints[frame]]
+        wall = walls.name[int(np.argmin(distance))]
+        fn, ft = float(readings.fn[s]), -float(readings.ft[s])
+        for name, value in zip(columns, (frame, int(readings.disc[s]), wall, fn, ft, fn, ""), strict=True):
+            columns[name].append(value)
+    left = len(at_wall) - len(columns["frame"])
+    return columns, f"{left} forces on walls of discs that touch two are left out." if left else ""
 
 
 def _read_by_photograph(files: list[Path]) -> tuple[Observations, ForceReadings]:
@@ -157,11 +191,8 @@ def _read_all(folder: Path) -> tuple[Observations, ForceReadings]:
         table = np.column_stack([np.full(len(table), number[0] if len(number) else 1.0), table])
     frame = _whole_numbers(file, table[:, 0], "frame")
     remarks = []
-    at_wall = contacts[:, 2] < 0
-    if at_wall.any():
-        remarks.append(f"{int(at_wall.sum())} forces on walls are left out: the file does not name the wall.")
-    contacts = contacts[~at_wall]
-    known = np.isin(contacts[:, 1], table[:, 1]) & np.isin(contacts[:, 2], table[:, 1])
+    contacts[contacts[:, 2] < 0, 2] = WALL
+    known = np.isin(contacts[:, 1], table[:, 1]) & np.isin(contacts[:, 2], [WALL, *table[:, 1]])
     if not known.all():
         remarks.append(f"{int((~known).sum())} forces of discs without a position are left out.")
     whole = _whole_numbers(folder / CONTACTS, contacts[known, :3].ravel(), "frame, i or j").reshape(-1, 3)

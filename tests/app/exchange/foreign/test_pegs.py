@@ -78,6 +78,23 @@ def test_lists_of_all_photographs(tmp_path, capsys):
     assert "1 forces of discs without a position are left out" in printed
 
 
+def test_forces_on_walls_belong_to_the_nearest_one(tmp_path, capsys):
+    positions = "".join(f"{frame},{row}\n" for frame in (3, 4) for row in DISCS.splitlines())
+    (tmp_path / "particle_positions.txt").write_text(positions)
+    forces = "3,1,2,.01,.5\n3,3,-1,.02,.9\n4,2,-1,0,.2\n4,2,-1,0,.3\n4,3,-1,0,.7\n"
+    (tmp_path / "Adjacency_list.txt").write_text(forces)
+    printed = import_files(capsys, "pegs", tmp_path, tmp_path / "out", "--walls", "box")
+    rows = truth_in(tmp_path / "out")
+    assert [(row["frame"], row["i"], row["j"]) for row in rows] == [
+        ("0", "1", "2"), ("0", "3", "top"), ("1", "3", "top"),
+    ]  # fmt: skip
+    assert [float(row["fn"]) for row in rows] == pytest.approx([0.5, 0.9, 0.7])
+    assert float(rows[1]["ft"]) == pytest.approx(-0.02)
+    assert "2 forces on walls of discs that touch two are left out" in printed
+    load_experiment(tmp_path / "out")
+    assert "5 forces" not in printed
+
+
 def test_damaged_files_are_named(tmp_path, capsys):
     assert "contains neither" in refuse(capsys, "pegs", tmp_path, tmp_path / "out")
     write_frame(tmp_path, "one", discs=DISCS.replace("248", "x"))
