@@ -133,7 +133,7 @@ def true_wall_forces(
     """Return columns of a table of true forces on walls, and a remark on those that are left out, or "".
 
     The program names no walls: a force belongs to the wall that is nearest to its disc. Forces of a disc that touches
-    two walls in a photograph cannot be told apart.
+    two walls in a photograph are ambiguous.
     """
     columns: dict[str, list[object]] = {name: [] for name in ("frame", "i", "j", "fn", "ft", "fn_i", "fn_j")}
     at_wall = np.flatnonzero(readings.other == WALL)
