@@ -14,6 +14,7 @@ from tests.app.workbench.hand import drag, fill, go, idle, on_screen, opened
 from tests.program import rodsight
 
 pytestmark = pytest.mark.screen
+FORCES_TAB = (138.0, 15.0)  # [px] of the viewer, where its second tab is named
 WATCHED = 1500.0  # [ms] that a viewer drawn by the processor may need for one picture
 
 
@@ -75,6 +76,12 @@ def test_from_photographs_to_forces(tab, photographs_only, made_photographs):
     go(tab, "share")
     tab.click("#write-page")
     idle(tab)
+    expect(tab.locator("#toast")).to_contain_text("is out of date: verdicts have changed")
+    tab.locator("#canvas").focus()
+    tab.keyboard.press("Control+z")  # the verdict
+    idle(tab)
+    tab.click("#write-page")
+    idle(tab)
     expect(tab.locator("#shared")).to_contain_text("my photographs-share.html")
     assert (photographs_only / "runs" / "my photographs" / "my photographs-share.html").stat().st_size > 10e6
     assert rodsight("check", photographs_only / "my photographs", "--quiet") == 0
@@ -128,6 +135,8 @@ def click_in_the_viewer(tab: Page) -> None:
     }""")
     box = tab.locator("#viewer").bounding_box()
     assert box is not None
+    tab.mouse.click(box["x"] + FORCES_TAB[0], box["y"] + FORCES_TAB[1])  # the summary is in front
+    tab.wait_for_timeout(WATCHED)
     left, reported = box["x"] + 0.28 * box["width"], []
     for top in box["y"] + box["height"] * np.linspace(0.25, 0.75, 11):  # a click on empty ground reports nothing
         before = tab.evaluate("clicks.length")
