@@ -7,7 +7,7 @@ same container is looked up; and the holder renews the file's time, a lease that
 
 from __future__ import annotations
 
-import _thread
+import ctypes
 import json
 import os
 import socket
@@ -85,18 +85,16 @@ def hold_folder(folder: Path, notify: Callable[[str], None]) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     lock = folder / LOCK
     handle, dead = _take(lock)
-    ended, taken = threading.Event(), threading.Event()
-    renewal = threading.Thread(target=_renew, args=(handle, ended, taken), daemon=True)
+    ended = threading.Event()
+    renewal = threading.Thread(target=_renew, args=(handle, ended, threading.get_ident()), daemon=True)
     _held.add(handle)
     renewal.start()
     try:
         if dead is not None:
             notify(f"Process {dead.process} ended without releasing this folder: its lock was taken over.")
         yield
-    except KeyboardInterrupt:
-        if taken.is_set():
-            raise RunError(f"{folder}: another process took it over while this one was suspended") from None
-        raise
+    except _TakenOver:
+        raise RunError(f"{folder}: another process took it over while this one was suspended") from None
     finally:
         ended.set()
         renewal.join()
@@ -164,12 +162,16 @@ def _lock(handle: int) -> bool:
     return True
 
 
-def _renew(handle: int, ended: threading.Event, taken: threading.Event) -> None:
-    """Renew the lease until the end of the block; interrupt the block where another process took the folder over."""
+class _TakenOver(BaseException):
+    """Ends the block of a thread whose folder another process took over; no handler of errors may go on."""
+
+
+def _renew(handle: int, ended: threading.Event, thread: int) -> None:
+    """Renew the lease until the end of the block; end the block where another process took the folder over."""
     while not ended.wait(RENEWAL):
         if _is_taken(handle):
-            taken.set()
-            _thread.interrupt_main()
+            # Not the signal of Ctrl+C, which a process in the background ignores.
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_TakenOver))
             return
         with suppress(OSError):  # the disk is away for a while
             os.utime(handle)

@@ -51,7 +51,6 @@ LEFT_OUT = {
     "study worlds --grains": "simulates packings of 200 rods",
     "study mixture": "simulates every scenario",
     "study real": "needs photoelastic experiments, which are not ours to share",
-    "solve test": "needs a photoelastic experiment, which is not ours to share",
 }
 # Arguments that are replaced to save time.
 SMALLER = {

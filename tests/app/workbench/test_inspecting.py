@@ -360,7 +360,7 @@ def test_the_motion_over_the_window_is_that_of_the_results(solved):
     visitor, at, results, folder = solved
     tracks, last = results.tracks, FIRST + len(results.frames) - 1
     measured = measure_kinematics(tracks.position, tracks.rotation, tracks.radius, tracks.sigma)
-    save_results(folder / RESULTS, replace(results, kinematics=measured), origin_of(folder / RESULTS))
+    save_results(folder / RESULTS, replace(results, read_kinematics=lambda: measured), origin_of(folder / RESULTS))
     answer = visitor.request("motion", at=at, frame=last)
     here = tracks.present[-1]
     assert (answer["window"], answer["since"]) == (measured.window, last - measured.window)
