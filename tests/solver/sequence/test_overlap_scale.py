@@ -51,6 +51,7 @@ def test_total_force_of_soft_grains_follows_their_overlap(squeezed, soft_grains)
     assert total / total[0] == pytest.approx(overlap / overlap[0], rel=0.02)
     assert np.corrcoef(total, STRAIN)[0, 1] > 0.8
     assert solved[-1][1].overlap_unit == frames[0].overlap
-    # standard deviations are multiplied, too: a relative error does not depend on the scale
-    relative = [float(np.median(frame.fn_sd[frame.fn > 0.0])) / float(frame.fn.mean()) for frame in frames]
-    assert max(relative) < 4.0 * min(relative)
+    # standard deviations are multiplied, too: a relative error does not depend on the scale; the first frame has no
+    # motion of its own, and wider ones
+    relative = [float(np.median(frame.fn_sd[frame.fn > 0.0])) / float(frame.fn.mean()) for frame in frames[1:]]
+    assert max(relative) < 2.0 * min(relative)
