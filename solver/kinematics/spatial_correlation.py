@@ -72,6 +72,6 @@ def _add_pairs(place, field, reach, pairs, total):  # type: ignore[no-untyped-de
             dy = place[b, 1] - y
             distance = dx * dx + dy * dy
             if distance < square:
-                k = int(scale * math.sqrt(distance))
+                k = min(int(scale * math.sqrt(distance)), len(pairs) - 1)  # the root may round up to the reach
                 pairs[k] += 1
                 total[k] += u * field[b, 0] + v * field[b, 1]
