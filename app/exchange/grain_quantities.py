@@ -11,6 +11,7 @@ from ..solver.bodies.cell import Cell
 from ..solver.bodies.grains import Array
 from ..solver.frame_forces import FrameStatus
 from ..solver.kinematics.local_motion import measure_local_motion
+from ..solver.statistics.balance import sum_on_grains
 from ..solver.statistics.stress import grain_stresses
 
 # Units and meanings of the columns.
@@ -61,9 +62,7 @@ def _measure_forces(results: Results, frame: int, length: float, columns: dict[s
     contacts, n, present = forces.contacts, tracks.grain_count, tracks.present[frame]
     bears = forces.bearing_probability
     bears = (forces.fn > 0.0).astype(np.float64) if bears is None else np.nan_to_num(bears)
-    total = np.bincount(contacts.i, weights=bears, minlength=contacts.grain_count)
-    between = ~contacts.with_wall
-    total = total + np.bincount(contacts.j[between], weights=bears[between], minlength=contacts.grain_count)
+    total = sum_on_grains(contacts, bears)
     columns["coordination_number"][frame] = np.where(present, total[:n], np.nan)
     stress = grain_stresses(contacts, forces.fn, forces.ft, results.grains.radius, length)[:n]
     stress[~present] = np.nan

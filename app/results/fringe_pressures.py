@@ -11,6 +11,7 @@ from ..solver.bodies.grains import Array
 from ..solver.frame_forces import FrameStatus
 from ..solver.posterior.fringe_calibration import fit_curve
 from ..solver.statistics.agreement import pearson
+from ..solver.statistics.balance import sum_on_grains
 from .results import Results
 
 FEWEST = 20  # discs with fringes and forces
@@ -52,9 +53,7 @@ def compare_with_fringes(results: Results) -> FringePressures | None:
     for k, forces in enumerate(results.frames):
         if forces.status is FrameStatus.FAILED:
             continue
-        contacts, total = forces.contacts, np.zeros(forces.contacts.body_count)
-        np.add.at(total, contacts.i, forces.fn)
-        np.add.at(total, contacts.j, forces.fn)
+        total = sum_on_grains(forces.contacts, forces.fn)
         used = tracks.present[k] if tracks.boundary is None else tracks.present[k] & ~tracks.boundary
         inferred[k, used] = total[:n][used]
     known = np.isfinite(inferred) & np.isfinite(tracks.fringes)

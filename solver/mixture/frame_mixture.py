@@ -16,6 +16,7 @@ from ..contacts.contacts import Contacts
 from ..contacts.pairs import match_values
 from ..posterior.frame_posterior import FramePosterior
 from ..statistics.agreement import pearson
+from ..statistics.balance import sum_on_grains
 from .field_mixing import ForceField, mix_fields
 
 HALF_WEIGHT_OVERLAP = 0.6  # overlap over the neighbours' displacement at which motion has half the weight
@@ -156,9 +157,7 @@ def limit_by_fringes(reliability: float, contacts: Contacts, fn: Array, position
     if positions.fringes is None or np.isnan(reliability):
         return reliability
     measured = positions.fringes.pressure
-    pressure, between = np.zeros(len(measured)), ~contacts.with_wall
-    np.add.at(pressure, contacts.i, fn)
-    np.add.at(pressure, contacts.j[between], fn[between])
+    pressure = sum_on_grains(contacts, fn)
     known = np.isfinite(measured)
     if known.sum() < FEWEST_DISCS:
         return reliability

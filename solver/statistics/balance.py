@@ -30,6 +30,14 @@ def resultant_forces(contacts: Contacts, fn: NDArray[np.floating], ft: NDArray[n
     return total
 
 
+def sum_on_grains(contacts: Contacts, value: Array) -> Array:
+    """Return the sum of a value (c,) of the contacts over those of every grain (n,), wall contacts included."""
+    total, pair = np.zeros(contacts.grain_count), ~contacts.with_wall
+    np.add.at(total, contacts.i, value)
+    np.add.at(total, contacts.j[pair], value[pair])
+    return total
+
+
 def resultant_norms(contacts: Contacts, fn: NDArray[np.floating], ft: NDArray[np.floating], weight: Array) -> Array:
     """Return |ΣF| on every grain (…, n) [N]; arguments as of `resultant_forces`."""
     return np.linalg.norm(resultant_forces(contacts, fn, ft, weight), axis=-1)

@@ -51,12 +51,9 @@ def remove_contact(
     reach
         Number of contacts from the removed one within which forces change.
     """
-    inside = neighbourhood(contacts, np.array([row]), reach)
-    touching = inside[contacts.i] | (inside[np.minimum(contacts.j, contacts.grain_count - 1)] & ~contacts.with_wall)
-    free = touching.copy()
+    free, members = neighbourhood(grains, contacts, np.array([row]), reach)
     free[row] = False
-    equilibrated = inside if grains.boundary is None else inside & ~grains.boundary
-    rows, members = np.flatnonzero(free), np.flatnonzero(equilibrated)
+    rows = np.flatnonzero(free)
     matrix = resultants(grains, contacts, rows, members)
     removed = resultants(grains, contacts, np.array([row]), members) @ np.array([fn[row], ft[row]])
     given = np.stack([fn[rows], ft[rows]], axis=1)
@@ -72,8 +69,13 @@ def remove_contact(
     return Removal(new_fn, new_ft, free, worst)
 
 
-def neighbourhood(contacts: Contacts, rows: NDArray[np.intp], reach: int) -> NDArray[np.bool_]:
-    """Return the grains (n,) that are at most `reach` contacts away from some contacts."""
+def neighbourhood(
+    grains: Grains, contacts: Contacts, rows: NDArray[np.intp], reach: int
+) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Return the contacts (c,) of the grains that are at most `reach` contacts away from some, and those grains (p,).
+
+    Boundary grains are left out of the grains, which must be in balance, and not of the contacts.
+    """
     inside = np.zeros(contacts.grain_count, np.bool_)
     between = ~contacts.with_wall
     inside[contacts.i[rows]] = True
@@ -82,7 +84,8 @@ def neighbourhood(contacts: Contacts, rows: NDArray[np.intp], reach: int) -> NDA
     for _ in range(reach):
         beside = inside[i] | inside[j]
         inside[i[beside]] = inside[j[beside]] = True
-    return inside
+    touching = inside[contacts.i] | (inside[np.minimum(contacts.j, contacts.grain_count - 1)] & ~contacts.with_wall)
+    return touching, np.flatnonzero(inside if grains.boundary is None else inside & ~grains.boundary)
 
 
 def resultants(grains: Grains, contacts: Contacts, rows: NDArray[np.intp], members: NDArray[np.intp]) -> Array:

@@ -64,10 +64,8 @@ def rebalance(
     reach
         Number of contacts from the changed ones within which forces change.
     """
-    inside = neighbourhood(contacts, rows, reach)
-    touching = inside[contacts.i] | (inside[np.minimum(contacts.j, contacts.grain_count - 1)] & ~contacts.with_wall)
+    touching, members = neighbourhood(grains, contacts, rows, reach)
     free = np.flatnonzero(touching)
-    members = np.flatnonzero(inside if grains.boundary is None else inside & ~grains.boundary)
     given = np.stack([fn[free], ft[free]], axis=1)
     carried = resultants(grains, contacts, free, members) @ given.ravel()
     matrix = resultants(grains, contacts if moved is None else moved, free, members)

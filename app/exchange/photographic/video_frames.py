@@ -12,7 +12,6 @@ from ...process.frame_range import ALL_FRAMES, FrameRange
 
 SUFFIXES = frozenset((".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".wmv", ".webm"))
 MOST_FRAMES = 100_000
-UNEVEN = 0.05  # greatest deviation of a time from even spacing, over the spacing, that is not reported
 
 
 def is_video(name: str) -> bool:

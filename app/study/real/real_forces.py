@@ -28,6 +28,7 @@ from ...solver.contacts.pairs import Keys, join_keys, match_values, split_keys
 from ...solver.convex.program import assemble_balance, project_onto_equilibrium
 from ...solver.detection.precision import measure_precision
 from ...solver.statistics.agreement import compare_forces, pearson
+from ...solver.statistics.balance import sum_on_grains
 from ...solver.statistics.stress import love_weber_stress, principal_stresses
 from ..baselines import packing_of
 
@@ -267,9 +268,9 @@ def _compare(
 ) -> RealFrame:
     """Compare fields with the truth; known: trust, correlation of both readings, and coverage of the run."""
     trust, sides, covered = known
-    pairs, count = join_keys(near, candidates["ours"].key, exact.key), len(snapshot.position)
+    pairs = join_keys(near, candidates["ours"].key, exact.key)
     true = match_values(pairs, exact.key, exact.force[:, 0])
-    pressure = _pressure(exact, count)
+    pressure = _pressure(exact)
     bearing = exact.force[:, 0] > 0.0
     found = {}
     for source, field in candidates.items():
@@ -277,7 +278,7 @@ def _compare(
         found[source] = FieldAgreement(
             pearson(match_values(pairs, field.key, field.force[:, 0]), true),
             pearson(on_true, exact.force[bearing, 0]),
-            pearson(_pressure(field, count), pressure),
+            pearson(_pressure(field), pressure),
             _direction(field, snapshot.position),
             _total(field),
         )
@@ -311,13 +312,9 @@ def _total(field: FrameField) -> float:
     return float(field.force[~field.contacts.with_wall, 0].sum())
 
 
-def _pressure(field: FrameField, count: int) -> Array:
+def _pressure(field: FrameField) -> Array:
     """Sum f_n over the contacts of every grain (n,)."""
-    total = np.zeros(count)
-    pair = ~field.contacts.with_wall
-    np.add.at(total, field.contacts.i, field.force[:, 0])
-    np.add.at(total, field.contacts.j[pair], field.force[pair, 0])
-    return total
+    return sum_on_grains(field.contacts, field.force[:, 0])
 
 
 def _direction(field: FrameField, position: Array) -> float:

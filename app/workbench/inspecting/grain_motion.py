@@ -13,6 +13,7 @@ from ...solver.bodies.grains import Array
 from ...solver.frame_forces import FrameStatus
 from ...solver.kinematics.local_motion import measure_local_motion
 from ...solver.kinematics.sequence_kinematics import SequenceKinematics
+from ...solver.statistics.balance import sum_on_grains
 from ...solver.statistics.stress import grain_stresses
 from .run_data import RunData
 
@@ -128,12 +129,10 @@ def _loads(data: RunData, frame: int, length: float) -> tuple[Array, Array]:
     forces, n = data.frames[frame], data.tracks.grain_count
     if forces.status is FrameStatus.FAILED:
         return np.full(n, np.nan), np.full(n, np.nan)
-    contacts, between = forces.contacts, ~forces.contacts.with_wall
+    contacts = forces.contacts
     bears = forces.bearing_probability
     bears = (forces.fn > 0.0).astype(np.float64) if bears is None else np.nan_to_num(bears)
-    ends = np.concatenate([contacts.i, contacts.j[between]])
-    total = np.zeros(contacts.grain_count)
-    np.add.at(total, ends, np.concatenate([bears, bears[between]]))
+    total = sum_on_grains(contacts, bears)
     radius = np.full(contacts.grain_count, data.tracks.radius.mean())
     radius[:n] = data.tracks.radius
     stress = grain_stresses(contacts, forces.fn, forces.ft, radius, length)[:n]

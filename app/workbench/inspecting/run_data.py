@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -95,8 +96,9 @@ def read_finished_run(folder: Path) -> RunData | None:
     results = load_results(folder / RESULTS)
     stored = results.frames
     frames: CachedSequence[FrameForces] = CachedSequence(len(stored), lambda k: stored[k], _bytes_of, KEPT_BYTES)
+    shown = replace(results, frames=frames, read_kinematics=cache(results.read_kinematics))  # read for every frame
     return RunData(
-        results.tracks, results.walls, frames, results.statistics, replace(results, frames=frames),
+        results.tracks, results.walls, frames, results.statistics, shown,
         first=first_photograph(folder / RESULTS),
     )  # fmt: skip
 

@@ -13,6 +13,7 @@ from rodsight.process.frame_range import FrameRange
 from rodsight.recording.look.force_style import THICKEST, THINNEST
 from rodsight.results.hdf5.store import load_results, origin_of, read_origin, save_results, save_tracks
 from rodsight.results.manifest import Manifest
+from rodsight.reviewing.judging.candidate_pairs import find_candidate_pairs
 from rodsight.run_folder import RESULTS, TRACKS, UNFINISHED
 from rodsight.solver.kinematics.local_motion import measure_local_motion
 from rodsight.solver.kinematics.sequence_kinematics import measure_kinematics
@@ -367,8 +368,21 @@ def test_the_motion_over_the_window_is_that_of_the_results(solved):
     for name, values in (("shear", measured.shear_strain), ("volume", measured.volumetric_strain)):
         given = np.array(answer[name], float)
         np.testing.assert_allclose(given, 100.0 * values[-1, here], rtol=1e-3, atol=1e-6)
+    turned = np.degrees(measured.rotation[-1, here])
+    np.testing.assert_allclose(np.array(answer["rotation"], float), turned, rtol=1e-3, atol=1e-6)
     moved = np.column_stack([answer["fx"], -np.array(answer["fy"], float)]).astype(float) * answer["pixel"]
     np.testing.assert_allclose(moved, measured.fluctuation[-1, here], rtol=0.02, atol=2e-6)
+
+
+def test_candidate_pairs_are_those_of_their_photograph(solved):
+    visitor, at, results, _ = solved
+    for frame in range(len(results.frames)):
+        view = {"reviewer": "anna", "frame": FIRST + frame, "blind": False}
+        listed = visitor.request("candidate_pairs", at=at, view=view)["pairs"]
+        names = BodyNames.of(results.tracks, results.walls)
+        found = find_candidate_pairs(results, frame).contacts
+        true = {(names.name(i), names.name(j)) for i, j in zip(found.i.tolist(), found.j.tolist(), strict=True)}
+        assert {(each["i"], each["j"]) for each in listed} == true
 
 
 def test_a_rod_has_its_places_in_all_photographs(solved):

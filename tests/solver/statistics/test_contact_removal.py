@@ -100,6 +100,15 @@ def test_forces_beyond_the_neighbourhood_are_unchanged(patch) -> None:
             assert (found.fn[c], found.ft[c]) == (fn[c], ft[c])
 
 
+def test_boundary_grains_need_no_balance(patch) -> None:
+    grains, contacts, fn, ft = patch
+    row = 10
+    held = np.isin(np.arange(grains.count), [int(contacts.i[row]), int(contacts.j[row])])
+    found = remove_contact(replace(grains, boundary=held), contacts, fn, ft, row, friction=np.full(len(fn), MU))
+    kept = np.arange(len(fn)) != row
+    np.testing.assert_allclose(found.fn[kept], fn[kept], atol=CLOSE * fn.mean())  # its force fell on these two alone
+
+
 def test_irreplaceable_contact_leaves_a_residual() -> None:
     grains = Grains.of_rods(np.array([0.01]), density=2700.0, length=0.06)
     one = Contacts(
