@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import AfterValidator, Field, StringConstraints
 
 from ...experiment.experiment import GrainGuess
-from ...experiment.pictures.mask import outline_of_stroke
 from ...process.errors import InputError
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ..setup import circles, edits, photograph_series
@@ -59,11 +58,7 @@ def set_photographs(
 def brush_mask(workbench: Workbench, at: Text, points: Stroke, radius: Brush) -> dict[str, Any]:
     """Add a stroke of a round brush [px] to the mask."""
     opened = workbench.project(at)
-    mask = opened.validation().data.get("photographs", {}).get("mask", [])
-    if isinstance(mask, str):
-        raise InputError(mask, "key photographs.mask", "is a picture: paint in it, or leave it out first")
-    added = [[list(point) for point in polygon] for polygon in outline_of_stroke(points, radius)]
-    opened.draft.set_keys("mask", {"photographs.mask": [*mask, *added]})
+    photograph_series.add_to_mask(opened.draft, opened.validation(), points, radius)
     return opened.describe()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -114,13 +114,15 @@ def _corner_rows(found: ValidationResult) -> list[tuple[object, ...]]:
     return list(zip(table.integers("frame").tolist(), table.text("corner"), *numbers, strict=True))
 
 
-def rescaled_corners(found: ValidationResult, after: Scale) -> bytes:
-    """Write the table of corner discs anew, in metres of another scale."""
+def moved_corners(found: ValidationResult, after: Scale, moved: Callable[[Array], Array]) -> bytes:
+    """Write the table of corner discs anew, in metres of another scale, with their places (n, 2) [px] moved."""
     assert found.experiment is not None
     assert found.scale is not None
     table = found.experiment.table(found.data["walls"]["corners"], CORNER_COLUMNS, optional=("theta",))
     place = found.scale.to_pixels(np.column_stack([table.numbers("x"), table.numbers("y")]))
-    radius = table.numbers("radius") / found.scale.size_at(place) * after.size_at(place)
+    size = table.numbers("radius") / found.scale.size_at(place)
+    place = moved(place)
+    radius = size * after.size_at(place)
     angle = table.text("theta") if "theta" in table.names else None
     rows = [
         (int(frame), corner, *np.round(world, 7).tolist(), round(size, 7), *(() if angle is None else (angle[k],)))

@@ -5,8 +5,9 @@ The page gives lengths in pixels of the photograph, files hold metres.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...tracking.detection.detect import Detection, DetectionSettings, detect_grains, refine_grains
 from ...tracking.walls.inner_edge import find_bars, lines_to_corners, snap_to_edge
-from .circles import arcs_table, circles_of, renamed, rescaled_corners
+from .circles import arcs_table, circles_of, moved_corners, renamed
 from .draft import Draft, as_table
 from .validation import ValidationResult, validate
 
@@ -101,22 +102,40 @@ def _no_new_message(draft: Draft, name: str, step: str, file: str | None = None)
 def _set_and_move_walls(draft: Draft, name: str, keys: dict[str, Any]) -> None:
     """Set keys that define the position of a pixel in the world, and write the walls again."""
     before = validate(draft)
-    walls, scale = before.walls, before.scale
     with draft.one_step(name):
         draft.set_keys(name, keys)
-        if walls is None or scale is None:
-            return
-        after = validate(draft).scale
-        if after is not None:
-            bars, circles = walls.sides == STRAIGHT, circles_of(before)
-            names = [wall for wall, bar in zip(walls.name, bars, strict=True) if bar]
-            ends = scale.to_pixels(walls.endpoints[0])[bars]
-            if "corners" in before.data.get("walls", {}):
-                draft.write("corners", {before.data["walls"]["corners"]: rescaled_corners(before, after)})
-            if names and before.data.get("walls", {}).keys() & {"file"}:  # else they run through the corners
-                draft.write("walls", {walls_file(before): walls_table(names, ends, after)})
-            if circles:
-                draft.write("circles", {before.data["walls"]["arcs"]: arcs_table(circles, after)})
+        move_walls(draft, before, lambda place: place)
+
+
+def move_walls(draft: Draft, before: ValidationResult, moved: Callable[[Array], Array]) -> None:
+    """Write walls, circles and corner discs again after an edit of the scale or of the photographs' rotation.
+
+    Parameters
+    ----------
+    draft : Draft
+        After the edit.
+    before : ValidationResult
+        Of the draft before it.
+    moved : callable
+        New places (…, 2) [px] of places in the photographs.
+    """
+    walls, scale = before.walls, before.scale
+    after = None if walls is None or scale is None else validate(draft).scale
+    if walls is None or scale is None or after is None:
+        return
+    section, bars = before.data.get("walls", {}), walls.sides == STRAIGHT
+    names = [wall for wall, bar in zip(walls.name, bars, strict=True) if bar]
+    circles = []
+    for each in circles_of(before):  # reads the table of corners, before it is written
+        x, y = moved(np.array([each.x, each.y])).tolist()
+        circles.append(replace(each, x=x, y=y))
+    if "corners" in section:
+        draft.write("corners", {section["corners"]: moved_corners(before, after, moved)})
+    if names and "file" in section:  # else they run through the corners
+        ends = moved(scale.to_pixels(walls.endpoints[0])[bars])
+        draft.write("walls", {walls_file(before): walls_table(names, ends, after)})
+    if circles:
+        draft.write("circles", {section["arcs"]: arcs_table(circles, after)})
 
 
 def walls_file(found: ValidationResult) -> str:

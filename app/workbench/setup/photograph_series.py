@@ -8,22 +8,20 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...experiment.pictures.mask import outline_of_stroke
 from ...experiment.reading.camera_notes import camera_times, read_note
 from ...experiment.reading.photograph_order import last_number, relative_name
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
-from ...solver.bodies.wall_shapes import STRAIGHT
-from .circles import arcs_table, circles_of
 from .draft import Draft, as_table
-from .edits import GRAIN_COLUMNS, GRAINS, walls_file, walls_table
-from .validation import ValidationResult, validate
+from .edits import GRAIN_COLUMNS, GRAINS, move_walls
+from .validation import ValidationResult
 
 ORDER, TIMES = "order.csv", "times.csv"
 NUMBERED = {  # tables whose rows belong to a photograph: section and keys
@@ -150,6 +148,15 @@ def number_by_names(draft: Draft, found: ValidationResult) -> None:
     )
 
 
+def add_to_mask(draft: Draft, found: ValidationResult, points: Sequence[Sequence[float]], radius: float) -> None:
+    """Add a stroke of a round brush [px] to the mask."""
+    mask = found.data.get("photographs", {}).get("mask", [])
+    if isinstance(mask, str):
+        raise InputError(mask, "key photographs.mask", "is a picture: paint in it, or leave it out first")
+    added = [[list(point) for point in polygon] for polygon in outline_of_stroke(points, radius)]
+    draft.set_keys("mask", {"photographs.mask": [*mask, *added]})
+
+
 def use_camera_times(draft: Draft, found: ValidationResult) -> None:
     """Order the photographs by the camera's clock, and take their times from it."""
     files = list(found.files)
@@ -210,20 +217,7 @@ def rotate(draft: Draft, found: ValidationResult, rotation: int) -> None:
         tables[GRAINS] = as_table(GRAIN_COLUMNS, rows)
     with draft.one_step("rotation"):
         draft.set_keys("rotation", keys, tables)
-        after = validate(draft).scale
-        if found.walls is None or found.scale is None or after is None:
-            return
-        bars = found.walls.sides == STRAIGHT
-        names = [name for name, bar in zip(found.walls.name, bars, strict=True) if bar]
-        if names:
-            ends = turn.of(found.scale.to_pixels(found.walls.endpoints[0])[bars])
-            draft.write("walls", {walls_file(found): walls_table(names, ends, after)})
-        circles = []
-        for each in circles_of(found):
-            x, y = turn.of(np.array([each.x, each.y])).tolist()
-            circles.append(replace(each, x=x, y=y))
-        if circles:
-            draft.write("circles", {found.data["walls"]["arcs"]: arcs_table(circles, after)})
+        move_walls(draft, found, turn.of)
 
 
 class _Turn:

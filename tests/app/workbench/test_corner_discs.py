@@ -53,6 +53,19 @@ def test_another_scale_moves_corner_discs_with_their_picture(framed):
     assert (circle["x"], circle["y"], circle["radius"]) == pytest.approx((20.0, 380.0, 40.0))
 
 
+def test_corner_discs_turn_with_the_photographs(framed):
+    visitor, at = framed
+    disc = _disc(visitor, at, 20.0)
+    before = {wall["name"]: wall for wall in visitor.request("set_photographs", at=at, interval=30.0)["walls"]}
+    after = {wall["name"]: wall for wall in visitor.request("rotate", at=at, rotation=180)["walls"]}
+    (x, y), old = (20.0, 380.0), before[disc]["circle"]
+    new = after[disc]["circle"]
+    line, turned = (next(each[name]["line"] for name in each if not each[name]["circle"]) for each in (before, after))
+    columns, rows = line[0][0] + turned[0][0], line[0][1] + turned[0][1]  # of the photograph, less one
+    assert (old["x"], old["y"]) == pytest.approx((x, y))
+    assert (new["x"], new["y"], new["radius"]) == pytest.approx((columns - x, rows - y, 40.0))
+
+
 def test_a_corner_needs_the_bars_that_meet_there(visitor):
     (series,) = visitor.request("home")["series"]
     at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]

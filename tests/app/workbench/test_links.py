@@ -99,9 +99,12 @@ def test_only_a_run_is_found_and_ended_and_no_other_process_that_a_file_names(ro
     place.mkdir()
     marks = ("run" if is_run else "look", str(root / "tracked"), "--out", str(results))
     process = subprocess.Popen(
-        [sys.executable, "-c", "import sys; sys.stdin.read()", *marks], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
+        [sys.executable, "-c", "import sys; print(flush=True); sys.stdin.read()", *marks],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
     try:
+        assert process.stdout is not None
+        process.stdout.readline()  # until it has begun, the system may not name its command
         stored = asdict(Holder.of(process.pid)) | {"results": str(results)}
         (place / PROCESS).write_text(json.dumps(stored))
         job = Job(root, root / "tracked", results, place)

@@ -1,6 +1,7 @@
 """The order of photographs, their places in time, what is left out, and how they are rotated."""
 
 import io
+import tomllib
 from pathlib import Path
 
 import cv2
@@ -69,6 +70,18 @@ def test_a_window_that_shows_another_order_edits_nothing(begun):
     assert (folder / "experiment.toml").read_bytes() == content
     visitor.request("set_photographs", at=at, interval=20.0, photograph=[1, names[2]])
     visitor.request("undo", at=at, photograph=[1, names[1]])
+
+
+def test_strokes_of_the_brush_are_added_to_the_mask_and_taken_back(begun):
+    visitor, at, folder = begun
+    for count, x in enumerate((40.0, 120.0), 1):
+        visitor.request("brush_mask", at=at, points=[[x, 50.0], [x + 10.0, 60.0]], radius=5.0)
+        mask = tomllib.loads((folder / "experiment.toml").read_text())["photographs"]["mask"]
+        assert len(mask) == count
+        first, *_ = mask[-1]
+        assert abs(first[0] - x) <= 16.0
+    visitor.request("undo", at=at)
+    assert len(tomllib.loads((folder / "experiment.toml").read_text())["photographs"]["mask"]) == 1
 
 
 def test_tables_go_with_the_photographs(begun):
