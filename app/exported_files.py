@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .experiment.units import Scale
     from .figures.figure_style import Width
     from .figures.gallery import FigureSet, FileKind
-    from .figures.paper_set import Picture
+    from .figures.paper.paper_set import Picture
     from .results.results import Results, TruthContacts
 
 ExportKind = Literal["pictures", "video", "figures", "tables", "vtk", "ovito", "graph", "dic"]
@@ -239,7 +239,7 @@ def _end_pictures(file: Path, results: Results) -> list[Picture]:
 
     from .experiment.experiment import load_experiment
     from .experiment.scaling import make_scale
-    from .figures.paper_set import Picture
+    from .figures.paper.paper_set import Picture
     from .results.hdf5.store import origin_of
     from .run_folder import find_experiment
 

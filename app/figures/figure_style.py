@@ -32,6 +32,10 @@ _STYLE: dict[Any, Any] = {
 }  # fmt: skip
 
 
+class NothingToDrawError(ValueError):
+    """The run lacks what a figure shows."""
+
+
 @contextmanager
 def paper_style() -> Iterator[None]:
     """Apply fonts and lines for papers while the block runs, independent of the settings of the user."""

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from ..results.fringe_pressures import compare_with_fringes
 from ..results.results import Results
-from .figure_style import BLUE, INK, OUTLINE, Width, add_title, new_figure
+from .figure_style import BLUE, INK, OUTLINE, NothingToDrawError, Width, add_title, new_figure
 from .force_network import bounds_of
 from .kinematics import draw_map
 
@@ -17,12 +17,12 @@ def draw_fringes(results: Results, frame: int, width: Width) -> Figure:
 
     Raises
     ------
-    ValueError
+    NothingToDrawError
         The run has no photoelastic photographs.
     """
     found = compare_with_fringes(results)
     if found is None:
-        raise ValueError("this run has no fringes: give photographs.fringes")
+        raise NothingToDrawError("this run has no fringes: give photographs.fringes")
     low, high = bounds_of(results)
     tall = float((high - low)[1] / (high - low)[0])
     figure = new_figure(width, 0.5 * tall + 0.15 if width == "double" else tall + 1.0)

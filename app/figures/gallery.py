@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -13,18 +14,17 @@ from matplotlib.figure import Figure
 from ..inference.zero_start import solve_from_zero
 from ..process.atomic import write_atomically
 from ..results.comparison import compare_runs, compare_with_truth
-from ..results.fringe_pressures import compare_with_fringes
 from ..results.results import Results, TruthContacts
 from ..solver.frame_forces import FrameStatus
 from .contact_sheet import draw_sheet
 from .difference import draw_difference
 from .directions import draw_rose, draw_stress
 from .distributions import draw_density
-from .figure_style import Width, paper_style
+from .figure_style import NothingToDrawError, Width, paper_style
 from .force_network import draw_forces
 from .fringes import draw_fringes
 from .kinematics import draw_kinematics
-from .paper_set import Picture, draw_apparatus, draw_recorded, draw_strip, draw_zero_starts
+from .paper.paper_set import Picture, draw_apparatus, draw_recorded, draw_strip, draw_zero_starts
 from .time_curves import draw_time
 from .truth_comparison import draw_truth
 
@@ -149,12 +149,10 @@ def write_figures(
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name in get_args(FigureName):
-        missing = name in NEED_TRUTH and truth is None
-        missing |= name == "kinematics" and results.kinematics is None
-        missing |= name == "fringes" and compare_with_fringes(results) is None
-        if missing:
+        if name in NEED_TRUTH and truth is None:
             continue
-        files += _write(draw_figure(results, name, frame, width=width, truth=truth), folder / name, kinds)
+        with suppress(NothingToDrawError):
+            files += _write(draw_figure(results, name, frame, width=width, truth=truth), folder / name, kinds)
     return files
 
 

@@ -14,7 +14,18 @@ from ..solver.bodies.grains import Array
 from ..solver.kinematics.mean_field import FLUCTUATION_EDGES
 from ..solver.kinematics.sequence_kinematics import SequenceKinematics
 from ..solver.kinematics.spatial_correlation import DISTANCE_EDGES
-from .figure_style import BLUE, COLOURS, DASHES, INK, OUTLINE, VERMILION, Width, add_title, new_figure
+from .figure_style import (
+    BLUE,
+    COLOURS,
+    DASHES,
+    INK,
+    OUTLINE,
+    VERMILION,
+    NothingToDrawError,
+    Width,
+    add_title,
+    new_figure,
+)
 from .force_network import bounds_of, draw_packing
 
 TOP_QUANTILE = 0.99  # of a quantity over the grains: above it the colour is constant
@@ -27,12 +38,12 @@ def draw_kinematics(results: Results, frame: int, width: Width) -> Figure:
 
     Raises
     ------
-    ValueError
+    NothingToDrawError
         The run has no kinematics: it was solved by an earlier version, or has one frame.
     """
     found = results.kinematics
     if found is None:
-        raise ValueError("this run has no kinematics: solve it again")
+        raise NothingToDrawError("this run has no kinematics: solve it again")
     frame = max(frame, 1)
     shape = (2, 4) if width == "double" else (4, 2)
     low, high = bounds_of(results)

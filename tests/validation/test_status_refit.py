@@ -7,7 +7,8 @@ import pytest
 from rich.console import Console
 from rodsight.solver.assessment.trust import motion_assessment
 from rodsight.solver.frame_forces import FrameStatus
-from rodsight.study.report.status import WINDOW, StatusSample, observe_status, refit_status
+from rodsight.study.report.status import refit_status
+from rodsight.study.report.status_sample import WINDOW, StatusSample, observe_status
 from rodsight.study.truths import simulate
 
 GRAINS, SEEDS = 250, (31, 32)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.image import AxesImage
 from rodsight.figures.gallery import write_paper_set
-from rodsight.figures.paper_set import Picture, draw_apparatus, draw_recorded, draw_strip
-from rodsight.figures.recorded_stress import recorded_stress
+from rodsight.figures.paper.paper_set import Picture, draw_apparatus, draw_recorded, draw_strip
+from rodsight.figures.paper.recorded_stress import recorded_stress
 from rodsight.inference.zero_start import solve_from_zero
 from rodsight.results.results import Results, TruthContacts
 from rodsight.solver.statistics.stress import friction_angle, love_weber_stress, principal_stresses

@@ -47,6 +47,7 @@ def test_photographs_share_an_estimate_from_positions_while_grains_move_less_tha
     assert choose_span(tracks_moving(1.2e-5))[0] in (1, 4)
     assert count_alike(tracks_moving(7e-5)) == 1
     assert count_alike(tracks_moving(0.0)) == 1  # forces may change without motion
+    assert count_alike(tracks_moving(1.2e-5).frames(0, 7)) == 1  # too few intervals
 
 
 def test_photographs_under_changing_loads_share_nothing() -> None:

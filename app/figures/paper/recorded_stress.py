@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..results.results import Results, TruthContacts
-from ..solver.bodies.grains import Array, Grains
-from ..solver.bodies.walls import Walls
-from ..solver.contacts.contacts import measure_pairs
-from ..solver.contacts.pairs import are_present
-from ..solver.statistics.stress import friction_angle, love_weber_stress, principal_stresses
+from ...results.results import Results, TruthContacts
+from ...solver.bodies.grains import Array, Grains
+from ...solver.bodies.walls import Walls
+from ...solver.contacts.contacts import measure_pairs
+from ...solver.contacts.pairs import are_present
+from ...solver.statistics.stress import friction_angle, love_weber_stress, principal_stresses
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,16 +11,16 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..drawing.force_range import ForceRange
-from ..drawing.frame_caption import caption_of_trust
-from ..inference.zero_start import ZeroStart
-from ..results.results import Results, TruthContacts
-from ..solver.bodies.grains import Array
-from ..solver.bodies.wall_shapes import outlines
-from ..solver.frame_forces import FrameStatus
-from ..solver.statistics.force_statistics import FORCE_EDGES, force_density
-from .figure_style import BLUE, INK, OUTLINE, VERMILION, Width, add_scale_bar, add_title, new_figure
-from .force_network import bar_length, bounds_of, draw_network
+from ...drawing.force_range import ForceRange
+from ...drawing.frame_caption import caption_of_trust
+from ...inference.zero_start import ZeroStart
+from ...results.results import Results, TruthContacts
+from ...solver.bodies.grains import Array
+from ...solver.bodies.wall_shapes import outlines
+from ...solver.frame_forces import FrameStatus
+from ...solver.statistics.force_statistics import FORCE_EDGES, force_density
+from ..figure_style import BLUE, INK, OUTLINE, VERMILION, Width, add_scale_bar, add_title, new_figure
+from ..force_network import bar_length, bounds_of, draw_network
 from .recorded_stress import recorded_stress
 
 STRIP = 5  # consecutive networks

@@ -1,0 +1,1 @@
+"""Figures as the paper shows them, from the data of a run and recorded forces."""
