@@ -19,10 +19,16 @@ const SCALED = ["forces", "contacts", "uncertainty", "displacement", "strain"];
 
 const shown = { open: false, details: new Set(["photograph"]) };
 
+/** The rows that are open now, read before the list is drawn anew: the event of a row that opens comes later than its opening. */
+function noteDetails() {
+  for (const row of document.querySelectorAll("#layers-panel details")) shown.details[row.open ? "add" : "delete"](row.dataset.layer);
+}
+
 /** The button in the corner of the picture, and the list that it opens. */
 export function showLayers(app) {
   const names = app.step?.layers ?? ["photograph", "marks"];
   const focused = document.activeElement?.id;
+  noteDetails();
   at("layers").replaceChildren(
     h("button", { id: "layers-button", class: names.some(isChanged) ? "on" : "", "aria-expanded": String(shown.open), "aria-controls": "layers-panel", title: "Layers: brightness, colours, ranges (Y)", onclick: () => { shown.open = !shown.open; showLayers(app); } }, "Layers"),
     h("div", { id: "layers-panel", role: "group", "aria-label": "Layers", hidden: !shown.open },
@@ -41,7 +47,7 @@ function row(app, name) {
     h("input", { type: "checkbox", id: `layer-${name}`, checked: layer.on, onchange: (event) => { setLayer(name, { on: event.target.checked }); changed(app); } }),
     h("label", { htmlFor: `layer-${name}` }, NAMES[name]),
     h("input", { type: "range", id: `opacity-${name}`, "aria-label": `opacity of ${NAMES[name]}`, title: "opacity", min: 0, max: 1, step: 0.05, value: layer.opacity, oninput: (event) => set({ opacity: Number(event.target.value) }) }),
-    more.length ? h("details", { open: shown.details.has(name), ontoggle: (event) => shown.details[event.target.open ? "add" : "delete"](name) }, h("summary", { "aria-label": `more of ${NAMES[name]}` }, "more"), more) : null);
+    more.length ? h("details", { open: shown.details.has(name), "data-layer": name }, h("summary", { "aria-label": `more of ${NAMES[name]}` }, "more"), more) : null);
 }
 
 function details(app, name) {

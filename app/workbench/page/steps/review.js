@@ -290,7 +290,7 @@ function progress(app) {
 /** The pairs of this photograph whose verdict may change the forces most. */
 function candidateList(app) {
   const listed = (state.frame?.pairs ?? []).filter((each) => each.priority !== null && each.priority !== undefined).slice(0, 14);
-  return h("details", { id: "candidates", open: state.listed, ontoggle: (event) => { state.listed = event.target.open; } }, h("summary", {}, "Influence times ambiguity"), h("div", { class: "list" }, listed.map((each) => h("button", { onclick: () => show(app, { frame: app.frame, ...each }) },
+  return h("details", { id: "candidates", open: state.listed, ontoggle: (event) => { if (event.target.open !== state.listed) { state.listed = event.target.open; app.paint(); } } }, h("summary", {}, "Influence times ambiguity"), h("div", { class: "list" }, listed.map((each) => h("button", { onclick: () => show(app, { frame: app.frame, ...each }) },
     h("span", { style: { flex: "1" } }, pairName(each)), h("span", { class: "soft" }, `P ${each.probability === null ? "–" : each.probability.toFixed(2)} · ${each.priority.toPrecision(2)} N`), each.verdict ? h("span", { class: "swatch", style: { background: COLOURS[each.verdict] } }) : null))));
 }
 
