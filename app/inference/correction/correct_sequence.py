@@ -19,7 +19,7 @@ from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii
 from .close_photographs import choose_span, count_alike
 from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii
-from .outliers import replace_outliers
+from .outliers import remove_outliers
 from .radii import calibrate_with_radii, use_size_classes
 from .short_gaps import interpolate_short_gaps
 from .soft_grain_errors import correct_soft_grains
@@ -53,9 +53,9 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         A requested friction coefficient or coordination number cannot be determined.
     """
     walls, settings = inputs.walls, inputs.settings
-    tracks, outlier_remark = replace_outliers(inputs.tracks)
-    tracks, gap_remark = interpolate_short_gaps(tracks)
-    walls, failed = complete_walls(tracks, walls)
+    walls, failed = complete_walls(inputs.tracks, walls)
+    tracks, outlier_remark = remove_outliers(inputs.tracks, walls)
+    tracks, gap_remark = interpolate_short_gaps(tracks, walls)
     nothing_seen = len(failed) == tracks.frame_count
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)

@@ -1,149 +1,235 @@
-"""Poses that contradict the photographs before and after them: a rod that jumps against its neighbours and returns."""
+"""Poses that contradict the photographs beside theirs: a rod that jumps against its neighbours, into others or back."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ...solver.bodies.grains import Array
-from ...tracks import Tracks, TrackStatus
+from ...solver.bodies.rods import RodMaterial
+from ...solver.bodies.walls import Walls
+from ...solver.contacts.contacts import Contacts, detect_contacts, measure_pairs
+from ...solver.inferred.interpolated_poses import NEIGHBOURS, ROBUST, interpolate_poses, neighbour_rows
+from ...tracks import Tracks, TrackStatus, WallTracks
 
-NEIGHBOURS = 8  # whose median motion a rod is compared with
 JUMP = 6.0  # robust standard deviations of a rod's deviation from its neighbours beyond which it jumps …
 NOISE = 6.0  # … and standard deviations of a position
 RETURN = 0.5  # a jump that is undone leaves at most this fraction of it
-ONE_SIDED = 1.2  # times the least jump, where no later photograph shows the return
-PENETRATION = 0.15  # of the jump: a wrong pose overlaps a neighbour by more of it, a rod that really moved does not
-PASSES = 3  # an outlier hides the one before or after it until it is interpolated
+PENETRATION = 0.15  # of the jump: a wrong pose overlaps another body by more of it, a rod that really moved does not
+BLAMED = 2.0  # robust standard deviations of the deviation of a rod whose pose is impossible
+DEEP = 6.0  # robust standard deviations above the usual overlap, and NOISE of a position: more is impossible
+ONE_SIDED = 1.2  # times the least jump, where only photographs on one side show the motion
+PASSES = 8  # an outlier hides the one before or after it until it is interpolated
 MOST = 0.1  # of the poses of a frame: where more jump, the packing rearranges
-ROBUST = 1.4826  # standard deviation over the median absolute deviation of a Gaussian
 
 
-def replace_outliers(tracks: Tracks) -> tuple[Tracks, str]:
-    """Replace poses of rods that jump for one photograph by interpolated ones.
+def remove_outliers(tracks: Tracks, walls: WallTracks | None = None) -> tuple[Tracks, str]:
+    """Take poses of rods that jump for one photograph out of it; they are lost there.
 
     Parameters
     ----------
     tracks : Tracks
+    walls : WallTracks, optional
+        Rods cannot be beyond them.
 
     Returns
     -------
     tracks : Tracks
-        Position and rotation of outliers are the means of the photographs before and after, plus the neighbours' own
-        deviation from theirs; their status is SUSPECT.
+        Without the outliers.
     remark : str
-        How many were replaced; empty where there is none.
-
-    Notes
-    -----
-    With d_k the displacement of a rod in step k less the median of its neighbours', its deviation in photograph k is
-    e = (d_k − d_{k+1})/2. It is an outlier if |e| > max(6 s, 6 σ), s the robust standard deviation of e over the rods,
-    |d_k + d_{k+1}| < |e|, so that the jump is undone, and the rod would overlap a neighbour by 0.15 |e| more than
-    without the jump: rods that really jump, as rattlers do, cannot penetrate others. In the last photograph
-    e = d_k − d_{k−1}, and 1.2 times as much is needed.
+        How many there were; empty where there is none.
     """
-    outlier, position = np.zeros(tracks.status.shape, np.bool_), tracks.position
-    for _ in range(PASSES):
-        more = find_outliers(replace(tracks, position=position)) & ~outlier
-        if not more.any():
-            break
-        outlier |= more
-        position = _interpolate(replace(tracks, position=position), more)
+    outlier = find_outliers(tracks, walls)
     count = int(outlier.sum())
     if not count:
         return tracks, ""
-    rotation, status = tracks.rotation.copy(), tracks.status.copy()
-    for k in np.flatnonzero(outlier.any(axis=1)):
-        rows = np.flatnonzero(outlier[k])
-        later = tracks.rotation[k + 1 if k + 1 < tracks.frame_count else k - 1]
-        rotation[k, rows] = 0.5 * (tracks.rotation[k - 1, rows] + later[rows])
-        status[k, rows] = TrackStatus.SUSPECT
     frames = int(outlier.any(axis=1).sum())
     remark = (
-        f"{count} poses in {frames} photographs jump against their neighbours and return: they are interpolated; "
-        "check these rods"
+        f"{count} poses in {frames} photographs jump against their neighbours: they count as lost; check these rods"
     )
-    return replace(tracks, position=position, rotation=rotation, status=status), remark
+    return without_poses(tracks, outlier), remark
 
 
-def find_outliers(tracks: Tracks) -> NDArray[np.bool_]:
-    """Whether a pose is an outlier (f, n); those of the first frame cannot be found from motions."""
+def without_poses(tracks: Tracks, lost: NDArray[np.bool_]) -> Tracks:
+    """The tracks with some poses (f, n) lost."""
+    return replace(
+        tracks,
+        position=np.where(lost[..., None], np.nan, tracks.position),
+        rotation=np.where(lost, np.nan, tracks.rotation),
+        sigma=np.where(lost, np.nan, tracks.sigma),
+        status=np.where(lost, np.uint8(TrackStatus.LOST), tracks.status),
+    )
+
+
+def find_outliers(tracks: Tracks, walls: WallTracks | None = None) -> NDArray[np.bool_]:
+    """Find poses that contradict the photographs beside theirs.
+
+    Parameters
+    ----------
+    tracks : Tracks
+    walls : WallTracks, optional
+
+    Returns
+    -------
+    array (f, n)
+        Whether a pose is an outlier.
+
+    Notes
+    -----
+    The deviation e of a pose is its distance from the mean of the poses before and after, corrected by the median
+    deviation of its neighbours from theirs; in the first and last photograph, from the linear continuation. With s the
+    robust standard deviation of e over the rods and σ that of a position, it is an outlier if
+
+    - e > max(6 s, 6 σ), the motion before and after cancel to less than e, and it overlaps another rod or a wall by
+      0.15 e more than the expected pose does: rods that really jump, as rattlers do, cannot penetrate others; or
+    - it overlaps another rod or a wall by 6 robust standard deviations and 6 σ more than rods usually do, and by as
+      much more than in the photographs beside it; of the two rods it deviates more, and e > max(2 s, 6 σ). Such a pose
+      is impossible, whatever the packing does.
+
+    Of outliers in consecutive photographs that with the greatest deviation is taken first, and interpolated before the
+    others are examined again.
+    """
     frames, n = tracks.position.shape[:2]
     found = np.zeros((frames, n), np.bool_)
     if frames < 3 or n <= NEIGHBOURS or tracks.boundary is not None:
         return found
-    steps = [_relative_step(tracks, k) for k in range(1, frames)]
-    for k in range(1, frames):
-        last = k == frames - 1
-        before, after = steps[k - 1], steps[k - 2] if last else steps[k]
-        deviation = np.linalg.norm(before - after, axis=1) * (1.0 if last else 0.5)
-        known = deviation[np.isfinite(deviation)]
-        if not len(known):
-            continue
-        least = np.maximum(JUMP * ROBUST * float(np.median(known)), NOISE * tracks.sigma[k])
-        jumps = deviation > (ONE_SIDED * least if last else least)
-        if not last:
-            jumps &= np.linalg.norm(before + after, axis=1) < 2.0 * RETURN * deviation
-        if last and frames > 3:  # a jump in the photograph before returns now
-            jumps &= ~found[k - 1]
-        if jumps.mean() <= MOST:
-            found[k] = jumps
-            found[k] &= _penetrates(tracks, found, k, deviation)
+    search = _Search(tracks, walls)
+    changed: Iterable[int] = range(frames)
+    for _ in range(PASSES):
+        more = search.examine(changed) & ~found
+        rows = np.flatnonzero(more.any(axis=1))
+        if not len(rows):
+            break
+        found |= more
+        search.interpolate(found)
+        changed = sorted({k for row in rows for k in range(max(row - 2, 0), min(row + 3, frames))})
     return found
 
 
-def _penetrates(tracks: Tracks, jumps: NDArray[np.bool_], k: int, deviation: Array) -> NDArray[np.bool_]:
-    """Whether a rod that jumps in frame k overlaps a neighbour more than without its jump (n,)."""
-    chosen = np.zeros_like(jumps)
-    chosen[k] = jumps[k]
-    rows = np.flatnonzero(jumps[k])
-    result = np.zeros(jumps.shape[1], np.bool_)
-    if len(rows):
-        measured, moved = tracks.position[k], _interpolate(tracks, chosen)[k]
-        others = np.flatnonzero(~jumps[k] & np.isfinite(measured[:, 0]))
-        change = _overlap(tracks, measured, rows, others) - _overlap(tracks, moved, rows, others)
-        result[rows] = change > PENETRATION * deviation[rows]
-    return result
+class _Search:
+    """Positions with the outliers found so far interpolated, and what the others show."""
+
+    def __init__(self, tracks: Tracks, walls: WallTracks | None) -> None:
+        self._tracks, self._walls = tracks, walls
+        self._grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
+        self._position = tracks.position.copy()
+        self._jump = np.full_like(tracks.position, np.nan)  # from where a rod is expected
+        self._suspect = np.zeros(tracks.status.shape, np.bool_)
+        self._outlier = np.zeros(tracks.status.shape, np.bool_)  # found so far
+
+    @property
+    def _deviation(self) -> Array:
+        return np.linalg.norm(self._jump, axis=2)
+
+    def examine(self, frames: Iterable[int]) -> NDArray[np.bool_]:
+        """Poses (f, n) that are outliers, after a new examination of some frames."""
+        frames = list(frames)
+        for k in frames:
+            self._jump[k] = self._beyond_neighbours(k, self._position[k] - self._continued(k))
+        for k in frames:
+            self._suspect[k] = self._contradicted(k)
+        size = np.where(self._suspect, self._deviation, -1.0)
+        greatest = self._suspect.copy()
+        greatest[1:] &= size[1:] >= size[:-1]
+        greatest[:-1] &= size[:-1] >= size[1:]
+        greatest[greatest.mean(axis=1) > MOST] = False
+        return greatest
+
+    def interpolate(self, outlier: NDArray[np.bool_]) -> None:
+        """Put outliers (f, n) where they are expected by the other photographs and by their neighbours."""
+        self._outlier = outlier
+        measured = np.where(outlier[..., None], np.nan, self._tracks.position)
+        for k in np.flatnonzero(outlier.any(axis=1)).tolist():
+            seen = np.isfinite(measured[:, outlier[k], 0]).any(axis=0)
+            poses = interpolate_poses(self._tracks.time, measured, k, np.flatnonzero(outlier[k])[seen])
+            self._position[k, poses.row] = poses.place
+
+    def _continued(self, k: int) -> Array:
+        """Mean of the positions before and after; in the first and last frame their linear continuation (n, 2)."""
+        position, last = self._position, len(self._position) - 1
+        if k == 0:
+            return 2.0 * position[1] - position[2]
+        if k == last:
+            return 2.0 * position[k - 1] - position[k - 2]
+        return 0.5 * (position[k - 1] + position[k + 1])
+
+    def _beyond_neighbours(self, k: int, change: Array) -> Array:
+        """A change (n, 2) of all rods less the median one of each one's neighbours; NaN: unknown."""
+        relative = np.full_like(change, np.nan)
+        rows = np.flatnonzero(np.isfinite(change[:, 0]))
+        if len(rows) > NEIGHBOURS:
+            near = neighbour_rows(self._continued(k), rows, rows)
+            relative[rows] = change[rows] - np.median(change[near], axis=1)
+        return relative
+
+    def _contradicted(self, k: int) -> NDArray[np.bool_]:
+        """Which poses of a frame are outliers (n,)."""
+        known = np.isfinite(self._jump[k, :, 0])
+        if not known.any():
+            return known
+        sd, noise = ROBUST * float(np.median(self._deviation[k][known])), NOISE * self._tracks.sigma[k]
+        bodies = walls_in(self._walls, k)
+        return self._returns(k, JUMP * sd, noise, bodies) | self._is_impossible(k, BLAMED * sd, noise, bodies)
+
+    def _returns(self, k: int, least: float, noise: Array, bodies: Walls) -> NDArray[np.bool_]:
+        """Which rods jump and return, and overlap others more than where they are expected (n,)."""
+        deviation, position, last = self._deviation[k], self._position, len(self._position) - 1
+        if k == 0:
+            return np.zeros(len(deviation), np.bool_)
+        jumps = deviation > np.maximum(ONE_SIDED * least if k == last else least, noise)
+        if k < last:
+            moved = self._beyond_neighbours(k, position[k + 1] - position[k - 1])
+            jumps &= np.linalg.norm(moved, axis=1) < 2.0 * RETURN * deviation
+        if not jumps.any():
+            return jumps
+        expected = position[k] - np.where(jumps[:, None], self._jump[k], 0.0)
+        change = self._greatest_overlap(position[k], bodies, jumps) - self._greatest_overlap(expected, bodies, jumps)
+        return jumps & (change > PENETRATION * deviation)
+
+    def _greatest_overlap(self, position: Array, bodies: Walls, jumps: NDArray[np.bool_]) -> Array:
+        """Greatest overlap (n,) [m] of each rod with a wall or with a rod that does not jump, 0 without one."""
+        found = np.zeros(len(position))
+        near = detect_contacts(self._grains, position, np.isfinite(position[:, 0]), bodies, 0.0)
+        jumping = np.append(jumps, False)
+        i, j, depth = near.i, np.minimum(near.j, len(position)), -near.gap
+        np.maximum.at(found, i[~jumping[j]], depth[~jumping[j]])
+        pair = ~near.with_wall & ~jumping[i]
+        np.maximum.at(found, j[pair], depth[pair])
+        return found
+
+    def _is_impossible(self, k: int, least: float, noise: Array, bodies: Walls) -> NDArray[np.bool_]:
+        """Which rods overlap others by more than in the photographs beside, and deviate more than these (n,)."""
+        position, found = self._position, np.zeros(len(noise), np.bool_)
+        near = detect_contacts(self._grains, position[k], np.isfinite(position[k, :, 0]), bodies, 0.0)
+        if not near.count:
+            return found
+        depth = self._greatest_overlap(position[k], bodies, found)[np.isfinite(position[k, :, 0])]
+        middle = float(np.median(depth))
+        spread = ROBUST * float(np.median(np.abs(depth - middle)))
+        deep = middle + DEEP * spread + float(np.nanmedian(noise))
+        near = near.select(near.gap < -deep)
+        beside = [each for each in (k - 1, k + 1) if 0 <= each < len(position)]
+        if not near.count:
+            return found
+        others = [self._measured_gaps(near, each) for each in beside]
+        new = near.gap < np.fmin.reduce([*others, np.zeros(near.count)]) - deep
+        deviation = np.append(np.nan_to_num(self._deviation[k]), -1.0)
+        i, j = near.i[new], np.minimum(near.j[new], len(noise))
+        worse = np.where(deviation[i] >= deviation[j], i, j)
+        found[worse] = True
+        return found & (self._deviation[k] > np.maximum(least, noise))
+
+    def _measured_gaps(self, pairs: Contacts, k: int) -> Array:
+        """Gaps (c,) [m] of pairs in another frame; NaN where a rod is not measured or is an outlier."""
+        measured = np.where(self._outlier[k][:, None], np.nan, self._position[k])
+        return measure_pairs(self._grains, measured, walls_in(self._walls, k), pairs.key).gap
 
 
-def _overlap(tracks: Tracks, position: Array, rows: NDArray[np.int64], others: NDArray[np.int64]) -> Array:
-    """Greatest overlap (m,) [m] of each of the rows with another rod, 0 without one."""
-    apart = np.linalg.norm(position[rows][:, None] - position[others][None], axis=2)
-    depth = tracks.radius[rows][:, None] + tracks.radius[others][None] - apart
-    return np.maximum(depth.max(axis=1), 0.0)
-
-
-def _interpolate(tracks: Tracks, outlier: NDArray[np.bool_]) -> Array:
-    """Positions (f, n, 2) [m] with those of outliers (f, n) interpolated from the photographs beside theirs."""
-    position = tracks.position.copy()
-    for k in np.flatnonzero(outlier.any(axis=1)):
-        rows, last = np.flatnonzero(outlier[k]), k == tracks.frame_count - 1
-        neighbours = neighbour_rows(tracks.position[k - 1], np.flatnonzero(~outlier[k]), rows)
-        middle = tracks.position[k - 1] if last else 0.5 * (tracks.position[k - 1] + tracks.position[k + 1])
-        position[k, rows] = middle[rows] + np.nanmedian(tracks.position[k][neighbours] - middle[neighbours], axis=1)
-    return position
-
-
-def _relative_step(tracks: Tracks, k: int) -> Array:
-    """Displacement (n, 2) [m] since the frame before, less the median of the neighbours'; NaN where unknown."""
-    step = tracks.position[k] - tracks.position[k - 1]
-    known = np.flatnonzero(np.isfinite(step[:, 0]))
-    if len(known) <= NEIGHBOURS:
-        return np.full_like(step, np.nan)
-    relative = np.full_like(step, np.nan)
-    near = neighbour_rows(tracks.position[k - 1], known, known)
-    relative[known] = step[known] - np.median(step[near], axis=1)
-    return relative
-
-
-def neighbour_rows(position: Array, among: NDArray[np.int64], of: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Rows of the nearest of `among` for each of `of` (m, NEIGHBOURS), itself left out; position (n, 2) [m]."""
-    finite = among[np.isfinite(position[among, 0])]
-    _, near = KDTree(position[finite]).query(position[of], k=NEIGHBOURS + 1)
-    rows = finite[near]
-    own = rows == of[:, None]
-    own[~own.any(axis=1), -1] = True  # it is not among them: the farthest is left out
-    return rows[~own].reshape(len(of), NEIGHBOURS)
+def walls_in(walls: WallTracks | None, k: int) -> Walls:
+    """The walls of a photograph, at rest; none without walls."""
+    if walls is None:
+        return Walls.at_rest(np.empty((0, 2, 2)))
+    return Walls.at_rest(walls.endpoints[k], side=walls.side, cell=None if walls.cell is None else walls.cell[k])

@@ -86,12 +86,12 @@ def diagnose(
         or examine_wall_places(inputs.tracks, walls)
     )
     found += examine_inertia(inputs.tracks, walls, inputs.material)
-    poses = examine_poses(inputs.tracks)
+    poses = examine_poses(inputs.tracks, walls)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
         found = _compare_rivals(inputs, trial, progress, first)
-    if poses and float(find_outliers(inputs.tracks).mean()) > FEW_OUTLIERS:  # so many explain it
+    if poses and float(find_outliers(inputs.tracks, walls).mean()) > FEW_OUTLIERS:  # so many explain it
         found = [each for each in found if each.cause != "not_explained"]
     if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]

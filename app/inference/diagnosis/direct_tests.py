@@ -126,9 +126,9 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     return found
 
 
-def examine_poses(tracks: Tracks) -> list[Finding]:
+def examine_poses(tracks: Tracks, walls: WallTracks | None = None) -> list[Finding]:
     """Look for rods that jump for one photograph, and for rods that photographs lack."""
-    found, outlier = [], find_outliers(tracks)
+    found, outlier = [], find_outliers(tracks, walls)
     if outlier.any():
         frames = np.flatnonzero(outlier.any(axis=1)).tolist()
         words = ", ".join(map(str, frames[:4])) + ("…" if len(frames) > 4 else "")

@@ -1,11 +1,11 @@
-"""Poses that jump against their neighbours and return are replaced; real motions are kept."""
+"""Poses that jump against their neighbours, into others or back, count as lost; real motions are kept."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rodsight.inference.correction.outliers import find_outliers, replace_outliers
-from rodsight.tracks import Tracks, TrackStatus
+from rodsight.inference.correction.outliers import find_outliers, remove_outliers
+from rodsight.tracks import Tracks, TrackStatus, WallTracks
 
 FRAMES, SIDE, PITCH, NOISE = 6, 7, 0.016, 1e-5
 N = SIDE * SIDE
@@ -30,30 +30,52 @@ def sheared_tracks(jumps=()):
 
 def test_correct_tracks_are_returned_as_they_are():
     tracks = sheared_tracks()
-    found, remark = replace_outliers(tracks)
+    found, remark = remove_outliers(tracks)
     assert found is tracks
     assert remark == ""
 
 
 @pytest.mark.parametrize("frame", [2, FRAMES - 1])
-def test_a_jump_for_one_photograph_is_replaced(frame):
-    true = sheared_tracks()
+def test_a_jump_for_one_photograph_counts_as_lost(frame):
     tracks = sheared_tracks([(frame, ROD, (6e-4, -5e-4))])
     assert np.argwhere(find_outliers(tracks)).tolist() == [[frame, ROD]]
-    found, remark = replace_outliers(tracks)
-    assert np.abs(found.position[frame, ROD] - true.position[frame, ROD]).max() < 6 * NOISE
-    assert found.status[frame, ROD] == TrackStatus.SUSPECT
+    found, remark = remove_outliers(tracks)
+    assert np.argwhere(found.lost).tolist() == [[frame, ROD]]
+    assert found.status[frame, ROD] == TrackStatus.LOST
     others = np.arange(N) != ROD
-    assert np.array_equal(found.position[:, others], true.position[:, others])
+    assert np.array_equal(found.position[:, others], tracks.position[:, others])
     assert "1 poses in 1 photographs" in remark
 
 
-def test_the_rotation_is_interpolated_too():
-    tracks = sheared_tracks([(2, ROD, (8e-4, 0.0))])
-    rotation = tracks.rotation.copy()
-    rotation[2, ROD] = 3.0
-    found, _ = replace_outliers(replace(tracks, rotation=rotation))
-    assert found.rotation[2, ROD] == pytest.approx(0.5 * (rotation[1, ROD] + rotation[3, ROD]))
+@pytest.mark.parametrize("frame", [0, 3, FRAMES - 1])
+def test_a_rod_inside_another_is_an_outlier_however_far_the_packing_moves(frame):
+    rng = np.random.default_rng(5)
+    quiet = sheared_tracks([(frame, ROD, (8e-4, 0.0))])
+    moving = quiet.position + 5e-5 * rng.standard_normal((FRAMES, N, 2))
+    moving[frame] = quiet.position[frame]
+    tracks = replace(quiet, position=moving, radius=np.full(N, 0.00795))
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[frame, ROD]]
+
+
+def test_a_rod_beyond_a_wall_is_an_outlier():
+    low = SIDE // 2  # in the row beside the wall
+    tracks = sheared_tracks([(2, low, (0.0, -4e-4))])
+    ends = np.tile(np.array([[[-1.0, -0.00798], [1.0, -0.00798]]]), (FRAMES, 1, 1, 1))
+    assert not find_outliers(tracks).any()
+    found = find_outliers(tracks, WallTracks(("bottom",), ends, np.array([np.nan])))
+    assert np.argwhere(found).tolist() == [[2, low]]
+
+
+def test_a_rod_that_jumps_in_consecutive_photographs_is_found_in_each():
+    tracks = sheared_tracks([(2, ROD, (7e-4, 0.0)), (3, ROD, (-5e-4, 4e-4)), (4, ROD, (0.0, -9e-4))])
+    assert np.argwhere(find_outliers(tracks)).tolist() == [[k, ROD] for k in (2, 3, 4)]
+
+
+def test_overlaps_of_wrong_radii_are_no_outliers():
+    tracks = sheared_tracks()
+    radius = tracks.radius.copy()
+    radius[::5] *= 1.05
+    assert not find_outliers(replace(tracks, radius=radius)).any()
 
 
 def test_a_jump_that_no_other_rod_hinders_is_real():
@@ -84,4 +106,4 @@ def test_lost_rods_and_few_frames_are_no_obstacle():
     position[3, 0] = np.nan
     lost = replace(tracks, position=position)
     assert np.argwhere(find_outliers(lost)).tolist() == [[2, ROD]]
-    assert np.isnan(replace_outliers(lost)[0].position[3, 0]).all()
+    assert np.isnan(remove_outliers(lost)[0].position[3, 0]).all()
