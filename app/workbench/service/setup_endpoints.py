@@ -9,8 +9,7 @@ from pydantic import AfterValidator, Field, StringConstraints
 
 from ...experiment.experiment import GrainGuess
 from ...process.errors import InputError
-from ...solver.bodies.wall_shapes import STRAIGHT
-from ..setup import circles, edits, photograph_series
+from ..setup import circles, edits, initialise, photograph_series
 from ..setup.validation import ValidationResult, outside_walls
 from .endpoints import Line, Number, Numbers, Point, Text, Values, Whole, editing_endpoint, endpoint, without_nul
 from .project import Project
@@ -176,7 +175,7 @@ def draw_wall(
         drawn, fraction = edits.snap_wall(opened.photograph(0), drawn, found)
     else:
         drawn = edits.towards_packing(drawn, found)
-    walls = _walls(found)
+    walls = circles.bars_of(found)
     if name is None:
         name = _name_for(drawn, found)
         walls.append((name, drawn))
@@ -188,13 +187,10 @@ def draw_wall(
 
 @editing_endpoint
 def find_walls(workbench: Workbench, at: Text) -> dict[str, Any]:
-    """Find the bars around the rods."""
+    """Find the bars around the rods, and the discs in the corners where they meet."""
     opened = workbench.project(at)
-    found = _scaled(opened)
-    lines = edits.find_walls(opened.photograph(0), found)
-    names = edits.names_of(lines)
-    edits.set_walls(opened.draft, found, list(zip(names, lines, strict=True)), "walls found")
-    return opened.describe()
+    bars, discs = initialise.find_frame(opened.draft, opened.photograph(0), _scaled(opened))
+    return opened.describe() | {"bars": bars, "discs": discs}
 
 
 @editing_endpoint
@@ -235,6 +231,16 @@ def make_corner(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
 
 
 @editing_endpoint
+def find_corner(workbench: Workbench, at: Text, x: Number, y: Number) -> dict[str, Any]:
+    """Find the disc in a corner of the frame that was clicked [px]."""
+    opened = workbench.project(at)
+    found = _scaled(opened)
+    disc = circles.corner_at(opened.photograph(0), found, x, y)
+    circles.add_corners(opened.draft, found, [disc])
+    return opened.describe() | {"wall": disc.name}
+
+
+@editing_endpoint
 def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
     opened = workbench.project(at)
     found = _scaled(opened)
@@ -245,7 +251,9 @@ def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
         left = [each for each in circles.circles_of(found) if each.name != name]
         circles.set_circles(opened.draft, found, left, f"wall {name} deleted")
         return opened.describe()
-    edits.set_walls(opened.draft, found, [each for each in _walls(found) if each[0] != name], f"wall {name} deleted")
+    edits.set_walls(
+        opened.draft, found, [each for each in circles.bars_of(found) if each[0] != name], f"wall {name} deleted"
+    )
     return opened.describe()
 
 
@@ -368,14 +376,6 @@ def _scaled(opened: Project) -> ValidationResult:
     if found.scale is None:
         raise InputError("scale", "", "is not set: walls and radii are in metres, so it comes first")
     return found
-
-
-def _walls(found: ValidationResult) -> list[tuple[str, Any]]:
-    if found.walls is None or found.scale is None:
-        return []
-    bars = found.walls.sides == STRAIGHT  # circles have a table of their own
-    ends = found.scale.to_pixels(found.walls.endpoints[0])
-    return [(name, line) for name, line, bar in zip(found.walls.name, ends, bars, strict=True) if bar]
 
 
 def _name_for(line: Any, found: ValidationResult) -> str:

@@ -15,6 +15,7 @@ from ...experiment.walls import ARC_COLUMNS
 from ...process.errors import InputError
 from ...solver.bodies.grains import Array
 from ...solver.bodies.wall_shapes import IN, STRAIGHT, circle_parameters
+from ...tracking.walls.corner_rims import BETWEEN_BARS, CLICKED, find_disc
 from ...tracking.walls.round_edge import snap_to_rim
 from .draft import Draft, as_table
 from .validation import ValidationResult
@@ -22,6 +23,7 @@ from .validation import ValidationResult
 ARCS, CORNERS = "arcs.csv", "corners.csv"
 RIM = 24  # points of a rod's rim that a circle around the rods must hold
 SNAP = 0.06  # of its radius, how far beside a drawn circle its edge is looked for
+MEETING = 2.0  # [px] between the ends of two bars that meet
 FLAT = 1e-3  # height of a triangle by its longest side below which it is a line
 
 
@@ -75,7 +77,9 @@ def make_corner(draft: Draft, found: ValidationResult, name: str) -> None:
         raise InputError("corner", name, "needs the bars that meet there: draw them first")
     rest = [each for each in circles if each.name != name]
     tables = {
-        section.get("corners", CORNERS): _with_corner(found, chosen[0]),
+        section.get("corners", CORNERS): as_table(
+            CORNER_COLUMNS, [*_corner_rows(found), _corner_row(found, chosen[0])]
+        ),
         section.get("arcs", ARCS): arcs_table(rest, found.scale) if rest else None,
     }
     if not rest:
@@ -96,12 +100,62 @@ def delete_corner(draft: Draft, found: ValidationResult, name: str) -> None:
     )
 
 
-def _with_corner(found: ValidationResult, circle: Circle) -> bytes:
+def find_corners(image: Image, found: ValidationResult) -> list[Circle]:
+    """Find the discs of the frame where its bars meet, without those that are in the table."""
+    bars = bars_of(found)
+    ends = [(name, end) for name, line in bars for end in line]
+    discs = []
+    for k, (name, end) in enumerate(ends):
+        for other, place in ends[k + 1 :]:
+            if other != name and float(np.hypot(*(place - end))) < MEETING:
+                disc = find_disc(image, (float(end[0]), float(end[1])), within=BETWEEN_BARS)
+                if disc is not None:
+                    discs.append(Circle(_corner_name(name, other), *disc, side="out"))
+    taken = corner_names(found)
+    return [each for each in discs if each.name not in taken]
+
+
+def corner_at(image: Image, found: ValidationResult, x: float, y: float) -> Circle:
+    """Return the disc in a corner of the frame that was clicked; raise InputError where no rim is seen."""
+    bars = bars_of(found)
+    if len(bars) < 2:
+        raise InputError("corner", "", "needs the bars that meet there: draw them first")
+    disc = find_disc(image, (x, y), within=CLICKED)
+    if disc is None:
+        raise InputError("corner", "", "has no disc with a visible rim there: draw a circle, and choose what it is")
+    away = {name: min(float(np.hypot(end[0] - disc[0], end[1] - disc[1])) for end in line) for name, line in bars}
+    name = _corner_name(*sorted(away, key=lambda each: away[each])[:2])
+    if name in corner_names(found):
+        raise InputError("corner", name, "has a disc already: delete it first")
+    return Circle(name, *disc, side="out")
+
+
+def add_corners(draft: Draft, found: ValidationResult, discs: Sequence[Circle]) -> None:
+    """Write discs in the corners of the frame to their table."""
+    section = {"corners": CORNERS, **found.data.get("walls", {})}
+    rows = [*_corner_rows(found), *(_corner_row(found, each) for each in discs)]
+    change = f"corner {discs[0].name}" if len(discs) == 1 else f"{len(discs)} corners"
+    draft.set_keys(change, {"walls": section}, {section["corners"]: as_table(CORNER_COLUMNS, rows)})
+
+
+def bars_of(found: ValidationResult) -> list[tuple[str, Array]]:
+    """Names and ends (2, 2) [px] of the straight walls."""
+    if found.walls is None or found.scale is None:
+        return []
+    ends = found.scale.to_pixels(found.walls.endpoints[0])
+    return [(found.walls.name[w], ends[w]) for w in np.flatnonzero(found.walls.sides == STRAIGHT).tolist()]
+
+
+def _corner_name(*bars: str) -> str:
+    """Name of the corner between two bars: bottom-left, not left-bottom."""
+    return "-".join(sorted(bars, key=lambda each: (each not in ("bottom", "top"), each)))
+
+
+def _corner_row(found: ValidationResult, circle: Circle) -> tuple[object, ...]:
     assert found.scale is not None
     place = np.array([[circle.x, circle.y]])
     (x, y), size = found.scale.to_world(place)[0].tolist(), float(found.scale.size_at(place)[0])
-    row = (0, circle.name, round(x, 7), round(y, 7), round(circle.radius * size, 7))
-    return as_table(CORNER_COLUMNS, [*_corner_rows(found), row])
+    return (0, circle.name, round(x, 7), round(y, 7), round(circle.radius * size, 7))
 
 
 def _corner_rows(found: ValidationResult) -> list[tuple[object, ...]]:

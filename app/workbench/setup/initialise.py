@@ -28,7 +28,7 @@ from ...tracking.outline.outline_tracker import OutlineTracker
 from ...tracking.settings import TrackingSettings
 from ...tracking.tracker import Tracker
 from ...tracks import TrackStatus
-from . import edits
+from . import circles, edits
 from .draft import Draft
 from .experiment_folders import valid_name
 from .setup_picture import draw_setup
@@ -204,6 +204,24 @@ def _first(photographs: Photographs, selection: ImageSelection) -> Image:
     return read_photograph(photographs.files[0], channel=selection.channel)
 
 
+def find_frame(draft: Draft, image: Image, found: ValidationResult) -> tuple[int, int]:
+    """Write the bars around the rods, and the discs where they meet; return how many of each. One step of undo."""
+    lines = edits.find_walls(image, found)
+    with draft.one_step("walls found"):
+        edits.set_walls(draft, found, list(zip(edits.names_of(lines), lines, strict=True)), "walls found")
+        barred = validate(draft)
+        discs = find_discs(draft, image, barred)
+    return len(lines), discs
+
+
+def find_discs(draft: Draft, image: Image, found: ValidationResult) -> int:
+    """Write the discs where bars meet to the table of corners; return their number."""
+    discs = circles.find_corners(image, found)
+    if discs:
+        circles.add_corners(draft, found, discs)
+    return len(discs)
+
+
 def _find_rods_and_walls(
     draft: Draft, flags: SetupFlags, first: Image, detection: Detection
 ) -> tuple[ValidationResult, list[str]]:
@@ -224,10 +242,12 @@ def _find_rods_and_walls(
         if cut:
             whole = [(name, line) for name, line in zip(names, lines, strict=True) if name not in cut]
             edits.set_walls(draft, found, whole, "walls that cut through no rod")
+            found = validate(draft)
             notes += [
                 f"Wall {name!r} is left out, since it would cut through {count} rod{'s' if count > 1 else ''}."
                 for name, count in cut.items()
             ]
+        find_discs(draft, first, found)
     else:
         source = Path(flags.walls)
         if not source.is_file():

@@ -1,8 +1,15 @@
 """Discs in the corners of a frame are made of drawn circles, and have a table of their own."""
 
+import shutil
+
+import numpy as np
 import pytest
 from rodsight.experiment.reading.tables import read_table
+from rodsight.synthetic.synthesis import synthesize
+from rodsight.workbench.service.workbench import Workbench
 from rodsight.workbench.setup.draft import Draft
+
+from tests.app.workbench.conftest import Visitor
 
 
 @pytest.fixture
@@ -73,3 +80,56 @@ def test_a_corner_needs_the_bars_that_meet_there(visitor):
     circle = visitor.request("draw_circle", at=at, place=[160.0, 160.0, 30.0], side="out")["wall"]
     with pytest.raises(Exception, match="draw them first"):
         visitor.request("make_corner", at=at, name=circle)
+
+
+@pytest.fixture
+def apparatus(tmp_path):
+    """The photograph of a frame with discs in its corners, and the true discs (x, y, radius) [m] by their names."""
+    made = synthesize(tmp_path / "made", preset="1g2e", seed=2, grains=60, frames=1)
+    (tmp_path / "mine" / "pictures").mkdir(parents=True)
+    for file in (made.folder / "photos").iterdir():
+        shutil.copy(file, tmp_path / "mine" / "pictures")
+    table = read_table(made.folder / "corners.csv", ("corner", "x", "y", "radius"))
+    rows = np.column_stack([table.numbers(name) for name in ("x", "y", "radius")])
+    visitor = Visitor(Workbench(tmp_path / "mine")).enter()
+    (series,) = visitor.request("home")["series"]
+    at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]
+    visitor.request("set_scale", at=at, pixel_size=1.45e-4)
+    visitor.request("detect_rods", at=at, radii=[0.00686, 0.00784, 0.01078])
+    return visitor, at, dict(zip(table.text("corner"), rows, strict=True))
+
+
+@pytest.mark.screen
+def test_discs_in_the_corners_are_found_with_the_bars_or_by_a_click(apparatus, tmp_path):
+    visitor, at, true = apparatus
+    described = visitor.request("find_walls", at=at)
+    assert (described["bars"], described["discs"]) == (4, 4)
+    discs = {wall["name"]: wall["circle"] for wall in described["walls"] if wall["corner"]}
+    (file,) = (tmp_path / "mine").rglob("corners.csv")
+
+    def written():
+        table = read_table(file, ("corner", "x", "y", "radius"))
+        rows = np.column_stack([table.numbers(name) for name in ("x", "y", "radius")])
+        return dict(zip(table.text("corner"), rows, strict=True))
+
+    assert discs.keys() == true.keys()
+    for name, row in written().items():
+        np.testing.assert_allclose(row, true[name], atol=2.5e-5)  # [m], a sixth of a pixel
+    disc = discs["top-left"]
+    visitor.request("delete_wall", at=at, name="top-left")
+    click = {"x": disc["x"] - 0.5 * disc["radius"], "y": disc["y"] + 0.4 * disc["radius"]}
+    assert visitor.request("find_corner", at=at, **click)["wall"] == "top-left"
+    np.testing.assert_allclose(written()["top-left"], true["top-left"], atol=2.5e-5)
+    assert "has a disc already" in visitor.refused("find_corner", at=at, **click)
+    beside = {"x": disc["x"] + 2.5 * disc["radius"], "y": disc["y"] - 1.5 * disc["radius"]}
+    assert "no disc with a visible rim" in visitor.refused("find_corner", at=at, **beside)
+
+
+def test_a_frame_without_discs_has_bars_alone(visitor, photographs_only):
+    (series,) = visitor.request("home")["series"]
+    at = visitor.request("begin", **{key: series[key] for key in ("folder", "suffix", "name")})["at"]
+    visitor.request("set_scale", at=at, pixel_size=2.5e-4)
+    visitor.request("detect_rods", at=at, radii=[])
+    described = visitor.request("find_walls", at=at)
+    assert (described["bars"], described["discs"]) == (4, 0)
+    assert not (photographs_only / "my photographs" / "corners.csv").exists()

@@ -7,26 +7,29 @@ import { choice, measured, typed, unit, within } from "/page/units.js";
 
 const COLOURS = ["#56b4e9", "#e69f00", "#cc79a7", "#f0e442", "#2fbf93", "#d55e00"];
 let chosen = null, line = null, held = null, snap = true, round = null, points = []; // round: the circle that is dragged; points: of a new one, null while bars are drawn
-const drawing = { circle: false };
+const drawing = { circle: false, corner: false };
+const KINDS = [["Straight bars", "draw-bars", "bars"], ["Circle", "draw-circle", "circle"], ["Corner disc", "draw-corner", "corner"]];
+const kindDrawn = () => (drawing.corner ? "corner" : drawing.circle ? "circle" : "bars");
+const draw = (kind) => { letGo(); drawing.circle = kind === "circle"; drawing.corner = kind === "corner"; };
 const TURNED = 0.2; // [rad] by which two bars meet no more
 
 export const walls = {
   name: "walls", title: "Walls", edits: 0,
   layers: ["photograph", "mask", "rods", "marks"], below: ["mask", "rods"],
-  hint: (app) => (app.project.pixel ? drawing.circle ? `Click three points on the rim, far apart (${points.length} of 3); drag its centre or rim to correct it` : "Drag along the inner edge of a bar: the line snaps to it. Drag an end to correct it" : "Set the scale first"),
-  keyHelp: [["Delete", "delete the chosen wall"], ["S", "snap to the edge, or not"], ["C", "draw circles, or bars"]],
-  enter: (app) => { letGo(); chosen = null; drawing.circle = app.project.walls.length > 0 && app.project.walls.every((wall) => wall.circle); },
+  hint: (app) => (app.project.pixel ? drawing.corner ? "Click a disc in a corner of the frame: its rim is found" : drawing.circle ? `Click three points on the rim, far apart (${points.length} of 3); drag its centre or rim to correct it` : "Drag along the inner edge of a bar: the line snaps to it. Drag an end to correct it" : "Set the scale first"),
+  keyHelp: [["Delete", "delete the chosen wall"], ["S", "snap to the edge, or not"], ["C", "draw circles, corner discs, or bars"]],
+  enter: (app) => { chosen = null; draw(app.project.walls.length > 0 && app.project.walls.every((wall) => wall.circle) ? "circle" : "bars"); },
   tool: (app) => (app.project.pixel ? tool(app) : null),
   panel(app) {
     const { project } = app;
     if (!project.pixel) return h("p", {}, "Walls are given in metres. Set the scale first (step 2); then the bars can be drawn or found here.");
     return [
       h("p", {}, "The packing lies between bars. Give a pressure where a plate loads it; every other bar has its measured motion."),
-      h("div", { class: "chips", role: "group", "aria-label": "kind of wall" }, [["Straight bars", false], ["Circle", true]].map(([words, circle]) => h("button", { class: drawing.circle === circle ? "on" : "", id: circle ? "draw-circle" : "draw-bars", onclick: () => { letGo(); drawing.circle = circle; app.paint(); } }, words))),
+      h("div", { class: "chips", role: "group", "aria-label": "kind of wall" }, KINDS.map(([words, id, kind]) => h("button", { class: kindDrawn() === kind ? "on" : "", "aria-pressed": String(kindDrawn() === kind), id, onclick: () => { draw(kind); app.paint(); } }, words))),
       drawing.circle ? h("div", { class: "row" }, h("button", { class: project.walls.length ? "" : "primary", id: "find-circle", disabled: !project.rods, title: project.rods ? "the least circle that holds them all" : "needs the rods: step 4", onclick: () => app.change("draw_circle", { name: project.walls.find((wall) => wall.name === chosen)?.circle ? chosen : null }, "", (given) => { chosen = given.wall; app.paint(); notify("The least circle around the rods"); }) }, "Around the rods"),
         snapButton(app))
         : h("div", { class: "row" },
-        h("button", { class: project.walls.length ? "" : "primary", id: "find-walls", disabled: !project.rods, title: project.rods ? "" : "needs the rods: step 4", onclick: () => app.change("find_walls", {}, "Finding the bars …", (given) => notify(`${given.walls.length} bars found`)) }, "Find the bars around the rods"),
+        h("button", { class: project.walls.length ? "" : "primary", id: "find-walls", disabled: !project.rods, title: project.rods ? "" : "needs the rods: step 4", onclick: () => app.change("find_walls", {}, "Finding the bars …", (given) => notify(given.discs ? `${given.bars} bars and ${given.discs} discs in their corners found` : `${given.bars} bars found`)) }, "Find the bars around the rods"),
         snapButton(app)),
       project.walls.map((wall, k) => card(app, wall, k)),
       project.walls.length ? [h("h2", {}, "Measured at walls"), tableField(app, "load"), tableField(app, "forces"), choice("pressure", app)] : null,
@@ -41,7 +44,7 @@ export const walls = {
   key(app, event) {
     if (event.key === "Delete" && chosen) { app.change("delete_wall", { name: chosen }); chosen = null; return true; }
     if (event.key === "s") { snap = !snap; app.paint(); return true; }
-    if (event.key === "c") { letGo(); drawing.circle = !drawing.circle; app.paint(); return true; }
+    if (event.key === "c") { draw({ bars: "circle", circle: "corner", corner: "bars" }[kindDrawn()]); app.paint(); return true; }
     if (event.key === "Escape") { letGo(); chosen = null; app.paint(); return true; }
     return false;
   },
@@ -58,10 +61,10 @@ function card(app, wall, k) {
       h("input", { value: wall.name, style: { flex: "1", fontWeight: 600 }, "aria-label": "name of the wall", id: `wall-name-${k}`, onchange: (event) => app.change("rename_wall", { name: wall.name, to: event.target.value.trim() }) }),
       h("span", { class: "soft" }, wall.circle ? `r ${measured("length", wall.circle.radius * app.project.pixel)}` : measured("length", long)),
       h("button", { class: "quiet", title: "Delete this wall", onclick: () => app.change("delete_wall", { name: wall.name }) }, "✕")),
-    numberField(`pressure ${wall.name}`, wall.pressure === null ? "" : within("pressure", wall.pressure, 6), unit("pressure"), (text) => app.queue(async () => {
+    wall.corner ? h("p", { class: "soft" }, "A disc in a corner of the frame: it moves with its bar, and shares its load.") : numberField(`pressure ${wall.name}`, wall.pressure === null ? "" : within("pressure", wall.pressure, 6), unit("pressure"), (text) => app.queue(async () => {
       plate({ pressure: text === "" ? null : typed("pressure", text, "pressure") });
     }), { placeholder: "moves as seen" }),
-    wall.circle ? h("div", { class: "field" }, h("label", { htmlFor: `side-${k}` }, "packing is"), h("select", { id: `side-${k}`, onchange: (event) => { const { x, y, radius } = wall.circle, side = event.target.value; if (side === "corner") app.change("make_corner", { name: wall.name }); else app.change("draw_circle", { name: wall.name, place: [x, y, radius], side }); } },
+    wall.corner ? null : wall.circle ? h("div", { class: "field" }, h("label", { htmlFor: `side-${k}` }, "packing is"), h("select", { id: `side-${k}`, onchange: (event) => { const { x, y, radius } = wall.circle, side = event.target.value; if (side === "corner") app.change("make_corner", { name: wall.name }); else app.change("draw_circle", { name: wall.name, place: [x, y, radius], side }); } },
       [["in", "inside the circle"], ["out", "outside it"], ["corner", "outside it, a disc in a corner of the frame"]].map(([value, words]) => h("option", { value, selected: value === (wall.corner ? "corner" : wall.circle.side) }, words))))
     : h("div", { class: "field" }, h("label", { htmlFor: `ends-${k}`, title: "bar: the ends are points of the bar itself; corners: where bars meet, and the bar slides along; judged: by how their distance changes" }, "its ends are"), h("select", { id: `ends-${k}`, onchange: (event) => plate({ ends: event.target.value }) },
       [["auto", "judged"], ["bar", "of the bar"], ["corner", "corners"]].map(([value, words]) => h("option", { value, selected: value === wall.ends }, words)))));
@@ -83,7 +86,7 @@ function tool(app) {
     cross: true, loupe: true,
     down: (p) => {
       const found = near(p);
-      if (!found && drawing.circle) return false; // the picture is moved, or a click is a point of the rim
+      if (drawing.corner || (!found && drawing.circle)) return false; // the picture is moved, or a click is a point of the rim
       held = found ?? { name: null, end: 1 };
       if (found && !found.part) held.old = app.project.walls.find((wall) => wall.name === found.name).line;
       if (held.part) round = { ...held.circle };
@@ -98,6 +101,10 @@ function tool(app) {
       else line = line.map((end, k) => (k === held.end ? p : end));
     },
     click: (p) => {
+      if (drawing.corner) {
+        app.change("find_corner", { x: p[0], y: p[1] }, "Finding its rim …", (given) => { chosen = given.wall; app.paint(); notify(`${given.wall}: a disc of radius ${measured("length", given.walls.find((wall) => wall.name === given.wall).circle.radius * given.pixel)}`); });
+        return;
+      }
       if (!drawing.circle) return;
       points.push(p);
       if (points.length < 3) { app.paint(); return; }
