@@ -40,3 +40,4 @@ class Evidence:
     agreement_age: int = 0  # frames since these three were computed
     force_change: float = math.nan  # 1 − correlation of f_n with the previous frame, over the contacts of either
     power_gap: float = math.nan  # of the convex members: 0 if all friction acts at its limit against the sliding
+    inertial_number: float = math.nan  # of the step by the times of its photographs; NaN: no load is stated

@@ -30,6 +30,10 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     # sliding that noise hides, or that there is not: the motion then shows little, and its estimators agree by chance
     "hidden_sliding": lambda e: 1.0 / (LEAST_SIGNAL + e.information.slide_signal),
     "load_mismatch": lambda e: abs(math.log(e.load_fraction)) if e.load_fraction > 0.0 else math.nan,
+    # a grain that no forces of the network hold in balance: friction, walls or contacts are not as stated
+    "force_residual": lambda e: e.unbalance,
+    "inertial_number": lambda e: e.inertial_number,
+    "coarse_step": lambda e: e.shear,
     # two readings of the positions: the posterior, and the balance of overlaps
     "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
 }

@@ -143,6 +143,11 @@ def _contradictions(evidence: Evidence) -> list[Penalty]:
         "with more shear, or more exact positions",
         "load_mismatch": f"the mean stress is {evidence.load_fraction:.2f} of the load: walls, loads or contacts "
         "are wrong",
+        "force_residual": f"a grain is out of balance by {evidence.unbalance:.2g} of the mean force, whatever the "
+        "forces: contacts, walls or friction are not as stated",
+        "inertial_number": f"the inertial number is {evidence.inertial_number:.2g}: part of the forces accelerates "
+        "grains; load more slowly, or photograph at rest",
+        "coarse_step": f"photographs are {step:.2g}° of shear apart: take them every .25°",
         "force_change": f"{100.0 * evidence.force_change:.0f} % of the force pattern is new{coarse}",
     }
     return [Penalty(loss, words[name], counted=True) for name, loss in losses(evidence).items()]

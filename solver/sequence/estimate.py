@@ -294,8 +294,18 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
             packing, snapshot, problem.motion, estimate.contacts, estimate.fn, step.walls, soft=problem.settings.soft
         ),
         force_change=_force_change(estimate, state),
+        inertial_number=_inertial_number(problem, load),
         power_gap=estimate.power_gap,
     )
+
+
+def _inertial_number(problem: FrameProblem, load: float) -> float:
+    """I = γ̇ √(m̄ / (p L)) by the mean pressure of the loads [Pa]; NaN without one."""
+    packing, motion = problem.packing, problem.motion
+    if not (load > 0.0 and motion.interval > 0.0 and motion.ends_here):
+        return np.nan
+    mass = float(packing.grains.mass[problem.snapshot.present].mean())
+    return shear_over(motion) / motion.interval * float(np.sqrt(mass / (load * packing.length)))
 
 
 def _count_interior(problem: FrameProblem, estimate: Estimate) -> int:
