@@ -18,12 +18,19 @@ from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.size_classes import find_size_classes
 from ...solver.calibration.calibrate import Calibration
 from ...solver.calibration.priors import CalibrationSettings
+from ...solver.contacts.contacts import detect_contacts
 from ...solver.posterior.radius_posterior import RadiusPosterior, estimate_radii, has_radius_errors
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence
-from .calibration import calibrate_tracks
+from .calibration import calibrate_tracks, radius_classes
+from .outliers import walls_in
 
 SEED = 0  # of the draws: the same input gives the same bits
+# Mean overlap of the pairs of one size over that of another, below which a radius is wrong: .45 at least in simulated
+# soft packings of three sizes, .02 where one of three radii is 2 % too large.
+UNEQUAL = 0.25
+SEEN = 0.002  # mean overlap over a diameter, below which it does not matter
+FEWEST = 30  # overlaps of a size in all photographs, with which it counts
 
 
 def use_size_classes(material: RodMaterial, tracks: Tracks) -> tuple[Tracks, str]:
@@ -99,3 +106,47 @@ def _joined(first: Calibration, found: RadiusPosterior, then: Calibration) -> Ca
         applied=True,
         verdict=verdict + (f"; then {then.verdict.removeprefix('applied: ')}" if then.applied else ""),
     )
+
+
+def find_wrong_sizes(tracks: Tracks, walls: WallTracks | None, failed: Collection[int] = ()) -> dict[float, float]:
+    """Find sizes of grains whose radius is stated too large.
+
+    Soft grains of all sizes overlap, larger ones more, because they bear larger forces; where hard grains of some sizes
+    overlap and those of others do not, the stated radii of these sizes are wrong.
+
+    Parameters
+    ----------
+    tracks : Tracks
+    walls : WallTracks or None
+    failed : collection of int
+        Photographs that are not read.
+
+    Returns
+    -------
+    dict of float to float
+        Stated radius [m] of every such size, and the mean overlap of its pairs over twice the radius.
+
+    Notes
+    -----
+    With d_c the mean overlap of the pairs of size c, these are sizes with d_c > max(min d / UNEQUAL, SEEN · 2 r_c).
+    """
+    sizes = radius_classes(tracks.radius)
+    if sizes is None or sizes.max() < 1:
+        return {}
+    grains, depth, of_size = RodMaterial().pack(tracks.radius, np.empty(0)).grains, [], []
+    for k in sorted(set(range(tracks.frame_count)) - set(failed)):
+        present = np.isfinite(tracks.position[k, :, 0])
+        near = detect_contacts(grains, tracks.position[k], present, walls_in(walls, k), 0.0)
+        near = near.select(~near.with_wall)
+        alike = sizes[near.i] == sizes[near.j]
+        depth.append(-near.gap[alike])
+        of_size.append(sizes[near.i[alike]])
+    size = np.concatenate(of_size) if of_size else np.empty(0, np.int64)
+    count = np.bincount(size, minlength=int(sizes.max()) + 1)
+    known = np.flatnonzero(count >= FEWEST)
+    if len(known) < 2:
+        return {}
+    mean = np.bincount(size, weights=np.concatenate(depth), minlength=len(count))[known] / count[known]
+    radius = [float(tracks.radius[sizes == each].mean()) for each in known.tolist()]
+    overlap = {r: d / (2.0 * r) for r, d in zip(radius, mean.tolist(), strict=True)}
+    return {r: each for r, each in overlap.items() if each > SEEN and mean.min() < UNEQUAL * 2.0 * r * each}

@@ -16,6 +16,7 @@ from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...solver.sequence.settings import SequenceSettings
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots
+from .radii import find_wrong_sizes
 
 STIFFNESS_SD = 0.2  # relative standard deviation of a given stiffness
 # Noise of a position over the mean diameter, above which the motion of hard rods without walls shows no more forces
@@ -68,7 +69,7 @@ def find_softness(
     packing = material.pack(tracks.radius, pressure, boundary=tracks.boundary)
     seen = find_soft_overlap(packing, interpolate_ignored_frames(make_snapshots(tracks, walls), failed))
     # A given stiffness, or the request to estimate it, means soft grains even where too small radii hide the overlaps.
-    if not seen and material.stiffness is None:
+    if material.stiffness is None and (not seen or find_wrong_sizes(tracks, walls, failed)):
         return settings
     trust = MAX_TRUST_MEASURED if seen else MAX_TRUST_STATED
     posterior = _stiffness_prior(material, settings, packing)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.rods import RodMaterial
 from ...solver.bodies.strain import displacement_gradient, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT
+from ...solver.contacts.contacts import detect_contacts
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
 from ...solver.statistics.agreement import pearson
 from ...tracks import Tracks, WallTracks
-from ..correction.outliers import find_outliers
+from ..correction.outliers import find_outliers, walls_in
+from ..correction.radii import find_wrong_sizes
 from .causes import finding
 
 AGREES = 0.25  # rank correlation of stated and inferred rotations beyond which they are the same, or opposite …
@@ -28,6 +31,7 @@ DRIFT_SIGMAS = 15.0  # standard deviations of a position by which rods may leave
 DRIFT = 0.02  # … and fraction of the mean radius
 LAGGING = 2.0  # times what rods may leave or penetrate a wall: walls off by so much may lag
 BEYOND = 0.1  # mean radius by which rods may stand beyond a wall
+USUAL, BEYOND_USUAL = 0.99, 1.5  # quantile of all overlaps, and times it that an outlier overlaps another body
 MISSING = 0.03  # fraction of the poses that may be missing
 INERTIAL, OUT = 5e-3, 7.0  # inertial number that is reported; force out of balance over the mean force, for I = 1
 ROTATING_POSES, FEWEST_STEPS = 6000, 4  # poses, and steps between photographs, whose rotations are compared
@@ -128,7 +132,7 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
 
 def examine_poses(tracks: Tracks, walls: WallTracks | None = None) -> list[Finding]:
     """Look for rods that jump for one photograph, and for rods that photographs lack."""
-    found, outlier = [], find_outliers(tracks, walls)
+    found, outlier = [], find_impossible_poses(tracks, walls)
     if outlier.any():
         frames = np.flatnonzero(outlier.any(axis=1)).tolist()
         words = ", ".join(map(str, frames[:4])) + ("…" if len(frames) > 4 else "")
@@ -139,6 +143,37 @@ def examine_poses(tracks: Tracks, walls: WallTracks | None = None) -> list[Findi
     if MISSING < missing < 1.0:
         found.append(finding("missing_poses", f"{100.0 * missing:.0f} % of the poses are missing"))
     return found
+
+
+def examine_sizes(tracks: Tracks, walls: WallTracks | None = None) -> list[Finding]:
+    """Look for sizes of rods whose radius is stated too large."""
+    found = find_wrong_sizes(tracks, walls)
+    if not found:
+        return []
+    radius, overlap = max(found.items(), key=lambda each: each[1])
+    words = f"rods of radius {1e3 * radius:.3g} mm overlap by {100.0 * overlap:.1f} % of a diameter, others do not"
+    return [finding("class_radii", words)]
+
+
+def find_impossible_poses(tracks: Tracks, walls: WallTracks | None = None) -> NDArray[np.bool_]:
+    """Outliers (f, n) that overlap another body by more than other poses do.
+
+    Where radii are wrong all overlaps are large, and a rod that really jumps seems to penetrate others.
+    """
+    outlier = find_outliers(tracks, walls)
+    if not outlier.any():
+        return outlier
+    grains, depth, usual = RodMaterial().pack(tracks.radius, np.empty(0)).grains, np.zeros(outlier.shape), []
+    for k in range(tracks.frame_count):
+        present, wrong = np.isfinite(tracks.position[k, :, 0]), np.append(outlier[k], False)
+        near = detect_contacts(grains, tracks.position[k], present, walls_in(walls, k), 0.0)
+        i, j = near.i, np.minimum(near.j, tracks.grain_count)
+        usual.append(-near.gap[~wrong[i] & ~wrong[j]])
+        np.maximum.at(depth[k], i, -near.gap)
+        np.maximum.at(depth[k], j[~near.with_wall], -near.gap[~near.with_wall])
+    known = np.concatenate(usual)
+    limit = float(np.quantile(known, USUAL)) if len(known) else 0.0
+    return outlier & (depth > BEYOND_USUAL * limit)
 
 
 def examine_inertia(tracks: Tracks, walls: WallTracks, material: RodMaterial) -> list[Finding]:

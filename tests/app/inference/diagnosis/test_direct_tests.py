@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rodsight.inference.correction.outliers import find_outliers
 from rodsight.inference.diagnosis.direct_tests import (
     examine_inertia,
     examine_order,
     examine_poses,
     examine_rotations,
+    examine_sizes,
     examine_wall_places,
     examine_wall_times,
     examine_walls,
+    find_impossible_poses,
 )
 from rodsight.solver.bodies.rods import RodMaterial
 from rodsight.tracks import Tracks, TrackStatus, WallTracks
@@ -130,6 +133,30 @@ def test_jumps_and_missing_poses_are_named():
         replace(tracks, position=np.where(lost[..., None], np.nan, tracks.position), status=status)
     )
     assert missing.cause == "missing_poses"
+
+
+def test_a_jump_is_no_outlier_where_all_rods_overlap_as_much():
+    tracks = rolling_tracks()
+    position = tracks.position.copy()
+    position[4, 44] += [1e-3, 0.0]
+    tracks = replace(tracks, position=position)
+    assert find_impossible_poses(tracks).sum() == 1
+    large = replace(tracks, radius=tracks.radius + np.where(np.arange(N) % 3 == 0, 2e-3, 0.0))
+    assert find_outliers(large).any()
+    assert not find_impossible_poses(large).any()
+    assert [each.cause for each in examine_poses(large)] == []
+
+
+@pytest.mark.parametrize(
+    ("factors", "named"), [((1.0, 1.02), True), ((1.0, 1.0005), False), ((1.02, 1.021), False), ((1.0, 0.98), False)]
+)
+def test_a_size_whose_rods_overlap_alone_is_named(factors, named):
+    tracks = rolling_tracks()
+    in_odd_layer = (np.arange(N) // SIDE) % 2 == 1  # touching neighbours along a layer are of one size
+    found = examine_sizes(replace(tracks, radius=RADIUS * np.where(in_odd_layer, factors[1], factors[0])), box())
+    assert [each.cause for each in found] == (["class_radii"] if named else [])
+    if named:
+        assert "rods of radius 8.16 mm overlap by 2.0 % of a diameter" in found[0].evidence
 
 
 def test_fast_shear_is_named():
