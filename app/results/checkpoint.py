@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from enum import IntEnum
-from functools import cache
+from functools import cache, partial
+from operator import itemgetter
 from pathlib import Path
 from types import UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -97,8 +98,12 @@ class Checkpoint:
 
     def lazy_sequences(self, count: int, *kinds: type) -> tuple[LazySequence[Any], ...]:
         """Return the first `count` frames as one sequence per kind, read on access."""
-        loaded = CachedSequence(count, lambda frame: self.load(frame, *kinds), _bytes_of, CACHE_SIZE)
-        return tuple(LazySequence(count, lambda frame, at=at: loaded[frame][at]) for at in range(len(kinds)))
+
+        def make(frame: int) -> tuple[list[Any], int]:
+            return self.load(frame, *kinds), self._file(frame).stat().st_size
+
+        loaded = CachedSequence(count, make, itemgetter(1), CACHE_SIZE)
+        return tuple(LazySequence(count, lambda frame, at=at: loaded[frame][0][at]) for at in range(len(kinds)))
 
     def drop(self, first: int) -> None:
         """Remove the frames from this one on."""
@@ -130,49 +135,66 @@ class Checkpoint:
 def flatten(value: Any, prefix: str = "") -> list[tuple[str, np.ndarray]]:
     """Return every array of a dataclass with its name, nested ones as outer.inner."""
     result = []
-    for each in fields(value):
-        part = getattr(value, each.name)
-        if is_dataclass(part):
-            result += flatten(part, f"{prefix}{each.name}.")
+    for name in type(value).__dataclass_fields__:
+        part = getattr(value, name)
+        if hasattr(type(part), "__dataclass_fields__"):
+            result += flatten(part, f"{prefix}{name}.")
         elif part is not None:
-            result.append((f"{prefix}{each.name}", np.asarray(part)))
+            result.append((f"{prefix}{name}", np.asarray(part)))
     return result
-
-
-def _bytes_of(values: list[Any]) -> int:
-    return sum(array.nbytes for value in values for _, array in flatten(value))
 
 
 def restore(kind: type[T], named: Mapping[str, Any], prefix: str) -> T:
     """Return the dataclass of the arrays that `flatten` named; missing fields get their default or None."""
-    hints = _hints(kind)
     values: dict[str, Any] = {}
-    for each in fields(kind):  # type: ignore[arg-type]
-        hint, name = hints[each.name], f"{prefix}{each.name}"
-        if is_dataclass(hint):
-            values[each.name] = restore(hint, named, f"{name}.")  # type: ignore[arg-type]
+    for each in _fields_of(kind):
+        name = f"{prefix}{each.name}"
+        if each.nested is not None:
+            values[each.name] = restore(each.nested, named, f"{name}.")
         elif name in named:
-            values[each.name] = _typed(hint, named[name])
-        elif each.default is MISSING and each.default_factory is MISSING:
+            value = named[name]
+            values[each.name] = value if each.convert is None or value is None else each.convert(value)
+        elif each.required:
             values[each.name] = None
     return kind(**values)
 
 
-def _typed(hint: Any, value: Any) -> Any:
-    if value is None:
-        return None
-    if isinstance(hint, UnionType):  # such as tuple[str, ...] | None
-        hint = next((each for each in get_args(hint) if get_origin(each) is tuple), hint)
-    if get_origin(hint) is tuple:
-        return tuple(np.asarray(value).tolist())
-    if hint not in (int, float, bool, str) and not (isinstance(hint, type) and issubclass(hint, IntEnum)):
-        return value
-    value = np.asarray(value)[()]
-    if hint is int and value != value:
-        return float("nan")  # the number was not stored
-    return hint(value)
+class _Field(NamedTuple):
+    """One field of a dataclass, and how its stored array becomes its value."""
+
+    name: str
+    nested: type | None  # a dataclass
+    convert: Callable[[Any], Any] | None  # None: an array stays one
+    required: bool  # it has no default
 
 
 @cache
-def _hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind)
+def _fields_of(kind: type) -> tuple[_Field, ...]:
+    hints = get_type_hints(kind)
+    return tuple(
+        _Field(
+            each.name,
+            hints[each.name] if is_dataclass(hints[each.name]) else None,
+            _converter(hints[each.name]),
+            each.default is MISSING and each.default_factory is MISSING,
+        )
+        for each in fields(kind)
+    )
+
+
+def _converter(hint: Any) -> Callable[[Any], Any] | None:
+    """What makes a value of this type of its stored array; None: it is an array."""
+    if isinstance(hint, UnionType):  # such as tuple[str, ...] | None
+        hint = next((each for each in get_args(hint) if get_origin(each) is tuple), hint)
+    if get_origin(hint) is tuple:
+        return lambda value: tuple(np.asarray(value).tolist())
+    if hint not in (int, float, bool, str) and not (isinstance(hint, type) and issubclass(hint, IntEnum)):
+        return None
+    return partial(_number_of, hint)
+
+
+def _number_of(kind: type, value: Any) -> Any:
+    value = np.asarray(value)[()]
+    if kind is int and value != value:
+        return float("nan")  # the number was not stored
+    return kind(value)

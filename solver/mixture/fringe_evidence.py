@@ -12,7 +12,7 @@ from ..bodies.grains import Array
 from ..posterior.frame_posterior import FramePosterior, infer_frame
 from ..posterior.fringe_calibration import FringeCalibration, FringeReading, calibrate_fringes, with_scale_of
 from ..posterior.sequence_evidence import SequenceEvidence
-from ..statistics.agreement import pearson
+from ..statistics.agreement import pearson, ranks
 
 FRAMES = 6  # estimated for the curve, evenly over the sequence
 PASSES = 4  # with the curve of the pass before; the first one rests on positions alone
@@ -89,13 +89,11 @@ def _readings(evidence: SequenceEvidence, posteriors: dict[int, FramePosterior])
 
 def _rank_agreement(readings: dict[int, FringeReading]) -> float:
     """Mean rank correlation of fringes and pressures."""
-    from scipy.stats import rankdata  # half a second of imports that few inputs need
-
     found = []
     for each in readings.values():
         seen = each.used & np.isfinite(each.fringes)
         if seen.sum() > 2 and np.ptp(each.fringes[seen]) > 0.0 and np.ptp(each.pressure[seen]) > 0.0:
-            found.append(pearson(rankdata(each.fringes[seen]), rankdata(each.pressure[seen])))
+            found.append(pearson(ranks(each.fringes[seen]), ranks(each.pressure[seen])))
     return float(np.mean(found)) if found else 0.0
 
 

@@ -26,7 +26,7 @@ from .sweeping.kernels import (
     measure_natural_map,
     measure_state,
 )
-from .sweeping.measured_sweeps import advance_and_measure, equilibrium_shape, find_equilibrium
+from .sweeping.measured_sweeps import advance_and_measure, advance_and_sample, equilibrium_shape, find_equilibrium
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def sweeps(
     *,
     guess: Array | None = None,
     every: int | Iterable[int] = 1,
-    measured: bool = False,
+    measured: int = 0,
 ) -> Iterator[Sweep]:
     """Iterate over sweeps from a guess.
 
@@ -117,8 +117,8 @@ def sweeps(
         Forces (f_n, f_t) in the order of the contacts [N]; zero if absent.
     every : int or iterable of int
         Sweeps per compiled call: one number for an endless iteration, or the successive strides.
-    measured : bool
-        Measure also the sweeps between the observed ones.
+    measured : int
+        Measure also one in so many of the sweeps between the observed ones; 0: none.
 
     Yields
     ------
@@ -134,11 +134,11 @@ def sweeps(
     find_equilibrium(problem, equilibrium)
 
     def advance_by(rows: Array) -> None:
-        if not measured:
-            rows[:-1] = np.nan
-            advance(problem, body, plate, force, len(rows) - 1, settings.relaxation)
-            rows = rows[-1:]
-        advance_and_measure(problem, body, plate, force, equilibrium, settings.relaxation, rows)
+        if measured == 1:
+            advance_and_measure(problem, body, plate, force, equilibrium, settings.relaxation, rows)
+        else:
+            spacing = measured or len(rows)
+            advance_and_sample(problem, body, plate, force, equilibrium, settings.relaxation, rows, spacing)
 
     acceleration = Acceleration(problem, force, settings.acceleration) if settings.acceleration else None
     for stride in repeat(every) if isinstance(every, int) else every:
@@ -165,7 +165,7 @@ def solve(
     guess: Array | None = None,
     observer: Callable[[Sweep], None] | None = None,
     every: int | Iterable[int] = 1,
-    measured: bool = False,
+    measured: int = 0,
 ) -> Solution:
     """Sweep until a stopping level or the number of sweeps is reached.
 
@@ -177,8 +177,8 @@ def solve(
         Called with a `Sweep` after every stride and after the last sweep.
     every : int or iterable of int
         Sweeps per stride, or the successive strides. Stopping levels are checked after each stride.
-    measured : bool
-        Measure also the sweeps between the observed ones.
+    measured : int
+        Measure also one in so many of the sweeps between the observed ones; 0: none.
     """
     if len(problem.rows) == 0:
         return Solution(np.empty(0), np.empty(0), Stop.EMPTY, 0, 0.0, 0.0, 0.0)

@@ -1,7 +1,7 @@
-"""An observer that records the sweeps of a frame: the exact residuals of all sweeps, the forces of some.
+"""An observer that records the sweeps of a frame: exact residuals and forces of all of them, or of some.
 
-Measuring a sweep takes about as long as the sweep. If only the last forces are kept, only the last sweep of a sub-step
-is measured; other rows are NaN.
+Measuring a sweep takes about as long as the sweep. Where the forces of some sweeps are kept, these and one in ten of
+the others are measured; where only the last forces are kept, the last sweep of a sub-step. Other rows are NaN.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from .solve import Sweep
 Keep = Literal["log", "all", "none"]
 FIRST = 8  # sweeps kept one by one before the spacing becomes logarithmic
 LOG_SPACED = 40  # sweeps kept of a frame
+MEASURED: dict[Keep, int] = {"all": 1, "log": 10, "none": 0}  # one in so many sweeps is measured; 0: only kept ones
 
 
 def recorded_sweeps(total: int, keep: Keep) -> NDArray[np.int64]:
@@ -54,7 +55,7 @@ class SweepRecorder:
     """Records the sweeps of the successive sub-steps of a frame."""
 
     def __init__(self, expected: int, keep: Keep) -> None:
-        self.measured = keep != "none"  # whether sweeps between the observed ones are measured
+        self.measured = MEASURED[keep]
         self._kept_sweeps = recorded_sweeps(expected, keep)
         self._recorded: list[int] = []
         self._count = 0
@@ -104,7 +105,7 @@ class SweepRecorder:
 
 @dataclass(frozen=True, slots=True)
 class SweepHistory:
-    """Residuals of every sweep of a frame, NaN where not measured, and the forces of kept sweeps."""
+    """Residuals of the sweeps of a frame, NaN where not measured, and the forces of kept sweeps."""
 
     force_change: Annotated[Array, Quantity("greatest |Δf| / |f| of a contact, the paper's ε_f", dims="sweep")]
     natural_map: Annotated[Array, Quantity("relative natural-map residual", dims="sweep")]

@@ -50,3 +50,13 @@ def pearson(a: Array, b: Array) -> float:
     if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return float("nan")
     return float(np.corrcoef(a, b)[0, 1])
+
+
+def ranks(values: Array) -> Array:
+    """Return the ranks (m,) of values (m,) from 1, equal ones with their mean rank.
+
+    As `scipy.stats.rankdata`, whose import takes a fifth of a second.
+    """
+    _, group, count = np.unique(values, return_inverse=True, return_counts=True)
+    last = np.cumsum(count)
+    return (0.5 * (2 * last - count + 1))[group]

@@ -120,15 +120,14 @@ class _Search:
         self._suspect = np.zeros(tracks.status.shape, np.bool_)
         self._outlier = np.zeros(tracks.status.shape, np.bool_)  # found so far
 
-    @property
-    def _deviation(self) -> Array:
-        return np.linalg.norm(self._jump, axis=2)
+        self._deviation = np.full(tracks.status.shape, np.nan)  # [m] sizes of the jumps
 
     def examine(self, frames: Iterable[int]) -> NDArray[np.bool_]:
         """Poses (f, n) that are outliers, after a new examination of some frames."""
         frames = list(frames)
         for k in frames:
             self._jump[k] = self._beyond_neighbours(k, self._position[k] - self._continued(k))
+            self._deviation[k] = np.linalg.norm(self._jump[k], axis=1)
         for k in frames:
             self._suspect[k] = self._contradicted(k)
         size = np.where(self._suspect, self._deviation, -1.0)
@@ -186,27 +185,21 @@ class _Search:
         if not jumps.any():
             return jumps
         expected = position[k] - np.where(jumps[:, None], self._jump[k], 0.0)
-        change = self._greatest_overlap(position[k], bodies, jumps) - self._greatest_overlap(expected, bodies, jumps)
+        here, there = (self._overlapping(each, bodies) for each in (position[k], expected))
+        change = _greatest_overlap(here, jumps) - _greatest_overlap(there, jumps)
         return jumps & (change > PENETRATION * deviation)
 
-    def _greatest_overlap(self, position: Array, bodies: Walls, jumps: NDArray[np.bool_]) -> Array:
-        """Greatest overlap (n,) [m] of each rod with a wall or with a rod that does not jump, 0 without one."""
-        found = np.zeros(len(position))
-        near = detect_contacts(self._grains, position, np.isfinite(position[:, 0]), bodies, 0.0)
-        jumping = np.append(jumps, False)
-        i, j, depth = near.i, np.minimum(near.j, len(position)), -near.gap
-        np.maximum.at(found, i[~jumping[j]], depth[~jumping[j]])
-        pair = ~near.with_wall & ~jumping[i]
-        np.maximum.at(found, j[pair], depth[pair])
-        return found
+    def _overlapping(self, position: Array, bodies: Walls) -> Contacts:
+        """Pairs that overlap where the rods are at these positions (n, 2) [m]."""
+        return detect_contacts(self._grains, position, np.isfinite(position[:, 0]), bodies, 0.0)
 
     def _is_impossible(self, k: int, least: float, noise: Array, bodies: Walls) -> NDArray[np.bool_]:
         """Which rods overlap others by more than in the photographs beside, and deviate more than these (n,)."""
         position, found = self._position, np.zeros(len(noise), np.bool_)
-        near = detect_contacts(self._grains, position[k], np.isfinite(position[k, :, 0]), bodies, 0.0)
+        near = self._overlapping(position[k], bodies)
         if not near.count:
             return found
-        depth = self._greatest_overlap(position[k], bodies, found)[np.isfinite(position[k, :, 0])]
+        depth = _greatest_overlap(near, found)[np.isfinite(position[k, :, 0])]
         middle = float(np.median(depth))
         spread = ROBUST * float(np.median(np.abs(depth - middle)))
         deep = middle + DEEP * spread + float(np.nanmedian(noise))
@@ -226,6 +219,16 @@ class _Search:
         """Gaps (c,) [m] of pairs in another frame; NaN where a rod is not measured or is an outlier."""
         measured = np.where(self._outlier[k][:, None], np.nan, self._position[k])
         return measure_pairs(self._grains, measured, walls_in(self._walls, k), pairs.key).gap
+
+
+def _greatest_overlap(near: Contacts, jumps: NDArray[np.bool_]) -> Array:
+    """Greatest overlap (n,) [m] of each rod with a wall or with a rod that does not jump (n,), 0 without one."""
+    found, jumping = np.zeros(len(jumps)), np.append(jumps, False)
+    i, j, depth = near.i, np.minimum(near.j, len(jumps)), -near.gap
+    np.maximum.at(found, i[~jumping[j]], depth[~jumping[j]])
+    pair = ~near.with_wall & ~jumping[i]
+    np.maximum.at(found, j[pair], depth[pair])
+    return found
 
 
 def walls_in(walls: WallTracks | None, k: int) -> Walls:

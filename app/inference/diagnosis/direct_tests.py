@@ -12,7 +12,7 @@ from ...solver.bodies.strain import displacement_gradient, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
-from ...solver.statistics.agreement import pearson
+from ...solver.statistics.agreement import pearson, ranks
 from ...tracks import Tracks, WallTracks
 from ..correction.outliers import find_outliers, walls_in
 from ..correction.radii import find_wrong_sizes
@@ -59,9 +59,7 @@ def examine_rotations(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     stated, inferred = stated[known], inferred[known]
     if len(stated) < 2 or not inferred.any():
         return []
-    from scipy.stats import rankdata  # a third of a second of imports that few inputs need
-
-    rank = pearson(rankdata(stated), rankdata(inferred))
+    rank = pearson(ranks(stated), ranks(inferred))
     if abs(rank) < max(AGREES, SIGMAS / np.sqrt(len(stated))):
         return []
     against = f"the rank correlation with the rotations expected from rolling is {rank:.2f}"

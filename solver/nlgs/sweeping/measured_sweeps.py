@@ -26,6 +26,7 @@ from .kernels import (
     IDS,
     ROWS,
     THIRD,
+    advance,
     contact_residual,
     measure_natural_map,
     pair_residual,
@@ -113,6 +114,18 @@ def advance_and_measure(problem, body, plate, force, equilibrium, relaxation, re
         copy_vector(flat, flat_previous)
         copy_matrix(plate, previous_plate)
     residuals[-1, 1] = measure_natural_map(problem, body, plate, force, norm)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def advance_and_sample(problem, body, plate, force, equilibrium, relaxation, residuals, spacing):  # type: ignore[no-untyped-def]
+    """Advance by one sweep per row of residuals (s, 3), measure one in `spacing` and the last; NaN in other rows."""
+    done = 0
+    while done < len(residuals):
+        last = min(done + spacing, len(residuals)) - 1
+        residuals[done:last] = np.nan
+        advance(problem, body, plate, force, last - done, relaxation)
+        advance_and_measure(problem, body, plate, force, equilibrium, relaxation, residuals[last : last + 1])
+        done = last + 1
 
 
 @njit(inline="always")

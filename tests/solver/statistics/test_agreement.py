@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from rodsight.solver.contacts.pairs import align
-from rodsight.solver.statistics.agreement import compare_forces, pearson, relative_change
+from rodsight.solver.statistics.agreement import compare_forces, pearson, ranks, relative_change
+from scipy.stats import rankdata
 
 TRUE_KEY, TRUE = np.array([1, 4, 6, 9]), np.array([[3.0, 0.5], [1.0, -0.2], [0.0, 0.0], [2.0, 0.0]])
 KEY, FORCE = np.array([1, 5, 9]), np.array([[2.0, 0.5], [1.0, 0.3], [2.5, 0.1]])
@@ -35,3 +36,9 @@ def test_constant_values_have_no_correlation():
     assert np.isnan(pearson(np.ones(3), np.arange(3.0)))
     assert np.isnan(pearson(np.ones(1), np.ones(1)))
     assert pearson(np.arange(3.0), -np.arange(3.0)) == pytest.approx(-1.0)
+
+
+def test_ranks_are_those_of_scipy():
+    rng = np.random.default_rng(5)
+    for values in (rng.random(50), rng.integers(0, 7, 60).astype(float), np.zeros(4), np.empty(0)):
+        assert np.array_equal(ranks(values), rankdata(values))
