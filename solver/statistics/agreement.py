@@ -59,4 +59,4 @@ def ranks(values: Array) -> Array:
     """
     _, group, count = np.unique(values, return_inverse=True, return_counts=True)
     last = np.cumsum(count)
-    return (0.5 * (2 * last - count + 1))[group]
+    return np.asarray(0.5 * (2 * last - count + 1), np.float64)[group]
