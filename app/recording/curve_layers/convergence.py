@@ -48,7 +48,7 @@ def log_residuals(clock: Clock, forces: FrameForces) -> None:
         known = np.flatnonzero(np.isfinite(powers))  # unmeasured sweeps are left out: gaps would interrupt the curve
         if len(known):
             when = rr.TimeColumn(entities.SWEEP, sequence=clock.first + known)
-            send_scalars(clock.stream, path, when, powers[known])
+            send_scalars(clock, path, when, powers[known])
         clock.end()
         log_scalar(clock, path, float(power_of_ten(np.array(reported))))
 

@@ -87,9 +87,7 @@ class ResidualPlot:
         )
         if len(rows) > 1:
             columns = rr.Points2D.columns(positions=np.concatenate(places[1:]))
-            clock.stream.send_columns(
-                entities.RESIDUAL_MARKS, clock.columns(rows[1:]), columns.partition(np.full(len(rows) - 1, 3))
-            )
+            clock.send(entities.RESIDUAL_MARKS, clock.columns(rows[1:]), columns.partition(np.full(len(rows) - 1, 3)))
 
     def _mark_reported(self, clock: Clock, axes: Axes, forces: FrameForces) -> None:
         """Log the unbalance of the reported field, beyond the last sweep, with its name."""

@@ -103,7 +103,7 @@ def log_statistics(clock: Clock, scene: Scene, statistics: FrameStatistics) -> N
         log_scalars(clock, path, values)
     if scene.walls.force is not None:
         for path, values in recorded_values(walls, scene.walls.force[clock.frame]):
-            clock.stream.log(path, rr.Scalars(np.where(np.isfinite(values), values, 0.0)))
+            clock.send_point(path, np.where(np.isfinite(values), values, 0.0).tolist())
 
 
 def statistic_values(statistics: FrameStatistics) -> tuple[tuple[str, float], ...]:

@@ -25,7 +25,6 @@ from ..packing_layers.forces.network import SweepChoice
 from ..parts import part_of, remove_parts
 from ..tabs.blueprint import RecordingLayout, Tab, make_blueprint
 from ..tabs.layout_property import send_layout
-from ..viewing.viewer import run_tool
 from .recorder import BATCHES, SWEEPS_KEPT, PhotographSource, Recorder
 from .run_survey import Survey, survey_frames
 from .writing import writing
@@ -33,10 +32,8 @@ from .writing import writing
 FrameProgress = Callable[[int, int], None]  # frames done, frames in all
 
 PART_FRAMES = 2000  # frames in one file: with more the viewer opens it slowly
-SEPARATE_INDEX_FRAMES = 200  # frames from which on a process of its own makes the index: .2 MB a frame
 FILE_END = struct.Struct("<QQI4s4sI")  # of a recording: place, length and checksum of its index; marks; their number
 END_MARKS = [b"RRF2", b"FOOT", 1]
-INDEXED_SUFFIX = ".whole.part"  # suffix of a recording with its index
 MIN_ROWS = 4  # sweeps per frame that even a short solve keeps
 BYTES_PER_CONTACT = 8  # per row, at least: a width and a colour
 
@@ -222,9 +219,8 @@ def _write(run: _Run, parts: list[Path], plan: _Plan, notes: tuple[str, ...], ma
     name, recorder, before = str(uuid.uuid4()), None, 0
     for number, part in enumerate(parts):
         begin, end = number * run.part_frames, min((number + 1) * run.part_frames, total)
-        indexed = end - begin < SEPARATE_INDEX_FRAMES
         stream = rr.RecordingStream(entities.APPLICATION_ID, recording_id=name, batcher_config=BATCHES)
-        with writing(stream, part, make_blueprint(layout, active=run.active), indexed=indexed) as written:
+        with writing(stream, part, make_blueprint(layout, active=run.active)) as written:
             if recorder is None:
                 recorder = Recorder(stream, sweeps=plan.sweeps, kept=plan.kept, flush=written.flush)
                 recorder.start(run.scene)
@@ -240,21 +236,9 @@ def _write(run: _Run, parts: list[Path], plan: _Plan, notes: tuple[str, ...], ma
                 if max_size is not None and before + written.size > max_size:
                     return None
             recorder.finish(notes)
-        if not indexed:
-            _add_index(part)
         _check_complete(part)
         before += part.stat().st_size
     return recorder
-
-
-def _add_index(part: Path) -> None:
-    """Copy a recording message by message and append its index; raise OSError if that fails."""
-    indexed = part.with_name(part.name.removesuffix(".part") + INDEXED_SUFFIX)
-    try:
-        run_tool("filter", part, "-o", indexed)
-        os.replace(indexed, part)
-    finally:
-        indexed.unlink(missing_ok=True)
 
 
 def _check_free_space(folder: Path, contacts: int, choice: SweepChoice, max_size: int | None) -> None:

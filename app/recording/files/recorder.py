@@ -43,14 +43,16 @@ from ..packing_layers.rods_in_3d import log_rods
 from ..packing_layers.verdict_lines import log_verdicts
 from ..tabs.summary_tab import FrameSummary, log_summary
 from .properties import send_experiment, send_outcome
+from .row_batches import RowBatches
 
 PhotographSource = Callable[[int], JpegPhotograph | None]
 
 # Messages are divided by size, never by time: the same run gives the same file.
 BATCHES = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1_000_000)
 
-# Frames between two flushes, which an incomplete file may lack at its end. Fewer frames make more and smaller messages.
-FRAMES_PER_FLUSH = 8
+# Frames between two flushes, which an incomplete file may lack at its end. With fewer there are more messages, each
+# with an entry in the index; with more frames, more rows wait in memory.
+FRAMES_PER_FLUSH = 50
 SWEEPS_KEPT = 40  # per frame, with SweepChoice.LOG
 
 
@@ -83,6 +85,7 @@ class Recorder:
         rr.set_strict_mode(True)  # otherwise the SDK only warns about data that it cannot write
         self._stream = stream
         self._sweeps, self._kept, self._flush_every, self._flush = sweeps, kept, flush_every, flush
+        self._rows = RowBatches()
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._film: FilmWriter | None = None
@@ -148,7 +151,9 @@ class Recorder:
         scene = self._running()
         span = forces.history.count + 1  # one row for the reported forces
         time, strain = float(scene.tracks.time[forces.frame]), self._strain.add(forces.strain)
-        clock = Clock(self._stream, forces.frame, self._next_sweep, self._next_sweep + span - 1, time, strain)
+        clock = Clock(
+            self._stream, forces.frame, self._next_sweep, self._next_sweep + span - 1, time, strain, self._rows
+        )
         self._next_sweep += span
         drawn, kept = drawn_contacts(forces), kept_sweeps(self._kept, scene.grains.count)
         if photograph is not None:
@@ -181,10 +186,12 @@ class Recorder:
         lost = int(scene.tracks.lost[forces.frame].sum())
         self._summaries.append(FrameSummary.of(forces, statistics, lost=lost, agreement=agreement))
         if len(self._summaries) % self._flush_every == 0:
+            self._rows.send(self._stream, points=self._flush_every == 1)
             self._flush(self._stream)
 
     def finish(self, notes: tuple[str, ...] = ()) -> None:
         """Write the summary."""
+        self._rows.send(self._stream)
         self._stream.reset_time()
         send_outcome(self._stream, self._summaries)
         clipped, total = self._clipped, self._force_count

@@ -25,9 +25,7 @@ PIECE_SIZE = 1 << 20  # [bytes] of one read
 
 
 @contextmanager
-def writing(
-    stream: rr.RecordingStream, file: Path, blueprint: rrb.Blueprint | None = None, *, indexed: bool = True
-) -> Iterator[WrittenFile]:
+def writing(stream: rr.RecordingStream, file: Path, blueprint: rrb.Blueprint | None = None) -> Iterator[WrittenFile]:
     """Write a stream to a file, which is complete at the end of the block; the stream is disconnected then.
 
     Parameters
@@ -38,8 +36,6 @@ def writing(
         The file.
     blueprint : Blueprint, optional
         The blueprint stored in the file.
-    indexed : bool
-        End the file with an index, by which viewers read parts of it and which is kept in memory until then.
 
     Yields
     ------
@@ -62,11 +58,11 @@ def writing(
             held = os.open(pipe, os.O_WRONLY)  # keeps the pipe open until the stream has opened it
             try:
                 written.read_pipe(end)
-                stream.save(pipe, default_blueprint=blueprint, write_footer=indexed)
+                stream.save(pipe, default_blueprint=blueprint)
             finally:
                 os.close(held)
     else:  # pragma: no cover - Windows
-        stream.save(file, default_blueprint=blueprint, write_footer=indexed)
+        stream.save(file, default_blueprint=blueprint)
     try:
         yield written
     finally:

@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
 from . import entities
+
+Moment = tuple[tuple[str, int | np.timedelta64], ...]  # timelines and the values on them
+
+
+class RowSink(Protocol):
+    """Receives rows that are sent in larger messages later."""
+
+    def begin(self, moment: Moment) -> None:
+        """Set the time of the points that follow."""
+
+    def add(
+        self,
+        stream: rr.RecordingStream,
+        path: str,
+        when: Iterable[rr.TimeColumn],
+        columns: Iterable[rr.ComponentColumn],
+    ) -> None:
+        """Add rows of an entity."""
+
+    def add_point(self, path: str, values: Sequence[float]) -> None:
+        """Add a point of the curves of an entity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +44,7 @@ class Clock:
     last: int  # value on `sweep` of the last row; equals first if the frame has one row
     time: float = np.nan  # [s]
     strain: float = np.nan  # accumulated strain since frame 0
+    rows: RowSink | None = None  # of rows that columns hold; None: they are sent at once
 
     def start(self) -> None:
         """Set the time of the next data to the first row of the frame."""
@@ -32,16 +56,38 @@ class Clock:
 
     def frame_only(self) -> None:
         """Set the time of the next data to the frame, without a value on `sweep`."""
-        self.stream.reset_time()
-        self.stream.set_time(entities.FRAME, sequence=self.frame)
-        if np.isfinite(self.time):
-            self.stream.set_time(entities.TIME, duration=_nanoseconds(self.time))
-        if np.isfinite(self.strain):
-            self.stream.set_time(entities.STRAIN, sequence=_millionths(self.strain))
+        self._set(None)
 
-    def _set(self, sweep: int) -> None:
-        self.frame_only()
-        self.stream.set_time(entities.SWEEP, sequence=sweep)
+    def _set(self, sweep: int | None) -> None:
+        moment: dict[str, int | np.timedelta64] = {entities.FRAME: self.frame}
+        if np.isfinite(self.time):
+            moment[entities.TIME] = _nanoseconds(self.time)
+        if np.isfinite(self.strain):
+            moment[entities.STRAIN] = _millionths(self.strain)
+        if sweep is not None:
+            moment[entities.SWEEP] = sweep
+        self.stream.reset_time()
+        for timeline, value in moment.items():
+            if isinstance(value, np.timedelta64):
+                self.stream.set_time(timeline, duration=value)
+            else:
+                self.stream.set_time(timeline, sequence=value)
+        if self.rows is not None:
+            self.rows.begin(tuple(moment.items()))
+
+    def send(self, path: str, when: Iterable[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
+        """Send rows of an entity at their times."""
+        if self.rows is None:
+            self.stream.send_columns(path, when, columns)
+        else:
+            self.rows.add(self.stream, path, when, columns)
+
+    def send_point(self, path: str, values: Sequence[float]) -> None:
+        """Send a point of the curves of an entity at the time that was set; no values are a gap."""
+        if self.rows is None:
+            self.stream.log(path, rr.Scalars(values))
+        else:
+            self.rows.add_point(path, values)
 
     def columns(self, rows: NDArray[np.int64]) -> list[rr.TimeColumn]:
         """Return the columns of all timelines for rows (k,) of this frame, counted from its first."""

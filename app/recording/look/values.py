@@ -24,16 +24,16 @@ def nullable(values: NDArray[np.floating]) -> pa.Array:
 
 def log_scalar(clock: Clock, path: str, value: float) -> None:
     """Log one point of a curve, a gap if the value is not finite."""
-    clock.stream.log(path, rr.Scalars([value] if np.isfinite(value) else []))
+    clock.send_point(path, [value] if np.isfinite(value) else [])
 
 
 def log_scalars(clock: Clock, path: str, values: Array) -> None:
     """Log one point of several curves of one path, a gap if any value is not finite."""
-    clock.stream.log(path, rr.Scalars(values if np.all(np.isfinite(values)) else []))
+    clock.send_point(path, values.tolist() if np.all(np.isfinite(values)) else [])
 
 
-def send_scalars(stream: rr.RecordingStream, path: str, when: rr.TimeColumn, values: Array) -> None:
+def send_scalars(clock: Clock, path: str, when: rr.TimeColumn, values: Array) -> None:
     """Send many points (k,) of a curve, with gaps where values are not finite."""
     finite = np.isfinite(values)
     columns = rr.Scalars.columns(scalars=values[finite])
-    stream.send_columns(path, [when], columns.partition(finite.astype(np.int64)))
+    clock.send(path, [when], columns.partition(finite.astype(np.int64)))

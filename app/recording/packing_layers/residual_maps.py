@@ -90,7 +90,7 @@ def log_residual_maps(
     ):
         if colours.size:
             lengths = np.full(len(colours), colours.shape[1])
-            clock.stream.send_columns(path, when, columns(colors=colours.ravel()).partition(lengths))
+            clock.send(path, when, columns(colors=colours.ravel()).partition(lengths))
 
 
 def changes_per_sweep(sweep: NDArray[np.int64], fn: NDArray[np.floating], ft: NDArray[np.floating]) -> Array:

@@ -230,7 +230,7 @@ def send_sweeps(
         if len(kept):
             lengths = np.full(len(kept), count)
             columns = rr.LineStrips2D.columns(radii=radii[keep].ravel(), colors=colours[keep].ravel())
-            clock.stream.send_columns(entities.FORCES, clock.columns(kept), columns.partition(lengths))
+            clock.send(entities.FORCES, clock.columns(kept), columns.partition(lengths))
             sent += len(kept)
     return sent
 

@@ -13,9 +13,8 @@ from pathlib import Path
 
 import pytest
 from rodsight.process.errors import RunError
-from rodsight.recording.files import finished_run, writing
+from rodsight.recording.files import writing
 from rodsight.recording.files.finished_run import write_recording
-from rodsight.recording.viewing.viewer import viewer_binary
 
 from tests.program import RODSIGHT, rodsight
 
@@ -87,19 +86,3 @@ def test_a_full_disk_prevents_the_recording_and_nothing_else(tracked, tmp_path, 
     assert "recording.rrd.part: No space left on device" in run.stderr
     assert run.stderr.splitlines()[-1].startswith("rodsight: ")
     assert sorted(each.name for each in small_disk.iterdir()) == ["manifest.json", "others", "results.h5"]
-
-
-def test_the_index_of_a_long_recording_is_made_separately_and_is_the_only_difference(results, tmp_path, monkeypatch):
-    write_recording(results, tmp_path / "short.rrd")
-    monkeypatch.setattr(finished_run, "SEPARATE_INDEX_FRAMES", 1)
-    write_recording(results, tmp_path / "long.rrd")
-    compared = ["rrd", "compare", "--unordered", str(tmp_path / "short.rrd"), str(tmp_path / "long.rrd")]
-    assert subprocess.run([viewer_binary(), *compared], capture_output=True, timeout=60).returncode == 0
-    monkeypatch.setattr(finished_run, "run_tool", refuse)
-    with pytest.raises(OSError, match="no tool"):
-        write_recording(results, tmp_path / "other.rrd")
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["long.rrd", "short.rrd"]
-
-
-def refuse(*_: object) -> None:
-    raise OSError("no tool")
