@@ -257,7 +257,7 @@ def _inputs(run: Run, log: VerdictLog, tracks: Tracks, walls: WallTracks) -> Inp
 def _inputs_of_solved(run: Run, log: VerdictLog, results: Results, tracks: Tracks, walls: WallTracks) -> Inputs:
     """The same with the friction that was measured, for sequences that are solved again."""
     inputs = _inputs(run, log, tracks, walls).with_friction(results.friction, results.friction_check)
-    return inputs.with_base_friction(results.base_friction) if inputs.material.base_friction_measured else inputs
+    return inputs.with_base_friction(results.base_friction) if np.isfinite(results.base_friction) else inputs
 
 
 def _solve_nominal(run: Run, origin: Provenance, log: VerdictLog) -> Results:

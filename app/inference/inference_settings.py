@@ -23,6 +23,7 @@ class InferenceSettings:
     sequence: SequenceSettings = field(default_factory=SequenceSettings)
     calibration: CalibrationSettings | None = field(default_factory=CalibrationSettings)  # None: as tracked
     boundary: BoundarySettings | None = field(default_factory=BoundarySettings)  # None: as given
+    resistance: bool = True  # use a friction of walls or base that is not stated but that the sliding clearly shows
     infer_unseen: bool = True  # add rods that no photograph shows where their neighbours require them
     coordination: float | None = None  # target of z without rattlers, reached by an equal change of all radii
     overlap: float | None = None  # [m] of touching surfaces; None: 3e-4 mean diameters, or as measured from the gaps
@@ -37,7 +38,7 @@ class InferenceSettings:
 
     def uncorrected(self) -> InferenceSettings:
         """The same settings for tracks that are corrected already: without calibration and tuning."""
-        return replace(self, calibration=None, boundary=None, infer_unseen=False, coordination=None)
+        return replace(self, calibration=None, boundary=None, resistance=False, infer_unseen=False, coordination=None)
 
     def without_sweeps(self) -> InferenceSettings:
         """The same settings without recorded sweeps."""
@@ -70,6 +71,7 @@ def settings_of(config: InferenceSections) -> InferenceSettings:
         if calibration.enabled
         else None,
         boundary=BoundarySettings(calibration.camera, calibration.walls_continue),
+        resistance=calibration.enabled and calibration.resistance,
         infer_unseen=contacts.unseen == "infer",
         coordination=contacts.coordination,
         overlap=contacts.overlap,

@@ -39,10 +39,10 @@ class Inputs:
         check : FrictionCheck, optional
             Holds the coefficient measured at walls, too.
         """
-        if not self.material.friction_measured:
-            return self
         of_walls = self.material.wall_friction
-        if of_walls is None and check is not None and np.isfinite(check.wall_measured):
+        if check is not None and np.isfinite(check.wall_measured):
             of_walls = check.wall_measured
+        if not self.material.friction_measured:
+            return replace(self, material=replace(self.material, wall_friction=of_walls))
         known = replace(self.material, friction=friction, wall_friction=of_walls, friction_measured=False)
         return replace(self, material=known)

@@ -14,6 +14,8 @@ from .motion import Snapshot
 from .wall_shapes import Sides
 from .walls import Walls
 
+BASE_ARM = 2.0 / 3.0  # of a radius: greatest moment of a base over its friction, for a uniform pressure
+
 
 @dataclass(frozen=True, slots=True)
 class Material:
@@ -53,7 +55,9 @@ class Packing:
         Notes
         -----
         F = −μ m g u / √(|u|² + 4 σ²), u the displacement since the frame before (of the first frame, until the next
-        one) and σ the standard deviation of a position: what hardly moves has no direction of sliding.
+        one) and σ the standard deviation of a position: what hardly moves has no direction of sliding. The base also
+        resists the turning of a grain, by at most ⅔ μ m g R, less where the grain slides fast: this moment is unknown,
+        with that standard deviation.
         """
         if self.material.base_drag == 0.0 or len(snapshots) < 2:
             return self
@@ -62,7 +66,8 @@ class Packing:
         size = np.sqrt((moved**2).sum(axis=1) + 4.0 * snapshots[k].sigma ** 2)
         limit = self.material.base_drag * self.grains.mass
         drag = -limit[:, None] * moved / np.where(size > 0.0, size, 1.0)[:, None]
-        return replace(self, grains=replace(self.grains, drag=drag))
+        moment = BASE_ARM * limit * self.grains.radius
+        return replace(self, grains=replace(self.grains, drag=drag, moment_sd=moment))
 
     @property
     def weight(self) -> Array:

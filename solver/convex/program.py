@@ -12,7 +12,7 @@ Inside, forces are in units of `force_unit` and torques are divided by the mean 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +102,8 @@ def assemble_balance(
 
     Notes
     -----
-    Grains of the boundary have no equilibrium equations.
+    Grains of the boundary have no equilibrium equations. Torque equations of grains on which unknown moments act are
+    multiplied by `torque_weight`.
     """
     n, present = grains.count, present & grains.free
     if not walls.loaded.any() and wall_normal_total is None and not any(gravity):
@@ -110,7 +111,10 @@ def assemble_balance(
     matrix = equilibrium_matrix(contacts, grains.radius, walls)
     load = external_load(grains.weight(gravity), walls)
     weight = np.full(len(load), 1.0 / force_unit)
-    weight[2 * n : 3 * n] /= grains.radius[present].mean() if present.any() else 1.0
+    lever = grains.radius[present].mean() if present.any() else 1.0
+    weight[2 * n : 3 * n] /= lever
+    if grains.moment_sd is not None:
+        weight[2 * n : 3 * n] *= torque_weight(grains.moment_sd / (force_unit * lever))
     # The matrix acts on forces in units of force_unit; only b is converted.
     matrix = sparse.diags_array(weight * force_unit) @ matrix
     load = weight * load
@@ -123,6 +127,31 @@ def assemble_balance(
     matrix = sparse.csr_matrix(matrix)
     blocks = block_balance(matrix, load, int(present.sum()), contacts.count)
     return Balance(matrix, load, np.asarray(friction, dtype=np.float64), force_unit, blocks)
+
+
+def weigh_rows(balance: Balance, weight: Array, grain_count: int) -> Balance:
+    """Multiply the equations of a balance of so many grains by weights (m,)."""
+    matrix = sparse.csr_matrix(sparse.diags_array(weight) @ balance.matrix)
+    load = weight * balance.load
+    blocks = block_balance(matrix, load, grain_count, balance.contact_count)
+    return replace(balance, matrix=matrix, load=load, grains=blocks)
+
+
+def torque_weight(moment_sd: Array) -> Array:
+    """Weight of torque equations of grains on which unknown moments act.
+
+    Parameters
+    ----------
+    moment_sd : (n,)
+        Standard deviation of the moments, over force unit and mean radius.
+
+    Notes
+    -----
+    An unknown moment M at the price λ/2 (M/s)², as a departure from previous forces has, leaves λ'/2 r² of the price
+    ρ/2 r² of a torque residual r, 1/λ' = 1/ρ + s²/λ: the weight is 1/√(1 + ρ s²/λ).
+    """
+    settings = ConvexSettings()
+    return 1.0 / np.sqrt(1.0 + settings.balance / settings.history * moment_sd**2)
 
 
 def soft_slip(ut: Array, scale: float, sigma: Array | float, settings: ConvexSettings | None = None) -> Array:

@@ -114,6 +114,11 @@ class CalibrationSection(Section):
         "Continue walls along rods that touch their line beyond the given ends; false: a wall ends where it is given.",
         default=BOUNDARY.continued,
     )
+    resistance: Switch = key(
+        "Use another friction of walls, or a base that drags the rods, where the sliding clearly shows them; false: "
+        "only as stated. The friction between rods is always as stated.",
+        default=True,
+    )
 
 
 class ContactsSection(Section):

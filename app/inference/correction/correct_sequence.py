@@ -18,7 +18,7 @@ from ..snapshots import make_snapshots
 from .boundary import correct_camera, correct_walls, measure_noise
 from .calibration import calibrate_tracks, known_radii
 from .close_photographs import choose_span, count_alike
-from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii
+from .friction import measure_friction, measure_resisting, refine_wall_friction, tuned_radii, use_unstated
 from .outliers import remove_outliers
 from .radii import calibrate_with_radii, use_size_classes
 from .short_gaps import interpolate_short_gaps
@@ -61,7 +61,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
     calibration = tuning = boundary = None
-    remarks, material = [outlier_remark, gap_remark, "", "", "", "", ""], inputs.material
+    remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", ""], inputs.material
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
             material, remarks[6] = assume_softness(material, tracks, walls, failed)
@@ -99,13 +99,19 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks = replace(tracks, radius=tracks.radius + tuning.found)
         packing = material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
     snapshots, of_walls = make_snapshots(tracks, walls), None
+    seen = snapshots if nothing_seen else interpolate_ignored_frames(snapshots, failed)
+    probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
+
+    def pack() -> Packing:
+        return material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
+
+    if settings.resistance and not (nothing_seen or settings.sequence.soft):
+        stated = material.wall_friction
+        material, remarks[7] = use_unstated(material, packing, seen, probability, settings.sequence.workers)
+        packing = pack()
+        if material.wall_friction != stated:
+            of_walls = refine_wall_friction(material, packing, seen, probability, settings.sequence.workers)
     if (material.friction_measured or material.base_friction_measured) and not nothing_seen:
-        seen = interpolate_ignored_frames(snapshots, failed)
-        probability = settings.for_overlap(overlap).for_radii(tracks.radius).ensemble.probability
-
-        def pack() -> Packing:
-            return material.pack(tracks.radius, walls.usual_pressure(material.length), inferred, tracks.boundary)
-
         given_at_walls = material.wall_friction is not None
         workers = settings.sequence.workers
         material = measure_resisting(material, packing, seen, probability, workers)
@@ -113,11 +119,11 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
             material = measure_friction(material, pack(), seen, probability, workers)
             if not given_at_walls:
                 of_walls = refine_wall_friction(material, pack(), seen, probability, workers)
-        if of_walls is not None:
-            material = replace(material, wall_friction=of_walls.measured)
+            if of_walls is not None:
+                material = replace(material, wall_friction=of_walls.measured)
         packing = pack()
     corrected = CorrectedSequence(
-        packing, tracks, walls, snapshots if nothing_seen else interpolate_ignored_frames(snapshots, failed),
+        packing, tracks, walls, seen,
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
         inputs.material.friction_measured, inputs.material.base_gravity, "; ".join(each for each in remarks if each),
     )  # fmt: skip

@@ -23,7 +23,18 @@ from ...solver.convex.friction_check import (
     check_friction,
     measure_wall_friction,
 )
-from ...solver.convex.resistance import Resistance, base_drag_of, find_in_sequence, model_of, resisted_frames
+from ...solver.convex.resistance import (
+    FRAMES as RESISTED,
+)
+from ...solver.convex.resistance import (
+    LEAST_WALLS,
+    Resistance,
+    base_drag_of,
+    find_in_sequence,
+    find_unstated,
+    model_of,
+    resisted_frames,
+)
 from ...solver.convex.sliding_model import Parameter, fit_model
 from ...solver.detection.touch_probability import ContactProbabilitySettings
 from ...solver.frame_forces import FrameForces, FrameStatus
@@ -191,6 +202,47 @@ def measure_resisting(
     if "wall_friction" in free and found.enclosed:
         material = replace(material, wall_friction=max(found.model.wall_friction, POSSIBLE[0]))
     return material
+
+
+def use_unstated(
+    material: RodMaterial,
+    packing: Packing,
+    snapshots: Sequence[Snapshot],
+    settings: ContactProbabilitySettings,
+    workers: int | None = 1,
+) -> tuple[RodMaterial, str]:
+    """Use a friction of walls or base that is not stated but that the sliding clearly shows.
+
+    Returns
+    -------
+    RodMaterial
+        The same friction between rods.
+    str
+        What is used; empty: nothing.
+    """
+    numbers = range(max(1, (len(snapshots) - RESISTED) // 2), len(snapshots) - 1)[:RESISTED]
+    if len(numbers) < RESISTED or material.friction <= 0.0 or material.at_walls() <= 0.0 or material.friction_measured:
+        return material, ""
+    unit = force_scale(packing, ChainSettings())
+    frames = resisted_frames(packing, snapshots, numbers, unit, settings, workers)
+    names = []
+    if float(np.mean([each.contacts.with_wall.sum() for each in frames])) >= LEAST_WALLS:
+        names.append("wall_friction")
+    if packing.scale_is_known and material.base_friction == 0.0 and not material.base_friction_measured:
+        names.append("base_friction")
+    given = model_of(packing, unit)
+    found = find_unstated(frames, given, names, workers)
+    remarks = []
+    if found.wall_friction != given.wall_friction:
+        remarks.append(
+            f"rods slide on walls as with a friction of {found.wall_friction:.2g}, not {given.wall_friction:g}"
+        )
+        material = replace(material, wall_friction=found.wall_friction)
+    if found.base_drag != given.base_drag:
+        coefficient = base_drag_of(packing, found, unit) / material.base_gravity
+        remarks.append(f"the base drags the rods as with a friction of {coefficient:.2g}")
+        material = replace(material, base_friction=coefficient)
+    return material, "".join(f"{each}: this is used, unless calibration.resistance is false; " for each in remarks)[:-2]
 
 
 class BaseFrictionError(UndeterminedError):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -147,6 +148,7 @@ def diagnose_solved(inputs: Inputs, results: Results, progress: Progress = no_pr
 def _examine_sliding(inputs: Inputs, first: int) -> list[Finding]:
     """What resists the sliding in the photographs from `first` on."""
     window, _ = select_window(inputs, first=first)
+    window = replace(window, settings=replace(window.settings, resistance=False))  # the input as it is stated
     try:
         sequence = correct_sequence(window)
         # overlaps of soft grains carry their forces: errors of radii or of the camera look like other friction

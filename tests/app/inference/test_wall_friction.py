@@ -20,6 +20,7 @@ from rodsight.synthetic.scenarios import scenario_folder
 from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
 from rodsight.tracks import Tracks, WallTracks
 
+from tests.app.inference.scenarios import agreement, solve
 from tests.solver.sequence.test_frames import sheared_frames
 
 SETTINGS = ContactProbabilitySettings(overlap=1e-6)
@@ -43,9 +44,41 @@ def test_sequences_solved_again_use_the_measured_friction_at_walls() -> None:
     check = FrictionCheck(0.25, 0.25, 0.2, 0.3, 1, 8, True, np.ones(1), np.ones(1), 0.14, 0.11, 0.17)
     assert measured.with_friction(0.25, check).material == RodMaterial(friction=0.25, wall_friction=0.14)
     given = replace(measured, material=replace(measured.material, wall_friction=0.1))
-    assert given.with_friction(0.25, check).material.wall_friction == 0.1
+    assert given.with_friction(0.25, check).material.wall_friction == 0.14  # the sliding contradicted the given one
+    stated = replace(measured, material=RodMaterial(wall_friction=0.25))
+    assert stated.with_friction(0.25, check).material == RodMaterial(wall_friction=0.14)
     unknown = replace(check, wall_measured=float("nan"))
     assert measured.with_friction(0.25, unknown).material.wall_friction is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "words", "least"),
+    [
+        ("smooth_walls", "rods slide on walls as with a friction of 0.01, not 0.25", 0.94),
+        ("base_friction", "the base drags the rods as with a friction of 1", 0.96),
+        ("sheared", "", 0.97),
+    ],
+)
+def test_a_friction_of_walls_or_base_that_is_not_stated_is_used_where_the_sliding_shows_it(
+    tmp_path, scenario, words, least
+) -> None:
+    solved = solve(tmp_path / scenario, scenario, 50, grains=200, frames=12)
+    material = solved.sequence.packing.material
+    assert material.friction == 0.25
+    assert (material.wall_friction != 0.25, material.base_drag > 0.0) == (
+        scenario == "smooth_walls",
+        scenario == "base_friction",
+    )
+    assert (
+        (words in solved.sequence.noise_remark)
+        if words
+        else "calibration.resistance" not in solved.sequence.noise_remark
+    )
+    r = [agreement(frame, true) for frame, true in zip(solved.frames[3:], solved.true[3:], strict=True)]
+    assert np.mean(r) > least
+    as_stated = replace(solved.inputs, settings=replace(solved.inputs.settings, resistance=False))
+    assert correct_sequence(as_stated).packing.material == solved.inputs.material.friction_law()
 
 
 @pytest.mark.slow

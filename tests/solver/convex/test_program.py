@@ -13,6 +13,8 @@ from rodsight.solver.convex.program import (
     project_onto_equilibrium,
     soft_slip,
     solve_convex_member,
+    torque_weight,
+    weigh_rows,
 )
 
 UNIT = 20.0  # N
@@ -257,3 +259,22 @@ def test_torques_are_balanced_over_the_mean_radius():
         assert matrix[2 * n + k, own] == pytest.approx(-grains.radius[k] / grains.radius.mean())
         others = np.delete(matrix[2 * n + k], own)
         assert not others.any()
+
+
+def test_moments_that_no_contact_exerts_relax_torque_equations():
+    settings = ConvexSettings()
+    none, small, large = torque_weight(np.array([0.0, 1e-3, 0.1]))
+    assert none == 1.0
+    assert 0.8 < small < 1.0
+    assert large == pytest.approx(np.sqrt(settings.history / settings.balance) / 0.1, rel=0.01)
+    grains, _, walls, contacts = lattice()
+    moment = np.linspace(0.0, 0.01, grains.count)
+    strict = balance_of(grains, walls, contacts)
+    relaxed = balance_of(replace(grains, moment_sd=moment), walls, contacts)
+    n = grains.count
+    weight = np.ones(len(strict.load))
+    weight[2 * n : 3 * n] = torque_weight(moment / (UNIT * grains.radius.mean()))
+    assert relaxed.matrix.toarray() == pytest.approx(weight[:, None] * strict.matrix.toarray())
+    again = weigh_rows(strict, weight, n)
+    assert again.matrix.toarray() == pytest.approx(relaxed.matrix.toarray())
+    assert again.grains.jacobian == pytest.approx(relaxed.grains.jacobian)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rodsight.solver.convex import resistance
-from rodsight.solver.convex.resistance import base_drag_of, find_resistance, model_of, resisted_frames
+from rodsight.solver.convex.resistance import base_drag_of, find_resistance, find_unstated, model_of, resisted_frames
 from rodsight.solver.convex.sliding_model import FittedModel, SlidingModel, fit_model, power_gap
 from rodsight.solver.detection.touch_probability import ContactProbabilitySettings
 from rodsight.solver.nlgs.chain import ChainSettings, force_scale
@@ -103,6 +103,38 @@ def test_only_a_clear_winner_is_named(frames, monkeypatch, gaps, cause):
     found = find_resistance(frames[2], GIVEN)
     assert found is not None
     assert found.cause == cause
+
+
+@pytest.mark.parametrize(
+    ("gaps", "wall_friction", "base_drag"),
+    [
+        ({}, 0.25, 0.0),
+        ({"wall_friction": 0.1}, 0.01, 0.0),
+        ({"base_drag": 0.1}, 0.25, 0.1),
+        ({"wall_friction": 0.1, "base_drag": 0.105}, 0.25, 0.0),  # one of two, and neither is clear
+        ({"wall_friction": 0.3}, 0.25, 0.0),
+        ({"wall_friction": 0.2, "both": 0.05}, 0.01, 0.1),
+    ],
+)
+def test_what_the_input_does_not_state_is_used_where_it_is_clear(frames, monkeypatch, gaps, wall_friction, base_drag):
+    found = {"wall_friction": replace(GIVEN, wall_friction=0.01), "base_drag": replace(GIVEN, base_drag=0.1)}
+    both = replace(found["wall_friction"], base_drag=0.1)
+    gap = (
+        {GIVEN: 0.45} | {model: gaps.get(name, 0.44) for name, model in found.items()} | {both: gaps.get("both", 0.19)}
+    )
+
+    def fitted(_, model, rivals, workers):
+        rows = []
+        for (name,) in rivals:
+            other = found[name] if model == GIVEN else both
+            rows.append(FittedModel(other, gap[other], True))
+        return rows
+
+    forwards = {id(each) for each in frames[2]}
+    monkeypatch.setattr(resistance, "power_gap", lambda some, model: gap[model] if id(some[0]) in forwards else 1.0)
+    monkeypatch.setattr(resistance, "compare_models", fitted)
+    model = find_unstated(frames[2], GIVEN, ("wall_friction", "base_friction"))
+    assert (model.wall_friction, model.base_drag, model.friction) == (wall_friction, base_drag, 0.25)
 
 
 def test_a_motion_that_fits_in_reverse_order_is_named_first(frames, monkeypatch):
