@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 
 from .grains import Array, Grains
-from .wall_shapes import wall_distance
+from .wall_shapes import distance_from_walls
 from .walls import Walls
 
 SMALLEST_FRACTION = 0.97  # of the smallest radius: least size of a hole, as its neighbours move in a little
@@ -44,7 +44,7 @@ def find_holes(grains: Grains, position: Array, present: NDArray[np.bool_], wall
     point = _equidistant_points(centre[corner], radius[corner])
     with np.errstate(invalid="ignore"):
         inside = np.all(
-            wall_distance(walls.endpoints[None], None if walls.side is None else walls.side[None], point[:, None])[0]
+            distance_from_walls(walls.endpoints[None], None if walls.side is None else walls.side[None], point[:, None])
             >= least_radius,
             1,
         )

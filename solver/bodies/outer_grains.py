@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 
 from .grains import Array
-from .wall_shapes import wall_distance
+from .wall_shapes import distance_from_walls
 from .walls import Walls
 
 DISC_FRACTION = 0.97  # radius of the rolled disc over the smallest radius
@@ -161,5 +161,5 @@ def _within(place: Array, clearance: float, walls: Walls) -> NDArray[np.bool_]:
     """Return which points (m, 2) [m] are inside all walls and farther than about `clearance` [m] from them (m,)."""
     if walls.count == 0:
         return np.ones(len(place), np.bool_)
-    distance = wall_distance(walls.endpoints, walls.sides, place[:, None])[0]
+    distance = distance_from_walls(walls.endpoints, walls.sides, place[:, None])
     return np.all(distance >= 0.9 * clearance, axis=1)

@@ -74,17 +74,24 @@ def wall_distance(endpoints: Array, side: Sides, point: Array) -> tuple[Array, A
     normal : (…, 2)
         Outward unit normals; NaN at the centre of a circle.
     """
-    outward = outward_normals(endpoints)
-    distance = np.einsum("...k,...k->...", endpoints[..., 0, :] - point, outward)
+    distance, outward = distance_from_walls(endpoints, side, point), outward_normals(endpoints)
     if side is None or not np.any(side):
         return distance, np.broadcast_to(outward, np.broadcast_shapes(outward.shape, point.shape))
-    centre, radius, _ = circle_parameters(endpoints)
-    from_centre = point - centre
+    from_centre = point - endpoints.mean(axis=-2)
     apart = np.linalg.norm(from_centre, axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         radial = np.where(apart > 0.0, side, np.nan)[..., None] * from_centre / apart[..., None]
-    curved = side != STRAIGHT
-    return np.where(curved, side * (radius - apart), distance), np.where(curved[..., None], radial, outward)
+    return distance, np.where((side != STRAIGHT)[..., None], radial, outward)
+
+
+def distance_from_walls(endpoints: Array, side: Sides, point: Array) -> Array:
+    """Return the distance (…) [m] of points from walls, negative beyond them; parameters as of `wall_distance`."""
+    distance = np.einsum("...k,...k->...", endpoints[..., 0, :] - point, outward_normals(endpoints))
+    if side is None or not np.any(side):
+        return distance
+    apart = np.linalg.norm(point - endpoints.mean(axis=-2), axis=-1)
+    radius = 0.5 * np.linalg.norm(endpoints[..., 1, :] - endpoints[..., 0, :], axis=-1)
+    return np.where(side != STRAIGHT, side * (radius - apart), distance)
 
 
 def beside_wall(endpoints: Array, side: Sides, point: Array, margin: Array) -> NDArray[np.bool_]:

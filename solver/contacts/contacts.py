@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..bodies.cell import Cell
 from ..bodies.disc_pairs import find_disc_pairs
 from ..bodies.grains import Array, Grains
-from ..bodies.wall_shapes import Sides, beside_wall, wall_distance
+from ..bodies.wall_shapes import Sides, beside_wall, distance_from_walls
 from ..bodies.walls import Walls
 from ..quantity import Quantity
 from .pairs import Keys, make_keys, split_keys
@@ -204,7 +204,7 @@ def _wall_pairs(
     radius: Array, position: Array, present: NDArray[np.bool_], walls: Walls, threshold: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find pairs of grain and wall; the centre must project onto a straight wall, within one radius of its ends."""
-    gap = wall_distance(walls.endpoints[None], _row(walls.side), position[:, None])[0] - radius[:, None]
+    gap = distance_from_walls(walls.endpoints[None], _row(walls.side), position[:, None]) - radius[:, None]
     i, w = np.nonzero((gap < threshold) & (gap > -radius[:, None]) & present[:, None])
     side = None if walls.side is None else walls.side[w]
     beside = beside_wall(walls.endpoints[w], side, position[i], radius[i])

@@ -95,12 +95,12 @@ def displacement_scale(before: Array, after: Array, sigma: Array) -> float:
     return float(np.sqrt(max((non_affine**2).mean() - noise, least)))
 
 
-@lru_cache(maxsize=8)  # the intervals around a frame begin at few photographs
-def _neighbours(points: bytes, count: int) -> tuple[float, NDArray[np.intp]]:
+@lru_cache(maxsize=16)  # the intervals around a frame begin at few photographs
+def _neighbours(points: bytes, count: int) -> tuple[float, NDArray[np.int32]]:
     """Return the mean distance to the `count` nearest points and their rows (n, count); points (n, 2) [m] as bytes."""
     at = np.frombuffer(points).reshape(-1, 2)
     distance, near = KDTree(at).query(at, k=count + 1)
-    return float(np.asarray(distance)[:, 1:].mean()), np.asarray(near)[:, 1:]
+    return float(np.asarray(distance)[:, 1:].mean()), np.asarray(near)[:, 1:].astype(np.int32)
 
 
 def find_reversals(endpoints: Array, position: Array) -> NDArray[np.bool_]:

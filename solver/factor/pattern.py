@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 Ids = NDArray[np.int64]
@@ -63,8 +63,11 @@ def find_pattern(node_count: int, a: Ids, b: Ids) -> Pattern:
     a, b : (m,)
         Coupled nodes, in any order; repetitions are allowed.
     """
-    graph = coo_array((np.ones(2 * len(a)), (np.append(a, b), np.append(b, a))), shape=(node_count, node_count)).tocsc()
-    place = _order_by_degree(graph)
+    itself = np.arange(node_count)
+    value = np.ones(2 * len(a) + node_count)
+    value[2 * len(a) :] = value.size  # definite: of a matrix with these couplings only the order is wanted
+    at = np.concatenate([a, b, itself]), np.concatenate([b, a, itself])
+    place = _order_by_degree(coo_array((value, at), shape=(node_count, node_count)).tocsc())
     first, second = place[a], place[b]
     low, high = np.minimum(first, second), np.maximum(first, second)
     distinct = low < high
@@ -85,9 +88,7 @@ def find_pattern(node_count: int, a: Ids, b: Ids) -> Pattern:
 def _order_by_degree(graph) -> Ids:  # type: ignore[no-untyped-def]
     if graph.shape[0] == 0:
         return np.zeros(0, np.int64)
-    degree = np.asarray(abs(graph).sum(axis=0)).ravel()
-    definite = (diags_array(2.0 * degree + 1.0) - graph).tocsc()
-    factor = splu(definite, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factor = splu(graph, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return factor.perm_c.astype(np.int64)
 
 

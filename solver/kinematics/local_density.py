@@ -62,10 +62,11 @@ def local_solid_fraction(
 
 def _on_outside(triangle: Int[np.ndarray, "t 3"], count: int) -> Bool[np.ndarray, " n"]:
     """Return which grains (n,) are ends of an edge that only one triangle has."""
-    edge = np.sort(np.stack([triangle, np.roll(triangle, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    ends, times = np.unique(edge, axis=0, return_counts=True)
+    one, other = triangle.ravel().astype(np.int64), np.roll(triangle, 1, axis=1).ravel()
+    edge, times = np.unique(np.minimum(one, other) * count + np.maximum(one, other), return_counts=True)
     outside = np.zeros(count, np.bool_)
-    outside[ends[times == 1]] = True
+    once = edge[times == 1]
+    outside[once // count] = outside[once % count] = True
     return outside
 
 

@@ -62,9 +62,7 @@ def measure_local_motion(
     if not present.any():
         return LocalMotion(np.full((count, 2, 2), np.nan), d2min, d2min)
     i, old, new = _neighbours(before, after, radius, present, cells)
-    moments, mixed = np.zeros((count, 2, 2)), np.zeros((count, 2, 2))
-    np.add.at(moments, i, old[:, :, None] * old[:, None, :])
-    np.add.at(mixed, i, new[:, :, None] * old[:, None, :])
+    moments, mixed = _sum_of_products(i, old, old, count), _sum_of_products(i, new, old, count)
     neighbours = np.bincount(i, minlength=count)
     known = (neighbours >= MIN_NEIGHBOURS) & _spanning(moments)
     gradient = np.full((count, 2, 2), np.nan)
@@ -74,6 +72,12 @@ def measure_local_motion(
     d2min[known] = total[known] / neighbours[known]
     rotation = np.arctan2(gradient[:, 1, 0] - gradient[:, 0, 1], gradient[:, 0, 0] + gradient[:, 1, 1])
     return LocalMotion(_logarithmic_strains(gradient), d2min, rotation)
+
+
+def _sum_of_products(i: NDArray[np.intp], a: Array, b: Array, count: int) -> Float[Array, "n 2 2"]:
+    """Σ a_c b_cᵀ over the vectors a, b (c, 2) of every grain i (c,)."""
+    sums = [np.bincount(i, a[:, p] * b[:, q], count) for p in range(2) for q in range(2)]
+    return np.stack(sums, axis=1).reshape(count, 2, 2)
 
 
 def _logarithmic_strains(deformation: Float[Array, "n 2 2"]) -> Float[Array, "n 2 2"]:

@@ -14,7 +14,7 @@ import numpy as np
 from ..bodies.grains import Array
 from .chain import ChainStep
 from .problem import ContactProblem
-from .solve import NlgsSettings, solve
+from .solve import NlgsSettings, solve, sweeps
 
 COLD_SWEEPS = 2 ** np.arange(10)  # up to 512
 
@@ -52,8 +52,5 @@ def measure_start_residuals(step: ChainStep) -> StartResiduals:
 
 def cold_residuals(problem: ContactProblem) -> Array:
     """Compute the natural-map residuals after COLD_SWEEPS sweeps from zero forces."""
-    residuals, force, done = np.empty(len(COLD_SWEEPS)), None, 0
-    for row, count in enumerate(COLD_SWEEPS.tolist()):
-        solution = solve(problem, NlgsSettings(count - done), guess=force)
-        residuals[row], force, done = solution.natural_map, solution.force, count
-    return residuals
+    strides = np.diff(COLD_SWEEPS, prepend=0).tolist()
+    return np.array([each.natural_map for each in sweeps(problem, NlgsSettings(), every=strides)])

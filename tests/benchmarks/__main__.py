@@ -18,6 +18,7 @@ from datetime import date
 from pathlib import Path
 
 from tests.benchmarks import history
+from tests.benchmarks.equal_error import equal_error_rows
 from tests.benchmarks.first_minute import first_run_rows
 from tests.benchmarks.growth import STEP, TILES, growth, run_benchmark_job, walled_packing
 from tests.benchmarks.marks import mark_rows
@@ -31,6 +32,7 @@ SAMPLE = ROOT / "sample_data" / "shear"
 
 def ratios() -> Iterator[tuple[str, list[Row]]]:
     yield "Ratios", [*sweep_rows((1000, 10_000, 100_000)), *member_rows((1000, 5000)), *load_rows((1000, 10_000))]
+    yield "Other solvers at equal error", list(equal_error_rows((1000, 5000)))
 
 
 def photographs() -> Iterator[tuple[str, list[Row]]]:

@@ -121,13 +121,14 @@ class _Search:
         self._outlier = np.zeros(tracks.status.shape, np.bool_)  # found so far
 
         self._deviation = np.full(tracks.status.shape, np.nan)  # [m] sizes of the jumps
+        # [m] motions from the photograph before to the one after, less those of the neighbours; NaN in the first, last
+        self._moved = np.full(tracks.status.shape, np.nan)
 
     def examine(self, frames: Iterable[int]) -> NDArray[np.bool_]:
         """Poses (f, n) that are outliers, after a new examination of some frames."""
         frames = list(frames)
         for k in frames:
-            self._jump[k] = self._beyond_neighbours(k, self._position[k] - self._continued(k))
-            self._deviation[k] = np.linalg.norm(self._jump[k], axis=1)
+            self._compare_with_neighbours(k)
         for k in frames:
             self._suspect[k] = self._contradicted(k)
         size = np.where(self._suspect, self._deviation, -1.0)
@@ -155,14 +156,23 @@ class _Search:
             return 2.0 * position[k - 1] - position[k - 2]
         return 0.5 * (position[k - 1] + position[k + 1])
 
-    def _beyond_neighbours(self, k: int, change: Array) -> Array:
-        """A change (n, 2) of all rods less the median one of each one's neighbours; NaN: unknown."""
-        relative = np.full_like(change, np.nan)
-        rows = np.flatnonzero(np.isfinite(change[:, 0]))
-        if len(rows) > NEIGHBOURS:
-            near = neighbour_rows(self._continued(k), rows, rows)
-            relative[rows] = change[rows] - np.median(change[near], axis=1)
-        return relative
+    def _compare_with_neighbours(self, k: int) -> None:
+        """Set the jump of every rod, its size, and the motion past photograph k, less those of its neighbours."""
+        position, expected, last = self._position, self._continued(k), len(self._position) - 1
+        changes = [position[k] - expected]
+        if 0 < k < last:
+            changes.append(position[k + 1] - position[k - 1])
+        rows, near = np.empty(0, np.int64), np.empty(0, np.int64)
+        for change in changes:
+            relative, known = np.full_like(change, np.nan), np.flatnonzero(np.isfinite(change[:, 0]))
+            if len(known) > NEIGHBOURS:
+                if not np.array_equal(known, rows):
+                    rows, near = known, neighbour_rows(expected, known, known)
+                relative[known] = change[known] - np.median(change[near], axis=1)
+            if change is changes[0]:
+                self._jump[k], self._deviation[k] = relative, np.linalg.norm(relative, axis=1)
+            else:
+                self._moved[k] = np.linalg.norm(relative, axis=1)
 
     def _contradicted(self, k: int) -> NDArray[np.bool_]:
         """Which poses of a frame are outliers (n,)."""
@@ -180,8 +190,7 @@ class _Search:
             return np.zeros(len(deviation), np.bool_)
         jumps = deviation > np.maximum(ONE_SIDED * least if k == last else least, noise)
         if k < last:
-            moved = self._beyond_neighbours(k, position[k + 1] - position[k - 1])
-            jumps &= np.linalg.norm(moved, axis=1) < 2.0 * RETURN * deviation
+            jumps &= self._moved[k] < 2.0 * RETURN * deviation
         if not jumps.any():
             return jumps
         expected = position[k] - np.where(jumps[:, None], self._jump[k], 0.0)
