@@ -77,7 +77,7 @@ def measure_local_motion(
 def _sum_of_products(i: NDArray[np.intp], a: Array, b: Array, count: int) -> Float[Array, "n 2 2"]:
     """Σ a_c b_cᵀ over the vectors a, b (c, 2) of every grain i (c,)."""
     sums = [np.bincount(i, a[:, p] * b[:, q], count) for p in range(2) for q in range(2)]
-    return np.stack(sums, axis=1).reshape(count, 2, 2)
+    return np.stack(sums, axis=1, dtype=np.float64).reshape(count, 2, 2)
 
 
 def _logarithmic_strains(deformation: Float[Array, "n 2 2"]) -> Float[Array, "n 2 2"]:
