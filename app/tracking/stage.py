@@ -116,22 +116,23 @@ def track_photographs(
             walls, tables[CORNERS] = follow_corners(
                 experiment, series, walls, Execution(workers, keep("corners"), progress)
             )  # fmt: skip
-            missing_walls = _missing_walls_by_frame(walls, photographs)
-        if np.isnan(walls.endpoints[:, walls.sides == STRAIGHT]).any() and not missing_walls:
+        file = experiment.config.walls.file if experiment.config.walls is not None else None
+        # Bars without a table of their own run through the discs' centres.
+        if file is not None and np.isnan(walls.endpoints[:, walls.sides == STRAIGHT]).any():
             straight = np.flatnonzero(walls.sides == STRAIGHT)
             bars = walls.select(straight)
             followed = follow_walls(
                 series, bars, _bar_depth(experiment, first, bars, scale, float(grains.radius.mean())),
                 Execution(workers, keep("walls"), progress),
-                source=experiment.folder / ((experiment.config.walls and experiment.config.walls.file) or ""),
+                source=experiment.folder / file,
             )  # fmt: skip
             endpoints = walls.endpoints.copy()
             sigma = np.full(walls.endpoints.shape[:2], np.nan) if walls.sigma is None else walls.sigma.copy()
             endpoints[:, straight] = followed.walls.endpoints
             sigma[:, straight] = np.sqrt((followed.sigma**2).mean(axis=2))
             walls = replace(walls, endpoints=endpoints, sigma=sigma)
-            missing_walls = _missing_walls_by_frame(walls, photographs)
             tables[WALLS] = _walls_table(followed)
+        missing_walls = _missing_walls_by_frame(walls, photographs)
     tracks = follow_photographs(
         series, grains, Execution(workers, keep("tracking"), progress, keep(PICTURES)),
         TrackingSettings(section.follow, search_window=tuning.search_window),

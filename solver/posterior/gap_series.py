@@ -102,8 +102,10 @@ def measure_gap_noise(series: GapSeries, stated: float) -> GapNoise:
         change = np.abs(gap[l:] - gap[:-l])
         change = change[np.isfinite(change)]
         if len(change) >= MIN_DIFFERENCES:
-            lag.append(float(l))
-            variance.append(_variance_by_quantile(change, NOISE_QUANTILE))
+            spread = _variance_by_quantile(change, NOISE_QUANTILE)
+            if spread > 0.0:  # the noise is unknown where frames are copies
+                lag.append(float(l))
+                variance.append(spread)
             if l == 1:
                 walk_variance = _variance_by_quantile(change, WALK_QUANTILE)
     if len(lag) < 2:

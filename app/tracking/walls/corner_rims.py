@@ -14,6 +14,7 @@ RATIO = 1.03  # of radii that are tried one after another
 LEAST_SLOPE = 0.3  # mean inward slope along a rough circle, as a fraction of a full edge's
 TRIED = 6  # rough circles, the most significant ones, that are measured
 ROUNDS = 3  # of measuring a circle from the last measurement
+CLEAR = 0.6  # fraction from which on no other circle is tried
 LEAST_SEEN = 0.4  # fraction of the rim that must be seen: bars and rods hide the rest
 BETWEEN_BARS = 0.3  # [radii] between the place where two bars meet and the centre of a disc that they are fixed to
 CLICKED = 0.8  # [radii] between a click on a disc and its centre
@@ -51,6 +52,8 @@ def find_disc(image: Image, place: tuple[float, float], *, within: float) -> tup
     near = np.flatnonzero(np.hypot(rough.x - x, rough.y - y) < within * rough.radius)
     best, seen = None, LEAST_SEEN
     for k in near[:TRIED].tolist():
+        if seen > CLEAR:
+            break
         circle = np.array([[rough.x[k]], [rough.y[k]], [rough.radius[k]]])
         for _ in range(ROUNDS):
             measured = refine_grains(part, circle[0], circle[1], circle[2], fixed_radius=False)

@@ -236,7 +236,7 @@ def find_corner(workbench: Workbench, at: Text, x: Number, y: Number) -> dict[st
     opened = workbench.project(at)
     found = _scaled(opened)
     disc = circles.corner_at(opened.photograph(0), found, x, y)
-    circles.add_corners(opened.draft, found, [disc])
+    initialise.add_discs(opened.draft, found, [disc])
     return opened.describe() | {"wall": disc.name}
 
 
@@ -245,7 +245,10 @@ def delete_wall(workbench: Workbench, at: Text, name: Text) -> dict[str, Any]:
     opened = workbench.project(at)
     found = _scaled(opened)
     if name in circles.corner_names(found):
-        circles.delete_corner(opened.draft, found, name)
+        with opened.draft.one_step(f"corner {name} deleted"):
+            if "file" not in found.data["walls"]:  # the bars ran through the discs' centres
+                edits.set_walls(opened.draft, found, circles.bars_of(found), "bars")
+            circles.delete_corner(opened.draft, opened.validation(), name)
         return opened.describe()
     if any(each.name == name for each in circles.circles_of(found)):
         left = [each for each in circles.circles_of(found) if each.name != name]

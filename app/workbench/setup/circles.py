@@ -24,6 +24,8 @@ ARCS, CORNERS = "arcs.csv", "corners.csv"
 RIM = 24  # points of a rod's rim that a circle around the rods must hold
 SNAP = 0.06  # of its radius, how far beside a drawn circle its edge is looked for
 MEETING = 2.0  # [px] between the ends of two bars that meet
+FRAME = 4  # bars, and discs, of a closed frame
+THROUGH = 0.05  # [radii] between the end of a bar and the centre of its disc
 FLAT = 1e-3  # height of a triangle by its longest side below which it is a line
 
 
@@ -134,8 +136,21 @@ def add_corners(draft: Draft, found: ValidationResult, discs: Sequence[Circle]) 
     """Write discs in the corners of the frame to their table."""
     section = {"corners": CORNERS, **found.data.get("walls", {})}
     rows = [*_corner_rows(found), *(_corner_row(found, each) for each in discs)]
+    tables: dict[str, bytes | None] = {section["corners"]: as_table(CORNER_COLUMNS, rows)}
+    if "file" in section and _run_through_centres(bars_of(found), [*discs_of(found), *discs]):
+        tables[section.pop("file")] = None  # the bars follow from the discs, whose rims are seen better
     change = f"corner {discs[0].name}" if len(discs) == 1 else f"{len(discs)} corners"
-    draft.set_keys(change, {"walls": section}, {section["corners"]: as_table(CORNER_COLUMNS, rows)})
+    draft.set_keys(change, {"walls": section}, tables)
+
+
+def _run_through_centres(bars: Sequence[tuple[str, Array]], discs: Sequence[Circle]) -> bool:
+    """Whether four bars join the centres of four discs, as far as edges and rims show it."""
+    if len(bars) != FRAME or len(discs) != FRAME:
+        return False
+    centre = np.array([[each.x, each.y] for each in discs])
+    radius = np.array([each.radius for each in discs])
+    ends = np.concatenate([line for _, line in bars])
+    return bool((np.linalg.norm(ends[:, None] - centre, axis=2) < THROUGH * radius).any(axis=1).all())
 
 
 def bars_of(found: ValidationResult) -> list[tuple[str, Array]]:

@@ -14,6 +14,7 @@ import numpy as np
 from ...exchange.photographic.opencv_calibration import read_calibration
 from ...exchange.photographic.rod_readings import read_rods
 from ...exchange.photographic.video_frames import extract_frames, is_video
+from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Photographs
 from ...experiment.pictures.image import FULL_SCALE, Channel, Image, ImageSelection
 from ...experiment.pictures.picture_file import read_photograph
@@ -218,8 +219,23 @@ def find_discs(draft: Draft, image: Image, found: ValidationResult) -> int:
     """Write the discs where bars meet to the table of corners; return their number."""
     discs = circles.find_corners(image, found)
     if discs:
-        circles.add_corners(draft, found, discs)
+        add_discs(draft, found, discs)
     return len(discs)
+
+
+def add_discs(draft: Draft, found: ValidationResult, discs: Sequence[circles.Circle]) -> None:
+    """Write discs in corners of the frame; circles that were detected on them are no rods. One step of undo."""
+    with draft.one_step("corners"):
+        circles.add_corners(draft, found, discs)
+        rods = found.rods
+        if rods is None:
+            return
+        on = np.zeros(len(rods.id), np.bool_)
+        for disc in discs:
+            on |= np.hypot(rods.x - disc.x, rods.y - disc.y) < disc.radius
+        if on.any():
+            left = GrainGuess(rods.id[~on], rods.x[~on], rods.y[~on], rods.radius[~on])
+            edits.set_rods(draft, "circles on corner discs dropped", left)
 
 
 def _find_rods_and_walls(

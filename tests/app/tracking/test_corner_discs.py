@@ -70,6 +70,33 @@ def test_discs_are_centred_on_their_rims_and_followed_with_their_bars(apparatus)
     assert set(np.array(walls.name)[walls.sides == STRAIGHT]) == {"bottom", "right", "top", "left"}
 
 
+def test_bars_of_a_table_are_followed_beside_the_discs(apparatus):
+    true = true_centres(apparatus)
+    around = ("bottom-left", "bottom-right", "top-right", "top-left")
+    names = ("bottom", "right", "top", "left")
+    ends = {name: (around[k], around[(k + 1) % 4]) for k, name in enumerate(names)}
+    rows = [(0, name, *true[0, first], *true[0, second]) for name, (first, second) in ends.items()]
+    bars, described = apparatus / "bars.csv", apparatus / "experiment.toml"
+    text = described.read_text(encoding="utf-8")
+    try:
+        bars.write_text(
+            "\n".join(",".join(map(str, row)) for row in [("frame", "wall", "x1", "y1", "x2", "y2"), *rows]) + "\n",
+            encoding="utf-8",
+        )
+        described.write_text(text.replace("[walls]\n", '[walls]\nfile = "bars.csv"\n'), encoding="utf-8")
+        walls, _ = track(apparatus)
+    finally:
+        described.write_text(text, encoding="utf-8")
+        bars.unlink()
+    for name, (first, second) in ends.items():
+        found = walls.endpoints[:, walls.name.index(name)]
+        along = found[:, 1] - found[:, 0]
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+        for k in range(FRAMES):
+            away = [abs(float(normal[k] @ (true[k, disc] - found[k, 0]))) for disc in (first, second)]
+            assert max(away) < ACCURACY, (name, k)
+
+
 def test_a_corner_given_in_every_photograph_stays_as_given(apparatus):
     walls, true = track(apparatus, keep="top-left")
     centre, _, _ = circle_parameters(walls.endpoints)

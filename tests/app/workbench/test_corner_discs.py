@@ -112,11 +112,15 @@ def test_discs_in_the_corners_are_found_with_the_bars_or_by_a_click(apparatus, t
         rows = np.column_stack([table.numbers(name) for name in ("x", "y", "radius")])
         return dict(zip(table.text("corner"), rows, strict=True))
 
+    assert "file" not in Draft(file.parent).data()["walls"]  # the bars run through the centres
     assert discs.keys() == true.keys()
     for name, row in written().items():
         np.testing.assert_allclose(row, true[name], atol=2.5e-5)  # [m], a sixth of a pixel
     disc = discs["top-left"]
-    visitor.request("delete_wall", at=at, name="top-left")
+    bars = {wall["name"]: wall["line"] for wall in described["walls"] if not wall["circle"]}
+    left = visitor.request("delete_wall", at=at, name="top-left")["walls"]
+    for name, line in bars.items():  # they stay where they were, without the disc
+        np.testing.assert_allclose(next(wall["line"] for wall in left if wall["name"] == name), line, atol=0.01)
     click = {"x": disc["x"] - 0.5 * disc["radius"], "y": disc["y"] + 0.4 * disc["radius"]}
     assert visitor.request("find_corner", at=at, **click)["wall"] == "top-left"
     np.testing.assert_allclose(written()["top-left"], true["top-left"], atol=2.5e-5)
