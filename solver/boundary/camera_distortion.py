@@ -18,14 +18,18 @@ MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
 FEWEST_PAIRS = 100  # in a frame
 SIGNIFICANT = 5.0  # standard errors
 EXPLAINED = 0.95  # greatest ratio of the robust scatter of touching gaps after a correction to that before
-ANISOTROPY, RADIAL, PERSPECTIVE, UNKNOWNS = slice(0, 2), slice(2, 4), slice(4, 6), 6  # unknowns of the model
-MODELS = ((2,), (0, 1), (2, 3), (0, 1, 2), (0, 1, 2, 3), (0, 1, 4, 5), (0, 1, 2, 3, 4, 5))
+# Unknowns of the model, by their rows.
+ANISOTROPY, RADIAL, PERSPECTIVE, DECENTRING, UNKNOWNS = slice(0, 2), slice(2, 6), slice(6, 8), slice(8, 10), 10
+MODELS = ((2,), (0, 1), (2, 3), (0, 1, 2), (0, 1, 2, 3), (0, 1, 6, 7), (0, 1, 2, 3, 6, 7))
+EXTENSIONS = ((3,), (8, 9), (4,), (4, 5))  # of a lens that was found: higher orders, another middle
+GAIN = 2.0  # standard errors, by which the likelihood of pairs that were not fitted must rise for an extension
+FITS = 3  # of an extension: which pairs are near enough depends on the correction
 MAX_OVERLAP = 2.5  # mean overlap over the scatter of touching gaps, above which readings of radii must be too large
-# Mean overlap of soft grains over the scatter of their touching gaps: forces have a standard deviation of .8 of their
-# mean.
-TYPICAL_OVERLAP = 1.25
+# Mean overlap of soft grains over the scatter s of their touching gaps: 1 − 1.6 σ/s, with σ the noise of a position, is
+# near the one at which r is largest in nine simulated packings with radii read too small (.8 at σ/s = .2, .3 at .45).
+OVERLAP_OF_NOISE = 1.6
 SECTORS, RINGS = 8, 3  # parts of the picture in which gaps are compared
-UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of its mean over the parts of the picture
+UNEXPLAINED = 1.0  # robust standard deviations of a touching gap: range of the usual one over the parts of the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +38,13 @@ class CameraDistortion:
 
     Notes
     -----
-    x_true = x + L [a (X, −Y) + b (Y, X) + (k |ξ|² + m |ξ|⁴ + p X + q Y) ξ] with ξ = (x − x_0)/L = (X, Y).
+    x_true = x + L [a (X, −Y) + b (Y, X) + (Σ k_i |ξ|^2i + p X + q Y) ξ + |ξ|² (c, d) − e ξ], i = 1 … 4, with
+    ξ = (x − x_0)/L = (X, Y), and e such that the mean length of the pairs stays the same: the pixel size is given.
     """
 
-    value: Array  # (6,) a, b, k, m, p, q
-    sd: Array  # (6,) standard error, as if errors were the same in all frames
+    value: Array  # (10,) a, b, k_1 … k_4, p, q, c, d
+    sd: Array  # (10,) standard error, as if errors were the same in all frames
+    shrinking: float  # e
     middle: Array  # (2,) [m] x_0
     half_width: float  # [m] L
     scatter: float  # [m] robust standard deviation of the gaps of candidate pairs as they were measured
@@ -52,22 +58,32 @@ class CameraDistortion:
         """Return undistorted positions (…, 2) [m]."""
         if not self.applied:
             return position
-        return position + np.tensordot(self.value, _displacements(position, self.middle, self.half_width), 1)
+        moved = np.tensordot(self.value, _displacements(position, self.middle, self.half_width), 1)
+        return position + moved - self.shrinking * (position - self.middle)
 
-    def class_correction(self) -> Array | None:
+    def radial_change(self) -> float:
+        """Return the radial displacement at the rim of the picture over its half-width, with the middle unchanged."""
+        return float(self.value[RADIAL].sum())
+
+    def class_correction(self, noise: float) -> Array | None:
         """Return what to add to the radii of every class (q,) [m] of soft grains; None: overlaps may explain the gaps.
+
+        Parameters
+        ----------
+        noise : float
+            Standard deviation of a position component [m].
 
         Notes
         -----
-        The correction leaves every class a mean overlap of 1.25 s, s the scatter of touching gaps. Overlaps of forces
-        explain neither classes that differ by more than s nor overlaps above 2.5 s.
+        The correction leaves every class a mean overlap of s max(1 − 1.6 σ/s, 0), s the scatter of touching gaps and σ
+        the noise. Overlaps of forces explain neither gaps between touching surfaces, nor classes that differ by more
+        than s, nor overlaps above 2.5 s.
         """
         error, scatter = self.radius_error, self.touching_scatter
-        if len(error) < 2:
+        overlap = -2.0 * float(error.mean())
+        if np.ptp(error) < scatter and 0.0 <= overlap < MAX_OVERLAP * scatter:
             return None
-        if np.ptp(error) < scatter and -2.0 * float(error.mean()) < MAX_OVERLAP * scatter:
-            return None
-        return error + 0.5 * TYPICAL_OVERLAP * scatter
+        return error + 0.5 * max(scatter - OVERLAP_OF_NOISE * noise, 0.0)
 
     def describe(self) -> list[str]:
         """Describe the correction and what remains in sentences for the user."""
@@ -75,19 +91,22 @@ class CameraDistortion:
         if self.applied:
             parts = []
             if self.value[RADIAL].any():
-                parts.append(
-                    f"a radial distortion of {100 * float(self.value[RADIAL].sum()):.2g} % at the picture's rim"
-                )
+                parts.append(f"a radial distortion of {100 * self.radial_change():.2g} % at the picture's rim")
             if self.value[ANISOTROPY].any():
                 size = 100 * float(np.hypot(*self.value[ANISOTROPY]))
                 parts.append(f"a stretching of {size:.2g} % along one direction")
+            if self.value[DECENTRING].any():
+                size = 100 * float(np.hypot(*self.value[DECENTRING]))
+                parts.append(f"a decentring of the lens of {size:.2g} %")
             if self.value[PERSPECTIVE].any():
                 size = 100 * float(np.hypot(*self.value[PERSPECTIVE]))
                 parts.append(f"a perspective of {size:.2g} %")
-            sentences.append(
-                f"{', '.join(parts)} {'was' if len(parts) == 1 else 'were'} removed, since gaps of near grains then "
-                f"scatter by {1e6 * self.explained:.0f} instead of {1e6 * self.scatter:.0f} µm"
-            )
+            removed = f"{', '.join(parts)} {'was' if len(parts) == 1 else 'were'} removed, since gaps of near grains"
+            before, after = 1e6 * self.scatter, 1e6 * self.explained
+            if after < EXPLAINED * before:
+                sentences.append(f"{removed} then scatter by {after:.0f} instead of {before:.0f} µm")
+            else:
+                sentences.append(f"{removed} have a gradient across the picture, which forces in balance do not have")
         if self.unexplained > 0.0:
             sentences.append(
                 f"gaps of touching grains depend on their place in the picture by {1e6 * self.unexplained:.0f} µm, "
@@ -100,13 +119,16 @@ class CameraDistortion:
 class _Pairs:
     """Pairs that may touch, of all frames that are read."""
 
-    gap: Array  # (m,) [m] as measured
-    design: Array  # (m, 6 + q) change of the gap by the unknowns of the camera and by an error of the radii by class
+    gap: Array  # (m,) [m] as measured, along the normals of the corrected positions
+    design: Array  # (m, 10 + q) change of the gap by the unknowns of the camera and by an error of the radii by class
+    shrinking: Array  # (10,) e of a unit of each unknown
     middle: Array  # (m, 2) of the pair over the half-width
     frames: int
 
 
-def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[np.integer]) -> CameraDistortion | None:
+def find_camera_distortion(
+    position: Array, radius: Array, size_class: NDArray[np.integer], *, soft: bool = False
+) -> CameraDistortion | None:
     """Find the distortion of the camera.
 
     Parameters
@@ -117,6 +139,8 @@ def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[n
         Radii [m].
     size_class : (n,)
         Class of each grain by its size, from 0; the error of a class's radius is found with the distortion.
+    soft : bool
+        Whether overlaps are forces, so that a small error of the camera matters.
 
     Returns
     -------
@@ -126,84 +150,185 @@ def find_camera_distortion(position: Array, radius: Array, size_class: NDArray[n
     Notes
     -----
     Weighted least squares of g + n·(u(x_j) − u(x_i)) − δ_i − δ_j = 0 over pairs, with u the displacement of
-    `CameraDistortion` and δ the error of a class's radius. Weights (1 + (g/s)²)⁻² for positive residuals g, with s
-    shrinking from a fraction of a diameter to twice the robust standard deviation: pairs that do not touch stand apart.
-    A model with more unknowns is applied where it reduces the robust scatter of all pairs to 0.95 of that of a simpler
-    one, if one of its unknowns exceeds five standard errors. Forces of soft grains depend on direction and place, too,
-    but do not change the scatter of their gaps so much.
+    `CameraDistortion` and δ the error of a class's radius, see `fit_touching_pairs`. A model with more unknowns is
+    applied where it reduces the robust scatter of all pairs to 0.95 of that of a simpler one, if one of its unknowns
+    exceeds five standard errors. Forces of soft grains depend on direction and place, too, but do not change the
+    scatter of their gaps so much. A lens that is found gets higher orders and another middle where these raise the
+    likelihood of the gaps in the other frames by two standard errors. A gradient of the gaps of soft grains across the
+    picture is a perspective if it exceeds two standard errors: balance allows no gradient of the mean pressure.
     """
-    rows = np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))
     present = position[np.isfinite(position[..., 0])]
     if not len(present):
         return None
     middle = 0.5 * (present.min(axis=0) + present.max(axis=0))
-    half_width = 0.5 * float(np.ptp(present, axis=0).max())
-    pairs = _pairs_with_design(position[rows], radius, size_class, middle, half_width)
+    reading = _Reading(
+        position[np.unique(np.linspace(0, len(position) - 1, min(MOST_FRAMES, len(position))).astype(int))],
+        radius, size_class, middle, 0.5 * float(np.ptp(present, axis=0).max()),
+    )  # fmt: skip
+    pairs = reading.find_pairs(None)
     if len(pairs.gap) < FEWEST_PAIRS * pairs.frames:
         return None
-    diameter = 2.0 * float(radius.mean())
-    none = _fit(pairs, (), diameter)
+    none = _fit(pairs, (), reading.diameter)
     best, chosen = none, ()
     for unknowns in MODELS:
-        found = _fit(pairs, unknowns, diameter)
+        found = _fit(pairs, unknowns, reading.diameter)
         significant = np.abs(found.value[list(unknowns)]) > SIGNIFICANT * found.sd[list(unknowns)]
         if significant.any() and found.misfit < EXPLAINED * best.misfit:
             best, chosen = found, unknowns
-    value = np.where(np.isin(np.arange(UNKNOWNS), chosen), best.value[:UNKNOWNS], 0.0)
+    if set(chosen) & set(range(UNKNOWNS)[RADIAL]):
+        pairs, best, chosen = _extend(reading, pairs, best, chosen)
+    if soft:
+        pairs, best, chosen = _add_perspective(reading, pairs, best, chosen)
+    value = best.value[:UNKNOWNS]
     return CameraDistortion(
-        value, best.sd[:UNKNOWNS], middle, half_width, none.misfit, best.misfit, bool(chosen),
-        _place_dependence(pairs, best), best.value[UNKNOWNS:], best.scatter,
+        value, best.sd[:UNKNOWNS], float(pairs.shrinking @ value), middle, reading.half_width, none.misfit, best.misfit,
+        bool(chosen), _place_dependence(pairs, best, reading.diameter), best.value[UNKNOWNS:], best.scatter,
     )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """Positions of some frames, from which pairs are read again as the correction changes."""
+
+    position: Array  # (f, n, 2) [m]
+    radius: Array  # (n,) [m]
+    size_class: NDArray[np.integer]  # (n,)
+    middle: Array  # (2,) [m]
+    half_width: float  # [m]
+
+    @property
+    def diameter(self) -> float:
+        return 2.0 * float(self.radius.mean())
+
+    def select(self, frames: slice) -> _Reading:
+        return replace(self, position=self.position[frames])
+
+    def find_pairs(self, fit: TouchingFit | None, shrinking: Array | None = None) -> _Pairs:
+        """Find the pairs that may touch after the correction of a fit, and what each unknown changes."""
+        classes = int(self.size_class.max()) + 1
+        radius = self.radius if fit is None else self.radius + fit.value[UNKNOWNS:][self.size_class]
+        gap, design, centre, length = [], [], [], []
+        for place in self.position:
+            moved = _displacements(place, self.middle, self.half_width)
+            if fit is None or shrinking is None:
+                corrected = place
+            else:
+                value = fit.value[:UNKNOWNS]
+                corrected = place + np.tensordot(value, moved, 1) - (shrinking @ value) * (place - self.middle)
+            near = find_near_pairs(corrected, radius)
+            branch = np.einsum("mk,mk->m", place[near.j] - place[near.i], near.normal)
+            along = np.einsum("pck,ck->cp", moved[:, near.j] - moved[:, near.i], near.normal)
+            gap.append(branch - self.radius[near.i] - self.radius[near.j])
+            design.append(np.column_stack([along, -count_classes(near, self.size_class, classes)]))
+            centre.append((0.5 * (place[near.i] + place[near.j]) - self.middle) / self.half_width)
+            length.append(branch)
+        branches, rows = np.concatenate(length), np.concatenate(design)
+        # Without this, a field of higher order could shrink the whole picture, which makes all gaps alike.
+        shrinking = rows[:, :UNKNOWNS].T @ branches / float(branches @ branches)
+        rows[:, :UNKNOWNS] -= branches[:, None] * shrinking
+        return _Pairs(np.concatenate(gap), rows, shrinking, np.concatenate(centre), len(self.position))
+
+
+def _extend(
+    reading: _Reading, pairs: _Pairs, best: TouchingFit, chosen: tuple[int, ...]
+) -> tuple[_Pairs, TouchingFit, tuple[int, ...]]:
+    """Add higher orders of a lens where pairs of the other half of the frames confirm them."""
+    halves = reading.select(slice(0, None, 2)), reading.select(slice(1, None, 2))
+    if not len(halves[1].position):
+        return pairs, best, chosen
+    before = _refit(halves[0], chosen)
+    for more in EXTENSIONS:
+        unknowns = tuple(sorted({*chosen, *more}))
+        if len(unknowns) == len(chosen):
+            continue
+        after = _refit(halves[0], unknowns)
+        if _likelihood_gain(halves[1], before, after) > GAIN:
+            before, chosen = after, unknowns
+    return *_refit(reading, chosen), chosen
+
+
+def _add_perspective(
+    reading: _Reading, pairs: _Pairs, best: TouchingFit, chosen: tuple[int, ...]
+) -> tuple[_Pairs, TouchingFit, tuple[int, ...]]:
+    """Add a perspective where one exceeds two standard errors."""
+    tilt = range(UNKNOWNS)[PERSPECTIVE]
+    unknowns = tuple(sorted({*chosen, *tilt}))
+    if unknowns == chosen:
+        return pairs, best, chosen
+    tilted = _refit(reading, unknowns)
+    value, sd = tilted[1].value[tilt], tilted[1].sd[tilt]
+    return (*tilted, unknowns) if (np.abs(value) > GAIN * sd).any() else (pairs, best, chosen)
+
+
+def _refit(reading: _Reading, unknowns: tuple[int, ...]) -> tuple[_Pairs, TouchingFit]:
+    """Fit some unknowns of the camera to pairs that are found anew with each correction."""
+    pairs = reading.find_pairs(None)
+    found = _fit(pairs, unknowns, reading.diameter)
+    for _ in range(FITS - 1):
+        pairs = reading.find_pairs(found, pairs.shrinking)
+        found = _fit(pairs, unknowns, reading.diameter, found)
+    return pairs, found
+
+
+def _likelihood_gain(reading: _Reading, before: tuple[_Pairs, TouchingFit], after: tuple[_Pairs, TouchingFit]) -> float:
+    """Compute by how many standard errors pairs of these frames are likelier after than before.
+
+    Notes
+    -----
+    The likelihood of a residual g is that of a Cauchy distribution of the touching gaps' scatter s: ln 1/(1 + (g/s)²).
+    Frames repeat each other's pairs, so that the standard error is that of one frame.
+    """
+    (fitted, one), (other, two) = before, after
+    pairs = reading.find_pairs(two, other.shrinking)
+    branch = pairs.shrinking  # the gauge of these pairs is replaced by those of the fits
+    likelihood = []
+    for gauge, fit in ((fitted.shrinking, one), (other.shrinking, two)):
+        shift = float((branch - gauge) @ fit.value[:UNKNOWNS])
+        residual = pairs.gap + pairs.design @ fit.value + shift * reading.diameter
+        likelihood.append(-np.log1p((residual / two.scatter) ** 2))
+    gain = likelihood[1] - likelihood[0]
+    return float(gain.mean() / max(gain.std(), 1e-300) * np.sqrt(len(gain) / pairs.frames))
+
+
 def _displacements(position: Array, middle: Array, half_width: float) -> Array:
-    """Displacements (6, …, 2) [m] of points (…, 2) [m] by a unit of each unknown."""
+    """Displacements (10, …, 2) [m] of points (…, 2) [m] by a unit of each unknown."""
     x = (position - middle) / half_width
     square = np.sum(x**2, axis=-1, keepdims=True)
+    radial = [square**order * x for order in range(1, 5)]
+    decentred = [square * np.array([1.0, 0.0]), square * np.array([0.0, 1.0])]
     return half_width * np.stack(
-        [x * np.array([1.0, -1.0]), x[..., ::-1], square * x, square**2 * x, x[..., :1] * x, x[..., 1:] * x]
+        [x * np.array([1.0, -1.0]), x[..., ::-1], *radial, x[..., :1] * x, x[..., 1:] * x, *decentred]
     )
 
 
-def _pairs_with_design(
-    position: Array, radius: Array, size_class: NDArray[np.integer], middle: Array, half_width: float
-) -> _Pairs:
-    classes, parts = int(size_class.max()) + 1, []
-    for place in position:
-        near = find_near_pairs(place, radius)
-        moved = _displacements(place, middle, half_width)
-        along = np.einsum("pck,ck->cp", moved[:, near.j] - moved[:, near.i], near.normal)
-        own = count_classes(near, size_class, classes)
-        centre = (0.5 * (place[near.i] + place[near.j]) - middle) / half_width
-        parts.append((near.gap, np.column_stack([along, -own]), centre))
-    gap, design, centre = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return _Pairs(gap, design, centre, len(position))
-
-
-def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float) -> TouchingFit:
+def _fit(pairs: _Pairs, unknowns: tuple[int, ...], diameter: float, start: TouchingFit | None = None) -> TouchingFit:
     """Fit some unknowns of the camera, and the errors of radii."""
     count = pairs.design.shape[1]
     used = [*unknowns, *range(UNKNOWNS, count)]
     found = fit_touching_pairs(
-        pairs.gap, pairs.design[:, used], np.arange(len(used)) >= len(unknowns), diameter, pairs.frames
-    )
+        pairs.gap, pairs.design[:, used], np.arange(len(used)) >= len(unknowns), diameter, pairs.frames,
+        start=None if start is None else start.value[used],
+    )  # fmt: skip
     value, sd = np.zeros(count), np.zeros(count)
     value[used], sd[used] = found.value, found.sd
     return replace(found, value=value, sd=sd)
 
 
-def _place_dependence(pairs: _Pairs, fit: TouchingFit) -> float:
-    """Compute the range of the mean touching gap over the picture [m]; 0 where it is within scatter and error."""
-    touching = fit.weight > 0.5
-    x, y = pairs.middle[touching].T
+def _place_dependence(pairs: _Pairs, fit: TouchingFit, diameter: float) -> float:
+    """Compute the range of the usual touching gap over the picture [m]; 0 where it is within scatter and error."""
+    x, y = pairs.middle.T
     ring = np.minimum((np.hypot(x, y) * RINGS).astype(int), RINGS - 1)
     part = ring * SECTORS + ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * SECTORS).astype(int) % SECTORS
-    count = np.bincount(part, minlength=SECTORS * RINGS)
-    known = count > FEWEST_PAIRS
-    if known.sum() < 2:
+    usual, error = [], []
+    for number in np.unique(part):
+        gap = fit.residual[part == number]
+        if len(gap) < FEWEST_PAIRS:
+            continue
+        local = fit_touching_pairs(gap, np.full((len(gap), 1), -1.0), np.array([False]), diameter, pairs.frames)
+        usual.append(local.value[0])
+        error.append(local.sd[0])
+    if len(usual) < 2:
         return 0.0
-    mean = np.bincount(part, fit.residual[touching], minlength=SECTORS * RINGS)[known] / count[known]
-    error = fit.scatter * np.sqrt(pairs.frames / count[known])
-    spread = float(np.ptp(mean))
-    beyond = spread > UNEXPLAINED * fit.scatter and spread > SIGNIFICANT * float(error.max())
+    spread = float(np.ptp(usual))
+    beyond = spread > UNEXPLAINED * fit.scatter and spread > SIGNIFICANT * float(max(error))
     return spread if beyond else 0.0

@@ -12,9 +12,11 @@ from ..bodies.grains import Array
 
 WIDEST = 0.15  # mean diameters: gap of a pair that may touch although it is distorted
 FIRST_QUANTILE = 0.2  # of all gaps: where touching ones are looked for first
-FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.06, 0.75, 2.0  # mean diameters; factor of a round; robust standard deviations
-ROUNDS = 15
-OVERLAPS = 3.0  # widths: larger overlaps are errors, too
+FIRST_WIDTH, SHRINK, LAST_WIDTH = 0.12, 0.75, 1.5  # mean diameters; factor of a round; robust standard deviations
+NEAR_WIDTH = 0.04  # mean diameters: where the solution is nearly known
+ROUNDS = 30
+CONVERGED = 1e-3  # scatters: change of a residual in a round
+NARROWEST = 1e-6  # mean diameters: width for gaps without any error
 MAD_TO_SD = 1.4826  # median of the absolute value to the standard deviation of a normal distribution
 
 
@@ -34,7 +36,7 @@ class TouchingFit:
 
     value: Float[Array, " u"]
     sd: Float[Array, " u"]  # standard error, as if errors were the same in all frames
-    scatter: float  # [m] robust standard deviation of the pairs that count as touching
+    scatter: float  # [m] robust standard deviation of the gaps of touching pairs
     misfit: float  # [m] of all pairs, on whose number models compare
     residual: Float[Array, " m"]  # [m]
     weight: Float[Array, " m"]
@@ -70,7 +72,7 @@ def count_classes(pairs: NearPairs, size_class: Int[np.ndarray, " n"], classes: 
 
 def fit_touching_pairs(
     gap: Float[Array, " m"], design: Float[Array, "m u"], radius_error: Bool[np.ndarray, " u"], diameter: float,
-    frames: int,
+    frames: int, *, start: Float[Array, " u"] | None = None,
 ) -> TouchingFit:  # fmt: skip
     """Fit g + D x = 0 over the pairs that touch.
 
@@ -86,26 +88,31 @@ def fit_touching_pairs(
         Mean diameter [m].
     frames : int
         From which gaps are taken; they show the same errors again.
+    start : (u,), optional
+        Values near the solution; None: unknown.
 
     Notes
     -----
-    Weighted least squares with weights (1 + (g/s)²)⁻² of positive residuals g, with s shrinking from a fraction of a
-    diameter to twice the robust standard deviation: pairs that do not touch stand apart. Overlaps have the weight
-    1/(1 + (g/3s)²).
+    Weighted least squares with weights (1 + (g/s)²)⁻² of the residuals g, with s shrinking from a fraction of a
+    diameter to 1.5 robust standard deviations, which finds the most frequent gap wherever distortion has moved it.
+    Pairs that do not touch only have positive residuals: the standard deviation is that of the negative ones. Weights
+    are the same on both sides of zero, since otherwise the open pairs that are beside the touching ones shift the fit
+    by as much as there are of them, which differs between the parts of a picture.
     """
-    value = np.where(radius_error, 0.5 * np.quantile(gap, FIRST_QUANTILE), 0.0)
-    width, scatter = FIRST_WIDTH * diameter, 0.0
+    value = np.where(radius_error, 0.5 * np.quantile(gap, FIRST_QUANTILE), 0.0) if start is None else start
+    width, scatter = (FIRST_WIDTH if start is None else NEAR_WIDTH) * diameter, 0.0
     normal, residual, weight = np.eye(len(value)), gap, np.ones(len(gap))
     for _ in range(ROUNDS):
         residual = gap + design @ value
-        apart = (1.0 + (residual / width) ** 2) ** -2
-        overlap = 1.0 / (1.0 + (residual / (OVERLAPS * width)) ** 2)
-        weight = np.where(residual > 0.0, apart, overlap)
+        weight = (1.0 + (residual / width) ** 2) ** -2
         normal = design.T @ (weight[:, None] * design)
-        value = -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
+        before, value = value, -np.linalg.lstsq(normal, design.T @ (weight * gap), rcond=None)[0]
         residual = gap + design @ value
-        scatter = MAD_TO_SD * float(np.median(np.abs(residual[weight > 0.5])))
-        width = max(SHRINK * width, LAST_WIDTH * scatter)
+        overlaps = residual[(residual < 0.0) & (residual > -WIDEST * diameter)]
+        scatter = MAD_TO_SD * float(np.median(-overlaps)) if len(overlaps) else 0.0
+        last, width = width, max(SHRINK * width, LAST_WIDTH * scatter, NARROWEST * diameter)
+        if width > SHRINK * last and float(np.abs(residual - gap - design @ before).max()) < CONVERGED * scatter:
+            break
     sd = scatter * np.sqrt(frames * np.diag(np.linalg.pinv(normal)))
     return TouchingFit(
         np.asarray(value, np.float64), sd, scatter, MAD_TO_SD * float(np.median(np.abs(residual))), residual, weight

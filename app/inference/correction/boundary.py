@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from ...solver.bodies.grains import Grains
+from ...solver.bodies.interpolation import interpolate_ignored_frames
+from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
 from ...solver.boundary.camera_distortion import find_camera_distortion
 from ...solver.boundary.size_classes import group_readings
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
+from ...solver.posterior.sequence_evidence import gather_position_evidence
 from ...tracks import Tracks, WallTracks
 from ..snapshots import make_snapshots, measure_sequence
 from .calibration import radius_classes
@@ -38,7 +42,9 @@ def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
     return replace(tracks, sigma=factor * tracks.sigma), describe_contradiction(found, factor)
 
 
-def correct_camera(tracks: Tracks, walls: WallTracks, *, soft: bool = False) -> tuple[Tracks, str]:
+def correct_camera(
+    material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]
+) -> tuple[Tracks, str]:
     """Remove the camera's distortion from a packing without walls, where gaps of touching pairs show one.
 
     Walls, where there are any, are measured with the same camera and show it better. The radii of each size of soft
@@ -52,21 +58,32 @@ def correct_camera(tracks: Tracks, walls: WallTracks, *, soft: bool = False) -> 
     """
     if walls.count or walls.cell is not None:
         return tracks, ""
+    soft = material.stiffness not in (None, "rigid")
     classes = group_readings(tracks.radius)  # whole pixels are few different radii, but no sizes
     classes = radius_classes(tracks.radius) if classes is None else classes
     position = np.where(tracks.present[..., None], tracks.position, np.nan)
     alike = np.zeros(tracks.grain_count, np.int64)
     classes = alike if classes is None else classes
-    found = find_camera_distortion(position, tracks.radius, classes)
+    found = find_camera_distortion(position, tracks.radius, classes, soft=soft)
     if found is None:
         return tracks, ""
     sentences, radius = found.describe(), tracks.radius
-    correction = found.class_correction() if soft else None
+    correction = found.class_correction(_noise_of_gaps(material, tracks, walls, failed)) if soft else None
     if correction is not None:
         radius = radius + correction[classes]
         changes = ", ".join(f"{1e6 * each:+.0f}" for each in correction)
         sentences.append(f"radii of the sizes are corrected by {changes} µm, so that grains of all sizes touch alike")
     return replace(tracks, position=found.correct(tracks.position), radius=radius), "; ".join(sentences)
+
+
+def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:
+    """Standard deviation of a position component [m] by the changes of gaps; the stated one without near grains."""
+    packing = material.pack(tracks.radius, walls.usual_pressure(material.length), boundary=tracks.boundary)
+    try:
+        seen = interpolate_ignored_frames(make_snapshots(tracks, walls), failed)
+        return gather_position_evidence(packing, seen).noise.sigma
+    except ValueError:  # no two bodies are near
+        return _stated_noise(tracks)
 
 
 def _stated_noise(tracks: Tracks) -> float:

@@ -68,8 +68,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks, remarks[5] = use_size_classes(material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
-            soft = material.stiffness not in (None, "rigid")
-            tracks, remarks[2] = correct_camera(tracks, walls, soft=soft)
+            tracks, remarks[2] = correct_camera(material, tracks, walls, failed)
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)

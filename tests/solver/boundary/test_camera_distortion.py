@@ -85,7 +85,7 @@ def test_readings_of_one_size_that_are_too_large_are_corrected() -> None:
         radius = np.where(size_class == 1, R + error, R)  # overlaps of 120 µm at a noise of 28 µm
         found = find_camera_distortion(position, radius, size_class)
         assert found is not None
-        correction = found.class_correction()
+        correction = found.class_correction(NOISE)
         assert (correction is not None) == corrected
         if correction is not None:
             assert correction[1] - correction[0] == pytest.approx(-error, abs=1e-5)
@@ -96,3 +96,47 @@ def test_few_discs_show_nothing() -> None:
     few = position[:, :9]
     assert find_camera_distortion(few, np.full(9, R), size_class[:9]) is None
     assert find_camera_distortion(np.full((2, 3, 2), np.nan), np.full(3, R), np.zeros(3, int)) is None
+
+
+def test_a_lens_of_high_order_and_its_own_middle_is_found_without_changing_the_scale() -> None:
+    position, size_class = lattice(4)
+    offset = (position - 0.5 * SIDE) / (0.5 * SIDE) - [0.1, -0.05]  # the lens' axis is not the picture's middle
+    square = np.sum(offset**2, axis=-1, keepdims=True)
+    seen = position + 0.5 * SIDE * (0.02 * square - 0.0015 * square**3) * offset
+    found = find_camera_distortion(seen, np.full(position.shape[1], R), size_class)
+    assert found is not None
+    assert found.applied
+    assert found.value[8:].any()  # the lens' middle
+    corrected = found.correct(seen)
+    before, after, true = gap_range(seen), gap_range(corrected), gap_range(position)
+    assert after - true < 0.15 * (before - true)
+    rows = corrected[0].reshape(COUNT, COUNT, 2)
+    length = np.linalg.norm(np.diff(rows, axis=1), axis=-1).mean()
+    given = np.linalg.norm(np.diff(seen[0].reshape(COUNT, COUNT, 2), axis=1), axis=-1).mean()
+    assert length == pytest.approx(given, rel=5e-3)
+
+
+def test_radii_that_leave_touching_surfaces_apart_are_corrected_to_the_usual_overlap() -> None:
+    position, size_class = lattice(5)
+    radius = np.full(position.shape[1], 0.99 * R)  # gaps of 100 µm
+    found = find_camera_distortion(position, radius, size_class)
+    assert found is not None
+    correction = found.class_correction(NOISE)
+    assert correction is not None
+    overlap = found.touching_scatter - 1.6 * NOISE
+    assert correction == pytest.approx(0.01 * R + 0.5 * max(overlap, 0.0), abs=4e-6)
+    exact = find_camera_distortion(position, np.full(position.shape[1], R + NOISE), size_class)
+    assert exact is not None
+    assert exact.class_correction(NOISE) is None  # overlaps as forces make them
+
+
+def test_a_tilt_of_the_camera_matters_where_overlaps_are_forces() -> None:
+    position, size_class = lattice(6)
+    offset = (position - 0.5 * SIDE) / (0.5 * SIDE)
+    seen = position + 0.5 * SIDE * 0.001 * offset[..., :1] * offset
+    radius = np.full(position.shape[1], R)
+    hard, soft = (find_camera_distortion(seen, radius, size_class, soft=soft) for soft in (False, True))
+    assert hard is not None
+    assert not hard.applied
+    assert soft is not None
+    assert soft.value[6:8] == pytest.approx([-0.001, 0.0], abs=3e-4)
