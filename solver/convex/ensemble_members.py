@@ -70,7 +70,9 @@ def advance_convex_member(
         Forces of the frame, and the memory for the next frame.
     """
     previous = memory.recall(contacts)
-    forces = solve_convex_member(balance, slip.value, probability, previous[:, 0], previous[:, 1], settings)
+    forces = solve_convex_member(
+        balance, slip.value, probability, previous[:, 0], previous[:, 1], settings, 1.0 - slip.weight
+    )
     return forces, memory.renew(contacts, np.column_stack([forces.fn, forces.ft]), frame.present)
 
 

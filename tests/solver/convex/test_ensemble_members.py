@@ -92,7 +92,8 @@ def test_a_member_uses_its_own_previous_forces():
         interval = (frames[k - 1], frames[k])
         slip = read_slip(contacts, grains, walls, interval)
         forces, memory = advance_convex_member(balance, contacts, frames[k], slip, sure, memory)
-        again = solve_convex_member(balance, slip.value, sure, previous[:, 0], previous[:, 1])
+        noise = 1.0 - slip.weight
+        again = solve_convex_member(balance, slip.value, sure, previous[:, 0], previous[:, 1], noise=noise)
         np.testing.assert_allclose(forces.fn, again.fn, atol=SAME)
         np.testing.assert_allclose(memory.recall(contacts)[:, 1], forces.ft, atol=SAME)
     assert forces.converged

@@ -278,3 +278,20 @@ def test_moments_that_no_contact_exerts_relax_torque_equations():
     again = weigh_rows(strict, weight, n)
     assert again.matrix.toarray() == pytest.approx(relaxed.matrix.toarray())
     assert again.grains.jacobian == pytest.approx(relaxed.grains.jacobian)
+
+
+def test_noise_takes_its_share_off_the_power_that_forces_could_dissipate():
+    grains, _, walls, contacts = lattice()
+    balance = balance_of(grains, walls, contacts)
+    rng = np.random.default_rng(4)
+    slip, none = rng.normal(size=contacts.count), np.zeros(contacts.count)
+    touch, settings = np.ones(contacts.count), ConvexSettings()
+
+    def gap(forces: ConvexForces, share: float) -> float:
+        return float(np.sum((1.0 - share) * balance.friction * forces.fn * np.abs(slip) + forces.ft * slip))
+
+    clear = solve_convex_member(balance, slip, touch, none, none)
+    noisy = solve_convex_member(balance, slip, touch, none, none, noise=1.0)
+    assert noisy.fn.sum() > clear.fn.sum()
+    assert gap(noisy, settings.noise_share) < gap(clear, settings.noise_share)
+    assert gap(clear, 0.0) < gap(noisy, 0.0)
