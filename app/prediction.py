@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .tracking.picture_quality import PictureQuality
 
 GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
+CORRECTED = ("outlier_tracks", "missing_poses", "photograph_repeated")  # named causes that a run corrects itself
 DOUBTFUL = 0.97  # expected r(f_n) below which rival inputs are compared
 NO_EXPECTATION = (math.nan, math.nan, math.nan)
 NOT_PREDICTED = (
@@ -46,7 +47,9 @@ class Prediction:
     @property
     def expected(self) -> tuple[float, float, float]:
         """Expected r(f_n), and an interval with a coverage of two thirds; NaN where there is no trial."""
-        return NO_EXPECTATION if self.trial is None else self.trial.expected
+        if self.trial is None:
+            return NO_EXPECTATION
+        return self.trial.expect(contradicted=any(each.cause not in CORRECTED for each in self.diagnosis))
 
     @property
     def good(self) -> bool:

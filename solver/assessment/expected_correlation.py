@@ -38,6 +38,8 @@ MEASURES: dict[str, Callable[[Evidence], float]] = {
     "disagreement_of_positions": lambda e: 1.0 - e.position_agreement,
 }
 MOSTLY_OVERLAPS = 0.5  # weight of the position-only estimate of soft grains above which only its evidence counts
+CONTRADICTED: float = FITTED["expected_correlation"]["contradicted"]  # change of a prediction where a cause is named
+BEST_EIGHTH = 1  # knot of a table: quantiles of the frames of the fit, an eighth apart
 LEAST = 1e-4  # of a measure: its logarithm is taken
 LEAST_SIGNAL = 1e-2  # of sliding over its noise, below which no sliding is seen
 
@@ -71,19 +73,22 @@ def bound_correlation(evidence: Evidence) -> float:
 
     Notes
     -----
-    T = tanh(g − max(a + b g + Σ c_j ln(x_j/x_j0), 0)) with g the argument of `expect_correlation` and measures x_j: a
-    quantile of the errors of g, fitted on kinds of input left out (fitted.toml).
+    T = tanh(g − max(a + b g, 0)) with g the argument of `expect_correlation`: a quantile of the errors of g, fitted on
+    kinds of input left out (fitted.toml). A margin that depended on measures as well fitted better the kinds that it
+    had read, and worse the others.
     """
     return _bound(correlation_score(evidence), evidence)
 
 
-def predict_correlation(evidence: Sequence[Evidence]) -> tuple[float, float, float]:
+def predict_correlation(evidence: Sequence[Evidence], *, contradicted: bool = False) -> tuple[float, float, float]:
     """Predict r(f_n) of a whole test from its first photographs.
 
     Parameters
     ----------
     evidence : sequence of Evidence
         Of the first photographs.
+    contradicted : bool
+        Whether a cause of wrong forces was named, which the evidence shows only in part.
 
     Returns
     -------
@@ -100,6 +105,7 @@ def predict_correlation(evidence: Sequence[Evidence]) -> tuple[float, float, flo
         known = [_logarithm(each, x) for x in map(MEASURES[name], evidence) if not math.isnan(x)]
         if known:
             score += float(np.interp(np.mean(known), np.log(each["at"]), each["value"]))
+    score += CONTRADICTED if contradicted else 0.0
     score, sd = max(score, float(table["least"])), float(table["sd"])
     r, low, high = (max(math.tanh(each), 0.0) for each in (score, score - sd, score + sd))
     return r, low, high
@@ -111,19 +117,18 @@ def rests_on_overlaps(evidence: Evidence) -> bool:
 
 
 def losses(evidence: Evidence) -> dict[str, float]:
-    """By how much the bound would rise if one measure were at its best, for each known measure."""
+    """By how much the bound would rise if one measure were as in the best eighth of the fit, for each known measure."""
     table, score = _table(evidence), correlation_score(evidence)
-    best = {name: float(each["value"][0]) - _term(each, MEASURES[name](evidence)) for name, each in _terms(table)}
+    best = {
+        name: max(float(each["value"][BEST_EIGHTH]) - _term(each, MEASURES[name](evidence)), 0.0)
+        for name, each in _terms(table)
+    }
     return {name: _bound(score + rise, evidence) - _bound(score, evidence) for name, rise in best.items()}
 
 
 def _bound(score: float, evidence: Evidence) -> float:
-    table = _table(evidence)
-    bound = table["bound"]
+    bound = _table(evidence)["bound"]
     margin = float(bound["constant"]) + float(bound["score"]) * score
-    for name, slope in bound.items():
-        if name in MEASURES and not math.isnan(measure := MEASURES[name](evidence)):
-            margin += slope[0] * (_logarithm(table[name], measure) - math.log(slope[1]))
     return max(math.tanh(score - max(margin, 0.0)), 0.0)
 
 

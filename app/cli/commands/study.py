@@ -286,17 +286,17 @@ def _study_trust(request: _StudyRequest, *, jobs: int, fit: tuple[int, ...]) -> 
             read_scores = score_scenarios(request.plan, read, fit, jobs=jobs, progress=progress)
             known = TrustSample.of(read_scores)
             for title, names in trust_study.FITS.items():
-                fits[title] = trust_study.fit_expected(
-                    trust_study.rows_of(known, title), names, trust_study.BOUNDED_BY[title]
-                )
+                fits[title] = trust_study.fit_expected(trust_study.rows_of(known, title), names)
                 print_line(console, fits[title].describe(title))
             tests = TrustSample.of_tests([each for each in read_scores if not each.refused], PREDICTED_PHOTOGRAPHS)
             print_line(console, trust_study.describe_prediction(tests))
+            print_line(console, trust_study.describe_scale_fit(read_scores))
         scores = score_scenarios(request.plan, scenarios, request.seeds, jobs=jobs, progress=progress)
     sample = trust_study.refit(TrustSample.of(scores), fits)
     new = np.isin(sample.kind, list(trust_study.LEFT_OUT))
     trust_study.print_trust(console, "Kinds that the fit has read", sample.select(~new))
     trust_study.print_trust(console, "Kinds left out of the fit", sample.select(new))
+    trust_study.print_scale(console, scores)
     return 0
 
 

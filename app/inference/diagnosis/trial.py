@@ -36,11 +36,15 @@ class Trial:
     @property
     def expected(self) -> tuple[float, float, float]:
         """Predicted r(f_n) of the whole test, and an interval with a coverage of two thirds."""
+        return self.expect(contradicted=False)
+
+    def expect(self, *, contradicted: bool) -> tuple[float, float, float]:
+        """The same where a cause of wrong forces was named, or not."""
         found = [each for each in self.evidence if not math.isnan(each.disagreement)]
         if not found:
             return math.nan, math.nan, math.nan
         kept = float(np.mean([_kept(each) for each in found]))
-        r, low, high = (kept * each for each in predict_correlation(found))
+        r, low, high = (kept * each for each in predict_correlation(found, contradicted=contradicted))
         return r, low, high
 
     @property

@@ -28,6 +28,7 @@ from ...results.results import Results
 from ...results.truth import names_of_given, read_truth, true_ids
 from ...solver.assessment.evidence import Evidence
 from ...solver.assessment.expected_correlation import MEASURES, rests_on_overlaps
+from ...solver.assessment.intervals.scale_sd import scale_terms
 from ...solver.bodies.grains import Array
 from ...solver.contacts.pairs import Keys, match_values
 from ...solver.frame_forces import FrameForces, FrameStatus
@@ -56,6 +57,8 @@ class ScenarioScore:
     trust: tuple[float | None, ...] = ()  # (f,)
     expected: tuple[float | None, ...] = ()  # (f,) expected correlation
     measures: tuple[tuple[float | None, ...], ...] = ()  # (f, m) of the evidence, see `expected_correlation.MEASURES`
+    scales: tuple[float | None, ...] = ()  # (f,) Σ f_n / Σ f_n,true; empty without a scale of forces
+    scale_terms: tuple[tuple[float | None, ...], ...] = ()  # (f, t) of its standard deviation, see `scale_sd.TERMS`
     status: tuple[str, ...] = ()  # (f,)
     overlaps: tuple[bool, ...] = ()  # (f,) whether the forces follow from the overlaps of soft grains
     coverage: tuple[float | None, float | None] = (None, None)  # of f_n by one and by two standard deviations
@@ -116,6 +119,7 @@ def score_scenario(
         true = true_forces(experiment, solution.sequence)
     return replace(
         _compare(scenario, seed, solution.sequence, frames, true, cpu),
+        scale_terms=tuple(tuple(_plain(term) for term in scale_terms(each)) for each in solution.evidence),
         overlaps=tuple(rests_on_overlaps(each) for each in solution.evidence),
         measures=tuple(tuple(_plain(measure(each)) for measure in MEASURES.values()) for each in solution.evidence),
     )
@@ -199,6 +203,7 @@ def _compare(
         scenario, seed, "",
         r=tuple(_plain(each.r_fn) for each in agreement),
         scale=_mean([_plain(each.scale) for each in agreement[SETTLED:]]) if sized else None,
+        scales=tuple(_plain(each.scale) for each in agreement) if sized else (),
         trust=tuple(_plain(frame.trust) for frame in frames),
         expected=tuple(_plain(frame.expected_correlation) for frame in frames),
         status=tuple(FrameStatus(frame.status).name.lower() for frame in frames),

@@ -17,6 +17,7 @@ from .observed_data import ObservedData
 OUTLIERS, OUTLIER_SIZE = 0.02, (3e-4, 2e-3)  # of all poses; [m]
 MISSING = 0.1  # of all poses
 WRONG_CLASS = 0.1  # of the rods
+MISSTATED = 0.2  # of the rods whose radii are stated too large by CLASS_ERROR
 CLASS_ERROR = 0.02  # of one class of radii
 INSIDE = 2e-3  # [m], by which a side is stated inside the packing
 JUMP = 1e-3  # [m] of one rod in one photograph
@@ -98,6 +99,13 @@ def misstate_class(observed: ObservedData, rng: np.random.Generator) -> Observed
     """State the radius of the middle class too large."""
     radius, middle = observed.radius.copy(), np.median(observed.radius)
     radius[np.isclose(radius, middle)] *= 1.0 + CLASS_ERROR
+    return replace(observed, radius=radius)
+
+
+def misstate_some(observed: ObservedData, rng: np.random.Generator) -> ObservedData:
+    """State the radii of some rods of all sizes too large."""
+    radius = observed.radius.copy()
+    radius[rng.permutation(len(radius))[: round(MISSTATED * len(radius))]] *= 1.0 + CLASS_ERROR
     return replace(observed, radius=radius)
 
 

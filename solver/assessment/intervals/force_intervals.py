@@ -164,6 +164,7 @@ def calibrate_sd(frame: FrameForces) -> FrameForces:
     formula = np.column_stack([frame.fn_sd, frame.ft_sd]) / mean
     size = np.sqrt(formula**2 + FLOOR**2 + _errors_with_force(frame, mean) ** 2) / TYPICAL
     sd = mean * TYPICAL * interval_factors(frame) * size ** (1.0 + POWER[source_of_frame(frame)])
+    sd = np.hypot(sd, _scale_errors(frame))
     sd[formula == 0] = 0.0
     return replace(frame, fn_sd=sd[:, 0], ft_sd=sd[:, 1])
 
@@ -175,9 +176,17 @@ def _errors_with_force(frame: FrameForces, mean: float) -> Array:
     return np.sqrt(unloaded + scale**2)[:, None] * np.abs(np.column_stack([frame.fn, frame.ft])) / mean
 
 
+def _scale_errors(frame: FrameForces) -> Array:
+    """Standard deviations (c, 2) [N] by the scale that all forces share; those of soft grains were fitted with it."""
+    relative = 0.0 if frame.soft or math.isnan(frame.scale_sd) else frame.scale_sd
+    return relative * np.abs(np.column_stack([frame.fn, frame.ft]))
+
+
 def formula_sd_of(frame: FrameForces) -> Array:
     """Invert `calibrate_sd`: its argument over the mean f_n, floor and proportional errors included (c, 2)."""
-    sd = np.column_stack([frame.fn_sd, frame.ft_sd]) / (mean_normal_force(frame.fn) * TYPICAL)
+    stated = np.column_stack([frame.fn_sd, frame.ft_sd])
+    alone = np.sqrt(np.maximum(stated**2 - _scale_errors(frame) ** 2, 0.0))
+    sd = alone / (mean_normal_force(frame.fn) * TYPICAL)
     return TYPICAL * (sd / interval_factors(frame)) ** (1.0 / (1.0 + POWER[source_of_frame(frame)]))
 
 

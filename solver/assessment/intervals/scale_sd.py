@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from ..evidence import Evidence
 from ..expected_correlation import correlation_score
 from ..fitted import FITTED
 
 TABLE = FITTED["scale_sd"]
+LEAST: float = TABLE["least"]
+# Evidence that the scale is uncertain, by the name of its factor in fitted.toml; NaN: not known.
+TERMS: dict[str, Callable[[Evidence], float]] = {
+    "per_load": lambda e: abs(math.log(e.load_fraction)) if e.load_fraction > 0.0 else 0.0,
+    "per_correction": lambda e: e.correction,
+    "per_power_gap": lambda e: e.power_gap,
+    "per_error": lambda e: math.exp(-2.0 * correlation_score(e)),
+    "per_inertia": lambda e: e.inertial_number,
+}
 
 
 def scale_sd(evidence: Evidence) -> float:
@@ -26,22 +36,17 @@ def scale_sd(evidence: Evidence) -> float:
 
     Notes
     -----
-    σ² = a² + (b ln q)² + (c ε)² + (d p)² + (e (1 − r)/(1 + r))²: q the mean stress of the field over that of the loads,
-    ε the correction of the measured motion, p the power gap and r the expected correlation. Wrong input makes part of
-    the load vanish, so that q is far from 1; an anisotropic stress does so, too, and widens σ without need. Fitted on
-    simulated packings (fitted.toml).
+    σ² = a² + (b ln q)² + (c ε)² + (d p)² + (e (1 − r)/(1 + r))² + (f I)²: q the mean stress of the field over that of
+    the loads, ε the correction of the measured motion, p the power gap, r the expected correlation and I the inertial
+    number. Wrong input makes part of the load vanish, so that q is far from 1; an anisotropic stress does so, too, and
+    widens σ without need. Fitted on simulated packings (fitted.toml).
     """
+    terms = scale_terms(evidence)
+    return math.hypot(LEAST, *(TABLE[name] * each for name, each in zip(TERMS, terms, strict=True)))
+
+
+def scale_terms(evidence: Evidence) -> list[float]:
+    """The TERMS of a frame (t,), 0 where one is not known; NaN where the frame is not assessed."""
     if not evidence.assessed or math.isnan(evidence.disagreement):
-        return math.nan
-    quotient = evidence.load_fraction
-    return math.hypot(
-        TABLE["least"],
-        TABLE["per_load"] * (math.log(quotient) if quotient > 0.0 else 0.0),
-        TABLE["per_correction"] * _known(evidence.correction),
-        TABLE["per_power_gap"] * _known(evidence.power_gap),
-        TABLE["per_error"] * math.exp(-2.0 * correlation_score(evidence)),
-    )
-
-
-def _known(value: float) -> float:
-    return 0.0 if math.isnan(value) else value
+        return [math.nan] * len(TERMS)
+    return [0.0 if math.isnan(each := term(evidence)) else each for term in TERMS.values()]

@@ -18,7 +18,9 @@ from rodsight.synthetic.scenarios.scenario_table import SCENARIOS
 from ..inference.test_data_quality import GOOD
 
 SOUND = Evidence(False, 0.05, 0.1, 0.01, 0.01, 1.0, 1e-3, 4e-3, 5, agreement=0.96, overlap_agreement=0.9)
-WRONG = replace(SOUND, correction=2.0, old_unbalance=0.15, agreement=0.1, overlap_agreement=0.1)
+WRONG = replace(
+    SOUND, correction=2.0, old_unbalance=0.15, disagreement=0.5, agreement=0.1, overlap_agreement=0.1, unbalance=0.3
+)
 
 
 def predicted(evidence: Evidence | None) -> Prediction:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from rodsight.solver.assessment.expected_correlation import (
+    CONTRADICTED,
     MEASURES,
     bound_correlation,
     expect_correlation,
@@ -56,9 +57,6 @@ def test_every_table_is_monotone_and_the_score_is_their_sum():
     assert expect_correlation(alone) == pytest.approx(math.tanh(score))
     bound = table["bound"]
     margin = bound["constant"] + bound["score"] * score
-    for name, value in (("correction", correction["at"][3]), ("disagreement_of_members", members["at"][2])):
-        slope, typical = bound[name]
-        margin += slope * math.log(value / typical)
     assert bound_correlation(alone) == pytest.approx(max(math.tanh(score - margin), 0.0))
 
 
@@ -68,6 +66,9 @@ def test_a_prediction_reads_the_mean_evidence_and_knows_its_interval():
     assert good[0] > mixed[0] > worse[0]
     assert predict_correlation([BOTH, BOTH]) == pytest.approx(good)
     sd = FITTED["expected_correlation"]["prediction"]["sd"]
+    contradicted = predict_correlation([BOTH], contradicted=True)
+    assert math.atanh(good[0]) - math.atanh(contradicted[0]) == pytest.approx(-CONTRADICTED)
+    assert CONTRADICTED < 0.0
     for r, low, high in (good, mixed):
         assert math.atanh(r) - math.atanh(low) == pytest.approx(sd)
         assert math.atanh(high) - math.atanh(r) == pytest.approx(sd)

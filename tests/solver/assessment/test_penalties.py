@@ -44,7 +44,6 @@ def test_without_further_penalties_the_assessment_is_that_of_the_evidence():
 @pytest.mark.parametrize(
     ("evidence", "word"),
     [
-        (replace(ASSESSED, agreement=0.4), "agree by 0.40"),
         (replace(ASSESSED, agreement=0.3, overlap_agreement=0.2), "by more than 0.30"),
         (replace(ASSESSED, correction=0.8), "ε = 0.8"),
         (replace(ASSESSED, disagreement=0.6), "disagree by 60 %"),

@@ -14,11 +14,11 @@ CARRIED = replace(ASSESSED, load_fraction=1.0)
 
 @pytest.mark.parametrize(("load_fraction", "mismatch"), [(1.0, 0.0), (0.5, math.log(2.0)), (math.nan, 0.0)])
 def test_the_terms_add_in_squares(load_fraction, mismatch):
-    evidence = replace(ASSESSED, correction=0.3, power_gap=0.5, load_fraction=load_fraction)
+    evidence = replace(ASSESSED, correction=0.3, power_gap=0.5, inertial_number=0.01, load_fraction=load_fraction)
     r = expect_correlation(evidence)
     expected = math.hypot(
         TABLE["least"], TABLE["per_load"] * mismatch, 0.3 * TABLE["per_correction"], 0.5 * TABLE["per_power_gap"],
-        TABLE["per_error"] * (1.0 - r) / (1.0 + r),
+        TABLE["per_error"] * (1.0 - r) / (1.0 + r), 0.01 * TABLE["per_inertia"],
     )  # fmt: skip
     assert scale_sd(evidence) == pytest.approx(expected)
 
@@ -28,7 +28,9 @@ def test_a_field_that_does_not_carry_the_load_has_an_uncertain_scale():
     assert half == twice > 1.1 * carried
 
 
-@pytest.mark.parametrize("worse", [{"correction": 1.0}, {"power_gap": 0.8}, {"disagreement": 0.9}])
+@pytest.mark.parametrize(
+    "worse", [{"correction": 1.0}, {"power_gap": 0.8}, {"disagreement": 0.9}, {"inertial_number": 0.02}]
+)
 def test_what_contradicts_the_forces_makes_their_scale_uncertain(worse):
     assert scale_sd(replace(CARRIED, **worse)) > scale_sd(replace(CARRIED, correction=0.05, power_gap=0.02))
 
