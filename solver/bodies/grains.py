@@ -26,7 +26,8 @@ class Grains:
         Quantity("whether the grain is the packing's boundary: its motion is imposed", dims="grain", since=2),
     ] = None  # None: no grain
     drag: Float[Array, "n 2"] | None = None  # [N] of a base in the frame at hand; None: no base
-    # [N m] standard deviation of a moment that is exerted by no force at a contact, as by a base; None: 0
+    # [N m] moment that no force at a contact exerts, as one of a base, and its standard deviation; None: 0
+    moment: Float[Array, " n"] | None = None
     moment_sd: Float[Array, " n"] | None = None
 
     def __post_init__(self) -> None:

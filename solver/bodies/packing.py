@@ -14,6 +14,7 @@ from .motion import Snapshot
 from .wall_shapes import Sides
 from .walls import Walls
 
+EXACT = 1e-12  # [m] floor of a displacement
 BASE_ARM = 2.0 / 3.0  # of a radius: greatest moment of a base over its friction, for a uniform pressure
 
 
@@ -56,8 +57,8 @@ class Packing:
         -----
         F = −μ m g u / √(|u|² + 4 σ²), u the displacement since the frame before (of the first frame, until the next
         one) and σ the standard deviation of a position: what hardly moves has no direction of sliding. The base also
-        resists the turning of a grain, by at most ⅔ μ m g R, less where the grain slides fast: this moment is unknown,
-        with that standard deviation.
+        resists the turning θ of a grain, by ⅔ μ m g R or less, the faster it slides: half of it is assumed, opposed to
+        R θ as F is to u, and as much again is its standard deviation.
         """
         if self.material.base_drag == 0.0 or len(snapshots) < 2:
             return self
@@ -66,8 +67,10 @@ class Packing:
         size = np.sqrt((moved**2).sum(axis=1) + 4.0 * snapshots[k].sigma ** 2)
         limit = self.material.base_drag * self.grains.mass
         drag = -limit[:, None] * moved / np.where(size > 0.0, size, 1.0)[:, None]
-        moment = BASE_ARM * limit * self.grains.radius
-        return replace(self, grains=replace(self.grains, drag=drag, moment_sd=moment))
+        rolled = self.grains.radius * np.nan_to_num(after.rotation - before.rotation)
+        moment_sd = 0.5 * BASE_ARM * limit * self.grains.radius
+        moment = -moment_sd * rolled / np.maximum(np.hypot(rolled, 2.0 * snapshots[k].sigma), EXACT)
+        return replace(self, grains=replace(self.grains, drag=drag, moment=moment, moment_sd=moment_sd))
 
     @property
     def weight(self) -> Array:

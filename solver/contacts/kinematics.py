@@ -69,12 +69,13 @@ def equilibrium_matrix(contacts: Contacts, radius: Array, walls: Walls) -> csr_m
     return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)
 
 
-def external_load(weight: Array, walls: Walls) -> Array:
-    """Return b (3n + p,) of the equilibrium H f = b: minus the weights, zero torques, the loads of the plates.
+def external_load(weight: Array, walls: Walls, moment: Array | None = None) -> Array:
+    """Return b (3n + p,) of the equilibrium H f = b: minus the weights and moments, the loads of the plates.
 
-    weight (n, 2) [N].
+    weight (n, 2) [N]; moment (n,) [N m], None: zero.
     """
-    return np.concatenate([-weight[:, 0], -weight[:, 1], np.zeros(len(weight)), walls.load[walls.loaded]])
+    torque = np.zeros(len(weight)) if moment is None else -moment
+    return np.concatenate([-weight[:, 0], -weight[:, 1], torque, walls.load[walls.loaded]])
 
 
 def relative_motion(

@@ -116,7 +116,7 @@ def assemble_balance(
     if not walls.loaded.any() and wall_normal_total is None and not any(gravity):
         raise ValueError("no wall carries a load: wall_normal_total must fix the scale of the forces")
     matrix = equilibrium_matrix(contacts, grains.radius, walls)
-    load = external_load(grains.weight(gravity), walls)
+    load = external_load(grains.weight(gravity), walls, grains.moment)
     weight = np.full(len(load), 1.0 / force_unit)
     lever = grains.radius[present].mean() if present.any() else 1.0
     weight[2 * n : 3 * n] /= lever

@@ -203,7 +203,7 @@ def _resisted_frame(
         packing.grains, [snapshots[f] for f in window], k - window.start, settings
     )
     walls = packing.walls_of(snapshot)
-    free = replace(packing, grains=replace(packing.grains, drag=None, moment_sd=None))
+    free = replace(packing, grains=replace(packing.grains, drag=None, moment=None, moment_sd=None))
     balance = assemble_balance(
         contacts, free.grains, walls, present=snapshot.present,
         friction=packing.material.friction_at(contacts.with_wall), force_unit=force_unit,

@@ -129,6 +129,8 @@ def assemble(
     body = np.zeros((n, 4))
     body[:, :2] = motion.velocity + weight * compliance[:, None]
     body[:, 2] = motion.spin * grains.radius
+    if grains.moment is not None:  # of half the inertia of the mass at the rim
+        body[moved, 2] += 2.0 * (compliance * grains.moment / grains.radius)[moved]
     body[:, 3] = compliance
     body[~motion.present] = 0.0
 
