@@ -36,11 +36,11 @@ CAUSES: dict[str, Cause] = {
     ),
     "wall_friction": Cause(
         "tangential forces at the walls are limited wrongly",
-        'set material.wall_friction to the value found, or leave it out and set material.friction to "measured"',
+        "a run uses the value found, unless calibration.resistance is false: set material.wall_friction to it",
     ),
     "base_friction": Cause(
-        "the base carries part of the load, and the forces are too small",
-        'set material.base_friction to "measured", or to the coefficient found',
+        "the base carries part of the load: as stated, forces are too small",
+        "a run uses the coefficient found, unless calibration.resistance is false: set material.base_friction to it",
     ),
     "adhesion": Cause(
         "contacts also pull, and this model lets them only push",
