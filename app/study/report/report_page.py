@@ -26,8 +26,10 @@ _PAGE = Environment(autoescape=True).from_string("""<!doctype html>
 <style>
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 64rem; padding: 0 1rem;
   color: #222; background: #fff }
-img { max-width: 100%; margin: .3rem 0 }
-td, th { padding: .1rem .9rem .1rem 0; text-align: right } td:first-child, th:first-child { text-align: left }
+img { width: 100%; margin: .3rem 0 } img.square { max-width: 40rem }
+table { border-collapse: collapse; font-size: .9em } tbody tr:nth-child(odd) { background: #f4f4f4 }
+td, th { padding: .1rem .7rem; text-align: right; white-space: nowrap }
+td:first-child, th:first-child { text-align: left }
 .broken { color: #a00 } code { overflow-wrap: anywhere }
 </style></head><body>
 <h1>Calibration report</h1>
@@ -51,7 +53,7 @@ line. {{ "%.1f"|format(100 * facts.too_trusting) }} % do.</p>
 {% if confused %}<h2>Prediction and diagnosis</h2>
 <p>What <code>rodsight check</code> expects from the first photographs, with its interval, over what the whole test
 reached.</p>
-<img src="{{ predicted }}" alt="Predicted over reached correlation, with intervals">
+<img class="square" src="{{ predicted }}" alt="Predicted over reached correlation, with intervals">
 <table><thead><tr><th>scenario</th><th>group</th><th>cause</th><th>named (tests)</th></tr></thead><tbody>
 {% for row in confused %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>{% endfor %}</tbody></table>
 {% endif %}
@@ -128,7 +130,7 @@ def draw_trust(study: CalibrationStudy) -> Figure:
 
 def draw_predictions(study: CalibrationStudy) -> Figure:
     """Draw the expected correlation of `check` with its interval over the correlation that was reached."""
-    figure = new_figure("double", 0.55)
+    figure = new_figure("single", 1.0)
     axes: Axes = figure.add_subplot()
     known = [each for each in study.outcomes if each.score.r_late is not None and np.isfinite(each.expected[0])]
     for number, group in enumerate(("correct", "missing physics", "wrong input")):
@@ -139,10 +141,14 @@ def draw_predictions(study: CalibrationStudy) -> Figure:
         expected, low, high = np.array([each.expected for each in some]).T
         axes.errorbar(
             r, expected, yerr=[expected - low, high - expected], fmt=MARKS[number], color=COLOURS[number],
-            mfc="none", linewidth=0.8, label=group,
+            mfc="none", linewidth=0.8, capsize=1.5, markersize=4.0, label=group,
         )  # fmt: skip
-    axes.axline((0.9, 0.9), slope=1.0, color=VERMILION, linewidth=1.2)
-    axes.set(xlabel="correlation that was reached", ylabel="predicted by check", ylim=(None, 1.0))
+    lowest = min([0.9, *(float(low) for each in known for low in (each.expected[1], each.score.r_late or 0.0))]) - 0.01
+    axes.plot([lowest, 1.0], [lowest, 1.0], color=VERMILION, linewidth=1.2)
+    axes.set(
+        xlabel="correlation that was reached", ylabel="predicted by check", xlim=(lowest, 1.0), ylim=(lowest, 1.0),
+        aspect="equal",
+    )  # fmt: skip
     axes.legend(loc="lower right")
     return figure
 
