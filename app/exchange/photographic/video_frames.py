@@ -19,6 +19,18 @@ def is_video(name: str) -> bool:
     return Path(name).suffix.lower() in SUFFIXES
 
 
+def duration(video: Path) -> float:
+    """Return how long a video plays [s], as its header states; NaN where it cannot be read."""
+    import cv2
+
+    stream = cv2.VideoCapture(str(video))
+    try:
+        count, rate = (float(stream.get(each)) for each in (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FPS))
+    finally:
+        stream.release()
+    return count / rate if count > 0.0 and np.isfinite(rate) and rate > 0.0 else np.nan
+
+
 def extract_frames(
     video: Path, folder: Path, frames: FrameRange = ALL_FRAMES, interval: float | None = None
 ) -> tuple[int, float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...exchange.photographic.opencv_calibration import read_calibration
 from ...exchange.photographic.rod_readings import read_rods
-from ...exchange.photographic.video_frames import extract_frames, is_video
+from ...exchange.photographic.video_frames import duration, extract_frames, is_video
 from ...experiment.experiment import GrainGuess
 from ...experiment.photographs import Photographs
 from ...experiment.pictures.image import FULL_SCALE, Channel, Image, ImageSelection
@@ -166,9 +166,17 @@ def _without_video(folder: Path, flags: SetupFlags, on_failure: ExitStack) -> tu
         return flags, []
     video = folder / flags.photographs
     frames = folder / f"{video.stem}_frames"
-    count, interval = extract_frames(video, frames, flags.frames, flags.interval)
+    # A video that plays for less than the time between two photographs was made of them: each frame is one.
+    lapse = flags.interval is not None and duration(video) < flags.interval
+    count, interval = extract_frames(video, frames, flags.frames, None if lapse else flags.interval)
     on_failure.callback(shutil.rmtree, frames)
     sentence = f"{count} frames of {video.name}, {interval:.4g} s apart, are photographs in {frames.name}."
+    if lapse and flags.interval is not None:
+        played, interval = count * interval, flags.interval
+        sentence = (
+            f"{video.name} plays for {played:.4g} s, less than --interval {interval:g}: each of its {count} frames is a "
+            f"photograph in {frames.name}, {interval:g} s apart."
+        )
     return replace(flags, photographs=f"{frames.name}/*.png", interval=interval), [sentence]
 
 

@@ -153,6 +153,17 @@ def test_a_video_and_the_rods_of_another_program_make_an_experiment(tmp_path):
     assert len(read_grain_guess(made).id) == labels.max()
 
 
+def test_each_frame_of_a_time_lapse_is_a_photograph(tmp_path, capsys):
+    labelled_discs(tmp_path)
+    flags = ("--pixel-size", 1e-4, "--walls", "none", "--grains", tmp_path / "labels.png")
+    assert rodsight("init", tmp_path, "--photographs", "test.avi", "--interval", 52.0, *flags) == 0
+    made = load_experiment(tmp_path)
+    assert len(made.photographs()) == 3
+    assert made.config.photographs.interval == 52.0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "test.avi plays for 1.5 s, less than --interval 52: each of its 3 frames" in printed
+
+
 def test_a_failure_leaves_no_frames_of_a_video(tmp_path, capsys):
     labelled_discs(tmp_path)
     before = sorted(tmp_path.iterdir())
