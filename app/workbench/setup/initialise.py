@@ -174,8 +174,8 @@ def _without_video(folder: Path, flags: SetupFlags, on_failure: ExitStack) -> tu
     if lapse and flags.interval is not None:
         played, interval = count * interval, flags.interval
         sentence = (
-            f"{video.name} plays for {played:.4g} s, less than --interval {interval:g}: each of its {count} frames is a "
-            f"photograph in {frames.name}, {interval:g} s apart."
+            f"{video.name} plays for {played:.4g} s, less than --interval {interval:g}: each of its {count} frames is "
+            f"a photograph in {frames.name}, {interval:g} s apart."
         )
     return replace(flags, photographs=f"{frames.name}/*.png", interval=interval), [sentence]
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rodsight.experiment.pictures.picture_file import read_photograph
+from rodsight.experiment.reading.tables import read_table
 from rodsight.tracking.detection.detect import Detection
 from rodsight.tracking.outline.missing_discs import add_missing_discs
 
 from tests.app.tracking.outline.discs import KINDS, lay_row_by_row, photograph_discs
 
+SAMPLE = Path(__file__).parents[4] / "sample_data" / "shear"
 RADII = (13.0, 18.0)  # [px]
 SHAPE = (420, 420)
 MISSED = np.array([3, 17, 44, 55, 56, 71, 90])
@@ -52,3 +56,11 @@ def test_discs_without_sizes_stay_as_they_are() -> None:
     found = add_missing_discs(np.zeros(SHAPE, np.float32), given)
     for each in fields(Detection):
         np.testing.assert_array_equal(getattr(found, each.name), getattr(given, each.name))
+
+
+@pytest.mark.screen
+def test_nothing_is_added_to_painted_rods_or_on_painted_bars() -> None:
+    image = read_photograph(SAMPLE / "photos" / "0000.jpg")
+    table = read_table(SAMPLE / "grains.csv", ("x", "y", "radius"))
+    rods = detection_of(*(table.numbers(name) for name in ("x", "y", "radius")))
+    assert add_missing_discs(image, rods).count == rods.count == 250
