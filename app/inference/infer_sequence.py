@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..process.machine.free_memory import release_free_memory
 from ..process.machine.linear_algebra import one_thread_each
 from ..results.hdf5.lazy_sequences import LazySequence
 from ..results.results import Results
@@ -67,6 +68,7 @@ def infer_sequence(
     observer = InferenceObserver() if observer is None else observer
     store = MemoryStore() if store is None else store
     sequence = correct_sequence(inputs)
+    release_free_memory()  # of equations of all photographs
     observer.corrected(sequence)
     solve_frames(sequence, store, observer)
     frames, statistics = store.sequences(len(sequence.snapshots))

@@ -97,6 +97,7 @@ class EnsembleForces:
     missing: MissingContacts  # pairs among those of `step` that were not detected but shown by the balance
     seen_slip: NormalisedSlip  # around the frame where that is known, else before it or after
     power_gap: float  # mean of the convex members against the sliding that each reads; NaN where nothing slides
+    balance: Balance
 
     @property
     def member_force(self) -> Array:
@@ -162,6 +163,7 @@ def solve_ensemble(
         EnsembleState(soft, stiff, chains.other, last, ahead, around, wide, steady, touching.pairs, chains.agreeing),
         chains.start_difference, "; ".join([*members.remarks, *remark]), touching.forbidden,
         touching.forbidden_probability, missing.only(touching.contacts.key), members.seen_slip, members.power_gap,
+        balance,
     )  # fmt: skip
 
 

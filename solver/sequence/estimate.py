@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 from ..assessment.evidence import Evidence
 from ..assessment.expected_correlation import expect_correlation
 from ..assessment.mixture_trust import LEAST_WEIGHT, evident_position_weight, motion_reliability
-from ..assessment.motion_information import measure_motion_information, motion_scale
+from ..assessment.motion_information import MotionInformation, measure_motion_information, motion_scale
 from ..assessment.status import is_suspect
 from ..baselines.motion_free import overlap_balance
 from ..bodies.grains import Array
@@ -19,6 +19,7 @@ from ..bodies.motion import shear_over
 from ..contacts.contacts import Contacts, detect_contacts
 from ..contacts.pairs import Keys, align, are_among
 from ..convex.ensemble_members import NormalisedSlip
+from ..convex.program import Balance
 from ..detection.contact_networks import ThresholdNetwork
 from ..mixture.equilibrium_projection import project_mixed_field
 from ..mixture.frame_mixture import (
@@ -35,7 +36,7 @@ from ..posterior.frame_posterior import FramePosterior
 from ..statistics.agreement import pearson
 from ..statistics.balance import worst_force_residual
 from ..statistics.stress import love_weber_stress, packing_area
-from .ensemble import EnsembleState, assemble_frame_balance, solve_ensemble
+from .ensemble import EnsembleState, solve_ensemble
 from .frame_problem import FrameProblem, PositionEstimates
 from .missing_contacts import NO_MISSING, MissingContacts
 from .state import SequenceState
@@ -74,6 +75,7 @@ class Estimate:
     overlap: float = np.nan  # [m] per mean force, by the position-only estimate
     threshold: float = 0.0  # [m] of the gap, of a single chain
     missing: MissingContacts = NO_MISSING  # pairs that were not detected but that the balance shows
+    balance: Balance | None = None  # of the ensemble; None: of a single chain
 
     @property
     def contacts(self) -> Contacts:
@@ -147,13 +149,15 @@ def _combine(
 
 
 def _evidence_of_mixture(problem: FrameProblem, mixed: Estimate, alone: Evidence, state: SequenceState) -> Evidence:
-    """Evidence of the mixed field, with the agreements that the motion estimate has."""
+    """Evidence of the mixed field: that of the motion estimate, but for what depends on the reported forces."""
+    assert mixed.mixture is not None
     return replace(
-        gather_evidence(problem, mixed, state),
-        agreement=alone.agreement,
-        position_agreement=alone.position_agreement,
-        overlap_agreement=alone.overlap_agreement,
-        agreement_age=alone.agreement_age,
+        alone,
+        unbalance=_worst_residual(problem, mixed),
+        mixed_trust=mixed.mixture.trust,
+        position_weight=mixed.mixture.position_weight,
+        information=_motion_information(problem, mixed),
+        force_change=_force_change(mixed, state),
     )
 
 
@@ -232,9 +236,9 @@ def _mix(
         contacts, field, positions, reliability, scale_known=known, soft_trust=soft, weight=weight,
         position_weight=position_weight,
     )  # fmt: skip
-    balance = assemble_frame_balance(problem, contacts, estimate.step)
+    assert estimate.balance is not None
     convex = problem.settings.ensemble.convex
-    projected = project_mixed_field(balance, mixture.fn, mixture.ft, mixture.fn_sd, convex)
+    projected = project_mixed_field(estimate.balance, mixture.fn, mixture.ft, mixture.fn_sd, convex)
     fn, ft = (projected.fn, projected.ft) if projected.converged else (mixture.fn, mixture.ft)
     members = estimate.members
     if not problem.motion.ends_here:  # no member has a history of its own yet
@@ -274,9 +278,7 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         old_unbalance=step.old_unbalance,
         pressure_jump=jump,
         load_fraction=pressure / load if load > 0 and not any(packing.material.gravity) else np.nan,
-        unbalance=worst_force_residual(
-            step.contacts, estimate.fn, estimate.ft, packing.weight, snapshot.present & packing.grains.free
-        ),
+        unbalance=_worst_residual(problem, estimate),
         shear=shear_over(problem.motion),
         frames_since_event=state.frames_since_event + 1,
         start_difference=estimate.start_difference,
@@ -287,16 +289,25 @@ def gather_evidence(problem: FrameProblem, estimate: Estimate, state: SequenceSt
         interior=_count_interior(problem, estimate),
         reach=estimate.threshold / (2.0 * float(packing.grains.radius.mean())),
         assessed=problem.motion.ends_here,
-        mixed_trust=np.nan if estimate.mixture is None else estimate.mixture.trust,
-        position_weight=0.0 if estimate.mixture is None else estimate.mixture.position_weight,
         unseen_fraction=1.0 - float(problem.seen.sum()) / max(problem.sequence.known, 1),
-        information=measure_motion_information(
-            packing, snapshot, problem.motion, estimate.contacts, estimate.fn, step.walls, soft=problem.settings.soft
-        ),
+        information=_motion_information(problem, estimate),
         force_change=_force_change(estimate, state),
         inertial_number=_inertial_number(problem, load),
         power_gap=estimate.power_gap,
     )
+
+
+def _worst_residual(problem: FrameProblem, estimate: Estimate) -> float:
+    """Worst |ΣF| on a grain over the mean f_n, of the reported field."""
+    packing, balanced = problem.packing, problem.snapshot.present & problem.packing.grains.free
+    return worst_force_residual(estimate.contacts, estimate.fn, estimate.ft, packing.weight, balanced)
+
+
+def _motion_information(problem: FrameProblem, estimate: Estimate) -> MotionInformation:
+    return measure_motion_information(
+        problem.packing, problem.snapshot, problem.motion, estimate.contacts, estimate.fn, estimate.step.walls,
+        soft=problem.settings.soft,
+    )  # fmt: skip
 
 
 def _inertial_number(problem: FrameProblem, load: float) -> float:
@@ -374,5 +385,5 @@ def _estimate_by_ensemble(problem: FrameProblem, state: SequenceState, positions
         found.step, found.fn, found.ft, found.probability, found.state, found.forbidden, found.forbidden_probability,
         found.remark, found.fn_sd, found.ft_sd, found.member_force if problem.settings.keep_members else None,
         found.cone_fraction(friction), found.seen_slip, found.disagreement, found.start_difference,
-        missing=found.missing, power_gap=found.power_gap,
+        missing=found.missing, power_gap=found.power_gap, balance=found.balance,
     )  # fmt: skip
