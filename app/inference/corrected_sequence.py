@@ -10,6 +10,7 @@ from ..solver.bodies.interpolation import interpolate_ignored_frames
 from ..solver.bodies.motion import Snapshot
 from ..solver.bodies.packing import Packing
 from ..solver.boundary.boundary_correction import Boundary
+from ..solver.boundary.camera_distortion import CameraDistortion
 from ..solver.calibration.calibrate import Calibration
 from ..solver.contacts.radius_tuning import RadiusTuning
 from ..solver.contacts.verdicts import Verdicts
@@ -37,6 +38,7 @@ class CorrectedSequence:
     friction_measured: bool = False  # whether the friction between rods was measured
     base_gravity: float = 9.81  # [m/s²] onto the base
     noise_remark: str = ""  # where the measured noise contradicts the stated one
+    lens: CameraDistortion | None = None  # None: not sought
 
     def with_tracks(self, tracks: Tracks) -> CorrectedSequence:
         """The sequence of the same rods with other positions and radii."""
@@ -48,5 +50,5 @@ class CorrectedSequence:
         """Results without any frame."""
         return Results(
             "", self.tracks, self.walls, self.packing.grains, self.packing.material.friction, (), (), "",
-            calibration=self.calibration, radius_tuning=self.tuning, boundary=self.boundary,
+            calibration=self.calibration, radius_tuning=self.tuning, boundary=self.boundary, lens=self.lens,
         )  # fmt: skip

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..solver.bodies.grains import Array, Grains
 from ..solver.boundary.boundary_correction import Boundary
+from ..solver.boundary.camera_distortion import CameraDistortion
 from ..solver.calibration.calibrate import Calibration
 from ..solver.contacts.pairs import Keys, make_keys
 from ..solver.contacts.radius_tuning import RadiusTuning
@@ -68,6 +69,7 @@ class Results:
     friction_check: FrictionCheck | None = None
     radius_tuning: RadiusTuning | None = None  # None: not requested
     boundary: Boundary | None = None  # None: used as given
+    lens: CameraDistortion | None = None  # None: not sought
     base_friction: float = 0.0  # coefficient of the base that was used; 0: none
     read_kinematics: Callable[[], SequenceKinematics | None] = _none  # on every access: it is as long as the tracks
     diagnosis: tuple[Finding, ...] = ()  # causes of wrong forces that the evidence supports

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..solver.bodies.grains import Array, Grains
 from ..solver.boundary.boundary_correction import Boundary
+from ..solver.boundary.camera_distortion import CameraDistortion
 from ..solver.calibration.calibrate import Calibration
 from ..solver.contacts.radius_tuning import RadiusTuning
 from ..solver.convex.friction_check import FrictionCheck
@@ -46,6 +47,7 @@ PARTS: dict[str, type] = {
     "statistics": FrameStatistics,
     "calibration": Calibration,
     "boundary": Boundary,
+    "lens": CameraDistortion,
     "friction_check": FrictionCheck,
     "radius_tuning": RadiusTuning,
     "kinematics": SequenceKinematics,
@@ -112,6 +114,10 @@ DIMENSIONS = {
     "distance_bin": Dimension(
         "bins of distances in mean diameters, labelled by their middles", _middles(DISTANCE_EDGES)
     ),
+    "lens_term": Dimension(
+        "terms of the camera's distortion", ("a", "b", "k_1", "k_2", "k_3", "k_4", "p", "q", "c", "d")
+    ),
+    "size_class": Dimension("sizes of the grains, ascending, where their radii have classes"),
     "radius_change": Dimension("tested changes of radius"),
     "friction_trial": Dimension("tested coefficients of friction"),
     "cold_sweep": Dimension("sweeps from zero forces", COLD_SWEEPS.astype(np.float64)),

@@ -7,11 +7,13 @@ towards the rim of the picture, or that depend on the direction of the pair, sho
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bodies.grains import Array
+from ..quantity import Quantity
 from .touching_pairs import TouchingFit, count_classes, find_near_pairs, fit_touching_pairs
 
 MOST_FRAMES = 8  # of which gaps are read, evenly over the sequence
@@ -23,6 +25,7 @@ ANISOTROPY, RADIAL, PERSPECTIVE, DECENTRING, UNKNOWNS = slice(0, 2), slice(2, 6)
 MODELS = ((2,), (0, 1), (2, 3), (0, 1, 2), (0, 1, 2, 3), (0, 1, 6, 7), (0, 1, 2, 3, 6, 7))
 EXTENSIONS = ((3,), (8, 9), (4,), (4, 5))  # of a lens that was found: higher orders, another middle
 GAIN = 2.0  # standard errors, by which the likelihood of pairs that were not fitted must rise for an extension
+TILT = 1.0  # standard errors above which removing a perspective that must be an error gains more than it costs
 FITS = 3  # of an extension: which pairs are near enough depends on the correction
 MAX_OVERLAP = 2.5  # mean overlap over the scatter of touching gaps, above which readings of radii must be too large
 # Mean overlap of soft grains over the scatter s of their touching gaps: 1 − 1.6 σ/s, with σ the noise of a position, is
@@ -42,17 +45,31 @@ class CameraDistortion:
     ξ = (x − x_0)/L = (X, Y), and e such that the mean length of the pairs stays the same: the pixel size is given.
     """
 
-    value: Array  # (10,) a, b, k_1 … k_4, p, q, c, d
-    sd: Array  # (10,) standard error, as if errors were the same in all frames
-    shrinking: float  # e
-    middle: Array  # (2,) [m] x_0
-    half_width: float  # [m] L
-    scatter: float  # [m] robust standard deviation of the gaps of candidate pairs as they were measured
-    explained: float  # [m] after the correction; the same without one
-    applied: bool
-    unexplained: float  # [m] range over the picture of the mean touching gap that remains; 0: within its error
-    radius_error: Array  # (q,) [m] true minus given radius of every class, if touching surfaces just meet
-    touching_scatter: float  # [m] robust standard deviation of the gaps of touching pairs after the correction
+    value: Annotated[Array, Quantity("a, b, k_1 … k_4, p, q, c, d of the correction", dims="lens_term", since=2)]
+    sd: Annotated[
+        Array, Quantity("standard error of them, as if errors were the same in all frames", dims="lens_term", since=2)
+    ]
+    shrinking: Annotated[float, Quantity("e, which keeps the mean length of the pairs", since=2)]
+    middle: Annotated[Array, Quantity("middle x_0 of the picture", "m", "xy", since=2)]
+    half_width: Annotated[float, Quantity("half-width L of the picture", "m", since=2)]
+    scatter: Annotated[float, Quantity("robust standard deviation of the gaps of near pairs as measured", "m", since=2)]
+    explained: Annotated[float, Quantity("the same after the correction", "m", since=2)]
+    applied: Annotated[bool, Quantity("whether positions were corrected by it", since=2, absent=False)]
+    unexplained: Annotated[
+        float,
+        Quantity("range over the picture of the usual touching gap that remains; 0: within its error", "m", since=2),
+    ]
+    radius_error: Annotated[
+        Array, Quantity("true minus given radius of a size, if touching surfaces just meet", "m", "size_class", since=2)
+    ]
+    touching_scatter: Annotated[
+        float, Quantity("robust standard deviation of the gaps of touching pairs", "m", since=2)
+    ]
+    radius_error_sd: Annotated[Array, Quantity("standard error of it", "m", "size_class", since=2)]
+    size: Annotated[Array, Quantity("mean given radius of a size", "m", "size_class", since=2)]
+    radius_factor: Annotated[
+        Array, Quantity("factor by which the radii of a size were multiplied on average", dims="size_class", since=2)
+    ]
 
     def correct(self, position: Array) -> Array:
         """Return undistorted positions (…, 2) [m]."""
@@ -155,7 +172,7 @@ def find_camera_distortion(
     exceeds five standard errors. Forces of soft grains depend on direction and place, too, but do not change the
     scatter of their gaps so much. A lens that is found gets higher orders and another middle where these raise the
     likelihood of the gaps in the other frames by two standard errors. A gradient of the gaps of soft grains across the
-    picture is a perspective if it exceeds two standard errors: balance allows no gradient of the mean pressure.
+    picture is a perspective if it exceeds its standard error: balance allows no gradient of the mean pressure.
     """
     present = position[np.isfinite(position[..., 0])]
     if not len(present):
@@ -180,9 +197,11 @@ def find_camera_distortion(
     if soft:
         pairs, best, chosen = _add_perspective(reading, pairs, best, chosen)
     value = best.value[:UNKNOWNS]
+    size = np.bincount(size_class, radius) / np.bincount(size_class)
     return CameraDistortion(
         value, best.sd[:UNKNOWNS], float(pairs.shrinking @ value), middle, reading.half_width, none.misfit, best.misfit,
         bool(chosen), _place_dependence(pairs, best, reading.diameter), best.value[UNKNOWNS:], best.scatter,
+        best.sd[UNKNOWNS:], size, np.ones(len(size)),
     )  # fmt: skip
 
 
@@ -250,14 +269,14 @@ def _extend(
 def _add_perspective(
     reading: _Reading, pairs: _Pairs, best: TouchingFit, chosen: tuple[int, ...]
 ) -> tuple[_Pairs, TouchingFit, tuple[int, ...]]:
-    """Add a perspective where one exceeds two standard errors."""
+    """Add a perspective where it exceeds its standard error."""
     tilt = range(UNKNOWNS)[PERSPECTIVE]
     unknowns = tuple(sorted({*chosen, *tilt}))
     if unknowns == chosen:
         return pairs, best, chosen
     tilted = _refit(reading, unknowns)
     value, sd = tilted[1].value[tilt], tilted[1].sd[tilt]
-    return (*tilted, unknowns) if (np.abs(value) > GAIN * sd).any() else (pairs, best, chosen)
+    return (*tilted, unknowns) if (np.abs(value) > TILT * sd).any() else (pairs, best, chosen)
 
 
 def _refit(reading: _Reading, unknowns: tuple[int, ...]) -> tuple[_Pairs, TouchingFit]:

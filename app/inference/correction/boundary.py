@@ -11,7 +11,7 @@ from ...solver.bodies.grains import Grains
 from ...solver.bodies.interpolation import interpolate_ignored_frames
 from ...solver.bodies.rods import RodMaterial
 from ...solver.boundary.boundary_correction import Boundary, BoundarySettings, correct_boundary
-from ...solver.boundary.camera_distortion import find_camera_distortion
+from ...solver.boundary.camera_distortion import CameraDistortion, find_camera_distortion
 from ...solver.boundary.size_classes import group_readings
 from ...solver.detection.precision import contradiction, describe_contradiction, measure_precision
 from ...solver.posterior.sequence_evidence import gather_position_evidence
@@ -44,7 +44,7 @@ def measure_noise(tracks: Tracks, walls: WallTracks) -> tuple[Tracks, str]:
 
 def correct_camera(
     material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]
-) -> tuple[Tracks, str]:
+) -> tuple[Tracks, str, CameraDistortion | None]:
     """Remove the camera's distortion from a packing without walls, where gaps of touching pairs show one.
 
     Walls, where there are any, are measured with the same camera and show it better. The radii of each size of soft
@@ -55,9 +55,11 @@ def correct_camera(
     Tracks
     str
         Sentences on the correction and on what remains; empty: neither.
+    CameraDistortion or None
+        The distortion and the errors of the radii; None: not sought.
     """
     if walls.count or walls.cell is not None:
-        return tracks, ""
+        return tracks, "", None
     soft = material.stiffness not in (None, "rigid")
     classes = group_readings(tracks.radius)  # whole pixels are few different radii, but no sizes
     classes = radius_classes(tracks.radius) if classes is None else classes
@@ -66,14 +68,17 @@ def correct_camera(
     classes = alike if classes is None else classes
     found = find_camera_distortion(position, tracks.radius, classes, soft=soft)
     if found is None:
-        return tracks, ""
+        return tracks, "", None
     sentences, radius = found.describe(), tracks.radius
     correction = found.class_correction(_noise_of_gaps(material, tracks, walls, failed)) if soft else None
     if correction is not None:
         radius = radius + correction[classes]
-        changes = ", ".join(f"{1e6 * each:+.0f}" for each in correction)
+        found = replace(found, radius_factor=1.0 + correction / found.size)
+        changes = ", ".join(
+            f"{1e6 * each:+.0f} ± {1e6 * sd:.0f}" for each, sd in zip(correction, found.radius_error_sd, strict=True)
+        )
         sentences.append(f"radii of the sizes are corrected by {changes} µm, so that grains of all sizes touch alike")
-    return replace(tracks, position=found.correct(tracks.position), radius=radius), "; ".join(sentences)
+    return replace(tracks, position=found.correct(tracks.position), radius=radius), "; ".join(sentences), found
 
 
 def _noise_of_gaps(material: RodMaterial, tracks: Tracks, walls: WallTracks, failed: Collection[int]) -> float:

@@ -60,7 +60,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
     if nothing_seen:
         settings = replace(settings, boundary=None, calibration=None, coordination=None)
     overlap, as_given = settings.overlap_of(tracks.radius), settings.calibration is None
-    calibration = tuning = boundary = None
+    calibration = tuning = boundary = lens = None
     remarks, material = [outlier_remark, gap_remark, "", "", "", "", "", ""], inputs.material
     if settings.calibration is not None:
         if settings.sequence.uses_positions:
@@ -68,7 +68,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         tracks, remarks[5] = use_size_classes(material, tracks)
     if settings.boundary is not None:
         if settings.boundary.camera:
-            tracks, remarks[2] = correct_camera(material, tracks, walls, failed)
+            tracks, remarks[2], lens = correct_camera(material, tracks, walls, failed)
         if settings.sequence.measure_precision:
             tracks, remarks[3] = measure_noise(tracks, walls)
         tracks, walls, boundary = correct_walls(settings.boundary, tracks, walls)
@@ -125,6 +125,7 @@ def correct_sequence(inputs: Inputs) -> CorrectedSequence:
         packing, tracks, walls, seen,
         settings.for_overlap(overlap), inputs.verdicts, calibration, tuning, boundary, failed, of_walls,
         inputs.material.friction_measured, inputs.material.base_gravity, "; ".join(each for each in remarks if each),
+        lens,
     )  # fmt: skip
     return corrected if as_given or nothing_seen or tuning is not None else correct_soft_grains(corrected)
 

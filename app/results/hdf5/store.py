@@ -101,6 +101,7 @@ def load_results(file: Path) -> Results:
             configuration=_configuration(file, store),
             calibration=stored.part("calibration"),
             boundary=stored.part("boundary"),
+            lens=stored.part("lens"),
             friction_check=stored.part("friction_check"),
             radius_tuning=stored.part("radius_tuning"),
             read_kinematics=stored.deferred("kinematics"),

@@ -10,6 +10,7 @@ from rodsight.solver.assessment.intervals.statistic_intervals import CONSTANT
 from rodsight.solver.bodies.wall_shapes import OUT, STRAIGHT
 from rodsight.solver.boundary.bars import Bars
 from rodsight.solver.boundary.boundary_correction import Boundary
+from rodsight.solver.boundary.camera_distortion import CameraDistortion
 from rodsight.solver.boundary.camera_pose import CameraPose
 from rodsight.solver.calibration.calibrate import Calibration
 from rodsight.solver.calibration.gap_statistics import GapStatistics
@@ -72,6 +73,7 @@ def make_full_results(frame_count: int = 3, seed: int = 3, **options) -> Results
         ),
         radius_tuning=tuning,
         boundary=_boundary(f, w, np.random.default_rng(seed + 1)),
+        lens=_lens(np.random.default_rng(seed + 3)),
         read_kinematics=lambda: _kinematics(f, n, np.random.default_rng(seed + 2)),
         ensemble_size=2,
     )
@@ -92,6 +94,13 @@ def _boundary(f: int, w: int, rng: np.random.Generator) -> Boundary:
         rng.random((f, 2)), rng.random(f), rng.random(f), rng.random((f, 2)), rng.random(2), 7.0, applied=True
     )
     return Boundary(bars, camera, rng.random((w, 2)))
+
+
+def _lens(rng: np.random.Generator) -> CameraDistortion:
+    value, sd = rng.random((2, 10))
+    return CameraDistortion(
+        value, sd, 0.1, rng.random(2), *rng.random(3), True, 0.2, rng.random(2), 0.3, *rng.random((3, 2))
+    )
 
 
 def _full_frame(frame: FrameForces, rng: np.random.Generator) -> FrameForces:

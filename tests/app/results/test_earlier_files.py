@@ -122,6 +122,7 @@ def test_a_file_of_schema_2_keeps_its_values(file):
         full, friction_check=check,
         statistics=statistics,
         boundary=None,
+        lens=None,
         read_kinematics=lambda: None,
         walls=walls,
         tracks=tracks,
