@@ -52,7 +52,9 @@ class CameraDistortion:
     shrinking: Annotated[float, Quantity("e, which keeps the mean length of the pairs", since=2)]
     middle: Annotated[Array, Quantity("middle x_0 of the picture", "m", "xy", since=2)]
     half_width: Annotated[float, Quantity("half-width L of the picture", "m", since=2)]
-    scatter: Annotated[float, Quantity("robust standard deviation of the gaps of near pairs as measured", "m", since=2)]
+    scatter: Annotated[
+        float, Quantity("robust standard deviation of the gaps of candidate pairs as measured", "m", since=2)
+    ]
     explained: Annotated[float, Quantity("the same after the correction", "m", since=2)]
     applied: Annotated[bool, Quantity("whether positions were corrected by it", since=2, absent=False)]
     unexplained: Annotated[
