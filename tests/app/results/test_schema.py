@@ -30,6 +30,7 @@ MADE_WITH = 2  # schema of the stored file: datasets of this version may be newe
 NEWER = {"inputs", "code", "libraries", "diagnosis", "base_friction"}  # attributes that the stored file is older than
 UNDECLARED = {
     "Grains.drag",
+    "Grains.moment",
     "Grains.moment_sd",
     "FrameForces.frame",
     "Contacts.grain_count",
