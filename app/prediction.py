@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 GOOD, POOR = 0.9, 0.75  # expected r(f_n) from which on nothing is wrong, and below which something is
 CORRECTED = ("outlier_tracks", "missing_poses", "photograph_repeated")  # named causes that a run corrects itself
+MOST_STATED = 0.99  # expected r(f_n)
 DOUBTFUL = 0.97  # expected r(f_n) below which rival inputs are compared
 NO_EXPECTATION = (math.nan, math.nan, math.nan)
 NOT_PREDICTED = (
@@ -61,6 +62,8 @@ class Prediction:
         r, low, high = self.expected
         if self.trial is None or math.isnan(r):
             return self.remark or NOT_PREDICTED
+        # A prediction of 1.00 would claim more than any evidence gives.
+        r, low, high = (min(each, MOST_STATED) for each in (r, low, high))
         number = f"expected r(f_n) {r:.2f} ({low:.2f} to {high:.2f})"
         if self.trial.stride > 1:
             number += f" from every {_ordinal(self.trial.stride)} photograph, --frames ::{self.trial.stride}"
