@@ -37,7 +37,7 @@ def test_the_prediction_follows_from_the_evidence_of_the_first_photographs():
     assert 0.0 < low < r < high < 1.0
 
 
-def test_no_verdict_promises_a_correlation_of_one(monkeypatch):
+def test_no_verdict_states_a_correlation_of_one(monkeypatch):
     monkeypatch.setattr(Trial, "expect", lambda *_, **__: (0.998, 0.996, 0.9991))
     assert predicted(SOUND).verdict() == "The forces can be found: expected r(f_n) 0.99 (0.99 to 0.99)."
 
