@@ -12,7 +12,7 @@ from .peak_memory import growth_of, peaks_of
 from .table import note
 
 SHORT, LONG, GRAINS = 100, 400, 60
-# [MB] a photograph of 60 rods; before, .19 and .12. From 200 photographs on the index is made by another process.
+# [MB] a photograph of 60 rods; before, .19 and .12.
 MOST = {"run": 0.05, "record": 0.05, "review": 0.05, "open": 0.05}
 
 

@@ -56,6 +56,7 @@ THUMBNAIL = 480  # [px] of a picture on the first page
 # mallopt(3): two areas of memory for all threads, since one each holds back as much as a photograph; large arrays in
 # pages of their own, which return to the system at once.
 MEMORY_SETTINGS = {"M_ARENA_MAX": (-8, 2), "M_MMAP_THRESHOLD": (-3, 1 << 20)}
+KEPT = 60  # [s] that a connection stays between two requests: the page's own ones are few
 POLLING = 0.4  # [s] between checks for changes of a run
 KINDS = {
     ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
@@ -156,7 +157,7 @@ class WorkbenchServer:
         config = uvicorn.Config(
             make_application(workbench, self.gate, entry, known), log_config=None, access_log=False,
             server_header=False, lifespan="off", timeout_graceful_shutdown=1, backlog=BACKLOG,
-            http=cast(Any, partial(HttpConnection, known)),
+            http=cast(Any, partial(HttpConnection, known)), timeout_keep_alive=KEPT,
         )  # fmt: skip
         self._server = uvicorn.Server(config)
 
