@@ -1,4 +1,4 @@
-"""Strain of a packing: the homogeneous motion that fits the motion of its grains best."""
+"""Strain of a packing: the homogeneous motion that fits that of its grains best; the time by which its rate is fast."""
 
 from __future__ import annotations
 
@@ -66,3 +66,18 @@ def strain_magnitude(step: Float[Array, "2 2"]) -> float:
     if not np.isfinite(step).all():
         return float("nan")
     return max(shear_strain(step), float(np.abs(np.linalg.eigvalsh(0.5 * (step + step.T))).max()))
+
+
+def inertial_time(mass: float, pressure: float, length: float) -> float:
+    """Return √(m̄/(p L)) [s], the inertial number over the rate of shear.
+
+    Parameters
+    ----------
+    mass : float
+        Mean mass of a grain m̄ [kg].
+    pressure : float
+        p [Pa].
+    length : float
+        Length of the rods L [m].
+    """
+    return float(np.sqrt(mass / (pressure * length)))

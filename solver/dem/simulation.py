@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from ..bodies.grains import Array, Grains
+from ..bodies.strain import inertial_time
 from .boundaries import LOAD, Boundary
 from .contact_law import Law
 from .dem_truth import DemFrame, DemSettings
@@ -119,12 +120,12 @@ class Simulation(ABC):
 
     @property
     def time_scale(self) -> float:
-        """√(m̄ / (pressure · length)) [s], the inertial number over the shear rate.
+        """The inertial number over the shear rate [s].
 
         The pressure is that of the settings or, where they have none, that of the contacts at present.
         """
         pressure = self.settings.pressure if np.isfinite(self.settings.pressure) else self.pressure
-        return float(np.sqrt(self.grains.mass.mean() / (pressure * self.settings.length)))
+        return inertial_time(self.grains.mass.mean(), pressure, self.settings.length)
 
     @property
     def pressure(self) -> float:

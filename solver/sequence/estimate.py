@@ -16,6 +16,7 @@ from ..baselines.motion_free import overlap_balance
 from ..bodies.grains import Array
 from ..bodies.holes import find_holes
 from ..bodies.motion import shear_over
+from ..bodies.strain import inertial_time
 from ..contacts.contacts import Contacts, detect_contacts
 from ..contacts.pairs import Keys, align, are_among
 from ..convex.ensemble_members import NormalisedSlip
@@ -311,12 +312,12 @@ def _motion_information(problem: FrameProblem, estimate: Estimate) -> MotionInfo
 
 
 def _inertial_number(problem: FrameProblem, load: float) -> float:
-    """I = γ̇ √(m̄ / (p L)) by the mean pressure of the loads [Pa]; NaN without one."""
+    """Inertial number by the mean pressure of the loads [Pa]; NaN without one."""
     packing, motion = problem.packing, problem.motion
     if not (load > 0.0 and motion.interval > 0.0 and motion.ends_here):
         return np.nan
     mass = float(packing.grains.mass[problem.snapshot.present].mean())
-    return shear_over(motion) / motion.interval * float(np.sqrt(mass / (load * packing.length)))
+    return shear_over(motion) / motion.interval * inertial_time(mass, load, packing.length)
 
 
 def _count_interior(problem: FrameProblem, estimate: Estimate) -> int:

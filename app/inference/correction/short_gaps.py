@@ -44,14 +44,14 @@ def interpolate_short_gaps(tracks: Tracks, walls: WallTracks | None = None) -> t
     grains = RodMaterial().pack(tracks.radius, np.empty(0)).grains
     for k in np.flatnonzero(gaps.any(axis=1)).tolist():
         poses = interpolate_poses(tracks.time, tracks.position, k, np.flatnonzero(gaps[k]))
-        noise = float(np.median(sigma[k][tracks.present[k]]))
+        noise = float(np.median(tracks.sigma[k][tracks.present[k]]))
         position[k, poses.row] = settle_poses(poses, grains, tracks.position, noise, partial(walls_in, walls))
         line = 1.0 - poses.fraction, poses.fraction
         rotation[k, poses.row] = (
             line[0] * tracks.rotation[poses.before, poses.row] + line[1] * tracks.rotation[poses.after, poses.row]
         )
         status[k, gaps[k]] = TrackStatus.INTERPOLATED
-        sigma[k, gaps[k]] = np.median(tracks.sigma[k][tracks.present[k]])
+        sigma[k, gaps[k]] = noise
     frames = int(gaps.any(axis=1).sum())
     remark = f"{count} lost poses in {frames} photographs are interpolated between the photographs before and after"
     return replace(tracks, position=position, rotation=rotation, sigma=sigma, status=status), remark

@@ -89,12 +89,13 @@ def diagnose(
     )
     found += examine_sizes(inputs.tracks, walls)
     found += examine_inertia(inputs.tracks, walls, inputs.material)
-    poses = examine_poses(inputs.tracks, walls)
+    impossible = find_impossible_poses(inputs.tracks, walls)
+    poses = examine_poses(inputs.tracks, impossible)
     if not found and sliding and inputs.tracks.grain_count >= LEAST_GRAINS:
         found = _examine_sliding(inputs, first)
     if not (found or trial is None or inputs.tracks.grain_count < LEAST_GRAINS):
         found = _compare_rivals(inputs, trial, progress, first)
-    if poses and float(find_impossible_poses(inputs.tracks, walls).mean()) > FEW_OUTLIERS:  # so many explain it
+    if poses and float(impossible.mean()) > FEW_OUTLIERS:  # so many explain it
         found = [each for each in found if each.cause != "not_explained"]
     if found:  # wrong radii look like a few jumps
         poses = [each for each in poses if each.cause != "outlier_tracks"]

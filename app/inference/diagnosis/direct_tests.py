@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ...results.finding import Finding
 from ...solver.bodies.grains import Array, Grains
 from ...solver.bodies.rods import RodMaterial
-from ...solver.bodies.strain import displacement_gradient, shear_strain
+from ...solver.bodies.strain import displacement_gradient, inertial_time, shear_strain
 from ...solver.bodies.wall_shapes import STRAIGHT
 from ...solver.contacts.contacts import detect_contacts
 from ...solver.inferred.unknown_rotations import fill_unknown_rotations
@@ -128,13 +128,13 @@ def examine_walls(tracks: Tracks, walls: WallTracks) -> list[Finding]:
     return found
 
 
-def examine_poses(tracks: Tracks, walls: WallTracks | None = None) -> list[Finding]:
-    """Look for rods that jump for one photograph, and for rods that photographs lack."""
-    found, outlier = [], find_impossible_poses(tracks, walls)
-    if outlier.any():
-        frames = np.flatnonzero(outlier.any(axis=1)).tolist()
+def examine_poses(tracks: Tracks, impossible: NDArray[np.bool_]) -> list[Finding]:
+    """Look for rods that photographs lack, and for those that jump for one photograph: the impossible poses (f, n)."""
+    found = []
+    if impossible.any():
+        frames = np.flatnonzero(impossible.any(axis=1)).tolist()
         words = ", ".join(map(str, frames[:4])) + ("…" if len(frames) > 4 else "")
-        count = int(outlier.sum())
+        count = int(impossible.sum())
         subject = "1 pose jumps" if count == 1 else f"{count} poses jump"
         found.append(finding("outlier_tracks", f"{subject} against its neighbours and back, in photographs {words}"))
     missing = 1.0 - float(tracks.present.mean())
@@ -179,15 +179,14 @@ def examine_inertia(tracks: Tracks, walls: WallTracks, material: RodMaterial) ->
 
     Notes
     -----
-    The inertial number is I = γ̇ √(m̄/(p L)), with the rate of shear γ̇ by the times of the photographs, the mean mass m̄,
-    the pressure p of the loaded walls and the length L of the rods. Simulated packings are out of balance by about
-    7 I of the mean force.
+    The inertial number I is the rate of shear, by the times of the photographs, times `inertial_time` of the mean mass
+    and the pressure of the loaded walls. Simulated packings are out of balance by about 7 I of the mean force.
     """
     pressure = walls.usual_pressure(material.length)
     if not np.isfinite(pressure).any() or tracks.frame_count < 2:
         return []
     mass = float(Grains.of_rods(tracks.radius, density=material.density, length=material.length).mass.mean())
-    scale = np.sqrt(mass / (float(np.nanmean(pressure)) * material.length))
+    scale = inertial_time(mass, float(np.nanmean(pressure)), material.length)
     rates = [_shear_rate(tracks, k) for k in range(1, tracks.frame_count)]
     known = [each for each in rates if np.isfinite(each)]
     number = float(np.median(known)) * scale if known else 0.0

@@ -85,7 +85,7 @@ class Recorder:
         rr.set_strict_mode(True)  # otherwise the SDK only warns about data that it cannot write
         self._stream = stream
         self._sweeps, self._kept, self._flush_every, self._flush = sweeps, kept, flush_every, flush
-        self._rows = RowBatches()
+        self._rows = RowBatches(stream)
         self._scene: Scene | None = None
         self._truth: TruthWriter | None = None
         self._film: FilmWriter | None = None
@@ -119,6 +119,7 @@ class Recorder:
     def continue_in(self, stream: rr.RecordingStream, flush: Callable[[rr.RecordingStream], None]) -> None:
         """Write the next frames into another stream, which gets the static data as well."""
         self._stream, self._flush, self._has_residual_styles = stream, flush, False
+        self._rows = RowBatches(stream)
         self._begin(stream)
         if self._plot is not None:
             self._plot.continue_in(stream)
@@ -186,12 +187,12 @@ class Recorder:
         lost = int(scene.tracks.lost[forces.frame].sum())
         self._summaries.append(FrameSummary.of(forces, statistics, lost=lost, agreement=agreement))
         if len(self._summaries) % self._flush_every == 0:
-            self._rows.send(self._stream, points=self._flush_every == 1)
+            self._rows.send(points=self._flush_every == 1)
             self._flush(self._stream)
 
     def finish(self, notes: tuple[str, ...] = ()) -> None:
         """Write the summary."""
-        self._rows.send(self._stream)
+        self._rows.send()
         self._stream.reset_time()
         send_outcome(self._stream, self._summaries)
         clipped, total = self._clipped, self._force_count

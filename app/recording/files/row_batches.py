@@ -46,9 +46,10 @@ class _Joined:
 
 
 class RowBatches:
-    """Collects rows and points of curves until they are many, or until `send` is called."""
+    """Collects rows and points of curves of a stream until they are many, or until `send` is called."""
 
-    def __init__(self) -> None:
+    def __init__(self, stream: rr.RecordingStream) -> None:
+        self._stream = stream
         self._moment: Moment = ()
         self._points: dict[tuple[str, tuple[str, ...]], list[tuple[Moment, Sequence[float]]]] = {}
         self._rows: dict[tuple[str, tuple[str, ...], tuple[rr.ComponentDescriptor, ...]], _Rows] = {}
@@ -62,13 +63,7 @@ class RowBatches:
         timelines = tuple(name for name, _ in self._moment)
         self._points.setdefault((path, timelines), []).append((self._moment, values))
 
-    def add(
-        self,
-        stream: rr.RecordingStream,
-        path: str,
-        when: Iterable[rr.TimeColumn],
-        columns: Iterable[rr.ComponentColumn],
-    ) -> None:
+    def add(self, path: str, when: Iterable[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
         """Add rows of an entity."""
         times = {each.timeline_name(): each.as_arrow_array() for each in when}
         parts = {each.component_descriptor(): each.as_arrow_array() for each in columns}
@@ -78,23 +73,21 @@ class RowBatches:
         rows.parts.append(list(parts.values()))
         rows.size += sum(array.nbytes for array in (*times.values(), *parts.values()))
         if rows.size >= LARGEST:
-            self._send(stream, key)
+            self._send(key)
 
-    def send(self, stream: rr.RecordingStream, *, points: bool = True) -> None:
+    def send(self, *, points: bool = True) -> None:
         """Send all rows that were added, and the points, which are small, unless they can wait."""
         for key in list(self._rows):
-            self._send(stream, key)
+            self._send(key)
         if not points:
             return
         for (path, timelines), found in self._points.items():
             when = [_times(name, [moment[k][1] for moment, _ in found]) for k, name in enumerate(timelines)]
             columns = rr.Scalars.columns(scalars=[value for _, values in found for value in values])
-            stream.send_columns(path, when, columns.partition([len(values) for _, values in found]))
+            self._stream.send_columns(path, when, columns.partition([len(values) for _, values in found]))
         self._points.clear()
 
-    def _send(
-        self, stream: rr.RecordingStream, key: tuple[str, tuple[str, ...], tuple[rr.ComponentDescriptor, ...]]
-    ) -> None:
+    def _send(self, key: tuple[str, tuple[str, ...], tuple[rr.ComponentDescriptor, ...]]) -> None:
         rows, (path, timelines, components) = self._rows.pop(key), key
         when = [
             _Joined(name, list(arrays)) for name, arrays in zip(timelines, zip(*rows.times, strict=True), strict=True)
@@ -103,7 +96,7 @@ class RowBatches:
             _Joined(name, list(arrays)) for name, arrays in zip(components, zip(*rows.parts, strict=True), strict=True)
         ]
         # The SDK takes the name and the array of a column, and no more.
-        stream.send_columns(path, when, cast("list[rr.ComponentColumn]", columns))
+        self._stream.send_columns(path, when, cast("list[rr.ComponentColumn]", columns))
 
 
 def _times(timeline: str, values: Sequence[int | np.timedelta64]) -> rr.TimeColumn:

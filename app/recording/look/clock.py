@@ -21,13 +21,7 @@ class RowSink(Protocol):
     def begin(self, moment: Moment) -> None:
         """Set the time of the points that follow."""
 
-    def add(
-        self,
-        stream: rr.RecordingStream,
-        path: str,
-        when: Iterable[rr.TimeColumn],
-        columns: Iterable[rr.ComponentColumn],
-    ) -> None:
+    def add(self, path: str, when: Iterable[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
         """Add rows of an entity."""
 
     def add_point(self, path: str, values: Sequence[float]) -> None:
@@ -80,7 +74,7 @@ class Clock:
         if self.rows is None:
             self.stream.send_columns(path, when, columns)
         else:
-            self.rows.add(self.stream, path, when, columns)
+            self.rows.add(path, when, columns)
 
     def send_point(self, path: str, values: Sequence[float]) -> None:
         """Send a point of the curves of an entity at the time that was set; no values are a gap."""

@@ -40,10 +40,9 @@ def find_disc(image: Image, place: tuple[float, float], *, within: float) -> tup
     largest = LARGEST * min(image.shape)
     if not largest > SMALLEST:
         return None
-    left, top = (max(int(each - 2.0 * largest), 0) for each in place)
-    part = np.ascontiguousarray(
-        image[top : int(place[1] + 2.0 * largest) + 1, left : int(place[0] + 2.0 * largest) + 1]
-    )
+    reach = 2.0 * largest
+    left, top = (max(int(each - reach), 0) for each in place)
+    part = np.ascontiguousarray(image[top : int(place[1] + reach) + 1, left : int(place[0] + reach) + 1])
     if min(part.shape) < 2.0 * SMALLEST:
         return None
     x, y = place[0] - left, place[1] - top

@@ -118,11 +118,18 @@ def test_discs_in_the_corners_are_found_with_the_bars_or_by_a_click(apparatus, t
         np.testing.assert_allclose(row, true[name], atol=2.5e-5)  # [m], a sixth of a pixel
     disc = discs["top-left"]
     bars = {wall["name"]: wall["line"] for wall in described["walls"] if not wall["circle"]}
-    left = visitor.request("delete_wall", at=at, name="top-left")["walls"]
+    left = visitor.request("delete_wall", at=at, name="top-left")
     for name, line in bars.items():  # they stay where they were, without the disc
-        np.testing.assert_allclose(next(wall["line"] for wall in left if wall["name"] == name), line, atol=0.01)
+        np.testing.assert_allclose(
+            next(wall["line"] for wall in left["walls"] if wall["name"] == name), line, atol=0.01
+        )
     click = {"x": disc["x"] - 0.5 * disc["radius"], "y": disc["y"] + 0.4 * disc["radius"]}
-    assert visitor.request("find_corner", at=at, **click)["wall"] == "top-left"
+    rods = len(left["rods"]["id"])
+    added = visitor.request("add_rod", at=at, x=disc["x"], y=disc["y"], radius=50.0)
+    assert len(added["rods"]["id"]) == rods + 1
+    found = visitor.request("find_corner", at=at, **click)
+    assert found["wall"] == "top-left"
+    assert len(found["rods"]["id"]) == rods  # a circle on the disc is no rod
     np.testing.assert_allclose(written()["top-left"], true["top-left"], atol=2.5e-5)
     assert "has a disc already" in visitor.refused("find_corner", at=at, **click)
     beside = {"x": disc["x"] + 2.5 * disc["radius"], "y": disc["y"] - 1.5 * disc["radius"]}

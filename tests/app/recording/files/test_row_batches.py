@@ -37,13 +37,14 @@ def test_rows_are_the_same_however_many_frames_share_a_message(results, tmp_path
 
 
 def test_points_are_at_the_times_that_were_set(tmp_path):
-    batches, stream = row_batches.RowBatches(), rr.RecordingStream("test")
+    stream = rr.RecordingStream("test")
+    batches = row_batches.RowBatches(stream)
     stream.save(tmp_path / "points.rrd")
     stream.set_log_time_enabled(False)
     for frame, values in enumerate(([1.5], [], [2.5])):
         batches.begin((("frame", frame), ("time", np.timedelta64(frame, "s"))))
         batches.add_point("/curve", values)
-    batches.send(stream)
+    batches.send()
     stream.disconnect()
     found = rows(tmp_path / "points.rrd", "/curve")
     assert [(row["frame"], row["Scalars:scalars"]) for row in found] == [(0, [1.5]), (1, []), (2, [2.5])]
